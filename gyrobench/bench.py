@@ -122,6 +122,11 @@ class Bench:
             found.update({f.stem: f for f in sorted((root / "reports" / "specs").glob("*.toml"))})
         return found
 
+    def existing(self, file: Path) -> Path:
+        """Return a file as the user names it where it is there, else of that path in the bench (systems/X/FILE)."""
+        candidates = (root / file for root in (Path(), self.folder, standard_folder()))
+        return next((f for f in candidates if f.exists()), file)
+
     def part_folder(self, name: str) -> Path:
         """Raises BenchError, naming the parts that are like it."""
         return self._folder("part", "components", "model.py", name)

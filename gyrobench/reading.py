@@ -17,6 +17,7 @@ from xml.etree import ElementTree as ET
 
 LARGEST = 1 << 28  # bytes: the run.json of a long run with its linear models has some 10 MB
 DEEPEST = 200  # levels; Python's own readers give up at about a thousand
+CONTAINERS = (dict, list, ET.Element)
 Raise = Callable[[str], Exception]
 
 
@@ -63,18 +64,22 @@ def xml(data: bytes, name: object, error: Raise) -> ET.Element:
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data, re.I):
         raise error(f"{name}: XML with a document type (<!DOCTYPE>), which is not read; remove it")
     root: ET.Element = _within(ET.fromstring, data, name, "XML", error)
-    level = [root]
-    for _ in range(DEEPEST):
-        level = [child for element in level for child in element]
-        if not level:
-            return root
-    raise error(f"{name}: XML of more than {DEEPEST} levels")
+    return root
 
 
 def _within(read: Callable[[Any], Any], text: Any, name: object, kind: str, error: Raise) -> Any:
+    """Return what a reader makes of a text, of no more levels than those that go through it later can take."""
     try:
-        return read(text)
+        value = read(text)
     except RecursionError:
-        raise error(f"{name}: {kind} of too many levels") from None
+        value = None
     except (ValueError, LookupError, ET.ParseError) as cause:  # of tomllib, of json; of XML in an unknown encoding
         raise error(f"{name}: not {'an' if kind == 'XML' else 'a'} {kind} file: {shorten(str(cause), 200)}") from None
+    else:
+        level = [value]
+        for _ in range(DEEPEST):
+            inside = (v.values() if isinstance(v, dict) else v for v in level if isinstance(v, CONTAINERS))
+            level = [v for values in inside for v in values if isinstance(v, CONTAINERS)]
+            if not level:
+                return value
+    raise error(f"{name}: {kind} of more than {DEEPEST} levels")

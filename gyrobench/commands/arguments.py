@@ -11,7 +11,7 @@ from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
-from gyrobench.system.values import InvalidValueError, parse
+from gyrobench.system.values import InvalidValueError, parse_number
 from gyrobench.workflow.inputs import load_test
 
 HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
@@ -82,7 +82,7 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
 
 def parse_time(option: str, text: str | None) -> float | None:
     """Return the time given by an option in s.  Raises InvalidValueError."""
-    return float(parse(option, text, "s")) if text else None
+    return parse_number(option, text, "s") if text else None
 
 
 def load_with_values(

@@ -32,7 +32,8 @@ def digest(root: ET.Element, files: Mapping[str, bytes]) -> str:
     bare = copy.deepcopy(root)
     for element in bare.findall("ssd:Annotations", NS):
         bare.remove(element)
-    text = ET.canonicalize(ET.tostring(bare, encoding="unicode"), strip_text=True)
+    # prefixes are rewritten: those of a text depend on what its process has registered
+    text = ET.canonicalize(ET.tostring(bare, encoding="unicode"), strip_text=True, rewrite_prefixes=True)
     h = hashlib.sha256(text.encode())
     for name in sorted(files):
         h.update(f"\0{name}\0".encode() + hashlib.sha256(files[name]).digest())

@@ -20,7 +20,7 @@ from gyrobench.report.page_model import Column, Row, Table, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
 from gyrobench.result import Result
 from gyrobench.system.system import System
-from gyrobench.system.values import parse
+from gyrobench.system.values import parse_number
 from gyrobench.units import format_quantity
 from gyrobench.workflow.external_run import reduce_result
 from gyrobench.workflow.feedback import Feedback
@@ -285,7 +285,7 @@ def path_of(file: File | None) -> Path | None:
 
 
 def time_of(name: str, value: float | str | None) -> float | None:
-    return None if value is None else float(parse(name, value, "s"))
+    return None if value is None else parse_number(name, value, "s")
 
 
 def mapping_files(maps: Mapping[str, File]) -> dict[str, Path]:

@@ -25,6 +25,8 @@ def called(e: ast.AST, code: Code, source: Source) -> Code | None:
         of = dotted(e.func.value)
         if of == "self":
             return source.method(e.func.attr, code)
+        if of == "super()":
+            return source.base_method(e.func.attr, code)
         if of.startswith("self."):
             return source.block_method(of.removeprefix("self."), e.func.attr, code)
     return None

@@ -166,7 +166,16 @@ class Source:
 
     def method(self, name: str, code: Code) -> Code | None:
         """Return the procedure that ``self.name(...)`` calls in ``code``; None where there is none of that name."""
-        f = getattr(code.owner, name, None)
+        return self._procedure(getattr(code.owner, name, None), name, code)
+
+    def base_method(self, name: str, code: Code) -> Code | None:
+        """Return the procedure that ``super().name(...)`` calls in ``code``; None where the bases have none."""
+        inside = dict(zip(code.function.__code__.co_freevars, code.function.__closure__ or (), strict=True))
+        if code.owner is None or "__class__" not in inside:
+            return None
+        return self._procedure(getattr(super(inside["__class__"].cell_contents, code.owner), name, None), name, code)
+
+    def _procedure(self, f: Any, name: str, code: Code) -> Code | None:
         if not isinstance(f, FunctionType) or f is vars(Component).get(name) or not procedure_name(name, f):
             return None
         return read_code(f, code.owner, code.placed)

@@ -344,6 +344,7 @@ class Translation:
         self.functions: list[str] = []
         self.procedures: dict[tuple[object, ...], Procedure] = {}
         self.under_way: list[object] = []
+        self.names: list[str] = []  # of the procedures, before those of one name are numbered
         self.written: set[str] = set()  # by the sampled methods
         for kind in ("start", "flow", "outputs"):
             self.equation(kind, False)
@@ -402,9 +403,12 @@ class Translation:
             raise caller.refuse(node, f"{code.node.name} calls itself: equations have no recursion")
         self.under_way.append(key)
         name = f"{code.placed.name}_{code.node.name}" if code.placed else code.node.name
+        if code.owner is not None and getattr(code.owner, code.node.name, code.function) is not code.function:
+            name = f"{code.function.__qualname__.split('.')[-2:][0]}_{name}"  # one that super() calls
         name += "_d" if dual else "_"
-        same = sum(p.name.rstrip("0123456789") == name for p in self.procedures.values())
-        name += str(same + 1) if same else ""
+        self.names.append(name)
+        same = self.names.count(name)
+        name += str(same) if same > 1 else ""
         method = Method(self, code, dual, PROCEDURE, shapes)
         head, text = method.text(name)
         self.under_way.pop()

@@ -75,9 +75,12 @@ def check_fmu_files(parts: Mapping[str, str | Path]) -> None:
 
 def find_specification(spec: str | Path | None) -> Path | None:
     """Return the file of an acceptance specification, given by name or path.  Raises UsageError."""
-    if spec is None or Path(spec).is_file():
-        return Path(spec) if spec else None
-    known = Bench.find().specifications()
+    if spec is None:
+        return None
+    bench = Bench.find()
+    if (file := bench.existing(Path(spec))).is_file():
+        return file
+    known = bench.specifications()
     spec = str(spec)
     if spec not in known:
         raise UsageError(f"{spec}: no such file or acceptance specification; {suggest_names(spec, known)}")

@@ -278,7 +278,9 @@ def test_an_equation_that_calls_that_of_its_base() -> None:
     def flow(self: One) -> None:
         super(One, self).flow()
 
-    with pytest.raises(ComponentError, match=r"run by themselves, before this: leave out super\(\)\.flow\(\)"):
+    with pytest.raises(
+        ComponentError, match=r"test_composition.py:279: .* by themselves.*leave out super\(\)\.flow\(\)"
+    ):
         type("Sub", (One,), {"flow": flow})
 
 

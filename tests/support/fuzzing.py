@@ -34,6 +34,7 @@ NASTY = [
     b"[" * 3000, b'{"a":' * 2000, b'"', b"'", b"#", b"=", b",", b";", b"|", b"/", b"..", b"../../etc/passwd", b"%s%n",
     b"deg", b"deg/h", b"K^99", b"m2" * 200, b"1deg/0s", b"<", b">", b"&", b"<![CDATA[",
     b"<!DOCTYPE a [<!ENTITY b 'c'>]>", b"a" * 20000, b"\xed\xa0\x80",
+    b"(" * 3000, b"sqrt(" * 3000, b"9" * 5000, b" " * 20000, b"..", b":", b"uniform(",
 ]  # fmt: skip
 Attack = Callable[[int], str | None]
 
@@ -87,7 +88,10 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
 
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
-    every = (_csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp, _other)
+    every = (
+        _csv, _numbers, _series, _set, _settings, _units, _axes, _campaign, _mapping, _spec, _record, _result, _fmu,
+        _ssp, _other,
+    )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
 
@@ -214,6 +218,47 @@ def _units(folder: Path) -> Callable[[random.Random], object]:
     def one(rng: random.Random) -> None:
         name = changed(rng.choice(texts), rng).decode("utf-8", "replace")
         units.parse_quantity(f"1.5{name}", rng.choice(texts).decode()) if rng.random() < 0.5 else units.unit(name)
+
+    return one
+
+
+def _axes(folder: Path) -> Callable[[random.Random], object]:
+    """Values of --over."""
+    from gyrobench.campaign.axes import Distribution, draw, parse_axis
+
+    texts = [
+        b"0deg..80deg:9",
+        b"1e-3..1:7log deg/h",
+        b"0.1,0.3,1 deg/h/g",
+        b"uniform(-1, 1) deg/h",
+        b"a,b",
+        b"normal(0, 2)",
+    ]
+
+    def one(rng: random.Random) -> None:
+        axis = parse_axis("latitude", changed(rng.choice(texts), rng).decode("utf-8", "replace"))
+        if isinstance(axis, Distribution):
+            draw([axis], 4)
+
+    return one
+
+
+def _campaign(folder: Path) -> Callable[[random.Random], object]:
+    from gyrobench.campaign.definition import read_definition
+
+    text = (
+        b'system = "fixed_position"\nseeds = [1, 2]\nruns = 4\ntime_limit = "5min"\nmemory_limit = "2GB"\nstep = 1e-3\n'
+        b'[set]\ndwell = "60s"\n[over]\nlatitude = "0deg..80deg:2"\n"gyro.D_F" = [0.1, 0.2]\n'
+        b'[parts]\ngyro = "floated_gyro"\n'
+    )
+    file = folder / "campaign.toml"
+
+    def one(rng: random.Random) -> None:
+        file.write_bytes(changed(text, rng))
+        definition = read_definition(file)
+        definition.axes(["gyro"])
+        definition.fixed_parts(["gyro"])
+        definition.rows()
 
     return one
 

@@ -22,7 +22,9 @@ from gyrobench import units
 from gyrobench.bench import UsageError, suggest_names
 
 DESIGNS = ("random", "lhs", "sobol")
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+MOST_POINTS = 1_000_000  # of a grid
+LONGEST = 200  # letters of a grid or a distribution: what is longer is a list, and takes the patterns below too long
+NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 QUANTITY = re.compile(rf"({NUMBER})\s*(.*)", re.S)
 _GRID = re.compile(rf"({NUMBER})\s*(\S*?)\s*\.\.\s*({NUMBER})\s*(\S*?)\s*:\s*(\d+)\s*(log)?\b\s*(.*)", re.S)
 _CALL = re.compile(r"([a-z]+)\s*\((.*)\)\s*(.*)", re.S)
@@ -101,19 +103,21 @@ def _one_unit(name: str, found: Sequence[tuple[float, str]], tail: str) -> tuple
         raise UsageError(f"{name}: some values have a unit and some have none; write it at the last or at each")
     if unit:
         units.unit(unit)
+    if not all(math.isfinite(x) for x, _ in named):
+        raise UsageError(f"{name}: finite numbers are expected")
     return [x if u == unit else units.convert(x, u, unit) for x, u in named], unit
 
 
 def _grid(name: str, text: str) -> Axis | None:
-    match = _GRID.fullmatch(text.strip())
+    match = _GRID.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if match is None:
         return None
     low_text, low_unit, high_text, high_unit, count, log, tail = match.groups()
     ends = [(float(low_text), low_unit or (high_unit if not tail else "")), (float(high_text), high_unit)]
     (low, high), unit = _one_unit(name, ends, tail.strip())
     n = int(count)
-    if n < 2:
-        raise UsageError(f"{name}: {text}: a grid has two points or more")
+    if not 2 <= n <= MOST_POINTS:
+        raise UsageError(f"{name}: {text}: a grid has 2 to {MOST_POINTS} points")
     if log and not (low > 0.0 and high > 0.0):
         raise UsageError(f"{name}: {text}: values in equal ratios must be > 0")
     steps = [k / (n - 1) for k in range(n)]
@@ -123,7 +127,7 @@ def _grid(name: str, text: str) -> Axis | None:
 
 
 def _distribution(name: str, text: str) -> Distribution | None:
-    match = _CALL.fullmatch(text.strip())
+    match = _CALL.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if match is None:
         return None
     family, inside, tail = match.groups()

@@ -30,16 +30,17 @@ from __future__ import annotations
 import csv
 import glob
 import importlib.util
-import tomllib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
-from gyrobench.system.values import parse
+from gyrobench.reading import shorten
+from gyrobench.system.values import parse_number
 
 KEEP = ("all", "failures", "extremes", "none")
 HOUR = 3600.0
@@ -84,9 +85,9 @@ class Definition:
             raise UsageError(f"design = {self.design}: {suggest_names(str(self.design), DESIGNS)}")
         if not isinstance(self.retries, int) or self.retries < 0:
             raise UsageError(f"retries = {self.retries}: a whole number from 0 on is expected")
-        self.time_limit = float(parse("time_limit", self.time_limit, "s"))
+        self.time_limit = parse_number("time_limit", self.time_limit, "s")
         self.memory_limit = None if self.memory_limit is None else memory(self.memory_limit)
-        self.step = None if self.step is None else float(parse("step", self.step, "s"))
+        self.step = None if self.step is None else parse_number("step", self.step, "s")
         self.set, self.over = flat(self.set), flat(self.over)
         self.name = self.name or self.system
 
@@ -107,7 +108,7 @@ class Definition:
         """Return the axes and the distributions; a name of ``over`` that is a slot is an axis of parts."""
         found = [parse_axis(name, given) for name, given in self.over.items() if name not in slots]
         swapped = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
-        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in swapped.items()}
+        lists = {s: _names(s, v) for s, v in swapped.items()}
         parts = [
             Axis(slot, "part", "", tuple(AxisValue(p.strip(), p.strip()) for p in names))
             for slot, names in lists.items()
@@ -121,7 +122,7 @@ class Definition:
     def fixed_parts(self, slots: Sequence[str]) -> dict[str, str]:
         """Return the part of each slot that has one for all runs."""
         given = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
-        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in given.items()}
+        lists = {s: _names(s, v) for s, v in given.items()}
         return {slot: names[0].strip() for slot, names in lists.items() if len(names) == 1}
 
     def drawn(self, axes: Sequence[Distribution]) -> list[Mapping[str, AxisValue]]:
@@ -166,7 +167,10 @@ class Definition:
         elif isinstance(self.table, str | Path):
             content = read_table(self.path(self.table))
         else:
-            content = [dict(row) for row in self.table]
+            try:
+                content = [dict(row) for row in self.table]
+            except (TypeError, ValueError):
+                raise UsageError(f"table = {shorten(str(self.table))}: rows of names and values are expected") from None
         if not content:
             raise UsageError(f"table = {self.table}: has no rows")
         seeds = [row.pop("seed", None) for row in content]
@@ -202,12 +206,7 @@ class Definition:
 
 def read_definition(file: Path) -> Definition:
     """Return the definition in a TOML file.  Raises UsageError."""
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: not a TOML file: {error}") from None
+    content = reading.toml(reading.read_text(file, UsageError), file, UsageError)
     content.setdefault("name", file.stem)
     for table in {"set", "over"} & content.keys():
         content[table] = _texts(content[table])
@@ -260,6 +259,14 @@ def read_table(file: Path) -> list[dict[str, Any]]:
     return rows
 
 
+def _names(slot: str, given: Any) -> list[str]:
+    """Return the parts of a slot: a text with commas between, or a list."""
+    names = given.split(",") if isinstance(given, str) else given
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
+        raise UsageError(f"{slot} = {shorten(str(given))}: names of parts or FMU files are expected")
+    return list(names)
+
+
 def _texts(value: Any) -> Any:
     """Return numbers of a file as texts: the size of one without a unit is questioned, as on the command line."""
     if isinstance(value, dict):
@@ -278,8 +285,8 @@ def memory(given: Any) -> int:
         size = float(number) * sizes[text[len(number) :]]
     except (KeyError, ValueError):
         raise UsageError(f"memory_limit = {given}: write for example 500MB or 1.5GB") from None
-    if not size >= 1e6:
-        raise UsageError(f"memory_limit = {given}: no worker fits into that")
+    if not 1e6 <= size < math.inf:
+        raise UsageError(f"memory_limit = {shorten(text)}: no worker fits into that")
     return int(size)
 
 

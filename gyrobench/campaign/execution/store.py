@@ -30,6 +30,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderLock, write_whole
 from gyrobench.notebook import MissingPackageError
@@ -144,7 +145,7 @@ class Campaign:
 
     def _read_definition(self) -> None:
         try:
-            document = json.loads(self.read(FILE))
+            document = reading.json_object(self.read(FILE).decode(), FILE, ValueError)
             if document.get("schema") != SCHEMA:
                 raise ValueError(f"schema {document.get('schema')!r}, expected {SCHEMA!r}")
         except (OSError, ValueError, AttributeError) as error:
