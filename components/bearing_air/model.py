@@ -7,12 +7,12 @@ from gyrobench.component.blocks.loads import WIDE, AirBearing
 class BearingAir(Component):
     """Torque of an air bearing on the axis of a table: block AirBearing.  [BEARING-AIR]
 
-        M = torque - (journal + thrust faces + eddy) rate + U g cos(elevation) sin(angle - unbalance_angle)
+        M = torque + M_2 - (journal + thrust faces) rate + U g cos(elevation) sin(angle - unbalance_angle)
 
-    Source: Hu 1981, eq. 5-33, 5-34, 5-36, 5-37 with ET7, ET8.
+    Source: Hu 1981, eq. 5-31..5-34, 5-36, 5-37 with ET7, ET8.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     air = AirBearing()
 

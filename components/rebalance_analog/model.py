@@ -23,7 +23,7 @@ class RebalanceAnalog(AnalogRebalance):
     k i = omega_IA - omega_d exactly.
 
     Not modelled: bandwidth and drift of the current source, heating of the torquer, pulse-width operation.
-    Source: Hu 1981, ch. 5, eq. 5-62..5-68.
+    Source: Hu 1981, ch. 5, eq. 5-62..5-67.
     """
 
     version = "1.0.0"

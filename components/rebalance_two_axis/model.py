@@ -14,7 +14,7 @@ class RebalanceTwoAxis(AnalogRebalance):
 
     u is the pickoff that this channel nulls, u_cross the other one.  A free or tuned rotor whose angles are alpha
     about x and beta about y has two such channels, i_x nulling u_y and i_y nulling u_x (u = -K_sg times the angle,
-    torquers k).  With the cross gain K_q in that of i_x and -K_q in that of i_y               [Hu 1981, eq. 5-68]
+    torquers k).  With the cross gain K_q in that of i_x and -K_q in that of i_y
 
         alpha' = k_q beta - k_phi alpha                 k_phi = k K_sg K_p
         beta' = -k_q alpha - k_phi beta                 k_q = k K_sg K_q
@@ -25,7 +25,8 @@ class RebalanceTwoAxis(AnalogRebalance):
     readings do not depend on K_q.
 
     Not modelled: as rebalance_analog; spring and damping of a tuned suspension (in the gyro's part, if it has them).
-    Source: Hu 1981, section 5.5, eq. 5-68.
+    Source: derived; Hu 1981, section 5.5.  Its eq. 5-68, of the same form, is the drift that the springs of a flexure
+    or gas-bearing gyro make of an angle that the loop leaves.
     """
 
     version = "1.0.0"

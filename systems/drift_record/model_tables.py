@@ -67,7 +67,7 @@ def models(m: DriftModel) -> list[Json]:
         head = ["order", "innovation variance / (°/h)²", "AIC − least", "SBC − least", "FPE over least", "least"]
         tables.append(table("Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows))
     if m.burg is not None:
-        walker = m.yule_walker.phi if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)
+        walker = m.yule_walker if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)
         rows = [[*row, float(w), -row[1]] for row, w in zip(_coefficients(m.burg), walker, strict=True)]
         caption = (
             "x(t) = φ₁ x(t−1) + ... + w(t), by Burg with 95 % intervals, and by Yule-Walker; a = −φ is what arburg "

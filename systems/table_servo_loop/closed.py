@@ -118,13 +118,16 @@ def loop_of(p: Mapping[str, Any]) -> ServoLoop | None:
 
 
 def sense_torque(p: Mapping[str, Any], rate: float) -> float | None:
-    """Return the torque (N.m) on a table that turns at a rate, of slip rings and bearing; None without those parts."""
+    """Return the torque (N.m) that follows the sense of a table that turns at a rate, of slip rings and bearing.
+
+    None without those parts.  Without what does not change sign with the sense: vortex torque, unbalance.
+    """
     of_rings = ("K_s", "k_w", "friction", "follower")
-    of_bearing = ("viscosity", "diameter", "length", "gap", "eccentricity", "inner", "outer", "thrust_gap", "eddy")
+    of_bearing = ("viscosity", "diameter", "length", "gap", "eccentricity", "inner", "outer", "thrust_gap")
     names = [f"rings.ring_{n}" for n in of_rings] + [f"bearing.air_{n}" for n in of_bearing]
     if any(n not in p for n in names):
         return None
-    K_s, k_w, friction, follower, mu, D, length, gap, eccentricity, r1, r2, faces, eddy = (float(p[n]) for n in names)
+    K_s, k_w, friction, follower, mu, D, length, gap, eccentricity, r1, r2, faces = (float(p[n]) for n in names)
     drag = math.pi * mu * D**3 * length / (4.0 * gap * math.sqrt(1.0 - eccentricity**2))
-    drag += math.pi * mu * (r2**4 - r1**4) / faces + eddy
+    drag += math.pi * mu * (r2**4 - r1**4) / faces
     return friction * (k_w / (K_s + k_w) if follower else 1.0) + drag * rate

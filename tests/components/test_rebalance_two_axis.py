@@ -1,4 +1,4 @@
-"""Two-axis rebalance with a cross term: the spiral of eq. 5-68, a turning case, steady readings, limit."""
+"""Two-axis rebalance with a cross term: the spiral of both channels, a turning case, steady readings, limit."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from scipy import stats
 
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import estimable_combinations
-from gyrobench.reduction.suite.consistency import MethodValue, combine_values, holm, normalized_error, outlier
+from gyrobench.reduction.suite.consistency import MethodValue, combine_values, normalized_error, outlier
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
 from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
 
@@ -85,11 +85,6 @@ def test_two_values_are_welch_s_t_test() -> None:
     values = [MethodValue(n, float(v.mean()), float(v.std(ddof=1) / math.sqrt(v.size)), dof=v.size - 1.0)
               for n, v in (("x", x), ("y", y))]  # fmt: skip
     assert combine_values(values).p == pytest.approx(float(stats.ttest_ind(x, y, equal_var=False).pvalue), rel=1e-9)
-
-
-def test_holm_by_hand() -> None:
-    """Sorted 0.01, 0.02, 0.03, 0.5 times 4, 3, 2, 1 = 0.04, 0.06, 0.06, 0.5."""
-    assert holm([0.5, 0.01, 0.03, 0.02]) == pytest.approx([0.5, 0.04, 0.06, 0.06])
 
 
 def test_the_one_that_is_off_is_named() -> None:

@@ -254,7 +254,7 @@ def test_corrected_and_printed_simple_model() -> None:
 
 
 def test_corrected_and_printed_nine_term_model() -> None:
-    """[TUM2B-REDUCE, TUM2B-ERR, E25-E29] amplitudes by hand, and printed forms that fail."""
+    """[TUM2B-REDUCE, TUM2B-ERR, E25-E29, E54] amplitudes by hand, and printed forms that fail."""
     truth = random_truth(10)
     s = T.setup(41.0, gravity=frames.G0, truth=truth)
     w = T.record(s, truth)
@@ -293,6 +293,9 @@ def test_corrected_and_printed_nine_term_model() -> None:
     assert differs((two["A1"] - one["A1"]) / c, D["Dx_y"])
     top = one["A0"] + two["A0"] + one["A2"] + two["A2"] - sum(dwell["x"])
     assert differs(top / (2 * s2), D["Dx_zz"]) and top / (2 * n * n) == pytest.approx(D["Dx_zz"], rel=1e-8)
+    # E54: mount 1 in the sum of the static mounts 3 and 4
+    assert differs(0.5 * (dwell["x"][0] + one["A0"]), D["Dx_0"])
+    assert 0.5 * sum(dwell["x"]) == pytest.approx(D["Dx_0"], abs=1e-9)
     one, two = found["y"]
     top = one["A0"] + two["A0"] - one["A2"] - two["A2"] - sum(dwell["y"])
     more = 4 * (one["A2"] + two["A2"]) / s2**2

@@ -79,15 +79,18 @@ def test_error_is_near_that_of_the_filter_that_knows_R(ratio):
     assert known <= own * (1 + 1e-3) and own < 1.03 * known
 
 
-def fixed_point(ratio: float) -> float:
+LEVEL = np.eye(1), np.array([[SIGMA2]])  # a random walk read with noise
+
+
+def fixed_point(ratio: float, model=None) -> float:
     """R/R_true where R = E y2 - H P+ H' of the filter that believes R, the truth being ratio Q (Lyapunov)."""
-    F, G = companion(AR3, SIGMA2)
-    H, true = np.eye(1, 3), ratio * SIGMA2
+    F, G = model or companion(AR3, SIGMA2)
+    H, true = np.eye(1, len(F)), ratio * SIGMA2
     R = true
     for _ in range(200):
         P = linalg.solve_discrete_are(F.T, H.T, G, np.array([[R]]))
         K = P @ H.T / (P[0, 0] + R)
-        A = F @ (np.eye(3) - K @ H)
+        A = F @ (np.eye(len(F)) - K @ H)
         S = linalg.solve_discrete_lyapunov(A, G + F @ K @ K.T @ F.T * true)  # of the error before the reading
         after = P[0, 0] - K[0, 0] * P[0, 0]
         R = 0.5 * R + 0.5 * (S[0, 0] + true - after)
@@ -103,6 +106,12 @@ def test_printed_posterior_has_the_bias_of_its_fixed_point(ratio, predicted):
     assert R.mean() / (ratio * SIGMA2) == pytest.approx(predicted, rel=0.05)
     corrected = part(z, ratio, 0.99, 1)[SKIPPED:, 1].mean() / (ratio * SIGMA2)
     assert abs(corrected - 1.0) < 0.06 and corrected < 0.95 * predicted
+
+
+@pytest.mark.parametrize(("ratio", "predicted"), [(4.0, 1.20), (1.0, 1.74)])
+def test_the_bias_depends_on_the_model(ratio, predicted):
+    """Local level (one state that walks): the same fixed point, further off than that of the AR(3) of the source."""
+    assert fixed_point(ratio, LEVEL) == pytest.approx(predicted, abs=5e-3)
 
 
 def test_without_misprints_the_plain_form_is_the_part():

@@ -172,6 +172,20 @@ def test_follower_and_shaper_by_comparison():
     assert "K_T" not in bare and "PM" not in bare  # H/c = 1: table and float turn by the same angle, 0.896 arcsec
 
 
+def test_vortex_torque_of_the_bearing_moves_the_null():
+    """M_2 = 0.05 N.m acts at rest: the table stands M_2/K_T aside; differences, so stiffness and M_r, do not show it.
+
+    Within a second: later the float, which is aside by M_2/(G K_g) too, lets in the Earth's rate about its spin axis.
+    """
+    runs = [gb.load(NAME, **QUIET, **more).run(seed=1, check_step=False) for more in ({}, {"bearing.air_vortex": 0.05})]
+    still, aside = ({c.name: c for c in r.result.coefficients} for r in runs)
+    time = runs[0].record.channels["time"]
+    null = [r.record.channels["table.angle"][(time > 0.5) & (time < 1.0)].mean() for r in runs]
+    assert null[1] - null[0] == pytest.approx(0.05 / still["K_T"].closed, rel=1e-3)
+    for name in ("K_T", "M_r"):
+        assert aside[name].estimate == pytest.approx(still[name].estimate, rel=1e-6)
+
+
 def test_undamped_gyro_returns_the_table_and_holds_the_torque_by_its_float():
     """c -> 0: the table angle under a constant torque is 0, the float holds M / (G K_g); no stiffness is given."""
     c = quiet(network=3, hold=2.0, friction=0.0)

@@ -74,7 +74,7 @@ def composite(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> Com
 
 
 def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -> list[dict[str, Any]]:
-    """What was found in each series (a sentence where there is nothing), and the correlations, for Result.tables."""
+    """Return the tables of drift rates (a sentence for a series that has none) and of their correlations."""
     rows: list[list[Any]] = []
     for label, c in statistics.items():
         if isinstance(c, str):

@@ -73,7 +73,7 @@ class Held:
         return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
 
     def turned(self, **axes_or_body: Array) -> Held:
-        """The same windows on other axes or of another gyro."""
+        """Return the same windows on other axes or of another gyro."""
         other = replace(self, **axes_or_body)
         other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
         return other
@@ -139,8 +139,9 @@ def window_problems(
 def tracking_problems(
     windows: Mapping[str, Array], rows: NDArray[np.bool_], parameters: Mapping[str, Any], limit: float
 ) -> list[str]:
-    """Where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and std) and
-    the gain of the gyro, as far as both are known.
+    """Return where the table did not follow the gyro to ``limit`` (rad), as a sentence.
+
+    From the pickoff voltage (columns mean and std) and the gain of the gyro, as far as both are known.
     """
     gain = parameters.get("gyro.K_sg", 0.0) * parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or 1.0)
     if not gain or "mean" not in windows or not limit > 0.0:
@@ -161,10 +162,11 @@ def effects(
     held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
     sizes: Mapping[str, float],
 ) -> list[Effect]:  # fmt: skip
-    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Return the effects of type B of the set-up of a held table.
 
-    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
-    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
+    Axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.  sizes: u_axis,
+    u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The axis is set up anew
+    in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
     columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
@@ -222,15 +224,17 @@ def effects(
 
 
 def _mounted(held: Held, k: int) -> Held:
-    """The windows with the gyro turned by SMALL about its axis k on the table."""
+    """Return the windows with the gyro turned by SMALL about its axis k on the table."""
     return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
 
 
 def candidates(
     held: Held, site: Site, columns: Callable[[Held], Array], phase: NDArray[np.int_], windows: Mapping[str, Array]
 ) -> list[Candidate]:
-    """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
-    differ from phase to phase, each of which is set up by itself.
+    """Return the set-up effects that a held table may have.
+
+    Misalignment of the input axis, trend, temperature, constants that differ from phase to phase, each of which is set
+    up by itself.
 
     columns: what is fitted.  windows: the rows of ``held``, with the thermometers of a measured record.
     """
@@ -252,7 +256,10 @@ def candidates(
 
 
 def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
+    """Return the table of the estimates in the notation and torque sign of Hu 1981.
+
+    combined: our name -> a combination in that notation.
+    """
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
@@ -277,7 +284,7 @@ CONVENTIONS = (
 
 
 def equation(names: Sequence[str]) -> str:
-    """Typst math of the measurement equation with the terms ``names``."""
+    """Return Typst math of the measurement equation with the terms ``names``."""
     axis = {"I": "X", "O": "Y", "S": "Z"}
     parts = []
     for n in names:

@@ -1,4 +1,4 @@
-"""What turning shows beside the model: harmonics the model does not hold, and turns that differ from one another.
+"""Evidence of a turning table beside the model: harmonics the model does not hold, turns that differ from one another.
 
     turns = Turns(found, [("mount 1", phase == 2), ("mount 2", phase == 4)], theta_start, theta_end)
     turns.test()                                # adds its F tests to found.tests
@@ -48,7 +48,7 @@ class Turns:
             self.turn[mine] = np.floor(way / (2.0 * math.pi)).astype(int)
 
     def test(self) -> None:
-        """F tests of the harmonics the model does not hold and, where a phase has several, of turn against turn."""
+        """Test (F) the harmonics that the model does not hold and, where a phase has several, turn against turn."""
         self._harmonic_test()
         self.found.f_test(
             AGREE, self._turn_columns(), "change of the drift between successive turns",
@@ -65,7 +65,7 @@ class Turns:
                 block, _ = harmonic.columns(self.start, self.end, orders)
                 columns.append(np.where(mine[:, None], block, 0.0))
                 labels += [(label, n) for n in orders]
-        extra = np.concatenate(columns, axis=1) if columns else np.empty((self.turn.size, 0))
+        extra = self._side_by_side(columns)
         name = f"harmonics {self.held + 1} and higher"
         size = self.found.f_test(
             name, extra, "model errors periodic in the table angle",
@@ -79,8 +79,9 @@ class Turns:
             ]
 
     def harmonics(self, fits: Mapping[str, Fit]) -> list[dict[str, Any]]:
-        """Amplitudes with u in the unit of the data: of ``fits`` (label -> harmonic.fit of the data), then those of
-        the residuals that the model does not hold.
+        """Return amplitudes with u in the unit of the data: of ``fits``, then of the residuals the model does not hold.
+
+        fits: label -> harmonic.fit of the data.
         """
         out, unit, scale = [], self.found.y_unit, self.found.y_scale
         for label, f in fits.items():
@@ -105,6 +106,9 @@ class Turns:
                 mine = phase & (self.turn == k)
                 if mine.sum() >= len(names):
                     columns.append(np.where(mine[:, None], block, 0.0))
+        return self._side_by_side(columns)
+
+    def _side_by_side(self, columns: Sequence[Array]) -> Array:
         return np.concatenate(columns, axis=1) if columns else np.empty((self.turn.size, 0))
 
     def _rows(self) -> list[list[Any]]:
@@ -121,7 +125,7 @@ class Turns:
         return ["A0", *(f"{c}{n}" for n in range(1, self.held + 1) for c in "AB")]
 
     def repeatability(self) -> dict[str, Any]:
-        """F test of the turns and the scatter of their harmonics; empty where no test was made."""
+        """Return the F test of the turns and the scatter of their harmonics; empty where no test was made."""
         test = next((t for t in self.found.tests if t.name == AGREE), None)
         if test is None:
             return {}
@@ -138,7 +142,7 @@ class Turns:
         return {"F": test.statistic, "p": test.p, "finding": test.finding, **scatter}
 
     def table(self, over: str = "θ") -> list[dict[str, Any]]:
-        """Harmonics of each turn; empty for single turns."""
+        """Return the table of the harmonics of each turn; empty for single turns."""
         if not self.turn.any():
             return []
         caption = f"Amplitudes in {self.found.y_unit} over {over}"

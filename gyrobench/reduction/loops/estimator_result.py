@@ -73,7 +73,7 @@ class Signals:
 
 @dataclass
 class Measures:
-    """What :func:`measure` found."""
+    """Measures of one estimator, filled by :func:`measure`."""
 
     coefficients: list[Coefficient] = field(default_factory=list)
     tests: list[Test] = field(default_factory=list)

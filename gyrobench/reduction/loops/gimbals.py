@@ -63,7 +63,7 @@ class Flight:
         return self.channels[name][self.first : self.last]
 
     def u(self, step: float) -> float:
-        """Standard uncertainty of the largest error, rad: the noise, and what the platform turns in a step at most."""
+        """Return u of the largest error, rad: the noise, and what the platform turns in a step at most."""
         moves = float(np.abs(np.gradient(self.error, self.t)).max()) * step if self.t.size > 1 else 0.0
         return math.hypot(self.noise, moves / math.sqrt(12.0))
 
@@ -72,7 +72,7 @@ class Flight:
         return slice(gate.inside.start - self.first, gate.inside.stop - self.first)
 
     def leg_at(self, k: int) -> str:
-        """Label of the phase in which sample k lies, or the one before it."""
+        """Return the label of the phase in which sample k lies, or the one before it."""
         return next((g.label for g in reversed(self.gates) if g.inside.start - self.first <= k), self.gates[0].label)
 
 
@@ -96,14 +96,14 @@ def rate_servo_limits(flight: Flight, rates: Sequence[str], rate_max: float | No
 
 
 def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last sample of each stretch in which a flag is 1."""
+    """Return first and last sample of each stretch in which a flag is 1."""
     on = np.concatenate([[False], np.asarray(flag, dtype=float) > 0.5, [False]])
     edges = np.flatnonzero(np.diff(on.astype(int)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> dict[str, Any]:
-    """Table with a row for each stretch of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
+    """Return the table of the stretches of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
     rows = []
     for kind, flag in kinds.items():
         for a, b in spans(flag):

@@ -128,7 +128,7 @@ class Point:
 
 
 def phasor(t: Array, y: Array, f: float) -> complex:
-    """Complex amplitude of the sine of f Hz in y, least squares, beside a mean and a slope: A cos + B sin -> A - jB."""
+    """Return the complex amplitude A - jB of the sine A cos + B sin of f Hz in y, beside a mean and a slope."""
     return _phasors(t, f, y)[0]
 
 
@@ -140,7 +140,7 @@ def _phasors(t: Array, f: float, *signals: Array) -> list[complex]:
 
 
 def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False) -> Point:
-    """y over x at f Hz from a record of some whole periods.
+    """Return y over x at f Hz from a record of some whole periods.
 
     The record is cut into up to 8 segments of whole periods; their scatter gives the uncertainty (type A, independent
     segments) and the coherence |sum Y X*|^2 / (sum |X|^2 sum |Y|^2).  by_neighbours: the uncertainty is that of y at
@@ -161,12 +161,16 @@ def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False
         return Point(f, value, None, 1.0)
     xs, ys = segment_phasors(t, f, x, y)
     n = xs.size
-    power = float(np.sum(np.abs(xs) ** 2) * np.sum(np.abs(ys) ** 2))
-    coherence = float(np.abs(np.sum(ys * np.conj(xs))) ** 2) / power if power > 0.0 else 0.0
     scatter = float(np.sum(np.abs(ys / xs - value) ** 2)) / (2.0 * n * (n - 1))
     noise = neighbour_noise(t, y, f) if by_neighbours else None
     own = noise / abs(whole) if noise is not None else math.sqrt(scatter)
-    return Point(f, value, own / abs(value) if value else None, coherence)
+    return Point(f, value, own / abs(value) if value else None, coherence(xs, ys))
+
+
+def coherence(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> float:
+    """Return |sum y x*|^2 / (sum |x|^2 sum |y|^2) of phasors of segments; 0 where either has none."""
+    power = float(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2))
+    return float(np.abs(np.sum(y * np.conj(x))) ** 2) / power if power > 0.0 else 0.0
 
 
 def neighbour_noise(t: Array, y: Array, f: float) -> float | None:
@@ -200,7 +204,7 @@ def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.comp
 # ------------------------------------------------------------------------------------------- steps
 @dataclass(frozen=True)
 class Step:
-    """What a step did.  Values in the unit of the signal, times in s after the gate opened.
+    """Measures of a step response: values in the unit of the signal, times in s after the gate opened.
 
     overshoot: share of the change beyond it.  settled_5, settled_2: time after which the signal stays within 5 or
     2 % of the change about the final value; None when it did not settle before the last tenth of the record.
@@ -246,8 +250,9 @@ class Step:
 
 
 def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
-    """Measures of a step response.  rest: the signal before it (empty: 0).  start: time of the step, default t[0].
+    """Return the measures of a step response.
 
+    rest: the signal before it (empty: 0).  start: time of the step, default t[0].
     The uncertainty of the change is that of two means of white noise, and what the signal still moves; that of the
     settling times is the sampling interval's, dt / sqrt(12).
     """
@@ -300,7 +305,7 @@ def _ahead(slope: float, before: Array, t: Array) -> float:
 
 
 def step_noise_std(y: Array, before: int, gap: int, after: int) -> float | None:
-    """Standard deviation that noise gives a change between two means, as half of a 95 % interval over 1.96.
+    """Return the standard deviation that noise gives a change between two means, as half a 95 % interval over 1.96.
 
     y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``
     samples that end ``gap`` samples later; it is taken from every piece of the record without overlap, so noise of any

@@ -155,7 +155,7 @@ def base_ways(
 
 
 def base_torques(p: Mapping[str, Any], f: float) -> dict[str, complex]:
-    """Torque on a platform at rest for a unit angle of the base about its axis, N.m/rad, by the ways it takes.
+    """Return the torque on a platform at rest for a unit angle of the base about its axis, N.m/rad, by its ways.
 
     n ratio, s = 2j pi f:  B s,  n2 k_t k_e s/(R + L s),  n (n - 1) J_motor s2, and of a bearing that sticks with the
     stiffness K = stiction/presliding K + s sqrt(K (J + n2 J_motor)).

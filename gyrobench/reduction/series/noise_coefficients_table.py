@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
@@ -72,16 +71,14 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
 
 
 def on_grid(t: Array, x: Array, step: float) -> Array:
-    """Return values in the order of their times, NaN where one is missing; a time off the grid begins a gap."""
+    """Return values in the order of their times, NaN where one is missing.
+
+    A time that does not follow the one before by a step, within a hundredth of it, begins a gap.
+    """
     order = np.argsort(t, kind="stable")
     t, x = t[order], x[order]
-    places = np.concatenate([[0], np.cumsum(np.where(_next(t, step), 1, 2))])
+    follows = np.abs(np.diff(t) - step) < 0.01 * step
+    places = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
     out = np.full(int(places[-1]) + 1, math.nan)
     out[places] = x
     return out
-
-
-def _next(t: Array, step: float) -> NDArray[np.bool_]:
-    """True where a time follows the one before by a step, within a hundredth of it."""
-    found: NDArray[np.bool_] = np.abs(np.diff(t) - step) < 0.01 * step
-    return found

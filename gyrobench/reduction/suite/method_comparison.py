@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gyrobench import drift
@@ -22,6 +22,7 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
+from gyrobench.reduction.suite.ranking import adjusted
 from gyrobench.result import (
     Coefficient,
     DriftTestResult,
@@ -53,7 +54,7 @@ class Member:
 
 @dataclass(frozen=True)
 class MeasurandComparison:
-    """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
+    """Values of one quantity by all methods.  found: None where one alone sees it, or nothing can be weighed."""
 
     quantity: Measurand
     values: tuple[MethodValue, ...]
@@ -73,7 +74,7 @@ class MeasurandComparison:
         return low if high - low <= 1e-6 * max(abs(low), abs(high), 1e-3) else None
 
     def words(self) -> str:
-        """Which methods disagree, and by how much."""
+        """Return which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
         significant = [
@@ -93,7 +94,7 @@ class MeasurandComparison:
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[MeasurandComparison]:
-    """Every quantity that the results report, by every one that sees it."""
+    """Return every quantity that the results report, by every one that determines it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
     out = []
@@ -103,9 +104,8 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
         out.append(MeasurandComparison(q, values, consistency.combine_values(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
-    adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
-    for k, p in zip(tested, adjusted, strict=True):
-        out[k] = MeasurandComparison(out[k].quantity, out[k].values, out[k].found, p)
+    for k, p in zip(tested, adjusted([out[k].found.p for k in tested]), strict=True):  # type: ignore[union-attr]
+        out[k] = replace(out[k], p=p)
     return out
 
 
@@ -168,7 +168,7 @@ def combine_methods(
     conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Specification | None = None,
     failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
 ) -> SuiteResult:  # fmt: skip
-    """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
+    """Return one result of several tests.  shared: sources of type B that are one and the same error in all tests.
 
     failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
     """
@@ -179,19 +179,6 @@ def combine_methods(
         raise ReductionError(reasons)
     compared = compare(results, shared)
     coefficients = [_coefficient(c, specification or {}) for c in compared]
-    first = next(iter(results.values()))
-    tests = [
-        Test(
-            f"consistency, {c.quantity.name}",
-            c.found.Q,
-            c.found.p,
-            "differences beyond the u of the methods",
-            c.words(),
-        )
-        for c in compared
-        if c.found is not None
-    ]
-    sites = [r.site for r in results.values()]
     comparison = SuiteComparison(
         rule=RULE,
         shared=common(results, shared),
@@ -205,17 +192,32 @@ def combine_methods(
         ],
         **_consistency(compared),
     )  # fmt: skip
+    first, *others = results.values()
+    said_alike = [s for s in first.conventions if all(s in r.conventions for r in others)]
     result = SuiteResult(
         system=system, title=title, method=method, sources=list(sources),
-        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
-        coefficients=coefficients, tests=tests, decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
-        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
-        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
-        simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
-        summary=_summary(comparison, compared), warnings=_warnings(results, compared, failed or {}),
+        conventions=list(dict.fromkeys([*conventions, *said_alike])), coefficients=coefficients, suite=comparison,
+        provenance=dict(provenance or {}), decision_rule=uncertainty.DECISION_RULE, **_facts(results),
+    )  # fmt: skip
+    result = replace(
+        result, tests=[_test(c, c.found) for c in compared if c.found is not None],
+        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients), summary=_summary(comparison, compared),
+        warnings=_warnings(results, compared, failed or {}),
     )  # fmt: skip
     return uncertainty.withhold(result, [f"{label}: {text}" for label, r in results.items() for text in r.withheld])
+
+
+def _facts(results: Mapping[str, DriftTestResult]) -> dict[str, Any]:
+    """Return the site of all tests ({} where it differs), the names of the instruments, whether they are simulated."""
+    first, *others = results.values()
+    names = dict.fromkeys(r.instrument for r in results.values() if r.instrument)
+    site = dict(first.site) if all(r.site == first.site for r in others) else {}
+    return {"site": site, "instrument": ", ".join(names), "simulated": first.simulated}
+
+
+def _test(c: MeasurandComparison, found: consistency.Agreement) -> Test:
+    what = "differences beyond the u of the methods"
+    return Test(f"consistency, {c.quantity.name}", found.Q, found.p, what, c.words())
 
 
 def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
@@ -231,11 +233,13 @@ def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
         meaning = f"{q.meaning}; {v.label} only" if len(c.values) == 1 else q.meaning
     truth = c.truth
     verdict = uncertainty.assess_conformity(estimate, U, limit)
-    return Coefficient(
-        name=q.name, meaning=meaning, unit=q.unit, estimate=estimate, u=u, k=U / u if u > 0.0 else NORMAL,
-        interval=(estimate - U, estimate + U), u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
-        z=(estimate - truth) / u if truth is not None and u > 0.0 and (a is not None or len(c.values) == 1) else None,
-        limit=limit, verdict="inconclusive" if c.disagree and limit else verdict, combination=dict(q.combination),
+    k, interval = U / u if u > 0.0 else NORMAL, (estimate - U, estimate + U)
+    measured = Coefficient(q.name, meaning, q.unit, estimate, u, k, interval, combination=dict(q.combination))
+    one = a is not None or len(c.values) == 1
+    return replace(
+        measured, u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
+        z=(estimate - truth) / u if truth is not None and u > 0.0 and one else None,
+        limit=limit, verdict="inconclusive" if c.disagree and limit else verdict,
     )  # fmt: skip
 
 
@@ -331,8 +335,3 @@ def _warnings(
             "size."
         )
     return out
-
-
-def _shared(result: DriftTestResult, results: Mapping[str, DriftTestResult]) -> list[str]:
-    """Conventions that all tests state alike."""
-    return [s for s in result.conventions if all(s in r.conventions for r in results.values())]
