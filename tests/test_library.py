@@ -253,14 +253,19 @@ class Own(System):
     stop = 3.0
     step = 0.1
 
-    def reduce(self, record, specification=None):
+    def findings(self, record):
         return {}["nothing"]
 '''
 
 
+def test_a_system_does_not_judge_itself() -> None:
+    with pytest.raises(TypeError, match=r"returned by findings\(record\)"):
+        type("Own", (gb.System,), {"reduce": lambda self, record: None})
+
+
 def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     init_bench(folder / "mine", [])
-    for name, text in (("own", SYSTEM), ("bare", SYSTEM.split("    def reduce")[0])):
+    for name, text in (("own", SYSTEM), ("bare", SYSTEM.split("    def findings")[0])):
         (folder / "mine" / "systems" / name).mkdir()
         (folder / "mine" / "systems" / name / "system.py").write_text(text, encoding="utf-8")
     monkeypatch.chdir(folder / "mine")

@@ -16,7 +16,7 @@ from gyrobench.bench import UsageError
 from gyrobench.notebook import html
 from gyrobench.record.record import Record
 from gyrobench.report.notebook_html import fragment, paragraph, table_html
-from gyrobench.report.page_model import Column, Row, Table, text_cell
+from gyrobench.report.page_model import Column, PageTable, Row, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
 from gyrobench.result import Result
 from gyrobench.system.system import System
@@ -244,7 +244,7 @@ class Experiment:
             for n, o in self.system.options.items()
         ]
         slots = ", ".join(f"{name}: {self.parts.get(name, s.part)}" for name, s in self.system.slots.items())
-        table = Table([Column("option"), Column("value"), Column("meaning")], rows, f"Parts: {slots}.")
+        table = PageTable([Column("option"), Column("value"), Column("meaning")], rows, f"Parts: {slots}.")
         return fragment(paragraph(self.system.title, strong=True), table_html(table))
 
 

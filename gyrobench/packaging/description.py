@@ -10,7 +10,7 @@ from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 from gyrobench.units import base_unit
 
 #: section -> causality, variability, initial
@@ -117,7 +117,7 @@ def licence(cls: type[Component]) -> dict[str, str]:
 
 def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
     """Return the XML text.  ``target`` is "native" or "python": what each can do differs."""
-    source = Source(cls)
+    source = PartCode(cls)
     root = ET.Element(
         "fmiModelDescription",
         {
@@ -161,7 +161,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
+def _structure(parent: ET.Element, cls: type[Component], source: PartCode) -> None:
     """Add the outputs with the inputs and states they follow without delay, derivatives and initial unknowns."""
     follows = dependencies(source)
     outputs = [s for s in cls.layout if s.section == "output"]
@@ -185,7 +185,7 @@ def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None
             ET.SubElement(node, "Unknown", {"index": str(s.reference + 1), "dependencies": on_index})
 
 
-def initial_references(cls: type[Component], source: Source) -> dict[str, list[int]]:
+def initial_references(cls: type[Component], source: PartCode) -> dict[str, list[int]]:
     """Return the places of the variables that outputs and derivatives depend on during initialization, by name."""
     follows = initial_dependencies(source)
     known = [x for x in cls.layout if x.section in ("parameter", "input", "state")]

@@ -124,7 +124,7 @@ def read_code(function: Any, owner: type | None, placed: Placed | None) -> Code:
     raise SubsetError(f"{path}:{at.co_firstlineno}: {function.__qualname__} is not found in its file: was it changed?")
 
 
-class Source:
+class PartCode:
     """The code of a part: its equations, and the procedures and functions that they call."""
 
     def __init__(self, cls: type[Component]) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from gyrobench.component import Discrete, Input, Output, Parameter, State
 from gyrobench.packaging.c_arrays import CExpression, CVariable, Shape, cells, dimensions, words
 from gyrobench.packaging.expressions import Expressions
-from gyrobench.packaging.source import Code, Source, SubsetError, gives_value, local, member, returns
+from gyrobench.packaging.source import Code, PartCode, SubsetError, gives_value, local, member, returns
 
 WRITABLE: dict[str, tuple[type, ...]] = {
     "start": (Discrete, State),
@@ -338,7 +338,7 @@ class Method(Expressions):
 class Translation:
     """The equations of a part as C: ``text`` holds the functions, ``heads`` those that are declared before."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: PartCode) -> None:
         self.source = source
         self.heads: list[str] = []
         self.functions: list[str] = []

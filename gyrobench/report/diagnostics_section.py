@@ -11,10 +11,10 @@ from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     Cell,
     CollapsedBlocks,
+    PageTable,
     Picture,
     Row,
     Section,
-    Table,
     Text,
     columns,
     number_cell,
@@ -101,7 +101,7 @@ def _tests(report: Report[RunResult], caption: str) -> list[Any]:
         p = number_cell(report.document, ("tests", k, "p"), write=write_p, mark=mark)
         rows.append(Row([text_cell(test.name, "strong"), text_cell(test.what), statistic, p, text_cell(test.finding)]))
     heads = columns("test", "sensitive to", "statistic", "p", "finding", wide=("sensitive to", "finding"))
-    return [Table(heads, rows, caption)] if rows else []
+    return [PageTable(heads, rows, caption)] if rows else []
 
 
 def _stability(report: Report[RunResult]) -> list[Any]:
@@ -145,7 +145,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
     caption = (
         "Uncertainty of each estimate. Closed form: the formula of the source; difference: closed form − estimate."
     )
-    blocks.append(Table(columns(*heads), rows, caption, small=True))
+    blocks.append(PageTable(columns(*heads), rows, caption, small=True))
     matrix = result.correlation if isinstance(result, DriftTestResult) else []
     correlation = Picture(
         "correlation", plots.correlation(matrix, names, "correlation"),
@@ -219,7 +219,7 @@ def budget(report: Report[RunResult]) -> list[Any]:
     alt = "Uncertainty budget as bars: contribution of each source to the uncertainty of the coefficients"
     caption = "Uncertainty budget: contribution of each source, and their root sum of squares against the stated u."
     heads = ("source", "u(x)", "unit", "sensitivity coefficient c", "unit", "|c|·u(x)", "note")
-    table = Table(
+    table = PageTable(
         columns(*heads, wide=("source", "note")), rows,
         "Uncertainty budget: standard uncertainty u(x) of each source, sensitivity coefficient and contribution to u.",
         small=True,

@@ -150,6 +150,14 @@ class System(Configurable):
     coupling: str = ""  # "parallel": every wire carries the value of the communication step before (Jacobi)
     stop: float | None = None  # s, or a property; None: only `done` ends the run
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "reduce" in vars(cls):
+            raise TypeError(
+                f"{cls.__name__}.reduce: what a record says, without limits and verdict, is returned by "
+                "findings(record); reduce judges it, for every system alike"
+            )
+
     def __init__(self) -> None:
         super().__init__()
         self.overrides: dict[str, Any] = {}  # "slot.parameter" -> value as given
