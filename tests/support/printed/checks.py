@@ -52,7 +52,7 @@ def drift_record(names: Names, page: str) -> None:
         assert all(math.isclose(a, b, rel_tol=0.006) for a, b in zip(printed, c.interval, strict=True)), name
         assert c.no_value or math.isclose(float(estimate), c.estimate, rel_tol=0.006)
         assert printed[0] <= float(truth) <= printed[1], "the interval holds the true value"
-    (slope,) = result.columns[0].tables["regression"][0]["rows"]
+    (slope,) = result.columns[0].tables["regression"][0].rows
     assert f"explains {slope[1]:.4f}".rstrip("0") in text and abs(slope[1] - 0.05) < 2.0 * slope[2]
     N = result["N"].estimate
     values = tomllib.loads(Path("fitted/floated_gyro.toml").read_text(encoding="utf-8"))["gyro"]
