@@ -161,6 +161,16 @@ def archive(reader: Reader, done: Done) -> None:
     assert coefficients(reader.runs[-1]) == coefficients(from_archive) == coefficients(from_fmpy)
 
 
+def corrected(reader: Reader, done: Done) -> None:
+    """Alone the true D_I is five u off, stated and corrected it is in the interval, corrected the narrower one."""
+    values = [json.loads((reader.here / n / "result.json").read_text()) for n in ("alone", "stated", "corrected")]
+    alone, stated, last = (next(c for c in v["coefficients"] if c["name"] == "D_I") for v in values)
+    assert alone["interval"][1] < -0.9 - 3.0 * alone["u"]
+    for c in (stated, last):
+        assert c["interval"][0] < -0.9 < c["interval"][1]
+    assert last["u"] < 0.3 * stated["u"]
+
+
 #: pattern of a command -> check of what it leaves and says
 AFTER: dict[str, Callable[[Reader, Done], None]] = {
     r"build warm_gyro$": part_of_blocks,
@@ -171,4 +181,5 @@ AFTER: dict[str, Callable[[Reader, Done], None]] = {
     r"design accelerometer_multipoint .*--count 100$": shown_output,
     r"site CAMPAIGN": site,
     r"run tumble\.ssp": archive,
+    r"compare alone stated corrected": corrected,
 }
