@@ -96,8 +96,8 @@ def between_ranges(step: RangeStep | None, theta: Array, mean: float) -> list[Re
     low, high = (f"{math.degrees(float(x)):g}°" for x in (theta.min(), theta.max()))
     text = (
         f"The rows over {low} and {high} contradict each other: their K_n differ by {step.size / mean:.2g} of K beyond "
-        f"a cubic torquer ({p_text(step.p)}). K and K_LS weigh the ranges differently and cannot both be right; what the "
-        "ranges differ by is in u. Check the meter, the torquer's current and the marks in both ranges."
+        f"a cubic torquer ({p_text(step.p)}). K and K_LS weigh the ranges differently and cannot both be right; what "
+        "the ranges differ by is in u. Check the meter, the torquer's current and the marks in both ranges."
     )
     return [Reason("ranges.contradict", text, ("pass", "fail"), severity="doubt")]
 
