@@ -20,22 +20,43 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.sources import Effect, Source
+from gyrobench.units import ARCSEC
 
 from . import closed
 from .geometry import specific_force
 from .model import MultipointSetup, Polynomial, Visits
 
 STEP = 1e-4
+LEVEL_SLOPE = 1e-3  # of the largest: a position where the data do not change with the angle shows no error of it
 SCALE = Source("accelerometer.scale", "scale λ", "1", "u_scale", "relative")
 ZERO = replace(sources.CURRENT_OFFSET, name="zero of the current meter")
 RESOLUTION = replace(sources.CURRENT_RESOLUTION, name="resolution of the current meter")
+STATIONS = "station"  # kind of the candidate
+UNSTATED = (
+    "errors of the head's positions are the same wherever a position comes back (the other mount, another turn); they "
+    "are not in u, and this plan does not show their size. State u_angle, take more positions or declare type_b = none."
+)
 PLACES = Source(
     "head.positions", "positions of the head", "rad", "u_angle", "independent, the same in each turn and mount"
 )
 AXIS = Source("head.axis", "axis of the head above the horizon", "rad", "u_axis")
 TURNED = Source("accelerometer.mount.{k}", "accelerometer turned about its {axis} axis", "rad", "u_mount")
+
+
+def places(v: Visits, slopes: Array) -> list[Candidate]:
+    """Return the errors of positions that come back as constants that scatter: of a position the data of both mounts,
+    and of all turns, are off by the same angle; none where each is visited once.  slopes (n,): of the data per rad.
+    """
+    stations, at, visited = np.unique(_stations(v.angle), return_inverse=True, return_counts=True)
+    if not np.any(visited > 1):
+        return []
+    columns = np.where(at[:, None] == np.arange(stations.size), slopes[:, None], 0.0)
+    columns = columns[:, np.abs(columns).max(axis=0) > LEVEL_SLOPE * np.abs(slopes).max()]
+    meaning = "standard deviation of the head's positions, the same in each turn and mount"
+    return [Candidate("σ_position", meaning, "″", ARCSEC, columns, scatter=True, kind=STATIONS)]
 
 
 def effects(
@@ -54,6 +75,8 @@ def effects(
     stations, at = np.unique(_stations(v.angle), return_inverse=True)
     alone = np.array([found.error(np.where(at == p, slope, 0.0)) for p in range(stations.size)])
     axis, turned = _mounted(model, v, zeros, k, s.gamma, slope)
+    weighed = any(c.kind == STATIONS for c in found.candidates)
+    needed = "" if weighed or s.places_stated or not places(v, slope) else UNSTATED
     of_head = "of the readings of the head"
 
     def misread(n: int) -> Array:  # the head stands short of what it reads
@@ -64,7 +87,7 @@ def effects(
         ZERO.effect(s, offset),
         RESOLUTION.effect(s.quantum / math.sqrt(12.0), offset),
         sources.GRAVITY.effect(s, found.error(dX=stretched)),
-        PLACES.effect(s, alone, parts=tuple(f"{x:g}°" for x in stations.tolist())),
+        PLACES.effect(s, alone, parts=tuple(f"{x:g}°" for x in stations.tolist()), needed=needed),
         sources.ANGLE_ONCE.effect(s, misread(1), note=of_head),
         sources.ANGLE_TWICE.effect(s, misread(2), note=of_head),
         AXIS.effect(s, found.error(axis)),

@@ -25,7 +25,8 @@ from .geometry import CROSS, specific_force
 @dataclass(frozen=True, kw_only=True)
 class MultipointSetup(setups.Setup):
     """scale: lambda, m/s2/A.  mounts: phase -> "a" or "b".  truth: k0 ... k5; zeros: mount -> true theta_0.  quantum:
-    resolution of the current reading.
+    resolution of the current reading.  nuisances: positions of the head that come back are weighed.  places_stated:
+    their errors are stated, declared absent, or simulated.
     """
 
     gravity: float
@@ -33,6 +34,8 @@ class MultipointSetup(setups.Setup):
     mounts: Mapping[int, str]
     zeros: Mapping[str, float] | None = None
     quantum: float = 0.0
+    nuisances: bool = True
+    places_stated: bool = True
     u_scale: float = 0.0
     u_current: float = 0.0
     u_gravity: float = 0.0

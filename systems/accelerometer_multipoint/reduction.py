@@ -23,6 +23,7 @@ import numpy as np
 from gyrobench.frames import G0
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.setup.run_metadata import phases
+from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -67,6 +68,7 @@ SEEN = {  # what four positions see, see closed.py
     ("b",): {"k0": "k0 − ½k4γ² tan 2θ₀", "k2": "k2 + k4 tan 2θ₀"},
     ("a", "b"): {"k0": "k0 + ¼γ²(k5 tan 2θ₀a − k4 tan 2θ₀b)", "k2": "k2 − ½(k5 tan 2θ₀a − k4 tan 2θ₀b)"},
 }
+ROUNDING = 1e-12  # of gravity; the noise of an accelerometer is less than 1e-6 of it
 CUBIC = "k1 + k3γ²"
 TURNS = "turns.agree"  # id of the test
 WRONG_SIGN = (
@@ -96,6 +98,8 @@ class Reduction(DriftReduction[MultipointSetup]):
             mounts=mounts,
             truth=truth if zeros is not None else None,
             zeros=zeros,
+            nuisances=weighed(run),
+            places_stated=not run.measured or run.type_b == "none" or not run.type_b_stated,
             quantum=float(run.parameters.get("accelerometer.resolution", 0.0)),
             site={"gravity / (m/s²)": site.gravity} if run.measured else site.shown(),
         )
@@ -123,7 +127,12 @@ class Reduction(DriftReduction[MultipointSetup]):
         groups = [self._group(m) for m in self.model.mounts]
         # four positions see combinations that differ a little from mount to mount: equal weights, as the formulas
         noise = "white" if self.four else "estimated"
-        return Regression(steps, self._columns(v), v.y, v.t_start, v.t_end, groups, "λi/g₀", "µg", UG, noise)
+        X = self._columns(v)
+        back = budget.places(v, X[:, len(self.model.terms) :].sum(axis=1)) if s.nuisances and not s.u_angle else []
+        return Regression(
+            steps, X, v.y, v.t_start, v.t_end, groups, "λi/g₀", "µg", UG, noise, candidates=back,
+            ideal=ROUNDING,
+        )  # fmt: skip
 
     def _columns(self, v: Visits) -> Array:
         where = (v, self.zeros, self.setup.gamma)
@@ -288,6 +297,7 @@ class Reduction(DriftReduction[MultipointSetup]):
                 f"Largest nonlinearity: {largest} = {{{largest}}}.",
             ),
             found.noise_sentence("positions"),
+            *found.nuisance_sentences(),
         ]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.table_test import TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -47,6 +47,7 @@ class AccelerometerMultipoint(TableTest):
         SITE
         | CORRECTIONS
         | {
+            "nuisances": NUISANCES["nuisances"],
             "points": Option(24, int, "positions a turn: 4, or 7 to 24", 4, STATIONS),
             "mounts": Option("both", str, "a (gives k5), b (gives k4) or both"),
             "turns": Option(1, int, "turns in each mount", 1, 24),

@@ -3,10 +3,12 @@
     w_y = A cos(psi - angle) + bias        A = W cos(latitude)
 
 by least squares under a noise model estimated from the windows; the heading is a function of the unknowns, its interval
-that of first order.  What the finder in the run says stands beside it.  [NORTH-COMMON; GSP ch. 5, section 5.3.2]
+that of first order; that of two positions, cos psi = c/A, reaches as far as c does.  What the finder in the run says
+stands beside it.  [NORTH-COMMON; GSP ch. 5, section 5.3.2]
 
-Not modelled: linear drift of the bias unless the nuisance model finds it, motion of the base, heading intervals of
-two positions near north and south, where first order does not hold (no value is stated there).
+Two positions have two headings, psi and -psi: the rough heading, which no residual shows to be wrong, chooses.
+
+Not modelled: linear drift of the bias unless the nuisance model finds it, motion of the base.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from scipy import special
 
 from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.sources import LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -52,7 +55,7 @@ from .model import LocalEarth, attitude, of_windows
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
 MANY = 3.0  # standard deviations of the horizontal rate, at least
-APART = 4.0  # of two positions: of the heading from north or south.  psi2 = 2 (1 - cos): the cosine is then 2 u from 1
+MOST = 3.0  # standard uncertainties by which a heading and the rough one may differ
 ZERO = Source("head.zero", "zero of the head against the reference", "rad", "u_angle")
 TILT = Source("head.tilt.{axis}", "tilt of the head about {axis}", "rad", "u_level", "right-handed")
 GYRO_BIAS = Source("gyro.bias.{axis}", "bias of the gyro along {axis}", "rad/s", "u_bias")
@@ -60,15 +63,16 @@ FORCE_NOISE = Source("accelerometers.noise.{axis}", "noise of the accelerometers
 FORCE_BIAS = Source("accelerometers.bias.{axis}", "bias of the accelerometer along {axis}", "m/s2", "u_accelerometer")
 STATUS = {2.0: "is ill-conditioned", 3.0: "contradicts the latitude", 4.0: "is of a moving base"}  # of the finder
 UNDETERMINED = (
-    "the rates do not determine the heading: their horizontal part is below three times its uncertainty, or, with two "
-    "positions, the heading is within four standard uncertainties of north or south; take four positions, or a longer "
+    "the rates do not determine the heading: their horizontal part is below three times its uncertainty; take a longer "
     "time"
 )
+THIRD = "take a third position, at 90° to the two (method four or several), which tells them apart"
 
 
 @dataclass(frozen=True, kw_only=True)
 class NorthFinderSetup(SiteSetup):
-    """method: a key of plans.PARTS.  rough: rough heading, rad.  finder: what the estimator of the run says.  unbiased:
+    """method: a key of plans.PARTS.  rough: rough heading, rad, sigma_rough: its standard uncertainty, 0 if not stated;
+    rough_stated: the run is simulated, and knows its heading.  finder: what the estimator of the run says.  unbiased:
     the gyro is simulated without bias, or it is declared that there is none.
 
     density of the white rate noise (rad/s/sqrt(Hz); 0: unknown), total time and settling (s): for the comparison of the
@@ -77,6 +81,8 @@ class NorthFinderSetup(SiteSetup):
 
     method: str
     rough: float = 0.0
+    sigma_rough: float = 0.0
+    rough_stated: bool = True
     finder: Mapping[str, float] | None = None
     density: float = 0.0
     time: float = 0.0
@@ -138,7 +144,9 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         """
         p, truth = self.model, self.setup.truth or {}
         psi, A = p.heading(self.unknowns(found))
-        if not self._determined(found, psi, A):
+        if math.isnan(A):
+            self.slope, cosine = self._slope(found, psi), float(self.unknowns(found)[0])
+        elif not found.ideal and not MANY * float(np.max(np.asarray(found.u)[: self.model.X.shape[1]][:2])) < A:
             raise ReductionError(UNDETERMINED)
         if abs(A / self.north - 1.0) > NEAR:
             raise ReductionError(
@@ -151,6 +159,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
 
         def values(a: Array) -> list[float]:
             heading, rate = p.heading(a)
+            if math.isnan(A):
+                heading = psi + self.slope * (float(a[0]) - cosine) / self.north
             every = (near(heading), rate, float(a[p.bias]))
             return [v for v, seen in zip(every, there, strict=True) if seen]
 
@@ -163,16 +173,25 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         )
         return found.derive([q for q, seen in zip(wanted, there, strict=True) if seen], values)
 
-    def _determined(self, found: Findings, psi: float, A: float) -> bool:
-        """Return whether first order holds: the horizontal part, or of two positions 1 - |cos psi|, is beyond noise."""
-        if found.ideal:
-            return True
-        a = self.unknowns(found)
-        u = np.asarray(found.u)[: a.size]
-        if math.isnan(A):
-            north = abs(float(a[0])) / max(abs(math.cos(psi)), 1e-9)
-            return abs(math.sin(psi)) > APART * float(u[0]) / max(north, 1e-12) / max(abs(math.sin(psi)), 1e-9)
-        return MANY * float(np.max(u[:2])) < A
+    def _slope(self, found: Findings, psi: float) -> float:
+        """Return the slope d psi/d cos psi, of two positions, at which an interval of first order reaches as far as the
+        heading does when its cosine is off by U: -1/sin psi, near north and south less steep.  Raises ReductionError
+        for a cosine beyond 1.
+        """
+        s, x = self.setup, float(self.unknowns(found)[0]) / self.north
+        half = 0.0 if found.ideal else float(found.reported.half_width[0]) / self.north
+        b = (s.u_level * s.earth.up / self.north, s.u_latitude * math.tan(s.latitude))
+        U = math.sqrt(half**2 + NORMAL**2 * sum(v * v for v in b))
+        if abs(x) > 1.0 + max(MOST * U, NEAR):
+            raise ReductionError(
+                f"the rates of the two positions differ by {abs(x):.3g} of what the Earth's can at this latitude: "
+                "latitude, unit or axes are wrong, or the base moves"
+            )
+        x, sense = max(-1.0, min(1.0, x)), -math.copysign(1.0, psi)
+        if U < 1e-9:
+            return sense / max(abs(math.sin(psi)), 1e-9)
+        ends = (math.acos(max(-1.0, min(1.0, x + d))) for d in (U, -U))
+        return sense * max(abs(end - abs(psi)) for end in ends) / U
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources of type B, by the change of the rates, or of the heading where they act on it directly."""
@@ -194,7 +213,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                     out.append(FORCE_BIAS.of(axis=n).effect(s, values=values))
             out.append(LATITUDE.effect(s, values=self._moved(found, latitude=1.0)))
         elif s.method == "two":  # cos psi = c / A
-            by_latitude = -math.tan(s.latitude) * math.cos(psi) / math.sin(psi)
+            by_latitude = self.slope * math.tan(s.latitude) * math.cos(psi)
             out.append(LATITUDE.effect(s, values=by_latitude * one))
         return out
 
@@ -226,7 +245,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 "anticlockwise.",
                 "At rest the specific force points up: nose up makes f_y positive, right side down f_x negative.",
             ],
-            tables=[self._integrity(A), *_methods(s, psi)],
+            tables=[self._integrity(psi, A), *_methods(s, psi)],
         )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
@@ -238,6 +257,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             if 2.0 * float(special.ndtr(-off)) < LEVEL:
                 departs = f"departs from that of the latitude by {off:.1f} standard uncertainties"
                 reasons.append(_doubt("earth_rate.departs", f"The horizontal Earth rate {departs}."))
+        if s.method == "two":
+            reasons += self._side(result["ψ"])
         if s.finder and s.finder["status"] != 1.0:
             words = STATUS.get(s.finder["status"], "is not there")
             reasons.append(_doubt("finder.status", f"The finder says that the heading {words}."))
@@ -251,6 +272,26 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             reasons.append(_doubt("gyro.bias", "The bias of the gyro is in the heading, and not in u.", "pass"))
         return replace(result, reasons=[*result.reasons, *reasons])
 
+    def _side(self, psi: Coefficient) -> list[Reason]:
+        """Return what speaks against the heading that the rough one chose, of the two that two positions have."""
+        s, both = self.setup, f"Two positions have two headings, {psi.estimate:.4g}° and {-psi.estimate:.4g}°"
+        if not s.sigma_rough:
+            chosen = (
+                f"{both}; the rough one, {s.rough / DEG:.4g}°, chose, and nothing in the record would show that it "
+            )
+            text = f"{chosen}lies on the wrong side. State its standard uncertainty, sigma_rough, or {THIRD}."
+            return [] if s.rough_stated else [_doubt("rough.unstated", text, "pass")]
+        u = math.hypot(s.sigma_rough, psi.u * DEG)
+        here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, -psi.estimate))
+        rough = f"the rough one is {s.rough / DEG:.4g}° ± {s.sigma_rough / DEG:.2g}°"
+        if here > MOST:
+            return [_doubt("rough.contradicts", f"{both}; {rough} (u), {here:.1f} standard uncertainties from it.")]
+        if other < MOST and not psi.interval[0] < -psi.estimate < psi.interval[1]:
+            return [
+                _doubt("rough.open", f"{both}; {rough} (u), which does not choose one. Know it better, or {THIRD}.")
+            ]
+        return []
+
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         compass, expected = coefficients[0].estimate % 360.0, self.north / DPH
         rate = f"Horizontal Earth rate {{A}}; the latitude gives {expected:.5g} °/h."
@@ -260,7 +301,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             *told(coefficients, rate),
         ]
 
-    def _integrity(self, A: float) -> Table:
+    def _integrity(self, psi: float, A: float) -> Table:
         s, p = self.setup, self.model
         rows: list[list[Any]] = []
         if not math.isnan(A):
@@ -268,6 +309,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 ["horizontal Earth rate of the latitude", self.north / DPH, "°/h"],
                 ["measured less this, relative", (A / self.north - 1.0) * 100.0, "%"],
             ]
+        if math.isnan(A):
+            rows.append(["the other heading with these rates", -psi / DEG, "°"])
         if p.force is not None:
             theta, gamma = attitude(p.force.x, p.force.y, s.gravity)
             rows += [["pitch, up positive", theta / DEG, "°"], ["roll, right side down positive", gamma / DEG, "°"]]
@@ -315,7 +358,8 @@ def setup_of(record: Record) -> NorthFinderSetup:
     names = {n: f"finder.{n}" for n in ("heading", "sigma", "status")}
     there = all(c in record.channels for c in names.values())
     return NorthFinderSetup.of(
-        run, method=method_of(run), rough=float(o.get("rough", 0.0)), truth=_truth(run),
+        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured, truth=_truth(run),
+        sigma_rough=float(o.get("sigma_rough", 0.0)),
         finder={n: float(np.asarray(record.channels[c])[-1]) for n, c in names.items()} if there else None,
         time=float(windows["t_end"][-1]) - (float(windows["t_start"][0]) if run.measured else 0.0),
         settle=float(o.get("settle", 0.0)),

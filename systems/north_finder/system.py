@@ -67,6 +67,9 @@ class NorthFinding(TableTest):
             "time": Option(300.0, "s", "total time: moves, settling, readings", 2.0),
             "wanted": Option(0.0, "rad", "standard deviation of the heading wanted (method auto)", 0.0),
             "rough": Option("90deg", "rad", "rough heading, known beforehand", -math.pi, math.pi),
+            "sigma_rough": Option(
+                0.0, "rad", "standard uncertainty of the rough heading (method two, measured data); 0: not stated", 0.0
+            ),
             "level": Option(True, bool, "the head is levelled: methods that take it for level may be chosen (auto)"),
             "axes": Option(1, int, "axes of the gyro (method auto)", 1, 2),
             "positions": Option(12, int, "positions a turn (method several)", 3, 36),
@@ -197,6 +200,12 @@ class NorthFinding(TableTest):
         near = min(abs(self["rough"]), math.pi - abs(self["rough"]))
         if self.chosen == "two" and near < plans.MARGIN:
             found.append("Two positions near north or south: the heading is ill-conditioned; take four.")
+        if self.chosen == "two" and math.sin(self["rough"]) * math.sin(self["heading"]) < 0.0:
+            found.append(
+                "Two positions have two headings, ψ and −ψ, and no residual tells them apart: rough lies on the other "
+                "side of the meridian than the heading and will choose the wrong one. Correct rough, or take a third "
+                "position, at 90° to the two (method four or several)."
+            )
         tilted = max(abs(self["pitch"]), abs(self["roll"]))
         if tilted > 1e-5 and self.chosen in ("two", "four", "several", "continuous"):
             found.append(

@@ -33,6 +33,7 @@ from gyrobench.reduction.setup.sources import (
 )
 
 AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")
+RANGES = Source("torquer.range_step", "step of K_n between the angle ranges", "rad/s/A")
 ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
 
 

@@ -16,12 +16,13 @@ from scipy import special
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.findings import CONTRADICTED, Findings
 from gyrobench.reduction.estimation.quantity import Quantity
 
 from .precession import Precession
 
 DPH, KU, UNIT = units.factor("deg/h"), units.factor("deg/h/mA"), "°/h/mA"
+ENOUGH = 5  # rows, to tell a step between angle ranges from noise
 Number = tuple[float, float, float]  # value, standard uncertainty of type A, degrees of freedom
 
 
@@ -30,7 +31,8 @@ class TorquerEstimates:
     """What is estimated, SI.  numbers: of QUANTITIES, in their order.  worst_at: the current of the largest departure.
     beta: K_1, K_3 of the cubic law; fitted (n,): it at the currents; scatter: about it; test: F of K_3 and its p.  gain
     (5, n): of K, K_LS, K_1, K_3 and the worst departure in the K_n; cofactor (n, n): of the K_n.  reported: all as one
-    fit.
+    fit.  step: between the angle ranges of a table; of_step: what it leaves open of each number, as standard
+    uncertainty.
     """
 
     numbers: tuple[Number, ...]
@@ -42,6 +44,23 @@ class TorquerEstimates:
     gain: Array
     cofactor: Array
     reported: Findings | None = None
+    step: RangeStep | None = None
+    of_step: tuple[float, ...] = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class RangeStep:
+    """What the K_n of the shortest range have more than those of the longest, beyond a cubic torquer, SI, and the p of
+    its t.
+    """
+
+    size: float
+    p: float
+
+    @property
+    def seen(self) -> bool:
+        """True where it is more than noise: what the ranges differ by is then in u."""
+        return self.p < CONTRADICTED
 
 
 QUANTITIES = [
@@ -61,7 +80,7 @@ def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> TorquerEstimate
     line = regression.least_squares(one, K_n, ("K",), w)
     cubic = regression.least_squares(curve, K_n, ("K_1", "K_3"), w)
     offset = regression.least_squares(one, half, ("drift",), w / (i / full) ** 2)
-    mean = float(K_n.mean())
+    mean, beta = float(K_n.mean()), cubic.beta
     s_mean, dof_mean = _scatter_beside_mean(K_n, w, line)
     pooled = math.sqrt((offset.s**2 * (n - 1) + (line.s * full) ** 2 * (n - 1)) / (2 * (n - 1)))
     k = int(np.argmax(np.abs(K_n - mean)))
@@ -70,13 +89,46 @@ def of_table(i: Array, K_n: Array, half: Array, theta: Array) -> TorquerEstimate
     numbers: tuple[Number, ...] = (
         (mean, s_mean * math.sqrt(float(np.sum(1.0 / w))) / n, dof_mean),
         (float(line.beta[0]), float(line.u[0]), n - 1),
-        (float(cubic.beta[0]), float(cubic.u[0]), n - 2),
-        (float(cubic.beta[1] / cubic.beta[0]), float(cubic.u[1] / abs(cubic.beta[0])), n - 2),
+        (float(beta[0]), float(cubic.u[0]), n - 2),
+        (float(beta[1] / beta[0]), float(cubic.u[1] / abs(beta[0])), n - 2),
         (float((K_n[k] - mean) / mean), line.s / math.sqrt(float(w[k])) / mean, n - 1),
         (float(offset.beta[0]), pooled / math.sqrt(float(np.sum(w / (i / full) ** 2))), 2 * (n - 1)),
     )
     gain = _gain(n, k, line.gain, cubic.gain)
-    return TorquerEstimates(numbers, k, cubic.beta, cubic.fitted, cubic.s, (F, p), gain, np.diag(1.0 / w))
+    step = range_step(i, K_n, w)
+    e = abs(step.size) if step and step.seen else 0.0
+    short = _shortness(
+        w
+    )  # which of the ranges is right is open: half the step, its bound as 1.96 standard uncertainties
+    drift = float(abs(offset.gain[0] @ (short * i)))
+    of_step = (e / 2.0, e / 2.0, e / 2.0, e * float(abs(gain[3] @ short)) / abs(beta[0]), e / 2.0 / mean, e * drift)
+    return TorquerEstimates(
+        numbers, k, beta, cubic.fitted, cubic.s, (F, p), gain, np.diag(1.0 / w), step=step, of_step=of_step
+    )
+
+
+def range_step(i: Array, K_n: Array, w: Array) -> RangeStep | None:
+    """Return the step of the K_n between the angle ranges, w (n,) their squares over the largest; None where all are
+    alike, or fewer than ENOUGH rows.
+
+    It is the direction in which the plain mean differs from the weighted one: nothing else than this holds a gain that
+    changes with the range (of a meter, of the angle marks) against the noise of the rest.
+    """
+    if np.ptp(w) < 1e-9 or i.size < ENOUGH:
+        return None
+    columns = np.column_stack([np.ones_like(w), (i / i.max()) ** 2, _shortness(w)])
+    try:
+        fit = regression.least_squares(columns, K_n, ("K_1", "K_3", "step"), w)
+    except regression.RegressionError:
+        return None
+    size, u = float(fit.beta[2]), float(fit.u[2])
+    return RangeStep(size, 2.0 * float(special.stdtr(fit.dof, -abs(size) / u)) if u > 0.0 else 1.0)
+
+
+def _shortness(w: Array) -> Array:
+    """Return 1 for the shortest range and 0 for the longest, between them as the variance of the marks is."""
+    out: Array = (1.0 / w - 1.0 / w.max()) / max(1.0 / w.min() - 1.0 / w.max(), 1e-300)
+    return out
 
 
 def of_windows(i: Array, found: Precession) -> TorquerEstimates:
@@ -130,4 +182,4 @@ def _scatter_beside_mean(K_n: Array, w: Array, line: regression.Fit) -> tuple[fl
     if np.ptp(w) < 1e-9:
         return line.s, line.dof
     fit = regression.least_squares(np.column_stack([np.ones_like(w), 1.0 / w]), K_n, ("K", "1/w"), w)
-    return fit.s, fit.dof
+    return (fit.s if w.size >= ENOUGH else max(fit.s, line.s)), fit.dof

@@ -8,7 +8,8 @@ r_minus are the magnitudes of its rate:
     drift_n = (r_plus - r_minus)/2
 
 A table of rates: the angle marks have a constant error, so over an angle range Theta the rate has one proportional to
-i/Theta and K_n one proportional to 1/Theta.  Least squares weighs K_n with Theta^2 (alike when no ranges are given),
+i/Theta and K_n one proportional to 1/Theta.  A gain that changes with the range is held against that noise: what is
+beyond it is in u, and withholds the verdict.  Least squares weighs K_n with Theta^2 (alike when no ranges are given),
 first with one constant, then with K_1 + K_3 i^2, the cubic torquer.  A run knows more: its windows are fitted together
 under an estimated noise model (precession.py).  Not modelled: heating by the current, drift that changes between the
 two senses otherwise than as noise.
@@ -44,7 +45,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.result import BudgetLine, Series, Test
 
 from . import marks, row_checks
-from .budget import AMMETER, TorquerSetup
+from .budget import AMMETER, RANGES, TorquerSetup
 from .estimates import DPH, KU, UNIT, of_table, of_windows
 from .precession import Precession, precession
 from .row_checks import MA
@@ -124,6 +125,7 @@ class Reduction:
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
         b = [abs(value) * s.u_current, abs(value) * s.u_time] if unit == UNIT else []
+        b = [*b, self.e.of_step[j] * size]
         if self.e.reported:
             b = (np.vstack([np.zeros((1, 6)), *self.by_source])[:, j] * size).tolist()
         u, U = uncertainty.combine_uncertainties(u_a, half_a, b)
@@ -213,7 +215,9 @@ class Reduction:
         note = "type A, with the linearity error in it"
         scatter = BudgetLine(TYPE_A, "scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", note)
         known = [(source, source.size(self.setup)) for source in (AMMETER, TIME_BASE)]
-        return [scatter, *(
+        step = self.e.of_step[0] / KU
+        ranges = BudgetLine(RANGES.id, RANGES.name, step, UNIT, 1.0, "1", step, UNIT, "K", "half of it")
+        return [scatter, *([ranges] if step > 0.0 else []), *(
             BudgetLine(source.id, source.name, u, "1", size, UNIT, size * u, UNIT, "K", source.note)
             for source, u in known if u > 0.0
         )]  # fmt: skip
@@ -225,6 +229,7 @@ class Reduction:
         if "range_plus" not in self.rows:
             found.append(Reason("rows.no_ranges", NO_RANGES))
         if self.fit is None:
+            found += row_checks.between_ranges(self.e.step, self.theta, float(self.K_n.mean()))
             against, said = row_checks.contradictions(self.i, self.marked, self.half, self.theta)
             found += [Reason("torquer.asymmetry", text) for text in said]
             found += [Reason("rows.contradict", text, ("pass", "fail"), severity="doubt") for text in against]

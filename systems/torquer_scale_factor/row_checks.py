@@ -15,7 +15,10 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.result import Reason
 from gyrobench.units import DPH
+
+from .estimates import RangeStep
 
 LEVEL = 1e-3  # probability that a clean table is contradicted by chance, of each kind
 LARGEST = 0.2  # departure of a K_n from the others, of a torquer
@@ -84,6 +87,19 @@ def contradictions(i: Array, K_n: Array, half: Array, theta: Array) -> tuple[lis
         wrong = f"The rates of one sense are mistaken (unit, factor): {text}; a torquer differs by less than "
         return [*found, f"{wrong}{100 * ASYMMETRY:g} %."], []
     return found, [f"Asymmetry of the torquer: {text}. The drift holds what it makes at the mean current."]
+
+
+def between_ranges(step: RangeStep | None, theta: Array, mean: float) -> list[Reason]:
+    """Return that the rows of the shortest angle range contradict those of the longest; theta (n,) rad, mean: K, SI."""
+    if step is None or not step.seen:
+        return []
+    low, high = (f"{math.degrees(float(x)):g}°" for x in (theta.min(), theta.max()))
+    text = (
+        f"The rows over {low} and {high} contradict each other: their K_n differ by {step.size / mean:.2g} of K beyond "
+        f"a cubic torquer ({p_text(step.p)}). K and K_LS weigh the ranges differently and cannot both be right; what "
+        "the ranges differ by is in u. Check the meter, the torquer's current and the marks in both ranges."
+    )
+    return [Reason("ranges.contradict", text, ("pass", "fail"), severity="doubt")]
 
 
 def _far(K_n: Array) -> list[str]:

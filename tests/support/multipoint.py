@@ -43,13 +43,15 @@ def reading(k: dict[str, float], mount: str, angle: float, zero: float, gamma: f
 def windows(
     k: dict[str, float], zeros: dict[str, float], gamma: float, points: int, turns: int = 1, scale: float = 9806.65,
     sigma: float = 0.0, rng: np.random.Generator | None = None, angles: list[float] | None = None,
+    off: list[float] | None = None,
 ) -> dict[str, np.ndarray[Any, Any]]:  # fmt: skip
-    """A record of the mounts in ``zeros``, phases 1 and 2, white noise of sigma (g0)."""
+    """A record of the mounts in ``zeros``, phases 1 and 2, white noise of sigma (g0); off: errors of the positions."""
     rows, t = [], 0.0
     places = angles or [2.0 * math.pi * j / points for j in range(points * turns)]
     for phase, (mount, zero) in enumerate(zeros.items(), 1):
-        for angle in places:
-            y = reading(k, mount, angle, zero, gamma) + (sigma * rng.normal() if rng is not None else 0.0)
+        for j, angle in enumerate(places):
+            error = off[j % len(off)] if off else 0.0
+            y = reading(k, mount, angle + error, zero, gamma) + (sigma * rng.normal() if rng is not None else 0.0)
             rows.append((phase, t, t + 10.0, angle, angle, y * G0 / scale))
             t += 13.0
     columns = np.array(rows).T

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from multipoint import KS, NAME, load, quiet
+from multipoint import G0, KS, NAME, estimates, load, module, polynomial, quiet, windows
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.effects import PREDICTED
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 
@@ -20,6 +21,7 @@ ARCSEC = math.pi / 648000.0
 K4, K5 = 8e-3, -12e-3
 VALUES: dict[str, Any] = {
     "settle": 0.6, "dwell": 0.2, "accelerometer.k4": K4, "accelerometer.k5": K5, "accelerometer.k1": 1.002,
+    "nuisances": "none",  # all visits weigh alike, as by hand below
 }  # fmt: skip
 TURN = 2.0 * math.pi * np.arange(24) / 24
 
@@ -125,3 +127,45 @@ def test_stated_errors_of_the_head_are_held(head: Session) -> None:
         k5 += abs(plain["k5"].estimate - K5 / 1e-6) <= plain["k5"].k * plain["k5"].u
     assert held.min() >= 27 and held.mean() <= 29.75 and k5 < 10
     assert all(n in r.names for n in KS)
+
+
+def made(rng: np.random.Generator, points: int, size: float, **setup: Any) -> tuple[Result, dict[str, float]]:
+    """Return the result of a record of both mounts whose positions are off by ``size`` arcsec (rms), alike in both,
+    with noise of 0.5 ug; and its truth, SI.
+    """
+    k, gamma = polynomial(rng), 1.0003
+    zeros = {m: float(rng.uniform(-1e-3, 1e-3)) for m in "ab"}
+    off = (rng.normal(size=points) * size * ARCSEC).tolist()
+    R = module("reduction")
+    own = R.MultipointSetup(gravity=gamma * G0, scale=9806.65, mounts={1: "a", 2: "b"}, **setup)
+    return R.reduce(windows(k, zeros, gamma, points, sigma=5e-7, rng=rng, off=off), own), {
+        **k, **{f"θ₀ {m}": z for m, z in zeros.items()}
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [0.2, 1.0])
+def test_errors_of_positions_that_come_back_are_in_the_intervals(size: float) -> None:
+    """One error of a position is in both mounts.  As noise of each datum they had k0 held 0.75 times at 1 arcsec."""
+    held: dict[str, list[bool]] = {}
+    for seed in range(120):
+        result, truth = made(np.random.default_rng(seed), 24, size)
+        value = estimates(result)
+        for c in result.coefficients:
+            if c.name in truth:
+                u = c.u * value[c.name] / c.estimate
+                held.setdefault(c.name, []).append(abs(value[c.name] - truth[c.name]) <= c.k * abs(u))
+    shares = {n: float(np.mean(h)) for n, h in held.items()}
+    assert len(shares) == 8 and min(shares.values()) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / 120), shares
+
+
+def test_positions_that_come_back_are_asked_for_where_the_plan_does_not_show_them() -> None:
+    """12 positions in both mounts leave 4 degrees of freedom beside 8 unknowns and 12 positions: 10 are needed."""
+    limits = {"k0": (-1e9, 1e9)}
+    for stated, u, verdict in ((True, 0.0, "pass"), (False, 0.0, "inconclusive"), (False, ARCSEC, "pass")):
+        result, _ = made(np.random.default_rng(2), 12, 0.0, places_stated=stated, u_angle=u)
+        result = conclude(result, None, limits)
+        assert result.verdict == verdict, result.warnings
+        asked = [r for r in result.reasons if r.id == "head.positions.unstated"]
+        assert bool(asked) == (not stated and not u) and all("State u_angle" in r.text for r in asked)
+    result, _ = made(np.random.default_rng(2), 24, 1.0, places_stated=False)
+    assert conclude(result, None, limits).verdict == "pass" and "σ_position" in result.names

@@ -207,3 +207,37 @@ def test_measured_record(pwm: Session, command: Any, tmp_path: Any) -> None:
         assert found[name]["estimate"] == pytest.approx(ours[name].estimate, rel=1e-6), name
         assert found[name]["truth"] is None
     assert "ripple" not in found and "dynamic range" not in found
+
+
+def test_record_without_the_optional_column(command: Any, tmp_path: Any) -> None:
+    """Readings by hand, x (1 + 1e-4) + 3 uA + 5e-5 |x| = omega/k at 0, +-0.3, +-0.6, +-0.9 deg/s and at rest, with and
+    without std; s = 2 uA is far below the reading at rest, 0.45 mA, so nothing changes.
+    """
+    k, earth = 17.2 * math.pi / 648000.0 / 1e-3, 7.2921159e-5 * math.sin(math.radians(45.75))
+    rng, values = np.random.default_rng(3), {}
+    rows: list[list[float]] = []
+    angle = 0.0
+    for phase, degrees in enumerate((0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9, 0.0), 1):
+        for _ in range(12):
+            current = (math.radians(degrees) + earth) / k - 3e-6
+            x = current / (1.0 + 1e-4 + math.copysign(5e-5, current)) + 1e-6 * float(rng.normal())
+            rows.append([phase, 1.1 * len(rows), 1.1 * len(rows) + 1.0, angle, angle + degrees, x * 1e3])
+            angle += 1.1 * degrees
+    names = "phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA]"
+    head = ["# latitude = 45.75deg", "# k = 17.2deg/h/mA", "# range = 0.95deg/s", "# gate = 1s", "# type_b = none"]
+    head += [f"# phase {p} = {'rest' if p in (1, 8) else 'turning'}" for p in range(1, 9)]
+    stds = {"all": ["0.002"] * len(rows), "none": []}
+    for which, std in stds.items():
+        lines = [",".join(map(repr, row)) for row in rows]
+        lines = [f"{a},{s}" for a, s in zip(lines, std, strict=True)] if std else lines
+        file = tmp_path / f"{which}.csv"
+        file.write_text("\n".join([*head, names + (",std [mA]" if std else ""), *lines]), encoding="utf-8")
+        code, _, err = command("reduce", NAME, "--data", file, "--out", tmp_path / which)
+        assert code == 0, err
+        result = json.loads((tmp_path / which / "result.json").read_text("utf-8"))
+        values[which] = {c["name"]: c for c in result["coefficients"]}
+        assert any(r["id"] == "samples.std_missing" for r in result["reasons"]) == (which == "none")
+    for name, truth in (("I_0", 3.0), ("κ", 100.0), ("κ_±", 50.0), ("κ_2", 0.0), ("κ_3", 0.0)):
+        for found in values.values():
+            assert abs(found[name]["estimate"] - truth) < 4.0 * found[name]["u"], name
+            assert found[name]["estimate"] == pytest.approx(values["all"][name]["estimate"], abs=0.1 * found[name]["u"])

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from gyrobench.bench import Bench
+from gyrobench.reduction.estimation.verdict import conclude
+from gyrobench.system.system import load_system
+from gyrobench.units import DPH
 
 Command = Callable[..., tuple[int, str, str]]
 NAME = "torquer_scale_factor"
@@ -98,3 +105,42 @@ def test_mistaken_rows_and_senses(
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert code == 1 and result["verdict"] == "inconclusive", err
     assert words in " ".join(result["withheld"]), result["withheld"]
+
+
+def stepped(rng: np.random.Generator, step: float, marks: float) -> Any:
+    """Return the result of a table as Hu 1981 takes it: r = K i (1 + marks ξ/Θ) ± drift, K = 17.2 °/h/mA, drift 0.05
+    °/h, ranges of 10° and 100°; the rates of the positive sense over 10° are read too large by ``step``.
+    """
+    i, theta = np.array([1.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0]), np.repeat([10.0, 100.0], 4)
+    plus, minus = (17.2 * i * (1.0 + marks * rng.normal(size=8) / theta) + s * 0.05 for s in (1.0, -1.0))
+    plus = plus * np.where(theta == 10.0, 1.0 + step, 1.0)
+    rows = {"current": i * 1e-3, "rate_plus": plus * DPH, "rate_minus": minus * DPH}
+    rows |= dict.fromkeys(("range_plus", "range_minus"), np.radians(theta))
+    reduction = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
+    return conclude(reduction.reduce(rows), None, {"K": (17.1, 17.3)})
+
+
+def test_a_gain_that_changes_with_the_range_is_named_and_in_u() -> None:
+    """3e-4 of one sense are 1.5e-4 of K_n in half of the rows, 7.5e-5 of K: 1.29e-3 °/h/mA, beside marks of 1e-6."""
+    for seed in range(12):
+        result = stepped(np.random.default_rng(seed), 3e-4, 1e-4)
+        K, least = result["K"], result["K_LS"]
+        assert K.estimate - 17.2 == pytest.approx(0.75e-4 * 17.2, rel=0.1)
+        # half of 1.5e-4 K is left open, whichever range is right
+        assert K.u == pytest.approx(0.75e-4 * 17.2, rel=0.1)
+        assert K.interval[0] < 17.2 < K.interval[1] and least.interval[0] < 17.2 < least.interval[1]
+        assert max(K.interval[0], least.interval[0]) < min(K.interval[1], least.interval[1])
+        assert result.verdict == "inconclusive"
+        (reason,) = [r for r in result.reasons if r.id == "ranges.contradict"]
+        assert "10° and 100° contradict" in reason.text and "differ by 0.0001" in reason.text
+        assert "torquer.range_step" in {b.id for b in result.budget}
+
+
+def test_tables_without_a_step_keep_their_intervals() -> None:
+    """Of 300 (1,000: K 0.946, K_LS 0.958, K_1 0.950, drift 0.945) 0.95 hold the truth, and 0.01 are doubted."""
+    truth = {"K": 17.2, "K_LS": 17.2, "K_1": 17.2, "drift": 0.05}
+    results = [stepped(np.random.default_rng(seed), 0.0, 1e-3) for seed in range(300)]
+    for name, value in truth.items():
+        share = np.mean([r[name].interval[0] <= value <= r[name].interval[1] for r in results])
+        assert abs(share - 0.95) < 3.0 * math.sqrt(0.95 * 0.05 / 300), (name, share)
+    assert np.mean([r.verdict == "pass" for r in results]) > 0.96

@@ -43,7 +43,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis import plausibility
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.findings import RAW, WHITENED
-from gyrobench.reduction.estimation.fit_result import REMOUNT_UNSTATED
+from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.nuisances import BOTH, NUISANCES, InTheModel
 from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -52,7 +52,6 @@ from gyrobench.result import Autocorrelation, DriftTestResult, Reason, Table
 Reduce = Callable[[Record], DriftTestResult]
 DIAGNOSIS = "handling.diagnosis"  # id of the table
 HANDLING = "handling.error"
-STATEMENTS = (REMOUNT_UNSTATED,)  # doubts that say nothing against the record
 FACTOR = 3.0  # least ratio of the residual scatters
 LEVEL = 1e-3  # of the F test, all mistakes together
 SLOW = 10.0  # the same where they are correlated
@@ -129,7 +128,7 @@ def with_options(record: Record, options: Mapping[str, Any]) -> Record:
 
 
 def _contradicted(result: DriftTestResult) -> bool:
-    return any(r.severity == "doubt" and r.id not in STATEMENTS for r in result.reasons)
+    return any(r.severity == "doubt" and not r.id.endswith(UNSTATED) for r in result.reasons)
 
 
 def _suspicious(result: DriftTestResult) -> bool:

@@ -34,7 +34,7 @@ from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Harmonic,
 CONDITION = 100.0  # above this a warning names the weakest direction
 TYPE_A = "type_a"  # id of the line of a budget
 CLOSED = "closed_form"  # id of the table
-REMOUNT_UNSTATED = "mount.unstated"
+UNSTATED = ".unstated"  # how the ids of reasons end that ask for a statement, and say nothing against the record
 CONTRADICTED = "residuals.contradict"
 _observers: ContextVar[tuple[list[tuple[Findings, Array]], ...]] = ContextVar("observers", default=())
 
@@ -197,7 +197,7 @@ def _unstated(fit: Findings, effects: Sequence[Effect]) -> list[Reason]:
             touched = np.sqrt(np.sum(e.changes(fit) ** 2, axis=0)) > TOUCHED
             names = tuple(q.title for q, t in zip(fit.quantities, touched, strict=True) if t)
             text = f"Of {', '.join(names)}: {e.needed}"
-            found.append(Reason(REMOUNT_UNSTATED, text, ("pass",), names, severity="doubt"))
+            found.append(Reason(f"{e.id}{UNSTATED}", text, ("pass",), names, severity="doubt"))
     return found
 
 

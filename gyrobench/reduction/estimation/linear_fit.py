@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 
-IDEAL = 1e-6  # residuals over data, below which there is no noise
+IDEAL = 1e-6  # the lag of a simulated loop
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Regression:
     wants some tens of windows) or "white" (assumed; few readings; then ``weights`` (n,) may be given, and times may be
     None); "readings": estimated, of data that are differences of readings at t_start and t_end (angles over time).
     limit: largest condition number.  candidates: set-up effects that may be in the data (nuisances); those that are
-    follow the quantities.
+    follow the quantities.  ideal: residuals over data, below which there is no noise.
     """
 
     quantities: Sequence[Quantity | str]
@@ -55,6 +55,7 @@ class Regression:
     weights: Array | None = None
     limit: float = 1e3
     candidates: Sequence[Candidate] = ()
+    ideal: float = IDEAL
 
     def rows(self, keep: NDArray[np.bool_]) -> Regression:
         """Return the regression of some rows; it has no figures, and its condition has been looked at."""
@@ -79,7 +80,7 @@ class Regression:
             t0, t1 = np.arange(n, dtype=float), np.arange(n, dtype=float) + 1.0
         wanted = tuple(Quantity(q, "", "", 1.0) if isinstance(q, str) else q for q in self.quantities)
         names = [q.name for q in wanted]
-        noisy = self.noise != "white" and not _noise_free(X, y)
+        noisy = self.noise != "white" and not _noise_free(X, y, self.ideal)
         tested, known = (self.candidates, known) if noisy else ((), None)
         seen, hidden = nuisances.observable(X, names, tested, y)
         if self.noise not in ("white", "estimated", "readings") or (self.noise != "white" and self.weights is not None):
@@ -110,12 +111,12 @@ def without(found: Findings, error: Array, known: Array | None = None) -> Findin
     return found.reported_alike(data.fit(known))
 
 
-def _noise_free(X: Array, y: Array) -> bool:
+def _noise_free(X: Array, y: Array, ideal: float) -> bool:
     """True for simulated data without noise, whose remainder (the lag of a loop) no candidate is to explain."""
     if not (np.all(np.isfinite(X)) and np.all(np.isfinite(y))):
         return True  # the fit says what is wrong
     left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
-    return bool(np.linalg.norm(left) <= IDEAL * np.linalg.norm(y))
+    return bool(np.linalg.norm(left) <= ideal * np.linalg.norm(y))
 
 
 def _reported(est: NoiseEstimate, joined: Sequence[tuple[Candidate, Evidence]], p: int) -> Estimates:
