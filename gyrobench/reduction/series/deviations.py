@@ -46,7 +46,12 @@ def decade() -> Iterator[int]:
     yield from (d * 10**k for k in range(18) for d in (1, 2, 4))
 
 
-GRIDS = {"octave": octave, "decade": decade}
+def quarter() -> Iterator[int]:
+    """Yield whole numbers, four to an octave: 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 13, 16, ..."""
+    yield from (round(2.0 ** (k / 4.0)) for k in (0, *range(4, 240)) if k == 0 or round(2.0 ** (k / 4.0)) > round(2.0 ** ((k - 1) / 4.0)))
+
+
+GRIDS = {"octave": octave, "decade": decade, "quarter": quarter}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,128 @@
+"""What a noise model says: coefficients, Gauss-Markov processes, minimum of the deviation, deviation and spectrum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.agreement import Agreement
+from gyrobench.reduction.noise_model.ordinates import Model, allan, joined, spectrum, split
+from gyrobench.reduction.noise_model.prior import PEAKS
+from gyrobench.reduction.noise_model.terms import Grid, Term
+from gyrobench.reduction.noise_model.treatment import Treated
+from gyrobench.reduction.series.deviations import Deviation
+from gyrobench.reduction.series.noise_coefficients import Estimate
+
+
+@dataclass(frozen=True)
+class Process:
+    """Gauss-Markov process x' = -x/tau + w as a Kalman filter takes it: rms sigma in the unit of the rate, tau in s.
+
+    present: probability that the record has such a process, by the evidence of the models with one near this tau.
+    """
+
+    sigma: Estimate
+    tau: Estimate
+    present: float
+
+    @property
+    def density(self) -> float:
+        """Return the density of w, two-sided: sigma sqrt(2/tau), unit/sqrt(s)."""
+        return self.sigma.value * math.sqrt(2.0 / self.tau.value)
+
+    def discrete(self, step: float) -> tuple[float, float]:
+        """Return phi and the standard deviation of w_k in x_k+1 = phi x_k + w_k every ``step`` s."""
+        phi = math.exp(-step / self.tau.value)
+        return phi, self.sigma.value * math.sqrt(-math.expm1(-2.0 * step / self.tau.value))
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end ``tau``."""
+
+    deviation: Estimate
+    tau: Estimate
+    reached: bool
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise model of a rate record; see :func:`gyrobench.reduction.noise_model.fit.fit_noise`.
+
+    N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  terms, p: in units of the sampling
+    interval tau0 (s) and of ``size`` (unit of the rate).  own: Allan deviation of the record as it was; clean: of the
+    record without what was taken out; removed (k,): Allan variance of that, at own.tau.
+    """
+
+    tau0: float
+    size: float
+    means: bool
+    terms: Model
+    p: Array
+    N: Estimate
+    B: Estimate
+    K: Estimate
+    R: Estimate
+    Q: Estimate
+    processes: tuple[Process, ...]
+    minimum: Minimum
+    treatment: Treated
+    own: Deviation
+    clean: Deviation
+    removed: Array
+    agreement: Agreement
+    agreement_clean: Agreement
+    with_wild: dict[str, float]
+    models: int
+
+    def _broad(self) -> tuple[Model, Array]:
+        return joined([(t, q) for t, q in split(self.terms, self.p) if t.name not in PEAKS])
+
+    def allan(self, tau: Array) -> Array:
+        """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""
+        m = np.maximum(np.rint(tau / self.tau0), 1.0)
+        ramp = self.R.value * tau if self.R.determined else np.zeros_like(tau)
+        out: Array = np.sqrt(self.size**2 * allan(self.terms, self.p, m, self.means) + 0.5 * ramp**2)
+        return out
+
+    def spectrum(self, f: Array) -> Array:
+        """Return the two-sided spectrum (k,) of the samples, 0 < f <= 1/(2 tau0) in Hz, aliasing included."""
+        omega = 2.0 * math.pi * f * self.tau0
+        out: Array = self.size**2 * self.tau0 * spectrum(self.terms, self.p, Grid(omega, self.means))
+        return out
+
+    @property
+    def filter(self) -> Term | None:
+        """Return the term of the white noise, with its filter."""
+        return next((t for t in self.terms if t.name == "white"), None)
+
+    def filter_words(self) -> str:
+        """Return what the sensor's filter is, in words; "" where the record shows none."""
+        found = next(((t, q) for t, q in split(self.terms, self.p) if t.name == "white" and t.filter != "none"), None)
+        if found is None:
+            return ""
+        t, q = found
+        if t.filter == "first":
+            return f"low-pass of first order, time constant {1e3 * self.tau0 * math.exp(q[1]):.3g} ms"
+        if t.filter == "second":
+            f = math.exp(q[1]) / (2.0 * math.pi * self.tau0)
+            return f"low-pass of second order, {f:.3g} Hz, damping {math.exp(q[2]):.2g}"
+        if t.filter == "average":
+            return f"mean over {1e3 * self.tau0 * math.exp(q[1]):.3g} ms"
+        if t.filter.startswith("mean"):
+            return f"mean over {t.filter[4:]} samples"
+        level = float(np.exp(-2.0 * np.sum(q[1::2])))
+        return f"smooth shape of {t.filter[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+
+    def peaks(self) -> list[tuple[float, float, float]]:
+        """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
+        out = []
+        for t, q in split(self.terms, self.p):
+            if t.name in PEAKS:
+                width = 1.0 / math.pi if t.name == "resonance" else math.sqrt(2.0 * math.log(2.0)) / math.pi
+                out.append((math.exp(q[2]) / (2.0 * math.pi * self.tau0), width / (math.exp(q[1]) * self.tau0),
+                            self.size * math.exp(0.5 * q[0])))  # fmt: skip
+        return out
