@@ -38,15 +38,15 @@ SEED = 90125
 class Completed:
     """A stretch x (n,) without missing values, and extra (n,): powers of the ordinates that the completion lacks.
 
-    wild: indices.  missing: samples that were not there.  z (n,): what a sample differs from all others, in standard
-    deviations, NaN where it is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
+    wild: indices.  missing: samples that were not there.  white (n,): the stretch with an even spectrum, of unit
+    variance, NaN where a sample is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
     """
 
     x: Array
     extra: Array | None
     wild: NDArray[np.int64]
     missing: int
-    z: Array
+    white: Array
     noise: Array | None
 
 
@@ -212,11 +212,12 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         noise = np.zeros(x.size)
         noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
         lost = fft.dct(noise, norm="ortho") ** 2
-    z = np.where(missing | wild, np.nan, z)
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
-        excess = core_excess((z / local_scale(z, missing | wild))[np.isfinite(z)]) / P.diagonal
-    return Completed(y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), z, noise)
+        excess = core_excess((z / local_scale(z, missing | wild))[~(missing | wild)]) / P.diagonal
+    white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
+    white[missing | wild] = np.nan
+    return Completed(y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise)
 
 
 def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:

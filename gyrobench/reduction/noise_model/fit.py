@@ -27,9 +27,9 @@ from gyrobench.reduction.noise_model.model import Minimum, NoiseModel, Process
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
 from gyrobench.reduction.noise_model.prior import PEAKS
-from gyrobench.reduction.noise_model.search import Fitted, Search, maximize, search
+from gyrobench.reduction.noise_model.search import Fitted, Search, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
-from gyrobench.reduction.noise_model.terms import Grid
+from gyrobench.reduction.noise_model.terms import Grid, Term
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -38,9 +38,10 @@ CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 ABSENT = 0.025  # probability of its absence below which a term is determined
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
-STEPS = 20
+STEPS = 5
 TRIED_MODELS, TRIED = 12, 60  # maxima and draws of each model that are held against the deviation
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
+DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
 SAMPLE = 250  # draws of the ramp and the minimum
 
@@ -130,9 +131,7 @@ def _one_step(treated: Treated, found: Search, means: bool) -> tuple[Treated, Se
         parts = [*split(model, p), *found.resonances]
         places = []
         for i, s in enumerate(treated.stretches):
-            omega = math.pi * np.arange(1, s.own.size) / s.own.size
-            S = np.concatenate([[1.0], spectrum(*joined(parts), Grid(omega, means))])
-            step, ratio = largest_step(s.clean, S)
+            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means))
             places.append((ratio, i, step))
         ratio, i, step = max(places, key=lambda c: c[0])
         if ratio < bound:
@@ -142,19 +141,23 @@ def _one_step(treated: Treated, found: Search, means: bool) -> tuple[Treated, Se
                                           *treated.stretches[i + 1 :]))  # fmt: skip
         data = new.ordinates(means)
         data.fixed = found.data.fixed
-        fits = [maximize(data, found.prior, f.model, f.p) for f in _shortlist(found)]
+        fits = [maximize(data, found.prior, f.model, f.p) for f in found.ranked[:3]]
         tried.append((min(f.value for f in fits), new, min(fits, key=lambda f: f.value)))
     if not tried:
         return None
     value, new, _ = min(tried, key=lambda t: t[0])
-    least = min(f.value for f in _shortlist(found))
+    least = min(f.value for f in found.ranked[:3])
     if least - value < bound:
         return None
-    return new, search(new.ordinates(means))
+    return new, search_again(new.ordinates(means), found)
 
 
-def _shortlist(found: Search) -> list[Fitted]:
-    return sorted(found.seen.values(), key=lambda f: -f.evidence)[:3]
+def _spectrum_of(n: int, parts: list[tuple[Term, Array]], means: bool) -> Array:
+    """Return the spectrum (n,) of terms at the ordinates of a stretch, interpolated; 1 for that of the mean."""
+    k = np.arange(1.0, n)
+    few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
+    S = spectrum(*joined(parts), Grid(math.pi * few / n, means))
+    return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])
 
 
 # ------------------------------------------------------------------ the model that is reported

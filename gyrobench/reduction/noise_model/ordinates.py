@@ -29,7 +29,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.terms import Grid, Term, folded_flicker, markov_parts
 
 LOW = 16  # first ordinates of each parity that are kept singly
-WIDTH = 0.006  # of a bin of ordinates, of the logarithm of k
+WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
 SHORTEST = 64  # samples of a stretch
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
@@ -174,11 +174,7 @@ class Ordinates:
 
         S (M, b), low (M, g, LOW, LOW); q2 (M,): variance of the error of an angle.
         """
-        try:
-            factor = np.linalg.cholesky(low)
-        except np.linalg.LinAlgError:
-            bump = 1e-9 * np.trace(low, axis1=-2, axis2=-1)[..., None, None] / LOW
-            factor = np.linalg.cholesky(low + bump * np.eye(LOW))
+        factor = _factor(low)
         columns = np.stack([self.columns, self.low_ends, self.ramp], axis=-1)
         solved = np.linalg.solve(factor, np.broadcast_to(columns, (*low.shape[:-1], 3)))
         forms = np.swapaxes(solved, -1, -2) @ solved  # (M, g, 3, 3)
@@ -256,6 +252,17 @@ class Ordinates:
         )[0]
         gradient += (rest[1 : 1 + p.size] - rest[1 + p.size :]) / (2.0 * h)
         return value + float(rest[0]), gradient, (slope * self.all_count) @ slope.T
+
+
+def _factor(low: Array) -> Array:
+    """Return the Cholesky factors of covariances (..., LOW, LOW); rounding that makes one indefinite is lifted."""
+    size = np.trace(low, axis1=-2, axis2=-1)[..., None, None] / LOW * np.eye(LOW)
+    for bump in (0.0, 1e-9, 1e-6, 1e-3, 1.0):
+        try:
+            return np.linalg.cholesky(low + bump * size)
+        except np.linalg.LinAlgError:
+            continue
+    raise AssertionError("a covariance is indefinite by more than its size")
 
 
 def split(model: Model, p: Array) -> list[tuple[Term, Array]]:

@@ -16,7 +16,7 @@ from gyrobench.reduction.noise_model.terms import Term
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-MOST_MARKOV, MOST_RESONANCES = 3, 16
+MOST_MARKOV, MOST_RESONANCES = 3, 8
 N, W, Q, B, K, GM = (Term(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
@@ -130,6 +130,10 @@ class Search:
     @property
     def best(self) -> Fitted:
         return max(self.seen.values(), key=lambda f: f.evidence)
+
+    @property
+    def ranked(self) -> list[Fitted]:
+        return sorted(self.seen.values(), key=lambda f: -f.evidence)
 
     # ------------------------------------------------------------------ moves
     def excess(self, at: Fitted) -> tuple[Array, Array]:
@@ -270,6 +274,16 @@ class Search:
         """Return the best model with its resonances."""
         b = self.best
         return joined([*split(b.model, b.p), *self.resonances])
+
+
+def search_again(data: Ordinates, before: Search) -> Search:
+    """Return the models tried for a record that differs little from another one, from the best models of that."""
+    data.fixed = before.data.fixed
+    found = Search(data, Prior(data), resonances=before.resonances)
+    for f in before.ranked[:3]:
+        found.fit(f.model, f.p)
+    found.climb(found.best, SIMPLE + SHAPES)
+    return found
 
 
 def search(data: Ordinates) -> Search:

@@ -143,9 +143,8 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
             used[d.wild] = False
             y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
         done = [complete(y, find_wild) for y in own]
-    z = [d.z for d in done]
     return Treated(rate.size, tuple(Stretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True)), lines,
-                   full, *_levels(np.concatenate(z)))  # fmt: skip
+                   full, *_levels(np.concatenate([d.white for d in done])))  # fmt: skip
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
@@ -175,7 +174,7 @@ def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
 def _levels(z: Array) -> tuple[float, Array, float]:
     """Return the spread of the mean square, the rms of parts over that of all, and p of so large differences of them.
 
-    z (n,): normal, independent of each other but for a smooth spectrum; NaN where a sample is missing.
+    z (n,): of unit variance and an even spectrum; NaN where a sample is missing.
     """
     z = z[np.isfinite(z)]
     n = z.size
