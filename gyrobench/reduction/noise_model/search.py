@@ -16,7 +16,7 @@ from gyrobench.reduction.noise_model.terms import Term
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-MOST_MARKOV, MOST_RESONANCES = 3, 8
+MOST_MARKOV, MOST_RESONANCES = 3, 12
 N, W, Q, B, K, GM = (Term(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
