@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check style bench clean
+.PHONY: demo test check style bench docs clean
 
 # The whole single-axis tumble test of the standard gyro: FMUs, run, step check, coefficients, report.
 demo: $(VENV)/demo.stamp
@@ -31,6 +31,10 @@ style: $(VENV)/test.stamp
 bench: $(VENV)/bench.stamp
 	$(BIN)/python tests/benchmarks/run.py
 
+# The documentation as a site that opens from disk; strict: a warning is an error.
+docs: $(VENV)/docs.stamp
+	$(BIN)/python docs/site/build.py
+
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "gyrobench needs Python 3.11 or newer; name one: make PYTHON=/path/to/python3.11"; exit 1; }
@@ -48,6 +52,10 @@ $(VENV)/test.stamp: pyproject.toml | $(BIN)/python
 
 $(VENV)/bench.stamp: pyproject.toml | $(BIN)/python
 	$(PIP) -e ".[test,bench]"
+	@touch $@
+
+$(VENV)/docs.stamp: pyproject.toml | $(BIN)/python
+	$(PIP) -e ".[docs,notebook]"
 	@touch $@
 
 clean:

@@ -50,7 +50,7 @@ def standard_folder() -> Path:
 
 @dataclass(frozen=True)
 class Bench:
-    """Where things are.  A part or system that the own bench lacks is taken from the standard one."""
+    """Folders of a bench.  A part or system that the own bench lacks is taken from the standard one."""
 
     folder: Path
 
@@ -76,7 +76,7 @@ class Bench:
 
     @property
     def home(self) -> Path:
-        """Where results go: the bench the user stands in, else the working folder."""
+        """Return the folder for results: the bench the user stands in, else the working folder."""
         here = Path.cwd()
         return self.folder if not self.packed and here.is_relative_to(self.folder) else here
 
@@ -89,7 +89,7 @@ class Bench:
 
     @property
     def products(self) -> Path:
-        """What was asked for by name, to be taken elsewhere: FMUs, SSP archives, containers."""
+        """Return the folder of products asked for by name (FMUs, SSP archives, containers)."""
         return self.home / "fmus"
 
     @property

@@ -1,4 +1,4 @@
-"""What records and results offer outside of reports: data frames, and HTML that a notebook shows by itself."""
+"""Records and results outside of reports: data frames, and HTML that a notebook shows by itself."""
 
 from __future__ import annotations
 

@@ -13,39 +13,42 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.notebook import Displayed, data_frame
+from gyrobench.result_entries import (
+    NO_VERDICT,
+    BudgetLine,
+    Coefficient,
+    Limit,
+    Reason,
+    Response,
+    Series,
+    Specification,
+    Table,
+    Test,
+    TypeB,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas
 
-NO_VERDICT = "no specification given"
-Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
-Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
-
-
-@dataclass
-class Coefficient:
-    """One estimated quantity, or one inseparable combination under the combination's name."""
-
-    name: str  # "D_I"; a combination: "D_F + D_OO·X²"
-    meaning: str
-    unit: str  # "°/h/g"
-    estimate: float
-    u: float  # combined standard uncertainty
-    k: float  # coverage factor of the 95 % interval
-    interval: tuple[float, float]
-    t: float | None = None  # estimate / u of type A
-    p: float | None = None  # two-sided p of t
-    u_a: float | None = None  # type A part of u
-    dof: float | None = None
-    closed: float | None = None  # the source's closed formula (corrected), same unit
-    truth: float | None = None  # simulated runs only
-    z: float | None = None  # (estimate - truth) / u
-    limit: Limit | None = None
-    verdict: str = NO_VERDICT  # pass | fail | inconclusive | void | no specification given
-    no_value: str = ""  # why there is none: estimate and u are then NaN, and the interval where it has no bound
-    combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
-
+__all__ = [
+    "NO_VERDICT",
+    "BudgetLine",
+    "Coefficient",
+    "DriftRecordResult",
+    "DriftTestResult",
+    "Limit",
+    "LoopResult",
+    "Reason",
+    "Response",
+    "Result",
+    "Series",
+    "Specification",
+    "SuiteResult",
+    "Table",
+    "Test",
+    "TypeB",
+]
 
 #: what :meth:`Result.array` reads of a coefficient
 NUMBERS: Mapping[str, Callable[[Coefficient], float | None]] = {
@@ -64,84 +67,9 @@ NUMBERS: Mapping[str, Callable[[Coefficient], float | None]] = {
 }
 
 
-@dataclass
-class Series:
-    """A measured quantity against a position or a time, with its fit."""
-
-    label: str  # "mount 1: output axis along the pole"
-    x: list[float]
-    x_name: str  # "table angle"
-    x_unit: str  # "°"
-    y: list[float]
-    fit: list[float]
-    residual: list[float]
-    y_name: str  # "drift rate"
-    y_unit: str  # "°/h"
-    t: list[float] = field(default_factory=list)  # mid time of each window, s
-    shown_fit_x: list[float] = field(default_factory=list)  # dense curve for the plot
-    shown_fit_y: list[float] = field(default_factory=list)
-
-
-@dataclass
-class Test:
-    """A statistical test of the residuals or of repeatability."""
-
-    name: str
-    statistic: float
-    p: float | None
-    what: str  # what it looks for, in words
-    finding: str  # what it says here, in words
-
-
-@dataclass
-class BudgetLine:
-    """One line of the error budget; contribution = |sensitivity| * size, all as standard uncertainties.
-
-    sensitivity: the change of the estimate for one unit by which the set-up is off, with its sign; a source of several
-    independent errors has none.
-    """
-
-    source: str
-    size: float
-    size_unit: str
-    sensitivity: float
-    sensitivity_unit: str
-    contribution: float
-    unit: str
-    coefficient: str  # which coefficient it touches
-    note: str = ""
-
-
-@dataclass
-class Response:
-    """A measured response of a loop, with the curves of its linear models laid over it.
-
-    kind: "loop" (open loop gain: Bode plot with margins), "ratio" (a gain against frequency), "step" (against time),
-    "time" (several quantities against time: all of them in curves, y is the one that runs are compared by).
-    x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
-    of a gain (u rad of its phase too), in y_unit of a step; None: not known.  counts: false for a point too noisy to be
-    used, []: all count.  curves: {"label", "x", "y", "phase"}.
-    """
-
-    name: str
-    kind: str
-    caption: str
-    x: list[float]
-    x_name: str
-    x_unit: str
-    y: list[float]
-    y_name: str
-    y_unit: str
-    phase: list[float] = field(default_factory=list)
-    u: list[float | None] = field(default_factory=list)
-    coherence: list[float] = field(default_factory=list)
-    counts: list[bool] = field(default_factory=list)
-    curves: list[dict[str, Any]] = field(default_factory=list)
-
-
-@dataclass(kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Result(Displayed):
-    """What results of every kind hold; a reduction returns one of the kinds below.
+    """Content common to results of every kind; a reduction returns one of the kinds below.
 
         result["D_I"].estimate, result["D_I"].interval      a coefficient by its name
         result.array("estimate"), result.covariance()       numpy arrays, in the order of result.names
@@ -153,21 +81,20 @@ class Result(Displayed):
 
     kind: ClassVar[str] = ""
 
-    system: str
-    title: str
+    system: str = ""  # name and title of the test: known where its result is concluded
+    title: str = ""
     method: str  # one line, with its source
     sources: list[str]  # "TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21"
     equation: str = ""  # model equation, Typst math
     conventions: list[str]  # sign and axis conventions, a sentence each
     coefficients: list[Coefficient]
     tests: list[Test] = field(default_factory=list)
-    tables: list[dict[str, Any]] = field(default_factory=list)  # method's own: {"title","caption","columns","rows"}
+    tables: list[Table] = field(default_factory=list)  # the method's own
     step_check: dict[str, Any] = field(default_factory=dict)  # see reduction.step_effect; "worst": largest change/u
-    warnings: list[str] = field(default_factory=list)
+    reasons: list[Reason] = field(default_factory=list)  # warnings, and why verdicts are withheld
     summary: list[str] = field(default_factory=list)  # the three numbers that matter, as sentences
     decision_rule: str = ""
-    verdict: str = NO_VERDICT
-    withheld: list[str] = field(default_factory=list)  # why no "pass" (or "fail") is stated, sentences
+    verdict: str = NO_VERDICT  # written by gyrobench.reduction.estimation.verdict alone
     site: dict[str, Any] = field(default_factory=dict)
     instrument: str = ""
     simulated: bool = True
@@ -181,6 +108,16 @@ class Result(Displayed):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.system}: {len(self.coefficients)} coefficients, {self.verdict}>"
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know, as sentences, the most serious first."""
+        return [r.text for r in self.reasons if r.severity in ("error", "warning")]
+
+    @property
+    def withheld(self) -> list[str]:
+        """Why no "pass" (or "fail") is stated, as sentences."""
+        return [r.text for r in self.reasons if r.severity == "doubt"]
 
     @property
     def names(self) -> list[str]:
@@ -217,7 +154,7 @@ class Result(Displayed):
         if not correlation:
             raise UsageError(f"{self.system}: its estimates have no correlation, each is made by itself")
         u = self.array("u")
-        changes = [np.asarray(b["changes"], dtype=float) for b in getattr(self, "type_b", [])]
+        changes = [np.asarray(b.changes, dtype=float) for b in getattr(self, "type_b", [])]
         if not changes or any(c.shape[1] != u.size for c in changes):
             return np.asarray(correlation, dtype=float) * np.outer(u, u)
         u_a = np.array([c.u if c.u_a is None else c.u_a for c in self.coefficients])
@@ -249,7 +186,7 @@ class Result(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of result.json, with the kind."""
-        return {"kind": self.kind, **ABSENT, **asdict(self)}
+        return {"kind": self.kind, **ABSENT, **asdict(self), "warnings": self.warnings, "withheld": self.withheld}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> DriftTestResult | LoopResult | DriftRecordResult | SuiteResult:
@@ -260,20 +197,26 @@ class Result(Displayed):
         older = "suite" if data.get("suite") else "drift_test" if data.get("correlation") else "loop"
         cls = KINDS[data.get("kind", older)]
         own = {f.name for f in fields(cls)}
-        values = {key: value for key, value in data.items() if key != "kind" and (key in own or key not in ABSENT)}
+        values = {key: value for key, value in data.items() if key not in SAID and (key in own or key not in ABSENT)}
+        if "reasons" not in data:  # of version 0.1.0, as are entries without an id
+            values["reasons"] = [
+                *({"id": "", "text": text} for text in data.get("warnings", [])),
+                *({"id": "", "text": text, "severity": "doubt"} for text in data.get("withheld", [])),
+            ]
         for key, entry in ENTRIES.items():
             if key in own:
-                values[key] = [entry(**e) for e in data.get(key, [])]
+                first = {"id": ""} if "id" in entry.__dataclass_fields__ else {}
+                values[key] = [entry(**{**first, **e}) for e in values.get(key, [])]
+        for column in values.get("columns", []):
+            for section, tables in column.tables.items():
+                column.tables[section] = [Table(**{"id": "", **t}) for t in tables]
         if cls is SuiteResult:
             values["suite"] = SuiteComparison(**data["suite"])
-        for c in values["coefficients"]:
-            c.estimate, c.u = (math.nan if x is None else x for x in (c.estimate, c.u))
-            c.interval = tuple(math.nan if x is None else x for x in c.interval)
-            c.limit = tuple(c.limit) if c.limit is not None else None
+        values["coefficients"] = [Coefficient(**numbers(c)) for c in data["coefficients"]]
         return cls(**values)
 
 
-@dataclass(kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class DriftTestResult(Result):
     """Coefficients of an instrument from a regression over windows, with its residuals and its error budget."""
 
@@ -292,11 +235,12 @@ class DriftTestResult(Result):
     psd: dict[str, Any] = field(default_factory=dict)  # f, S; unit
     harmonics: list[dict[str, Any]] = field(default_factory=list)  # {"series", "n", "a", "b", "u"}
     budget: list[BudgetLine] = field(default_factory=list)
-    type_b: list[dict[str, Any]] = field(default_factory=list)  # {"source", "changes": independent parts x estimates}
+    type_b: list[TypeB] = field(default_factory=list)
     repeatability: dict[str, Any] = field(default_factory=dict)
+    ideal: bool = False  # data without noise: what is left of them is rounding
 
 
-@dataclass(kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class LoopResult(Result):
     """Measures of a loop, a platform or an estimator, each by itself: responses, steps, drift."""
 
@@ -313,7 +257,7 @@ class LoopResult(Result):
     residual_unit: str = "1"
 
 
-@dataclass
+@dataclass(frozen=True)
 class DriftColumn:
     """One column of a drift record: what its report draws and tabulates, in printed units.
 
@@ -331,11 +275,11 @@ class DriftColumn:
     model: dict[str, Any] = field(default_factory=dict)
     spectrum: dict[str, Any] = field(default_factory=dict)
     correlation: dict[str, Any] = field(default_factory=dict)
-    tables: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    tables: dict[str, list[Table]] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
 
 
-@dataclass(kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class DriftRecordResult(Result):
     """Noise coefficients of a drift record, for each of its columns, with deviations, spectrum and models."""
 
@@ -344,9 +288,9 @@ class DriftRecordResult(Result):
     columns: list[DriftColumn]
 
 
-@dataclass
+@dataclass(frozen=True)
 class SuiteComparison:
-    """What the methods of a suite say of each other, see gyrobench.reduction.suite.method_comparison."""
+    """Comparison of the methods of a suite, see gyrobench.reduction.suite.method_comparison."""
 
     rule: str
     shared: list[str]  # sources of type B that are one and the same error in all tests
@@ -361,7 +305,7 @@ class SuiteComparison:
     pairs_apart: int  # E_n > 1
 
 
-@dataclass(kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class SuiteResult(Result):
     """Several tests of one instrument: weighted means of what they have in common, and whether the methods agree."""
 
@@ -374,14 +318,26 @@ KINDS: dict[str, type[DriftTestResult | LoopResult | DriftRecordResult | SuiteRe
     cls.kind: cls for cls in (DriftTestResult, LoopResult, DriftRecordResult, SuiteResult)
 }
 #: key -> class of its entries
-ENTRIES: dict[str, type] = {
-    "coefficients": Coefficient,
+ENTRIES: dict[str, Any] = {
     "tests": Test,
+    "tables": Table,
+    "type_b": TypeB,
+    "reasons": Reason,
     "series": Series,
     "budget": BudgetLine,
     "responses": Response,
     "columns": DriftColumn,
 }
+SAID = ("kind", "warnings", "withheld")  # keys that follow from others
+
+
+def numbers(c: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a coefficient of result.json with NaN where it has null."""
+    nan = [math.nan if x is None else x for x in (c["estimate"], c["u"], *c["interval"])]
+    limit = None if c.get("limit") is None else tuple(c["limit"])
+    return {**c, "estimate": nan[0], "u": nan[1], "interval": (nan[2], nan[3]), "limit": limit}
+
+
 #: what result.json holds under the keys that a kind does not have
 ABSENT: dict[str, Any] = {
     "series": [],
@@ -399,6 +355,7 @@ ABSENT: dict[str, Any] = {
     "budget": [],
     "type_b": [],
     "repeatability": {},
+    "ideal": False,
     "responses": [],
     "suite": {},
     "columns": [],

@@ -28,6 +28,7 @@ BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  #: base units in the orde
 G0 = 9.80665  #: standard acceleration, m/s2; "per g" means per this
 EARTH_RATE = 7.2921159e-5  #: rad/s; the unit ERU
 DEG = math.pi / 180.0
+ARCMIN = math.pi / 10800.0  #: rad
 ARCSEC = math.pi / 648000.0  #: rad
 DPH = math.pi / 648000.0  #: 1 deg/h in rad/s
 

@@ -11,8 +11,12 @@ import tempfile
 import threading
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" width="1pt" height="1pt" viewBox="0 0 1 1"></svg>'
 CREATED = "GYROBENCH_TEST_CACHE"  # the folder that this session has created, if it has
@@ -110,3 +114,27 @@ def gyrobench(
     """Run a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
     return command
+
+
+@pytest.fixture(scope="session")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Builds an FMU of tests/foreign once, with each set of the compiler's flags."""
+    import foreign_fmus
+
+    done: dict[tuple[str, ...], Path] = {}
+
+    def make_once(name: str, *flags: str) -> Path:
+        key = (name, *flags)
+        if key not in done:
+            done[key] = foreign_fmus.make(name, tmp_path_factory.mktemp("foreign"), *flags)
+        return done[key]
+
+    return make_once
+
+
+@pytest.fixture
+def small() -> System:
+    """The small tumble of tests/support."""
+    from small_tumble import SmallTumble
+
+    return SmallTumble()

@@ -165,7 +165,8 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: room -> rooms it may import.  Data goes one way: component -> FMU -> system -> engine ->
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
-COMMON = {"errors", "files", "result", "bench", "units", "frames", "attitudes", "drift", "notebook", "reading"}
+COMMON = {"errors", "files", "result", "result_entries", "bench", "units", "arrays", "frames", "attitudes", "drift"}
+COMMON |= {"notebook", "reading", "callable_room"}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
     "component": {"errors"},  # a Python FMU carries a copy of both
@@ -181,8 +182,15 @@ ROOMS: dict[str, set[str]] = {
 BELOW = {*ROOMS}
 #: from a request to a result, for the commands and the library
 ROOMS["workflow"] = BELOW
+ROOMS["design"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
-ROOMS["library"] = BELOW | {"workflow", "campaign"}
+ROOMS["library"] = BELOW | {"workflow", "design", "campaign"}
+#: rooms inside a room -> rooms beside them that they may import
+INNER: dict[str, set[str]] = {
+    "campaign.execution": set(),
+    "campaign.analysis": {"campaign.execution"},
+    "campaign.site": {"campaign.execution", "campaign.analysis"},
+}
 
 
 @functools.cache
@@ -219,6 +227,23 @@ def test_imports_go_one_way(file: Path) -> None:
     for module in imports(file):
         there = module.split(".")[1] if "." in module else ""
         assert there in ROOMS[room(file)] | {room(file), ""}, f"{file}: imports {module}"
+
+
+def inner_room(module: str) -> str:
+    """Room inside a room that a module is in: "campaign.site" of gyrobench.campaign.site.site_page; else ""."""
+    return next((name for name in INNER if f"{module}.".startswith(f"gyrobench.{name}.")), "")
+
+
+def test_imports_between_the_rooms_of_a_room_go_one_way() -> None:
+    for name, allowed in INNER.items():
+        files = [f for f in FILES if inner_room(module_of(f)) == name]
+        assert len(files) > 2, name
+        for file in files:
+            others = {inner_room(m) for m in imports(file)} - {"", name}
+            assert others <= allowed, f"{file}: imports {others - allowed}"
+    for name in {name.partition(".")[0] for name in INNER}:
+        loose = [f.name for f in (TOOL / name).glob("*.py")]
+        assert loose == ["__init__.py"], f"gyrobench/{name}: {loose}"
 
 
 def module_of(file: Path) -> str:
@@ -282,6 +307,64 @@ def test_no_two_modules_of_one_name() -> None:
     assert len(set(names)) == len(names), sorted({n for n in names if names.count(n) > 1})
 
 
+#: public classes of gyrobench/reduction and systems whose name another class has; one that is renamed leaves the list
+NAMED_TWICE = {
+    "Axis",
+    "Block",
+    "Candidate",
+    "Choice",
+    "Estimate",
+    "Estimates",
+    "Expected",
+    "Fit",
+    "GaussMarkov",
+    "Linear",
+    "Loop",
+    "Model",
+    "NorthFinder",
+    "Piece",
+    "Place",
+    "Plan",
+    "PlatformFourGimbal",
+    "PlatformThreeAxis",
+    "Run",
+    "Setup",
+    "Site",
+    "State",
+    "TumbleSetup",
+    "Windows",
+}
+
+
+def test_no_two_public_classes_of_one_name() -> None:
+    places: dict[str, list[str]] = {}
+    bench = standard_folder()
+    for top in (TOOL, bench / "components", bench / "systems"):
+        for file in sorted(f for f in top.rglob("*.py") if "_bench" not in f.parts):
+            for node in tree(file).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    places.setdefault(node.name, []).append(f"{top.name}/{file.relative_to(top)}")
+    assert len(places) > 500, "the classes are read"
+    twice = {name: files for name, files in places.items() if len(files) > 1}
+    new = {name: files for name, files in twice.items() if name not in NAMED_TWICE}
+    assert not new, f"two classes of one name: {new}"
+    assert set(twice) == NAMED_TWICE, f"no longer named twice: {NAMED_TWICE - set(twice)}"
+    for name, files in twice.items():
+        assert any(f.startswith(("gyrobench/reduction/", "systems/")) for f in files), f"{name}: {files}"
+
+
+def test_docstrings_open_with_what_is_returned_or_done() -> None:
+    """Not with a fragment: "Return the parameters ...", "Parameters of ...", and not "Of all parts, ..."."""
+    fragment = re.compile(r"(What|Of|As|Whether)\b")
+    for file in (*FILES, *(standard_folder() / "components").rglob("*.py")):
+        if "reduction" in file.parts:
+            continue
+        for node in ast.walk(tree(file)):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                text = ast.get_docstring(node) or ""
+                assert not fragment.match(text), f"{file}: '{text.splitlines()[0]}'"
+
+
 def test_the_tool_names_no_content() -> None:
     """gyrobench works on any bench: no part, system or specification is named in its code."""
     bench = Bench(standard_folder())
@@ -305,3 +388,16 @@ def test_what_the_benchmarks_import_exists() -> None:
             for name in re.findall(r"(\w+)(?: as \w+)?", names):
                 found = hasattr(importlib.import_module(module), name)
                 assert found or importlib.util.find_spec(f"{module}.{name}"), f"{file.name}: {module} has no {name}"
+
+
+def test_files_of_tests_are_tests() -> None:
+    """What tests share is in tests/support, on the path by pyproject.toml; each room of tests is one of the tool."""
+    tests = Path(__file__).parent
+    others = {"benchmarks", "support", "foreign", "corpus"}
+    for folder in (f for f in tests.iterdir() if f.is_dir() and f.name not in {*others, "__pycache__"}):
+        assert folder.name in {*ROOMS, "components", "systems", "spec"}, f"{folder}: which room of the tool is it of?"
+        for file in folder.glob("*.py"):
+            assert file.name == "conftest.py" or file.name.startswith("test_"), f"{file}: to tests/support"
+            assert "sys.path.insert" not in file.read_text(encoding="utf-8"), file
+    names = [f.name for f in tests.rglob("test_*.py")]  # the rooms are no packages: pytest imports them by these names
+    assert len(names) == len(set(names)), f"twice: {sorted({n for n in names if names.count(n) > 1})}"

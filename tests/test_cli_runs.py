@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -212,16 +211,10 @@ def test_interrupted_step_check_still_gives_the_report(
     assert json.loads((tmp_path / "r" / "result.json").read_text(encoding="utf-8"))["step_check"] == {}
 
 
-@pytest.fixture(scope="module")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def faulty(foreign: Callable[..., Path]) -> Path:
     """A gyro FMU that crashes, see tests/foreign/faulty.c."""
-    file = Path(__file__).parent / "foreign" / "make.py"
-    spec = importlib.util.spec_from_file_location("foreign_make", file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    made: Path = module.make("faulty", tmp_path_factory.mktemp("foreign"))
-    return made
+    return foreign("faulty")
 
 
 def test_crash_of_a_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
 from gyrobench.component.blocks.gyro import GaussMarkov
 from gyrobench.component.math import Number, clip, floor
+from gyrobench.component.set_up import turned
 
 G0 = 9.80665  # m/s2
 UG = 1e-6  # in units of g0
@@ -45,6 +46,7 @@ class AccelerometerPendulous(Component):
     k3 = Parameter(20.0 * UG, "1", "third order in X, g0 per g0^3 (20 ug/g3)")
     k4 = Parameter(20.0 * UG, "1", "cross term X Y, g0 per g0^2 (20 ug/g2)")
     k5 = Parameter(20.0 * UG, "1", "cross term X Z, g0 per g0^2 (20 ug/g2)")
+    simulates = (turned("mount", ("accelerometer.mount.1", "accelerometer.mount.2", "accelerometer.mount.3")),)
     mount = Rotation("rows: accelerometer axes x, y, z in case axes")
 
     J = Parameter(1e-6, "kg.m2", "inertia of the pendulum about its hinge", above=0.0)

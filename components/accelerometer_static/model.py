@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, Rotation
 from gyrobench.component.math import cos, sin
+from gyrobench.component.set_up import turned
 
 G0 = 9.80665
 
@@ -29,6 +30,7 @@ class AccelerometerStatic(Component):
     K_IO = Parameter(-2.8e-5, "V", "cross term, per g0 squared")
     K_II = Parameter(4e-6, "V", "square term, per g0 squared")
     eta = Parameter(0.0, "rad", "misalignment about the pendulum axis", min=-0.01, max=0.01)
+    simulates = (turned("mount", ("accelerometer.mount.1", "accelerometer.mount.2", "accelerometer.mount.3")),)
     mount = Rotation("rows: input, output, pendulum axis in head axes")
     white = Noise(9.5e-6, "V/sqrt(Hz)", "white noise (3 uV in a mean of 10 s)")
 

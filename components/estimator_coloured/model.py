@@ -8,8 +8,8 @@ from gyrobench.component.blocks.matrix_model import (
     NO_READING,
     SMALL,
     UNIT,
-    LinearModel,
     M,
+    MatrixModel,
     corner,
     decays,
     padded,
@@ -37,7 +37,7 @@ def updated(L: Vector, P: Vector, rest: Vector, W: Vector, K: Vector, noise: Vec
     return vector(propagated(L, P) + propagated(rest, W) + propagated(K, noise))
 
 
-class EstimatorColoured(LinearModel):
+class EstimatorColoured(MatrixModel):
     """Kalman filter of a linear model whose readings carry coloured noise, without states for it.  [EST-KF-COLOURED]
 
         x+ = A x + w,   cov w = W        z = C x + v        v+ = psi v + nu,   cov nu = V

@@ -5,8 +5,8 @@ from gyrobench.component.blocks.matrix_model import (
     NO_STATE,
     SMALL,
     UNIT,
-    LinearModel,
     M,
+    MatrixModel,
     corner,
     padded,
     propagated,
@@ -17,7 +17,7 @@ from gyrobench.component.blocks.matrix_model import (
 from gyrobench.component.math import dot, vector
 
 
-class EstimatorLti(LinearModel):
+class EstimatorLti(MatrixModel):
     """Kalman filter of any linear model with constant matrices: up to six states, up to three readings.  [EST-KF-GEN]
 
         x+ = A x + w,   cov w = W        z = C x + v,   cov v = V

@@ -4,6 +4,7 @@ from gyrobench.component import Component, Discrete, Input, Noise, Output, Param
 from gyrobench.component.blocks.gyro import DEG_H, PER_G, ChannelDrift, GaussMarkov, torquer_rate
 from gyrobench.component.blocks.random_drift import Flicker, Quantization, RateRandomWalk
 from gyrobench.component.math import Vector, clip, cos, fabs, pi, sin, vector
+from gyrobench.component.set_up import GYRO_MOUNT, turned
 
 
 class Gyro2dof(Component):
@@ -88,6 +89,7 @@ class Gyro2dof(Component):
     k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
     k_T_x = Parameter(0.0, "1/K", "scale factor of the torquer about x per kelvin of mean temperature, relative")
     k_T_y = Parameter(0.0, "1/K", "scale factor of the torquer about y per kelvin of mean temperature, relative")
+    simulates = (turned("mount", GYRO_MOUNT),)
     mount = Rotation("rows: gyro axes x, y, z in case axes")
 
     H = Parameter(0.2, "N.m.s", "spin angular momentum", above=0.0)

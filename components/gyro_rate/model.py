@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, Rotation
 from gyrobench.component.blocks.gyro import DEG_H, GaussMarkov
+from gyrobench.component.set_up import GYRO_MOUNT, each, turned
 
 
 class GyroRate(Component):
@@ -21,6 +22,7 @@ class GyroRate(Component):
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     scale = Parameter([0.0, 0.0], "1", "relative errors of the scale factors", min=-0.1, max=0.1)
+    simulates = (each("bias", ("gyro.bias.x",), ("gyro.bias.y",)), turned("mount", GYRO_MOUNT))
     bias = Parameter([0.1 * DEG_H, 0.1 * DEG_H], "rad/s", "bias of each axis (0.1 deg/h)")
     ramp = Parameter([0.0, 0.0], "rad/s2", "linear drift of the bias")
     mount = Rotation("rows: gyro axes x, y, z in head axes")

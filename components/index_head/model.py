@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Discrete, Input, Noise, Output, Parameter, sampled
 from gyrobench.component.blocks.table import AxisTable
 from gyrobench.component.math import Number, cos, exp, fabs, floor, index, pi, sign, sin
+from gyrobench.component.set_up import places
 
 
 class IndexHead(AxisTable):
@@ -28,6 +29,8 @@ class IndexHead(AxisTable):
     """
 
     version = "1.0.0"
+
+    simulates = (places,)
 
     positions = Parameter(8, int, "number of positions N of a turn", min=2, max=24)
     error = Parameter([0.0] * 24, "rad", "error of each position", min=-0.1, max=0.1)

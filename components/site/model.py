@@ -4,7 +4,7 @@ from gyrobench.component.blocks.place import Place
 
 
 class Site(Place):
-    """Where the test stands: specific force and Earth rate, local frame ENU.  [CONV-FRAMES; TR8350.2]
+    """Site of the test: specific force and Earth rate, local frame ENU.  [CONV-FRAMES; TR8350.2]
 
         f = (0, 0, g)                    specific force a - G of a body at rest: it points up
         omega = W (0, cos L, sin L)      Earth rate, along the pole

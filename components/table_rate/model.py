@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.table import AxisTable, SegmentMotion
 from gyrobench.component.math import cos, fabs, floor, sin, vector
+from gyrobench.component.set_up import harmonic
 
 
 class TableRate(AxisTable):
@@ -44,6 +45,7 @@ class TableRate(AxisTable):
     rate_max = Parameter(10.0, "rad/s", "largest rate that may be commanded", above=0.0)
     ripple = Parameter(0.0, "1", "rate ripple, relative amplitude r", min=-0.1, max=0.1)
     ripple_cycles = Parameter(36, int, "ripple cycles per turn n", min=1, max=100000)
+    simulates = (harmonic(("encoder_amplitude",), ("encoder_phase",), ("angle.once", "angle.twice")),)
     encoder_amplitude = Parameter([0.0, 0.0], "rad", "encoder error of orders 1 and 2")
     encoder_phase = Parameter([0.0, 0.0], "rad", "their phases at angle 0")
     quantum = Parameter(0.0, "rad", "quantum of angle_read; 0: none", min=0.0)

@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Discrete, Input, Noise, Output, Parameter, State, sampled
 from gyrobench.component.blocks.table import AxisTable, SegmentMotion
 from gyrobench.component.math import Number, clip, cos, fabs, floor, maximum, pi, sin, sqrt, tanh
+from gyrobench.component.set_up import harmonic, unbalanced
 
 DRIVEN, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages: kinematic modes; servo, far from null; servo, loop closed
 SIXTH = 1.0 / 6.0
@@ -70,6 +71,10 @@ class TableServo(AxisTable):
     capture_slow = Parameter(3e-5, "rad/s", "fine below this rate, or this one against the drift", above=0.0)
     capture_hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
 
+    simulates = (
+        harmonic(("encoder_amplitude",), ("encoder_phase",), ("angle.once", "angle.twice")),
+        unbalanced("unbalance"),
+    )
     encoder_amplitude = Parameter([0.0, 0.0, 0.0], "rad", "encoder error of orders 1, 2 and encoder_fine")
     encoder_phase = Parameter([0.0, 0.0, 0.0], "rad", "their phases at angle 0")
     encoder_fine = Parameter(360, int, "order of the fine encoder error, cycles per turn", min=1, max=100000)
@@ -96,18 +101,18 @@ class TableServo(AxisTable):
     per_lag = Discrete(0.0, "1/s", "1 / lag")
     per_J = Discrete(0.0, "1/(kg.m2)", "1 / J")
     back = Discrete(0.0, "N.m.s/V", "H_g / K_g")
-    kick = Discrete(0.0, "N.m/(V.s)", "demand of the compensator by a step of u, per time")
+    demand_rate = Discrete(0.0, "N.m/(V.s)", "demand of the compensator by a step of u, per time")
     wave_s = Discrete([0.0, 0.0], "rad", "encoder errors of order 1 and 2, sine part")
     wave_c = Discrete([0.0, 0.0], "rad", "their cosine part")
     reach = Discrete(1e-3, "rad", "largest angle from the mark")
-    pull = Discrete(0.0, "N.m/V", "k_p while capturing")
+    capture_gain = Discrete(0.0, "N.m/V", "k_p while capturing")
     brake = Discrete(0.0, "N.m.s/rad", "k_d while capturing")
     near = Discrete(0.0, "V", "capture_angle as a pickoff voltage")
 
     stage = Discrete(DRIVEN, "1", "0 kinematic, 1 capture, 2 fine")
     near_for = Discrete(0.0, "s", "time near null while capturing")
     slow_for = Discrete(0.0, "s", "time near null and slow while capturing")
-    wish = Discrete(0.0, "N.m", "demand of the compensator at the end of the step")
+    demand = Discrete(0.0, "N.m", "demand of the compensator at the end of the step")
     slope = Discrete(0.0, "N.m/s", "its derivative for u = 0")
     load = Discrete(0.0, "N.m", "M_load without noise")
     drag = Discrete(0.0, "N.m", "tachometer torque while capturing")
@@ -169,7 +174,7 @@ class TableServo(AxisTable):
         self.per_lag = 1.0 / self.lag
         self.per_J = 1.0 / self.J
         self.back = self.H_g / self.K_g
-        self.kick = self.gain * self.ratio[0] * self.ratio[1] * self.ratio[2] / self.lag
+        self.demand_rate = self.gain * self.ratio[0] * self.ratio[1] * self.ratio[2] / self.lag
         n = [self.gain * top, 0.0, 0.0, 0.0]
         for j in range(6):
             d[6 - j] = d[6 - j] + d[5 - j] * self.lag
@@ -195,7 +200,7 @@ class TableServo(AxisTable):
                 upper[j] = lower[j]
                 lower[j] = below
         sensitivity = top / self.C_g if self.C_g > 0.0 else self.K_g  # V per rad of table angle
-        self.pull = self.J * self.capture_rate * self.capture_rate / sensitivity
+        self.capture_gain = self.J * self.capture_rate * self.capture_rate / sensitivity
         self.brake = 2.0 * self.J * self.capture_rate * self.capture_damping
         self.near = self.capture_angle * sensitivity
         wide = self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max
@@ -249,12 +254,12 @@ class TableServo(AxisTable):
         m = -self.gain * y
         # what the motor gives beyond the linear law, at mid-step, from held values: nothing of it enters the Jacobian
         if self.stage == FINE:
-            middle = self.wish + 0.5 * self.h * (self.slope - self.kick * volt)
+            middle = self.demand + 0.5 * self.h * (self.slope - self.demand_rate * volt)
             m = m + (self.shaped(middle) - middle)
         if self.stage == CAPTURE:
             limit = self.brake * self.capture_speed
-            demand = clip(-self.polarity * self.pull * self.u, -limit, limit) + self.drag
-            m = m + clip(demand, -self.torque_max, self.torque_max)
+            capture = clip(-self.polarity * self.capture_gain * self.u, -limit, limit) + self.drag
+            m = m + clip(capture, -self.torque_max, self.torque_max)
         m = m + self.load + self.torque + self.noise.rumble - self.viscous * slip
         self.der.spin = (m - self.back * fast) * self.per_J
         self.der.theta = slip
@@ -311,7 +316,7 @@ class TableServo(AxisTable):
                 self.net[k] = ready * volt
         self.load = 0.0
         self.push = 0.0
-        self.wish = 0.0
+        self.demand = 0.0
         if self.stage == DRIVEN:
             return
         slip = self.spin - self.earth()
@@ -334,15 +339,15 @@ class TableServo(AxisTable):
                 d = self.pole[k] * lead
                 y = self.net[k] + self.ratio[k] * lead
                 dy = d + self.ratio[k] * (dy - d)
-            self.wish = -self.gain * y
+            self.demand = -self.gain * y
             self.slope = -self.gain * dy
-            self.push = self.shaped(self.wish)
+            self.push = self.shaped(self.demand)
             others = others - self.back * (volt * self.per_lag + fast)
         else:
             limit = self.brake * self.capture_speed
             self.drag = -self.brake * self.spin
-            demand = clip(-self.pull * volt, -limit, limit) + self.drag
-            self.push = clip(demand, -self.torque_max, self.torque_max)
+            capture = clip(-self.capture_gain * volt, -limit, limit) + self.drag
+            self.push = clip(capture, -self.torque_max, self.torque_max)
         self.motion.a = (self.push + others) * self.per_J
         self.motion.x = self.theta
         self.motion.v = slip
@@ -366,4 +371,4 @@ class TableServo(AxisTable):
         self.angle_read = read
         self.in_position = self.motion.arrived
         self.motor = self.push
-        self.saturated = 1.0 if fabs(self.wish) > self.torque_max else 0.0
+        self.saturated = 1.0 if fabs(self.demand) > self.torque_max else 0.0

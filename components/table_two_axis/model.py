@@ -3,6 +3,7 @@ from __future__ import annotations
 from gyrobench.component import IDENTITY, Discrete, Input, Output, Parameter, sampled
 from gyrobench.component.blocks.table import SegmentMotion, TwoAxisTable
 from gyrobench.component.math import Number, fabs, floor, index, sin, vector
+from gyrobench.component.set_up import harmonic
 
 
 class TableTwoAxis(TwoAxisTable):
@@ -26,6 +27,10 @@ class TableTwoAxis(TwoAxisTable):
     index_rate = Parameter([0.1, 0.1], "rad/s", "rate of an index move", above=0.0)
     rate_max = Parameter([10.0, 10.0], "rad/s", "largest rate that may be commanded", above=0.0)
     limits_y = Parameter([-1e9, 1e9], "rad", "lowest and highest inner angle")
+    simulates = tuple(
+        harmonic(("encoder_amplitude",), ("encoder_phase",), (f"{axis}.angle.once", f"{axis}.angle.twice"), row)
+        for row, axis in enumerate(("outer", "inner"))
+    )
     encoder_amplitude = Parameter([[0.0, 0.0], [0.0, 0.0]], "rad", "encoder error; rows: axes, columns: orders 1 and 2")
     encoder_phase = Parameter([[0.0, 0.0], [0.0, 0.0]], "rad", "their phases at angle 0")
     quantum = Parameter(0.0, "rad", "quantum of both readings; 0: none", min=0.0)

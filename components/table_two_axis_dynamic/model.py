@@ -8,6 +8,7 @@ from gyrobench.component.blocks.control import InPosition, SampledController
 from gyrobench.component.blocks.drive import DcMotor, SquareLawMotor
 from gyrobench.component.blocks.table import TwoAxisTable
 from gyrobench.component.math import Number, cos, sin, vector
+from gyrobench.component.set_up import SCALE, SCALE_PHASE, harmonic
 
 
 class TableTwoAxisDynamic(TwoAxisTable):
@@ -29,6 +30,14 @@ class TableTwoAxisDynamic(TwoAxisTable):
     """
 
     version = "1.0.0"
+
+    simulates = tuple(
+        harmonic(
+            [f"{axis}_{n}" for n in SCALE], [f"{axis}_{n}" for n in SCALE_PHASE],
+            (f"{axis}.angle.once", f"{axis}.angle.twice"),
+        )
+        for axis in ("outer", "inner")
+    )  # fmt: skip
 
     step = Parameter(1e-4, "s", "largest internal step", above=0.0)
     angle0 = Parameter([0.0, 0.0], "rad", "outer and inner angle at the start")

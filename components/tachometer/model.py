@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Output
-from gyrobench.component.blocks.drive import Tachometer as TachometerBlock
+from gyrobench.component.blocks.drive import TachometerReading
 
 
 class Tachometer(Component):
-    """Tachometer of a table axis: block Tachometer.  [TACHOMETER]
+    """Tachometer of a table axis: block TachometerReading.  [TACHOMETER]
 
         reading = rate (1 + scale_error) (1 + ripple sin(cycles x + phase))
 
@@ -14,7 +14,7 @@ class Tachometer(Component):
 
     version = "1.0.0"
 
-    tacho = TachometerBlock()
+    tacho = TachometerReading()
 
     angle = Input(0.0, "rad", "table angle")
     rate = Input(0.0, "rad/s", "table rate relative to its base")

@@ -27,6 +27,8 @@ from gyrobench.commands.options import (
 def list_command(as_json: Json = False) -> None:
     """List parts, systems, sockets and acceptance specifications.
 
+    A socket is the list of inputs and outputs, with units, that a part must have to stand in a slot of a system.
+
     \b
     Example: gyrobench list
     """

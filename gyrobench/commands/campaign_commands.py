@@ -106,7 +106,7 @@ def campaign(
     \b
     Example: gyrobench campaign lot.toml --workers 8
     """
-    from gyrobench.campaign.definition import read_definition
+    from gyrobench.campaign.execution.definition import read_definition
     from gyrobench.commands import run_campaign
 
     definition = read_definition(file)
@@ -194,9 +194,9 @@ def design(
         parse_swaps,
         parse_time,
     )
-    from gyrobench.design.plan_runs import DesignedTest
+    from gyrobench.design.designed_test import DesignedSuite, DesignedTest
     from gyrobench.design.shortest_test import design_test
-    from gyrobench.design.suite_design import DesignedSuite, design_suite
+    from gyrobench.design.suite_design import design_suite
     from gyrobench.system.suite import Suite
 
     settings = parse_settings(values)

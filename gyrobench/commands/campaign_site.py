@@ -10,8 +10,8 @@ from gyrobench.bench import Bench, UsageError, display_path
 
 def write(url: str, out: Path | None, publish: Path | None) -> None:
     """Write the site, print what it answers and where it is."""
-    from gyrobench.campaign.site import write_site
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.execution.store import Campaign
+    from gyrobench.campaign.site.site_folder import write_site
 
     written = write_site(Campaign.open(url), out, publish)
     for sentence in written.answer:
@@ -30,9 +30,9 @@ def are_campaigns(folders: Sequence[Path]) -> bool:
 
 def compare(folders: Sequence[Path], out: Path | None, as_json: bool) -> None:
     """Write and print what the second campaign differs in from the first beyond chance.  Raises UsageError."""
-    from gyrobench.campaign.campaign_comparison import compare_campaigns
-    from gyrobench.campaign.campaign_comparison_page import write_comparison
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.analysis.campaign_comparison import compare_campaigns
+    from gyrobench.campaign.execution.store import Campaign
+    from gyrobench.campaign.site.campaign_comparison_page import write_comparison
     from gyrobench.commands.console import print_report_files
     from gyrobench.workflow.run_comparison import comparison_folder
 

@@ -57,7 +57,9 @@ def format_system(description: Mapping[str, Any]) -> str:
             not w["connected"]
         )
         lines.append("  " + w["wire"] + "".join(marks))
-    lines += ["", "loops are cut at"] * bool(description["cuts"]) + [f"  {c}" for c in description["cuts"]]
+    lines += ["", "delayed wires, each closes a loop of parts"] * bool(description["cuts"]) + [
+        f"  {c}" for c in description["cuts"]
+    ]
     if description["plan"]:
         transitions = "" if "shape" in description["plan"][0] else " without the transitions between the phases"
         lines += ["", f"plan: {description['duration']:,.0f} s{transitions}"]

@@ -55,7 +55,7 @@ Spec = Annotated[
 ]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write record and result.json only, no HTML and PDF.")]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="End with exit code 1 if the verdict is void, fail or inconclusive.")
+    bool, typer.Option("--strict", help="End with exit code 1 if the verdict is fail, inconclusive or void (no value).")
 ]
 Data = Annotated[
     list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; for a suite, its runs.  Repeatable.")
@@ -95,7 +95,7 @@ class Target(StrEnum):
     python = "python"
 
 
-class Table(StrEnum):
+class TableFormat(StrEnum):
     csv = "csv"
 
 

@@ -13,8 +13,8 @@ from gyrobench.commands import console
 from gyrobench.commands.progress_display import ProgressDisplay
 
 if TYPE_CHECKING:
-    from gyrobench.campaign.campaign_execution import CampaignOutcome
-    from gyrobench.campaign.definition import Definition
+    from gyrobench.campaign.execution.campaign_execution import CampaignOutcome
+    from gyrobench.campaign.execution.definition import Definition
 
 REASONS = 5  # shown of each state
 
@@ -29,7 +29,7 @@ def from_arguments(
     more: dict[str, Any],
 ) -> Definition:
     """Return the definition of a sweep.  Raises UsageError."""
-    from gyrobench.campaign.definition import from_mapping
+    from gyrobench.campaign.execution.definition import from_mapping
     from gyrobench.commands.arguments import parse_assignments, parse_settings, parse_swaps
 
     axes = parse_assignments(list(over), "--over", "latitude=0deg..80deg:9")
@@ -60,7 +60,7 @@ def run(
 
     site: write the site of the campaign, too.
     """
-    from gyrobench.campaign.campaign_execution import execute_campaign
+    from gyrobench.campaign.execution.campaign_execution import execute_campaign
 
     with ProgressDisplay(definition.name) as progress:
         outcome = execute_campaign(
@@ -70,7 +70,7 @@ def run(
     summary = summarize(outcome)
     print(json.dumps(summary, indent=1, ensure_ascii=False) if as_json else "\n".join(_lines(summary)))
     if site:
-        from gyrobench.campaign.site import write_site
+        from gyrobench.campaign.site.site_folder import write_site
 
         written = write_site(outcome.campaign)
         if not as_json:
@@ -129,7 +129,7 @@ def _lines(summary: dict[str, Any]) -> list[str]:
     for state, reasons in summary["reasons"].items():
         lines += [f"{state}, {n:,}: {reason}" for reason, n in reasons.items()]
     if summary["quantities"]:
-        rows = [["", "unit", "runs", "mean", "std of estimates", "mean u", "interval holds the truth"]]
+        rows = [["", "unit", "runs", "mean", "std of estimates", "mean u", "interval contains the true value"]]
         for q in summary["quantities"]:
             spread = f"{q['std']:.3g}" if q["std"] is not None else ""
             held = f"{q['held'] / q['with_truth']:.3f} of {q['with_truth']:,}" if "held" in q else ""

@@ -24,7 +24,7 @@ from gyrobench.commands.options import (
     Spec,
     Strict,
     System,
-    Table,
+    TableFormat,
 )
 
 
@@ -204,7 +204,9 @@ def compare(
 @app.command()
 def record(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
-    to: Annotated[Table, typer.Option("--to", help="csv: windows.csv and channels.csv, SI, units in the header.")],
+    to: Annotated[
+        TableFormat, typer.Option("--to", help="csv: windows.csv and channels.csv, SI, units in the header.")
+    ],
     out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder; default csv/ in the run.")] = None,
 ) -> None:
     """Write the record of a run as tables for other programs.
@@ -218,6 +220,6 @@ def record(
     from gyrobench.record.record import Record
     from gyrobench.workflow.inputs import require_run
 
-    assert to is Table.csv
+    assert to is TableFormat.csv
     for file in Record.load(require_run(folder)).to_csv(out or folder / "csv"):
         echo(display_path(file))

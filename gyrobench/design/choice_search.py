@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gyrobench.design.designed_test import DesignedTest
 from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.plan_runs import (
-    DesignedTest,
     DesignError,
     Trial,
     Workbench,

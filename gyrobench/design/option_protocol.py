@@ -1,4 +1,4 @@
-"""What a test offers whose plan is a choice of options: methods, rates, numbers of positions, each with one length."""
+"""Protocol of a test whose plan is a choice of options: methods, rates, numbers of positions, each with one length."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gyrobench.arrays import Array
-from gyrobench.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import DataNoise
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
 
@@ -37,5 +37,5 @@ class OptionProtocol:
     covariances: Callable[[Sequence[Findings], Record], Sequence[Array]]
     names: tuple[str, ...]
     unseen: tuple[str, ...] = ()
-    noise: Noise | None = None  # of choices with known windows
+    noise: DataNoise | None = None  # of choices with known windows
     propose: Callable[[Mapping[str, float], float | None, str], Sequence[Choice]] | None = None

@@ -1,12 +1,11 @@
-"""Plans that are run to be designed by: the run, the predictions of its fits, the count of a plan, what comes out."""
+"""Plans that are run to be designed by: the run, the predictions of its fits, the count of a plan."""
 
 from __future__ import annotations
 
 import functools
 import math
-import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +14,13 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError, suggest_names
+from gyrobench.design.designed_test import DesignedValue
 from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
-from gyrobench.report.result_json import plain
 from gyrobench.system.system import System
 
 
@@ -29,60 +28,6 @@ class DesignError(GyrobenchError):
     """A wanted uncertainty that no plan of the test reaches, or a test that offers no plans."""
 
     exit_code = 2
-
-
-@dataclass(frozen=True)
-class DesignedValue:
-    """wanted, predicted u (as the reduction will state it), error (rms of the estimate), in ``unit``; book: u of the
-    system's own plan.  None: nothing was wanted of it.
-    """
-
-    name: str
-    unit: str
-    wanted: float | None
-    u: float
-    error: float
-    book: float
-
-
-@dataclass(frozen=True)
-class DesignedTest:
-    """options: of the system, for --set.  time, book_time: s of the plan, and of the system's own at equal uncertainty
-    (in a given time: the same time).  bound: s below which no plan reaches what is wanted; shares_efficiency: of the
-    shares of the time among the places under white noise, 1 is optimal; NaN where options and not places are chosen:
-    tried: the choices of options with their times.  counted: mean u, standard deviation of the estimates, runs.
-    """
-
-    system: str
-    given: Mapping[str, Any]
-    options: Mapping[str, Any]
-    plan: tuple[tuple[str, float], ...]
-    time: float
-    book_time: float
-    bound: float
-    shares_efficiency: float
-    timed: bool
-    criterion: str
-    values: Mapping[str, DesignedValue]
-    unseen: tuple[str, ...]
-    counted: Mapping[str, tuple[float, float, int]] = field(default_factory=dict)
-    tried: tuple[tuple[str, float], ...] = ()
-
-    @property
-    def command(self) -> str:
-        """Return the command that runs the plan."""
-        settings = {**self.given, **self.options}
-        text = " ".join(f"--set {shlex.quote(f'{n}={v}')}" for n, v in settings.items())
-        return f"gyrobench run {self.system} {text}".rstrip()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain JSON values; infinite times and what is not known are null."""
-        return {**plain(asdict(self)), "command": self.command}
-
-    def __str__(self) -> str:
-        from gyrobench.design.design_text import format_design
-
-        return format_design(self)
 
 
 @dataclass(frozen=True)

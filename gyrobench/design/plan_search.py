@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.design.approximate_design import ApproximateDesign, approximate_design, evaluate
 from gyrobench.design.predicted_uncertainty import effective
-from gyrobench.design.visit_protocol import Noise, VisitProtocol
+from gyrobench.design.visit_protocol import DataNoise, VisitProtocol
 
 LONGEST = 1e7  # s, beyond which a wanted uncertainty is not reached
 EXCHANGES = 400  # plans tried of each number of visits
@@ -53,7 +53,7 @@ class Search:
 
     protocol: VisitProtocol
     wants: tuple[Want, ...]
-    instruments: tuple[tuple[Noise, ...], ...]
+    instruments: tuple[tuple[DataNoise, ...], ...]
     criterion: str = "minimax"
     asked: int = 1
     least: float = 1.0
@@ -67,7 +67,7 @@ class Search:
             self._maps[channel] = np.array(rows).reshape(len(rows), p)
         return self._maps[channel]
 
-    def _white(self, noises: Sequence[Noise], dwell: float | None) -> tuple[Array, Array]:
+    def _white(self, noises: Sequence[DataNoise], dwell: float | None) -> tuple[Array, Array]:
         """Return information (m, p, p) of a second at each candidate under white noise, and the wanted rows (q, p)."""
         total = sum(c.rows.shape[1] for c in self.protocol.channels)
         M, wanted, at = np.zeros((len(self.protocol.labels), total, total)), [], 0
@@ -81,7 +81,7 @@ class Search:
             at = own.stop
         return M, np.vstack(wanted)
 
-    def approximate(self, noises: Sequence[Noise], dwell: float | None = None) -> ApproximateDesign:
+    def approximate(self, noises: Sequence[DataNoise], dwell: float | None = None) -> ApproximateDesign:
         """Return the best shares of the time under white noise: of the white part, or of all noise over a dwell (s)."""
         return approximate_design(*self._white(noises, dwell), self.criterion)
 
@@ -101,7 +101,7 @@ class Search:
         index = np.asarray(places)
         return max(self._merit(index, t0, t1, noises) for noises in self.instruments)
 
-    def _merit(self, index: NDArray[np.int_], t0: Array, t1: Array, noises: Sequence[Noise]) -> float:
+    def _merit(self, index: NDArray[np.int_], t0: Array, t1: Array, noises: Sequence[DataNoise]) -> float:
         squares: list[float] = []
         logdet, count = 0.0, 0
         for k, c in enumerate(self.protocol.channels):
@@ -317,7 +317,7 @@ def exchanged(search: Search, design: ApproximateDesign, plan: ExactPlan, time: 
     return plan
 
 
-def shortest_time(search: Search, noises: Sequence[Noise]) -> tuple[float, ApproximateDesign]:
+def shortest_time(search: Search, noises: Sequence[DataNoise]) -> tuple[float, ApproximateDesign]:
     """Return a time (s) below which no plan reaches what is wanted, and its design.  The fewest visits settle in it.
 
     The noise is taken as its white part and moves as none: both make a plan shorter than it can be.

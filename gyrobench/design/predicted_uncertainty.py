@@ -1,4 +1,4 @@
-"""What a reduction will state for a plan, predicted from the fit that the same reduction made of one run of it.
+"""Uncertainty that a reduction will state for a plan, predicted from its fit of one run of that plan.
 
 The design matrix, the windows, the set-up effects that are weighed and the functions of the unknowns are those of that
 fit; its data are replaced by the fitted model plus noise drawn from the true noise model, and it is made again, a few
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.design.visit_protocol import Noise
+from gyrobench.design.visit_protocol import DataNoise
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise import mean_variance
@@ -32,7 +32,7 @@ EASY, FEWEST = 300.0, 12
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of one fit: names and printed units of its values, u, error and least (q,) in these units, and u of type B."""
+    """Prediction for a fit: names and printed units of its values; u, error, least (q,) in these units, u of type B."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -79,18 +79,19 @@ def _again(fit: Findings, y: Array, J: Array) -> tuple[Array, Array]:
     """Return u (q,) and gain (q, n) of the values J b of the same fit of other data, as :meth:`Findings.derive` does,
     without its tests of the residuals, which would take most of the time.
     """
-    p, names = fit.X.shape[1], [x.name for x in fit.linear]
-    if fit.mode == "white":
+    p = fit.X.shape[1]
+    names = fit.est.names[:p]
+    if fit.white:
         est = noise_mixture_fit.ordinary(fit.X, y, names, fit.t_start, fit.t_end, fit.weights, math.inf)
     else:
         blocks = [c.block for c in fit.candidates]
-        readings = fit.mode == "readings"
+        readings = fit.data.noise == "readings"
         est = noise_mixture_fit.fit(fit.X, y, names, fit.t_start, fit.t_end, math.inf, readings, blocks, fit.known)
     full = np.column_stack([J, np.zeros((len(J), est.beta.size - p))])
     sd, half = est.mixture.spread(full)
     return np.minimum(sd, half / NORMAL), full @ est.gain
 
 
-def effective(noise: Noise, window: float) -> float:
+def effective(noise: DataNoise, window: float) -> float:
     """Return the density that white noise would have with the variance of this noise over a window (s)."""
     return math.sqrt(noise.white**2 + window * noise.markov**2 * float(mean_variance(np.array(window / noise.tau))))

@@ -25,10 +25,10 @@ from gyrobench.bench import UsageError
 from gyrobench.design import plan_search
 from gyrobench.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
 from gyrobench.design.choice_search import search_choices
+from gyrobench.design.designed_test import DesignedTest
 from gyrobench.design.option_protocol import OptionProtocol
 from gyrobench.design.plan_runs import (
     Covariances,
-    DesignedTest,
     DesignError,
     Trial,
     Workbench,
@@ -39,7 +39,7 @@ from gyrobench.design.plan_runs import (
 )
 from gyrobench.design.plan_search import ExactPlan, Search, Want
 from gyrobench.design.predicted_uncertainty import effective
-from gyrobench.design.visit_protocol import Noise, VisitProtocol
+from gyrobench.design.visit_protocol import DataNoise, VisitProtocol
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import noise as noise_model
@@ -266,7 +266,7 @@ def _unreachable(search: Search, wanted: Mapping[str, Want], time: float | None)
     return f"{', '.join(wanted)}: not reached by any plan of up to {plan_search.LONGEST:g} s a visit{cause}"
 
 
-def _population(nominal: Sequence[Noise], count: int) -> list[tuple[Noise, ...]]:
+def _population(nominal: Sequence[DataNoise], count: int) -> list[tuple[DataNoise, ...]]:
     """Return instruments of the population of the reductions, with the nominal variance over WINDOW."""
     rng, out = np.random.default_rng(0), []
     t0 = np.arange(0.0, 3600.0, WINDOW)
@@ -274,7 +274,9 @@ def _population(nominal: Sequence[Noise], count: int) -> list[tuple[Noise, ...]]
         tau, share, _ = noise_model.sample_instrument(rng, t0, t0 + WINDOW)
         v = float(noise_model.mean_variance(np.array(WINDOW / tau)))
         sizes = [effective(n, WINDOW) for n in nominal]
-        out.append(tuple(Noise(s * math.sqrt(1.0 - share), s * math.sqrt(share / (WINDOW * v)), tau) for s in sizes))
+        out.append(
+            tuple(DataNoise(s * math.sqrt(1.0 - share), s * math.sqrt(share / (WINDOW * v)), tau) for s in sizes)
+        )
     return out
 
 
@@ -290,8 +292,8 @@ def _with_noise_of(protocol: VisitProtocol, folder: Path, system: System) -> Vis
         system.reduce(record)
     if any(f.ideal for f, _ in fits):
         raise UsageError(f"--noise {folder}: a run without noise; a run of the instrument, or simulated with its noise")
-    estimates = [f.est for f, _ in fits]
-    found = [Noise(e.density[0], e.sigma[0], max(e.tau[0], 1e-3)) for e in estimates]
+    estimates = [f.est.noise for f, _ in fits]
+    found = [DataNoise(e.density[0], e.sigma[0], max(e.tau[0], 1e-3)) for e in estimates]
     channels = [replace(c, noise=n) for c, n in zip(protocol.channels, found, strict=True)]
     slow = max(e.sigma[2] / e.density[0] * math.sqrt(WINDOW) if e.density[0] > 0.0 else 0.0 for e in estimates)
     said = (

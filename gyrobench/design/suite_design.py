@@ -1,4 +1,4 @@
-"""Which tests of a suite, and which plan of each, reach wanted uncertainties soonest.
+"""Tests of a suite, and a plan of each, that reach wanted uncertainties soonest.
 
 Each test that offers plans is designed for all that is wanted of it; of the sets of tests in which every wanted value
 is reached by one test, the set that takes least time is chosen, the shortest test first.  Not used: that two tests that
@@ -9,40 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 from gyrobench.bench import UsageError
-from gyrobench.design.design_text import format_suite_design
-from gyrobench.design.plan_runs import DesignedTest, DesignError
+from gyrobench.design.designed_test import DesignedSuite, DesignedTest
+from gyrobench.design.plan_runs import DesignError
 from gyrobench.design.shortest_test import design_test
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.suite import Suite
-
-
-@dataclass(frozen=True)
-class DesignedSuite:
-    """tests: in the order to be made.  others: designed and not needed.  left_out: test -> why it has no plan."""
-
-    suite: str
-    tests: tuple[DesignedTest, ...]
-    others: tuple[DesignedTest, ...]
-    left_out: Mapping[str, str]
-
-    @property
-    def time(self) -> float:
-        """Return the time of all tests, s; changes from one to the next are not in it."""
-        return sum(t.time for t in self.tests)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        named = {"tests": [t.as_dict() for t in self.tests], "others": [t.as_dict() for t in self.others]}
-        return {"suite": self.suite, "time": self.time, **named, "left_out": dict(self.left_out)}
-
-    def __str__(self) -> str:
-        return format_suite_design(self)
 
 
 def design_suite(

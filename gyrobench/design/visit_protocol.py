@@ -1,4 +1,4 @@
-"""What a test tells the search for its shortest plan: candidates, rows of its regression, noise, moves, options.
+"""Protocol of a test for the search for its shortest plan: candidates, rows of its regression, noise, moves, options.
 
 A system names in ``protocol`` a module beside system.py with
 
@@ -26,7 +26,7 @@ GUARD = 0.011  # s that sequencer and sampler take beside move, settling and dwe
 
 
 @dataclass(frozen=True)
-class Noise:
+class DataNoise:
     """Noise of the data of a fit: white density, rms and correlation time (s) of a Gauss-Markov process, in the unit of
     the data.  The model of gyrobench.reduction.estimation.noise.
     """
@@ -54,7 +54,7 @@ class Channel:
     names: tuple[str, ...]
     rows: Array
     map: Array
-    noise: Noise
+    noise: DataNoise
     repeat: Array | float = 0.0
     aliases: Mapping[str, str] = field(default_factory=dict)  # want -> name
 
@@ -96,7 +96,7 @@ def phases_of(system: System) -> list[Phase]:
 
 def gyro_noise(
     parameters: Mapping[str, Any], k: str = "gyro.k", meter: str = "rebalance.meter", axis: str = ""
-) -> Noise:
+) -> DataNoise:
     """Return the noise of a drift rate that a rebalance current gives, rad/s: of the gyro, and of the current meter.
 
     axis: "_x" of a gyro with two.  The noise of the pickoff falls with the window and is left out.
@@ -104,7 +104,9 @@ def gyro_noise(
     p = parameters
     read = float(p.get(k, 0.0)) * float(p.get(meter, 0.0))
     tau = float(p.get(f"gyro.markov{axis}_tau", p.get("gyro.markov_tau", 1.0)))
-    return Noise(float(np.hypot(p.get(f"gyro.white{axis}", 0.0), read)), float(p.get(f"gyro.markov{axis}", 0.0)), tau)
+    return DataNoise(
+        float(np.hypot(p.get(f"gyro.white{axis}", 0.0), read)), float(p.get(f"gyro.markov{axis}", 0.0)), tau
+    )
 
 
 #: parameters of a gyro's drift that are outside the noise model

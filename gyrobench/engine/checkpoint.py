@@ -224,7 +224,7 @@ class CheckpointManager:
 
     @property
     def is_there(self) -> bool:
-        """Whether there is a checkpoint to continue from."""
+        """Return True if there is a checkpoint to continue from."""
         return any((folder / FILE).is_file() for folder in (self.folder, self.source))
 
     def last_step(self, h: float) -> int | None:

@@ -1,9 +1,8 @@
 """The process in which a run happens: its FMUs, its loop, its checkpoints.
 
-What it records goes to the files of a :class:`Desk`, not through descriptors that an FMU could write to: they are open
-only while no FMU runs.  Standard output and error go to a file, all other descriptors of the parent are closed.
-On a system where a process cannot be forked safely it is ``python -m gyrobench.engine.child``, with the job on standard
-input.
+What it records goes to :class:`RunFiles`, not through descriptors that an FMU could write to: they are open only while
+no FMU runs.  Standard output and error go to a file, all other descriptors of the parent are closed.  On a system where
+a process cannot be forked safely it is ``python -m gyrobench.engine.child``, with the job on standard input.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ GONE = 0.2  # s between two looks whether the parent lives
 
 
 @dataclass(frozen=True)
-class Desk:
+class RunFiles:
     """Files that parent and child share, in a folder.
 
     board: of the run, where memory cannot be shared otherwise.  channel, window: rows that have left the board, as
@@ -82,22 +81,22 @@ class Loads:
     memory: int | None
 
 
-def run_job(job: Job, loads: Loads, desk: Desk, board: RunBoard, parent: int) -> None:
+def run_job(job: Job, loads: Loads, files: RunFiles, board: RunBoard, parent: int) -> None:
     """Run a job in this process, which does nothing else, and end it."""
     code = 1
     try:
-        _settle(desk, parent)
+        _settle(files, parent)
         _limit_memory(loads.memory)
         instances: dict[str, FmuInstance] = {}
-        board.keep = desk.keep
+        board.keep = files.keep
         try:
             place = os.getcwd()
             ending = _load_and_execute(job, loads, board, instances)
             if _here() != place:
                 ending.remarks = (f"an FMU changed the working directory to {_here()}; the run was not affected",)
-            _write(desk, job, ending)
+            _write(files, job, ending)
         except BaseException:  # a fault of gyrobench itself
-            write_whole(desk.file("ending"), json.dumps({"fault": traceback.format_exc()}).encode())
+            write_whole(files.file("ending"), json.dumps({"fault": traceback.format_exc()}).encode())
         for instance in instances.values():
             instance.free()
         code = 0
@@ -122,15 +121,15 @@ def _here() -> str:
         return "one that does not exist"
 
 
-def _settle(desk: Desk, parent: int) -> None:
-    """Become a process that shares nothing with the parent but the board and the desk, and that ends with it."""
+def _settle(files: RunFiles, parent: int) -> None:
+    """Become a process that shares with the parent only the board and the files of the run, and ends with it."""
     gc.freeze()  # nothing of the parent's is finalized here
     if faulthandler.is_enabled():
         faulthandler.disable()
     for number in SIGNALS:  # the parent's business
         signal.signal(number, signal.SIG_IGN)
     nothing = os.open(os.devnull, os.O_RDWR)
-    printed = os.open(desk.file("printed"), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    printed = os.open(files.file("printed"), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for target, source in ((0, nothing), (1, printed), (2, printed)):
         os.dup2(source, target)
     if os.name == "posix":
@@ -179,7 +178,7 @@ def _limit_memory(more: int | None) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
 
 
-def _write(desk: Desk, job: Job, ending: Ending) -> None:
+def _write(files: RunFiles, job: Job, ending: Ending) -> None:
     """Write how the run ended, for :func:`read_ending`; its rows are there."""
     found: dict[str, Any] = {"remarks": ending.remarks}
     state, error = ending.state, ending.problem
@@ -194,16 +193,16 @@ def _write(desk: Desk, job: Job, ending: Ending) -> None:
         found["resume"] = [str(error)]
     if job.checkpoints is not None:
         found["checkpoints"] = [job.checkpoints.resumed_at, job.checkpoints.resume_hint]
-    write_whole(desk.file("ending"), json.dumps(found).encode())
+    write_whole(files.file("ending"), json.dumps(found).encode())
 
 
 ERRORS: dict[str, Any] = {"call": FmuCallError, "stopped": EngineStopped, "resume": ResumeError}
 
 
-def read_ending(desk: Desk) -> dict[str, Any] | None:
+def read_ending(files: RunFiles) -> dict[str, Any] | None:
     """Return what the child wrote at its end, with its ``problem``; None where it did not come to write it."""
     try:
-        found: dict[str, Any] = json.loads(desk.file("ending").read_bytes())
+        found: dict[str, Any] = json.loads(files.file("ending").read_bytes())
     except (OSError, ValueError):
         return None
     found["problem"] = next((ERRORS[key](*found[key]) for key in ERRORS if key in found), None)
@@ -215,8 +214,8 @@ def main() -> None:
     import pickle
 
     job, loads, folder, parent = pickle.load(sys.stdin.buffer)
-    desk = Desk(folder)
-    run_job(job, loads, desk, RunBoard(job.program, desk.file("board")), parent)
+    files = RunFiles(folder)
+    run_job(job, loads, files, RunBoard(job.program, files.file("board")), parent)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ class Job:
 
 @dataclass
 class Ending:
-    """How a run ended.  state: None where it did not come to its first step.  problem: None for a whole run.
+    """End of a run.  state: None where it did not come to its first step.  problem: None for a whole run.
 
     remarks: on the FMUs, for the user.
     """

@@ -34,7 +34,7 @@ class NumberType:
 
     @property
     def refusal(self) -> str:
-        """What is said of a number that the type does not hold."""
+        """Return the message for a number that the type does not hold."""
         return f"a value that {self.name} does not hold ({self.lowest} to {self.highest})"
 
 

@@ -85,7 +85,7 @@ class RunBoard:
 
     @property
     def full(self) -> bool:
-        """Whether a block has no place for another row."""
+        """Return True if a block has no room for another row."""
         return bool(self.status.channel_rows >= BLOCK or self.status.window_rows >= BLOCK)
 
     def drain(self, channel_rows: list[Array], window_rows: list[Array]) -> None:

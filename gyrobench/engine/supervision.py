@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.arrays import Array
-from gyrobench.engine.child import Desk, Loads, read_ending, run_job
+from gyrobench.engine.child import Loads, RunFiles, read_ending, run_job
 from gyrobench.engine.execution import Ending, Job
 from gyrobench.engine.fmu_instance import FmuCallError
 from gyrobench.engine.reference_engine import RunState
@@ -41,11 +41,11 @@ MEMORY_SHARE = 0.5  # of the machine's memory that a run may take
 class _Forked:
     """A child made by fork: it has what this process has, at once."""
 
-    def __init__(self, job: Job, loads: Loads, desk: Desk, board: RunBoard) -> None:
+    def __init__(self, job: Job, loads: Loads, files: RunFiles, board: RunBoard) -> None:
         parent = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
-            run_job(job, loads, desk, board, parent)
+            run_job(job, loads, files, board, parent)
         self.code: int | None = None
 
     def poll(self) -> int | None:
@@ -64,7 +64,7 @@ class _Forked:
             time.sleep(0.001)
 
 
-def _spawn(job: Job, loads: Loads, desk: Desk) -> subprocess.Popen[bytes]:
+def _spawn(job: Job, loads: Loads, files: RunFiles) -> subprocess.Popen[bytes]:
     """Return a child that starts Python anew."""
     import pickle
 
@@ -72,7 +72,7 @@ def _spawn(job: Job, loads: Loads, desk: Desk) -> subprocess.Popen[bytes]:
 
     root = str(Path(gyrobench.__file__).parents[1])
     paths = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH", "")) if p)
-    with desk.file("printed").open("ab") as printed:
+    with files.file("printed").open("ab") as printed:
         process = subprocess.Popen(
             [sys.executable, "-m", "gyrobench.engine.child"],
             stdin=subprocess.PIPE,
@@ -83,7 +83,7 @@ def _spawn(job: Job, loads: Loads, desk: Desk) -> subprocess.Popen[bytes]:
         )
     assert process.stdin is not None
     with contextlib.suppress(OSError), process.stdin:  # a child that is gone says so by its exit code
-        pickle.dump((job, loads, desk.folder, os.getpid()), process.stdin)
+        pickle.dump((job, loads, files.folder, os.getpid()), process.stdin)
     return process
 
 
@@ -115,7 +115,7 @@ def supervise(
     fmus: slot -> model description and folder of its files.  folder: for files of the run.  timeout: s, for one call of
     an FMU.
     """
-    return _Supervisor(job, fmus, Desk(folder), progress, timeout).run()
+    return _Supervisor(job, fmus, RunFiles(folder), progress, timeout).run()
 
 
 class _Supervisor:
@@ -123,16 +123,16 @@ class _Supervisor:
         self,
         job: Job,
         fmus: dict[str, tuple[Any, Path]],
-        desk: Desk,
+        files: RunFiles,
         progress: Callable[[ProgressReport], None] | None,
         timeout: float,
     ) -> None:
-        self.job, self.desk, self.progress, self.timeout = job, desk, progress, timeout
+        self.job, self.files, self.progress, self.timeout = job, files, progress, timeout
         self.memory = memory_limit()
         self.loads = Loads(fmus, None if self.memory is None else 2 * self.memory)
-        desk.clear()
+        files.clear()
         self.forked = can_fork()
-        self.board = RunBoard(job.program, None if self.forked else desk.file("board"))
+        self.board = RunBoard(job.program, None if self.forked else files.file("board"))
         self.status = self.board.status
         self.process: Any = None
         self.end: int | None = None  # readable when the process has ended
@@ -146,8 +146,8 @@ class _Supervisor:
         h = self.job.schedule.step
         try:
             with Interrupts() as interrupts:
-                job, loads, desk = self.job, self.loads, self.desk
-                self.process = _Forked(job, loads, desk, self.board) if self.forked else _spawn(job, loads, desk)
+                job, loads, files = self.job, self.loads, self.files
+                self.process = _Forked(job, loads, files, self.board) if self.forked else _spawn(job, loads, files)
                 with contextlib.suppress(AttributeError, OSError):  # Linux
                     self.end = os.pidfd_open(self.process.pid)
                 while self.process.poll() is None:
@@ -186,13 +186,13 @@ class _Supervisor:
                 f"the run takes more than {self.memory / 1e9:.2g} GB of memory, {MEMORY_SHARE:.0%} of this machine's; "
                 "its process was stopped"
             )
-        printed = self.desk.file("printed")
+        printed = self.files.file("printed")
         with contextlib.suppress(OSError):
             if printed.stat().st_size > PRINTED:
                 os.truncate(printed, 0)
 
     def _patience(self) -> float:
-        if self.status.stop or self.desk.file("ending").exists():
+        if self.status.stop or self.files.file("ending").exists():
             return min(self.timeout, ENDING)
         return self.timeout if self.status.call else max(self.timeout, START)
 
@@ -242,7 +242,7 @@ class _Supervisor:
 
     # ------------------------------------------------------------ after it has ended
     def _ending(self) -> Ending:
-        found = read_ending(self.desk)
+        found = read_ending(self.files)
         if found is None:
             return Ending(self._state({}), self._failure())
         if "fault" in found:
@@ -274,7 +274,7 @@ class _Supervisor:
 
     def _rows(self, name: str, last: Array) -> list[Array]:
         """Return the rows that were kept, and those in the block, each once."""
-        kept = self.desk.rows(name, last.shape[1])
+        kept = self.files.rows(name, last.shape[1])
         if len(kept):
             last = last[last[:, 0] > kept[-1, 0]]
         return [rows for rows in (kept, last) if len(rows)]
@@ -308,7 +308,7 @@ class _Supervisor:
 
     def _printed(self) -> list[str]:
         """Return the last lines that FMUs printed."""
-        with contextlib.suppress(OSError), self.desk.file("printed").open("rb") as file:
+        with contextlib.suppress(OSError), self.files.file("printed").open("rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - 4096))
             text = file.read().decode("utf-8", "replace")
             printable = "".join(c if c.isprintable() or c == "\n" else " " for c in text)

@@ -1,4 +1,4 @@
-"""What a system that is one FMU offers to set and to read: variables of its parts, and options that stand for them."""
+"""Variables that a system that is one FMU exposes: those of its parts, and options that stand for them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SECTIONS = ("parameter", "input", "output")
 
 
 @dataclass(frozen=True)
-class Choice:
+class ExposedVariable:
     """A variable to expose.  section: its causality.  ends: (slot, variable) of what it stands for."""
 
     name: str
@@ -45,16 +45,16 @@ class _Chooser:
             raise ExportError(f"--expose {name}: {what}")
         return found
 
-    def of_part(self, name: str) -> Choice:
+    def of_part(self, name: str) -> ExposedVariable:
         """Return a variable of a part.  Raises ExportError for one that cannot be exposed."""
         slot, _, variable = name.partition(".")
         if name in self.wired:
             raise ExportError(f"--expose {name}: this input is wired: {self.wired[name]}")
         if self.causality[name] not in SECTIONS:
             raise ExportError(f"--expose {name}: it is internal; parameters, inputs and outputs can be exposed")
-        return Choice(name, self.causality[name], ((slot, variable),))
+        return ExposedVariable(name, self.causality[name], ((slot, variable),))
 
-    def option(self, name: str) -> Choice | None:
+    def option(self, name: str) -> ExposedVariable | None:
         """Return an option whose only effect is that parameters or inputs of parts take its value, else None."""
         value, kind = self.system[name], self.system.options[name].kind
         if kind is float and isinstance(value, float | int):
@@ -80,7 +80,7 @@ class _Chooser:
             ends = changed
         if not ends or any(not slot or f"{slot}.{variable}" in self.wired for slot, variable in ends):
             return None  # it changes nothing, a time of the run, or an input with a wire
-        return Choice(name, "parameter", tuple(sorted(ends)))
+        return ExposedVariable(name, "parameter", tuple(sorted(ends)))
 
     def settings(self, system: System) -> dict[tuple[str, str], Any]:
         """Return what is set in the parts, the factors of wires and the times of a system, by (slot, variable)."""
@@ -93,7 +93,7 @@ class _Chooser:
         return found
 
 
-def choose(system: System, assembly: Assembly, seed: int, asked: Iterable[str]) -> list[Choice]:
+def choose(system: System, assembly: Assembly, seed: int, asked: Iterable[str]) -> list[ExposedVariable]:
     """Return the variables to expose.
 
     asked: "slot.variable" (a parameter, an input without a wire, an output; all elements of an array) and names of

@@ -36,8 +36,8 @@ TURN = 0.1  # of a window by angle: the angle is a reading
 
 
 @dataclass(frozen=True)
-class Series:
-    """Where a recorded output is in a file: its name, None for a constant; how it becomes SI; whether it is held."""
+class RecordedOutput:
+    """Recorded output in a file: its name there, None for a constant; how it becomes SI; whether it is held."""
 
     name: str | None
     bound: Bound
@@ -51,7 +51,7 @@ class Series:
 
 def find_series(
     result: ResultFile, recorded: Mapping[str, tuple[str, Bound]], needed: set[str], held: set[str]
-) -> tuple[dict[str, Series], list[str]]:
+) -> tuple[dict[str, RecordedOutput], list[str]]:
     """Return the series of the recorded outputs by their names, and the names of those that are not in the file.
 
     In the file an output is "slot.variable" with the name that its FMU gives it and in the FMU's unit, "slot.output" in
@@ -59,7 +59,7 @@ def find_series(
     whose outputs hold what they say of a window.
     Raises DataError where one that is ``needed`` is missing, or one is there twice.
     """
-    found: dict[str, Series] = {}
+    found: dict[str, RecordedOutput] = {}
     missing, problems = [], []
     ends: dict[str, list[str]] = {}
     for name in result.names:
@@ -68,7 +68,7 @@ def find_series(
             ends.setdefault(".".join(parts[k:]), []).append(name)
     for output, (slot, bound) in recorded.items():
         if bound.constant is not None:
-            found[output] = Series(None, bound)
+            found[output] = RecordedOutput(None, bound)
             continue
         own = f"{slot}.{bound.variable}"
         fits = list(dict.fromkeys([*ends.get(own, ()), *ends.get(output, ())]))
@@ -78,7 +78,7 @@ def find_series(
         elif fits:
             name = (exact or fits)[0]
             si = name not in ends.get(own, ())
-            found[output] = Series(name, replace(bound, gain=1.0, offset=0.0) if si else bound, slot in held)
+            found[output] = RecordedOutput(name, replace(bound, gain=1.0, offset=0.0) if si else bound, slot in held)
         elif own in result.constants or output in result.constants:
             problems.append(f"{own} is constant in the file: nothing ran, or its outputs were not stored")
         else:
@@ -97,7 +97,7 @@ class ResultReader:
 
     system: System
     result: ResultFile
-    series: Mapping[str, Series]
+    series: Mapping[str, RecordedOutput]
     step: float  # s, of the system
     windows: dict[str, list[AnyArray]] = field(default_factory=dict)
     channels: dict[str, list[AnyArray]] = field(default_factory=dict)

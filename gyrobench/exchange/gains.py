@@ -25,7 +25,7 @@ FACTOR, OFFSET, INPUT, OUTPUT = (
 
 
 @dataclass(frozen=True)
-class Link:
+class ExportedLink:
     """A connection that copies: of a system, or one of the two that a gain lies between."""
 
     source: str
@@ -41,7 +41,7 @@ class Gains:
 
     parts: Mapping[str, Connection]
     order: list[str]  # slots and gains, each gain right before its target
-    links: list[Link]
+    links: list[ExportedLink]
 
     def starts(self) -> Starts:
         """Return what is set in the gains."""
@@ -65,14 +65,14 @@ def gains_of(assembly: Assembly) -> Gains:
     before = {slot: [name for name, c in parts.items() if c.target == slot] for slot in assembly.order.order}
     order = [name for slot, names in before.items() for name in (*names, slot)]
     named = {id(c): name for name, c in parts.items()}
-    links: list[Link] = []
+    links: list[ExportedLink] = []
     for c in varying(assembly):
         name = named.get(id(c))
         if name is None:
-            links.append(Link(c.source, c.output, c.target, c.input, False))
+            links.append(ExportedLink(c.source, c.output, c.target, c.input, False))
         else:
-            links.append(Link(c.source, c.output, name, INPUT, True))
-            links.append(Link(name, OUTPUT, c.target, c.input, True))
+            links.append(ExportedLink(c.source, c.output, name, INPUT, True))
+            links.append(ExportedLink(name, OUTPUT, c.target, c.input, True))
     return Gains(parts, order, links)
 
 

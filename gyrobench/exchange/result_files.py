@@ -17,7 +17,7 @@ import numpy as np
 
 from gyrobench.arrays import AnyArray
 from gyrobench.exchange.mat_files import SEVEN_THREE, is_mat, read_mat
-from gyrobench.record.csv_reader import Column, DataError, Head, read_head
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, read_head
 
 Block = dict[str, AnyArray]
 ROWS = 1 << 16  # of a block
@@ -109,7 +109,7 @@ def _csv_blocks(file: Path, head: Head, names: Sequence[str], wanted: Sequence[s
 
     plain = [n.replace("[", "(").replace("]", ")") for n in names]  # brackets would be units
     at = {n: plain[names.index(n)] for n in dict.fromkeys(wanted)}
-    for block in read_blocks(file, replace(head, names=plain), [Column(n, "1") for n in at.values()]):
+    for block in read_blocks(file, replace(head, names=plain), [CsvColumn(n, "1") for n in at.values()]):
         yield {n: block[column] for n, column in at.items()}
 
 

@@ -27,7 +27,7 @@ from gyrobench import reading
 from gyrobench.bench import Bench
 from gyrobench.exchange.gains import is_gain
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
-from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, Value, as_kind, bound_values, transformation
+from gyrobench.exchange.ssp_values import NS, ArchiveError, SspValue, Units, as_kind, bound_values, transformation
 from gyrobench.system.binding import Binding, Bound, fit
 from gyrobench.system.sockets import Socket
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
@@ -42,7 +42,7 @@ Node = tuple[Place, str]  # connector of a component or of a system
 
 @dataclass(frozen=True)
 class _Feed:
-    """What a connector gets: value = factor * (value of ``source``) + offset; unit: of the result."""
+    """Source of a connector's value: value = factor * (value of ``source``) + offset; unit: of the result."""
 
     source: Node
     factor: float
@@ -196,7 +196,7 @@ class _Structure:
         return _Feed(before.source, factor * before.factor, factor * before.offset + offset, unit or before.unit)
 
     # ------------------------------------------------------------------ parameters
-    def set_value(self, place: Place, name: str, value: Value, known: Units, raw: dict[str, Any]) -> None:
+    def set_value(self, place: Place, name: str, value: SspValue, known: Units, raw: dict[str, Any]) -> None:
         """Set a parameter or start value, named from ``place``.  Raises ArchiveError."""
         targets = self.targets(place, name)
         if not targets:

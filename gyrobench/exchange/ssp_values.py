@@ -65,7 +65,7 @@ class Units:
 
 
 @dataclass(frozen=True)
-class Value:
+class SspValue:
     """One value of a parameter set."""
 
     kind: str  # "Real", "Integer", "Boolean", "String", "Enumeration"
@@ -84,7 +84,7 @@ def transformation(element: ET.Element) -> tuple[float, float]:
     return 1.0, 0.0
 
 
-def _values(element: ET.Element) -> dict[str, Value]:
+def _values(element: ET.Element) -> dict[str, SspValue]:
     found = {}
     for p in element.findall("ssv:Parameters/ssv:Parameter", NS):
         child, name = next(iter(p), None), p.get("name", "")
@@ -105,7 +105,7 @@ def _values(element: ET.Element) -> dict[str, Value]:
             if isinstance(error, ArchiveError):
                 raise
             raise ArchiveError(f"parameter '{name}' = '{text}': not a value of the type {kind}") from None
-        found[name] = Value(kind, value, child.get("unit", ""))
+        found[name] = SspValue(kind, value, child.get("unit", ""))
     return found
 
 
@@ -123,7 +123,9 @@ def _read(binding: ET.Element, folder: Path, inline: str, what: str) -> ET.Eleme
     return reading.xml(file.read_bytes(), f"{what} {source}", ArchiveError)
 
 
-def bound_values(element: ET.Element, folder: Path, ssd_units: ET.Element | None) -> Iterator[tuple[str, Value, Units]]:
+def bound_values(
+    element: ET.Element, folder: Path, ssd_units: ET.Element | None
+) -> Iterator[tuple[str, SspValue, Units]]:
     """Yield name, value and units of all that is bound to a system or a component, after mappings.
 
     With a mapping only its entries are applied.  Raises ArchiveError.
@@ -152,11 +154,11 @@ def bound_values(element: ET.Element, folder: Path, ssd_units: ET.Element | None
             yield target, _mapped(entry, values[source]), known
 
 
-def _mapped(entry: ET.Element, value: Value) -> Value:
+def _mapped(entry: ET.Element, value: SspValue) -> SspValue:
     factor, offset = transformation(entry)
     suppressed = entry.get("suppressUnitConversion") == "true"
     if (factor, offset) == (1.0, 0.0):
-        return Value(value.kind, value.value, "" if suppressed else value.unit)
+        return SspValue(value.kind, value.value, "" if suppressed else value.unit)
     if value.kind not in ("Real", "Integer"):
         raise ArchiveError(f"parameter mapping: {entry.get('source')} is {value.kind}, which no factor applies to")
     if offset and value.unit and not suppressed:
@@ -164,10 +166,10 @@ def _mapped(entry: ET.Element, value: Value) -> Value:
             f"parameter mapping: {entry.get('source')}: an offset beside a unit conversion has no defined order; "
             "set suppressUnitConversion"
         )
-    return Value(value.kind, factor * value.value + offset, "" if suppressed else value.unit)
+    return SspValue(value.kind, factor * value.value + offset, "" if suppressed else value.unit)
 
 
-def as_kind(name: str, value: Value, kind: str, target_unit: str, known: Units) -> Any:
+def as_kind(name: str, value: SspValue, kind: str, target_unit: str, known: Units) -> Any:
     """Return a value as one of a variable of the FMU, in its unit.  Raises ArchiveError."""
     if kind == "Real" and value.kind in ("Real", "Integer"):
         factor, offset = known.convert(value.unit, target_unit)

@@ -21,7 +21,7 @@ from typing import Any
 from gyrobench.component.component import Component
 from gyrobench.engine.linked_system import obstacle
 from gyrobench.engine.program import build_program
-from gyrobench.exchange.exposure import SECTIONS, Choice, choose
+from gyrobench.exchange.exposure import SECTIONS, ExposedVariable, choose
 from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, stop_time
 from gyrobench.exchange.system_source import Exposed, SystemSource, source_files
 from gyrobench.packaging import load_part
@@ -93,7 +93,7 @@ def _exposed(
     assembly: Assembly,
     starts: Starts,
     classes: Mapping[str, tuple[str, type[Component]]],
-    choices: Iterable[Choice],
+    choices: Iterable[ExposedVariable],
 ) -> list[Exposed]:
     """Return the variables of the FMU, numbered in the order parameters, inputs, outputs.  Raises ExportError."""
     scalars = {f"{slot}.{s.name}": s for slot, (_, cls) in classes.items() for s in cls.layout}
@@ -102,7 +102,7 @@ def _exposed(
     for name, (slot, bound) in recorded(assembly).items():
         if bound.gain != 1.0 or bound.offset != 0.0:
             raise ExportError(f"fmu: {name} is mapped with a factor or offset, which its outputs do not apply")
-        chosen.append(Choice(name, "output", ((slot, bound.variable),)))
+        chosen.append(ExposedVariable(name, "output", ((slot, bound.variable),)))
     named: dict[str, Exposed] = {}
     for choice in chosen:
         ends = [(slot, scalars[f"{slot}.{variable}"]) for slot, variable in choice.ends]
@@ -121,7 +121,7 @@ def _text(source: SystemSource) -> str:
 
 
 class _Face:
-    """What the writers of descriptions take for a part."""
+    """System in the form of a part, for the writers of descriptions."""
 
     states = ()
 

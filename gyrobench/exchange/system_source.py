@@ -31,7 +31,7 @@ class Exposed:
 
 @dataclass(frozen=True)
 class SystemSource:
-    """What model.c of a system is made from.
+    """Content of the model.c of a system.
 
     parts: slot -> (name, class).  settings: (slot, value reference, value) of what is set in the parts.
     exposed: in the order of their value references: parameters, inputs, outputs.

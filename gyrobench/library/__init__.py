@@ -37,7 +37,7 @@ from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
 
 if TYPE_CHECKING:
-    from gyrobench.design.plan_runs import DesignedTest
+    from gyrobench.design.designed_test import DesignedTest
 
 __all__ = [
     "Comparison",

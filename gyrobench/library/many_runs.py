@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import pandas
     from distributed import Client
 
-    from gyrobench.campaign.campaign_execution import CampaignProgress
-    from gyrobench.campaign.definition import Definition
-    from gyrobench.campaign.site import Site
+    from gyrobench.campaign.execution.campaign_execution import CampaignProgress
+    from gyrobench.campaign.execution.definition import Definition
+    from gyrobench.campaign.site.site_folder import CampaignSite
 
 
 def campaign(
@@ -31,12 +31,13 @@ def campaign(
 ) -> pandas.DataFrame:
     """Run what is not done yet of a campaign; return a row for each run, ``attrs["units"]`` with the units.
 
-    definition: a TOML file, or a dictionary with its keys (see gyrobench.campaign.definition).  out: folder or URL that
-    keeps the rows; without it nothing is written.  client: of dask; else the one of a scheduler at an address, the
-    current one of a notebook, or ``workers`` local processes.  retry: run again what crashed or hung.  progress: called
-    twice a second.  Columns: see gyrobench.campaign.store.  Raises errors of type GyrobenchError.
+    definition: a TOML file, or a dictionary with its keys (see gyrobench.campaign.execution.definition).  out: folder
+    or URL that keeps the rows; without it nothing is written.  client: of dask; else the one of a scheduler at an
+    address, the current one of a notebook, or ``workers`` local processes.  retry: run again what crashed or hung.
+    progress: called twice a second.  Columns: see gyrobench.campaign.execution.store.  Raises errors of type
+    GyrobenchError.
     """
-    from gyrobench.campaign.definition import from_mapping, read_definition
+    from gyrobench.campaign.execution.definition import from_mapping, read_definition
 
     asked = from_mapping(definition) if isinstance(definition, Mapping) else read_definition(Path(definition))
     return _executed(asked, out or asked.out, client, scheduler, workers, retry, progress)
@@ -58,24 +59,24 @@ def sweep(
 
         gb.sweep("...", {"latitude": "0deg..80deg:9", "gyro.D_I": [0.1, 0.3]}, seeds=100, set={"turns": 2})
 
-    over: axis -> values as gyrobench.campaign.axes reads them.  more: further keys of a campaign (set, parts, runs,
-    design, table, data, keep ...).  The rest is as of :func:`campaign`.
+    over: axis -> values as gyrobench.campaign.execution.axes reads them.  more: further keys of a campaign (set,
+    parts, runs, design, table, data, keep ...).  The rest is as of :func:`campaign`.
     """
-    from gyrobench.campaign.definition import from_mapping
+    from gyrobench.campaign.execution.definition import from_mapping
 
     asked = from_mapping({"system": system, "over": dict(over or {}), "seeds": seeds, **more}, where="sweep")
     return _executed(asked, out, client, scheduler, workers, False, progress)
 
 
-def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> Site:
+def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> CampaignSite:
     """Write the site of a stored campaign; ``.index`` is its page, ``.answer`` the sentences with which it opens.
 
     campaign: folder or URL, the ``out`` of :func:`campaign` or :func:`sweep`.  out: folder of the site, default
     ``site`` in the campaign.  publish: a folder that shall hold everything, reports included.  Raises errors of type
     GyrobenchError.
     """
-    from gyrobench.campaign.site import write_site
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.execution.store import Campaign
+    from gyrobench.campaign.site.site_folder import write_site
 
     places = (None if p is None else Path(p) for p in (out, publish))
     return write_site(Campaign.open(campaign), *places)
@@ -90,7 +91,7 @@ def _executed(
     retry: bool,
     progress: Callable[[CampaignProgress], None] | None,
 ) -> pandas.DataFrame:
-    from gyrobench.campaign.campaign_execution import execute_campaign
+    from gyrobench.campaign.execution.campaign_execution import execute_campaign
 
     with _store(out) as url:
         outcome = execute_campaign(

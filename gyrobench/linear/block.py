@@ -15,13 +15,13 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.linear.part_linearization import jacobians
-from gyrobench.linear.sampled_model import Step, sampled_step
+from gyrobench.linear.sampled_model import SampledStep, sampled_step
 
 KEPT = 256  # parts at a point
 
 
 @dataclass
-class Block:
+class LinearBlock:
     """One part: x' = A x + B u, y = C x + D u, with the ports that matter, "slot.variable".
 
     within: B in the middle of each internal step, where a part follows an input through the communication step.
@@ -71,26 +71,26 @@ class _Point:
         return hash(self._key)
 
 
-def block_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> Block:
+def block_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> LinearBlock:
     """Return the part, slot = its instance name, linearized at its present point.  Raises ComponentError."""
     return _block(_Point(part), tuple(inputs), tuple(outputs), step)
 
 
-def step_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
+def step_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> SampledStep | None:
     """Return, and raise, what :func:`gyrobench.linear.sampled_model.sampled_step` does."""
     return _step(_Point(part), tuple(inputs), tuple(outputs), step)
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> Block:
+def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> LinearBlock:
     part = point.part
     a, b, c, d = jacobians(part, inputs, outputs)
     states = [s.name for s in part.states]
-    return Block(part.instance, [*inputs], [*outputs], states, a, b, c, d, _within(part, inputs, b, step))
+    return LinearBlock(part.instance, [*inputs], [*outputs], states, a, b, c, d, _within(part, inputs, b, step))
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> Step | None:
+def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> SampledStep | None:
     return sampled_step(point.part, [*inputs], [*outputs], step)
 
 

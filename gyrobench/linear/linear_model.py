@@ -30,8 +30,8 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.block import Block, block_of, step_of
-from gyrobench.linear.sampled_model import Step
+from gyrobench.linear.block import LinearBlock, block_of, step_of
+from gyrobench.linear.sampled_model import SampledStep
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
 from gyrobench.system.sockets import socket
@@ -100,7 +100,7 @@ class Linear:
         for part in parts.values():  # outputs may look ahead within the internal step
             part.h = step / max(1, math.ceil(step / getattr(part, "step", step) - 1e-9))
         self.blocks = {s: self._block(s, parts[s]) for s in self.order}
-        self.sampled: dict[str, Step] = {}
+        self.sampled: dict[str, SampledStep] = {}
         for s in self.order:
             try:
                 model = step_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
@@ -126,7 +126,7 @@ class Linear:
         slot, _, variable = name.partition(".")
         return any(s.name == variable and s.section == "output" for s in parts[slot].layout)
 
-    def _block(self, slot: str, part: Component) -> Block:
+    def _block(self, slot: str, part: Component) -> LinearBlock:
         incoming = list(dict.fromkeys(c.input.variable for c in self.connections if c.target == slot))
         wired = [c.output.variable for c in self.connections if c.source == slot]
         outgoing = list(dict.fromkeys([*wired, *(n.partition(".")[2] for n in self.shown if n.startswith(slot + "."))]))

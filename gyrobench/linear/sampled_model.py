@@ -23,7 +23,7 @@ MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the 
 
 
 @dataclass
-class Step:
+class SampledStep:
     """One step; names: of states and discrete values, in the order of the columns of A and C.
 
     within: the discrete values carry inputs through the step only (a part that follows an input between its values); at
@@ -38,7 +38,7 @@ class Step:
     within: bool = False
 
 
-def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> Step | None:
+def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> SampledStep | None:
     """Return the linear step of ``part`` at its present point; None where no sampled method links input and output.
 
     Raises ValueError (the text says why) for a part whose step is not the same one step later.
@@ -91,7 +91,9 @@ def _reached(part: Component, inputs: list[str], discrete: list[str], step: floa
     return np.asarray(values[0] != values[1])
 
 
-def _differences(part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]) -> Step:
+def _differences(
+    part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]
+) -> SampledStep:
     names = [s.name for s in part.states] + discrete
     kept: Any = part.get_state()
 
@@ -118,7 +120,7 @@ def _differences(part: Component, inputs: list[str], outputs: list[str], step: f
     def matrix(columns: list[str], after: Callable[[], list[float]], move: bool, rows: int) -> Array:
         return np.column_stack([column(n, after, move) for n in columns]) if columns else np.zeros((rows, 0))
 
-    return Step(
+    return SampledStep(
         names,
         matrix(names, state, True, len(names)),
         matrix(inputs, state, True, len(names)),

@@ -1,4 +1,4 @@
-"""What an FMU holds for its reader: documentation/index.html, made from what is declared, and licences.
+"""Documentation in an FMU: documentation/index.html, made from the declarations, and licences.
 
 Of FMI 3.0 also terminals: each vector or matrix of inputs or outputs is one, with the array as its only member.
 """

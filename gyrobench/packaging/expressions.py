@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
-from gyrobench.packaging.arrays import Place, Value, words
+from gyrobench.packaging.c_arrays import CExpression, CVariable, words
 from gyrobench.packaging.places import OPERATORS, Places
 from gyrobench.packaging.source import Code, SubsetError, gives_value, returns
 
@@ -37,7 +37,7 @@ class Expressions(Places):
             raise self.refuse(e, f"{ast.unparse(e)} is {words(value.shape)}: take one element of it")
         return value.text
 
-    def value(self, e: ast.expr) -> Value:
+    def value(self, e: ast.expr) -> CExpression:
         d = self.dual
         if isinstance(e, ast.Constant):
             if isinstance(e.value, bool) or not isinstance(e.value, int | float):
@@ -67,10 +67,10 @@ class Expressions(Places):
             raise self.refuse(e, f"write vector({ast.unparse(e)}), from gyrobench.component.math")
         raise self.refuse(e, f"{ast.unparse(e)!r} is outside the subset of equations")
 
-    def number(self, text: str, plain: bool = False) -> Value:
-        return Value((), lambda: text, plain)
+    def number(self, text: str, plain: bool = False) -> CExpression:
+        return CExpression((), lambda: text, plain)
 
-    def of_place(self, p: Place) -> Value:
+    def of_place(self, p: CVariable) -> CExpression:
         d = self.dual
         if p.kind == "constant":
             return self.number(f"d_con({p.base})" if d else p.base, plain=True)
@@ -80,24 +80,24 @@ class Expressions(Places):
         reads = frozenset([f"{p.kind}.{p.name}"])
         if p.kind == "local":
             storage = p.at() if p.whole and p.shape else ""
-            return Value(p.shape, p.at, True, p.whole, storage, reads)
+            return CExpression(p.shape, p.at, True, p.whole, storage, reads)
         storage = f"self->{p.at()}" if p.whole and p.shape and not d else ""
 
         def element(*i: str) -> str:
             return f"d_of(self->{p.at(*i)}, seed->{p.at(*i)})" if d else f"self->{p.at(*i)}"
 
-        return Value(p.shape, element, True, p.whole, storage, reads)
+        return CExpression(p.shape, element, True, p.whole, storage, reads)
 
-    def each(self, of: tuple[Value, ...], text: Callable[..., str]) -> Value:
+    def each(self, of: tuple[CExpression, ...], text: Callable[..., str]) -> CExpression:
         """Return the value made of the elements of ``of`` (numbers serve all elements)."""
         shape = next((v.shape for v in of if v.shape), ())
 
         def element(*i: str) -> str:
             return text(*(v.element(*i) if v.shape else v.text for v in of))
 
-        return Value(shape, element, False, all(v.aligned for v in of), "", _reads(of))
+        return CExpression(shape, element, False, all(v.aligned for v in of), "", _reads(of))
 
-    def binary(self, e: ast.BinOp) -> Value:
+    def binary(self, e: ast.BinOp) -> CExpression:
         if isinstance(e.op, ast.Pow):
             raise self.refuse(e, "no `**` (its rounding differs between targets): write x * x")
         if isinstance(e.op, ast.MatMult):
@@ -111,7 +111,7 @@ class Expressions(Places):
         infix, function = OPERATORS[type(e.op)]
         return self.each((a, b), lambda x, y: f"{function}({x}, {y})" if self.dual else f"({x} {infix} {y})")
 
-    def check_arithmetic(self, e: ast.BinOp, a: Value, b: Value) -> None:
+    def check_arithmetic(self, e: ast.BinOp, a: CExpression, b: CExpression) -> None:
         for side in (e.left, e.right):
             if isinstance(side, ast.Name) and side.id in self.bare:
                 raise self.refuse(side, f"{side.id} is a list: write {side.id} = vector([...]), which has arithmetic")
@@ -123,7 +123,7 @@ class Expressions(Places):
         if isinstance(e.op, ast.Div) and b.shape:
             raise self.refuse(e, f"{text}: only a number divides")
 
-    def operand(self, e: ast.expr) -> Value:
+    def operand(self, e: ast.expr) -> CExpression:
         """Return an array whose elements are read several times: a temporary where it is computed."""
         if isinstance(e, ast.Name) and e.id in self.bare:
             raise self.refuse(e, f"{e.id} is a list: write {e.id} = vector([...]), which has arithmetic")
@@ -132,7 +132,7 @@ class Expressions(Places):
             raise self.refuse(e, f"{ast.unparse(e)} is a number: a vector or a matrix is needed here")
         return value if value.plain else self.of_place(self.kept(value))
 
-    def product(self, e: ast.expr, a: Value, b: Value) -> Value:
+    def product(self, e: ast.expr, a: CExpression, b: CExpression) -> CExpression:
         """Return a @ b, summed from left to right."""
         if a.shape[-1] != b.shape[0]:
             raise self.refuse(e, f"{ast.unparse(e)}: {words(a.shape)} and {words(b.shape)} do not fit")
@@ -146,18 +146,18 @@ class Expressions(Places):
                 total = f"d_add({total}, {self.times(x, y)})" if self.dual else f"({total} + {self.times(x, y)})"
             return total
 
-        return Value(shape, element, False, False, "", _reads((a, b)))
+        return CExpression(shape, element, False, False, "", _reads((a, b)))
 
     def times(self, x: str, y: str) -> str:
         return f"d_mul({x}, {y})" if self.dual else f"({x} * {y})"
 
-    def transposed(self, e: ast.Attribute) -> Value:
+    def transposed(self, e: ast.Attribute) -> CExpression:
         of = self.operand(e.value)
         if len(of.shape) != 2:
             raise self.refuse(e, f"{ast.unparse(e.value)} is {words(of.shape)}: only a matrix is transposed")
-        return Value(of.shape[::-1], lambda i, j: of.element(j, i), of.plain, False, "", of.reads)
+        return CExpression(of.shape[::-1], lambda i, j: of.element(j, i), of.plain, False, "", of.reads)
 
-    def choice(self, e: ast.expr, test: ast.expr, then: ast.expr, other: ast.expr) -> Value:
+    def choice(self, e: ast.expr, test: ast.expr, then: ast.expr, other: ast.expr) -> CExpression:
         condition = self.condition(test)
         before = len(self.pre)
         a, b = self.value(then), self.value(other)
@@ -168,7 +168,7 @@ class Expressions(Places):
         return self.each((a, b), lambda x, y: f"({condition} ? {x} : {y})")
 
     # ------------------------------------------------------------------------------ calls
-    def call(self, e: ast.Call) -> Value:
+    def call(self, e: ast.Call) -> CExpression:
         if e.keywords:
             raise self.refuse(e, "no keyword arguments")
         code = self.callee(e)
@@ -234,7 +234,7 @@ class Expressions(Places):
         args = [v.text if not v.shape else (v.storage or self.kept(v).at()) for v in values]
         return procedure, ", ".join([*head, *args])
 
-    def returned(self, e: ast.Call, code: Code) -> Value:
+    def returned(self, e: ast.Call, code: Code) -> CExpression:
         procedure, args = self.invoke(e, code)
         self.touched |= procedure.touched
         if not procedure.shape:
@@ -243,7 +243,7 @@ class Expressions(Places):
         self.pre.append(f"{procedure.name}({args}, {at.base});")
         return self.of_place(at)
 
-    def array_function(self, e: ast.Call, name: str) -> Value:
+    def array_function(self, e: ast.Call, name: str) -> CExpression:
         self.count(e, name, ARGUMENTS.get(name, 1))
         if name == "vector":
             if isinstance(e.args[0], ast.Name) and (constant := self.code.array(e.args[0].id)) is not None:
@@ -254,7 +254,7 @@ class Expressions(Places):
                     raise self.refuse(
                         e, f"{ast.unparse(e.args[0])} is a number: write vector([...]), or an array to copy"
                     )
-                return Value(value.shape, value.element, False, value.aligned, "", value.reads)
+                return CExpression(value.shape, value.element, False, value.aligned, "", value.reads)
             return self.literal(e.args[0])
         a, b = (self.operand(x) for x in e.args)
         if name == "dot":
@@ -270,21 +270,21 @@ class Expressions(Places):
             y = self.times(a.element(str(k)), b.element(str(j)))
             return f"d_sub({x}, {y})" if self.dual else f"({x} - {y})"
 
-        return Value((3,), element, False, False, "", _reads((a, b)))
+        return CExpression((3,), element, False, False, "", _reads((a, b)))
 
-    def literal(self, e: ast.List) -> Value:
+    def literal(self, e: ast.List) -> CExpression:
         """Return the value of [a, b, c], or of a list of such lists or vectors."""
         rows = [self.literal(r) if isinstance(r, ast.List) else self.value(r) for r in e.elts]
         if len({r.shape for r in rows}) != 1:
             raise self.refuse(e, "an array is a list of numbers, or of lists of equal length")
         shape = (len(rows), *rows[0].shape)
-        return Value(shape, lambda i, *more: rows[int(i)].element(*more), False, False, "", _reads(tuple(rows)))
+        return CExpression(shape, lambda i, *more: rows[int(i)].element(*more), False, False, "", _reads(tuple(rows)))
 
     def count(self, e: ast.Call, name: str, n: int) -> None:
         if len(e.args) != n:
             raise self.refuse(e, f"{name} takes {n} argument{'s' if n != 1 else ''}, not {len(e.args)}")
 
-    def named(self, v: Value) -> Value:
+    def named(self, v: CExpression) -> CExpression:
         """Compute a number before the current statement, so that all elements share it."""
         at = self.temporary(())
         self.pre.append(f"{at.base} = {v.text};")
@@ -317,7 +317,7 @@ class Expressions(Places):
         return f"({text}).v" if self.dual else text
 
 
-def _reads(of: tuple[Value, ...]) -> frozenset[str]:
+def _reads(of: tuple[CExpression, ...]) -> frozenset[str]:
     return frozenset().union(*(v.reads for v in of)) if of else frozenset()
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging.arrays import dimensions
+from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
 from gyrobench.packaging.source import Source, member
 from gyrobench.packaging.translate import Translation

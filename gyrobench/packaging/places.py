@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gyrobench.component import Noise, State
 from gyrobench.component.composition import TIMES
-from gyrobench.packaging.arrays import Place, Range, Shape, Span, Value, cells
+from gyrobench.packaging.c_arrays import CExpression, CVariable, Range, Shape, Span, cells
 from gyrobench.packaging.source import Code, SubsetError, dotted, local, member
 
 if TYPE_CHECKING:
@@ -65,19 +65,19 @@ class Places(ABC):
             e, f"{ast.unparse(e)!r}: an index is a loop variable, a whole number from 0 on, or index(expression)"
         )
 
-    def place(self, e: ast.expr) -> Place:
+    def place(self, e: ast.expr) -> CVariable:
         if isinstance(e, ast.Subscript):
             return self.element(e)
         if isinstance(e, ast.Name):
             if e.id in self.loops:
-                return Place(local(e.id), "loop")
+                return CVariable(local(e.id), "loop")
             if e.id in self.locals or e.id in self.arguments:
                 if e.id not in self.assigned:
                     raise self.refuse(e, f"{e.id!r} is not assigned on every path before it is read")
                 shape = self.locals[e.id] if e.id in self.locals else self.arguments[e.id]
-                return Place(local(e.id), "local", e.id, shape)
+                return CVariable(local(e.id), "local", e.id, shape)
             if (x := self.code.constant(e.id)) is not None:
-                return Place(repr(x), "constant")
+                return CVariable(repr(x), "constant")
             raise self.refuse(e, f"unknown name {e.id!r}: a local is assigned before it is read")
         if isinstance(e, ast.Attribute) and not self.transposes(e):
             return self.attribute(e)
@@ -86,7 +86,7 @@ class Places(ABC):
             raise self.refuse(e, f"{ast.unparse(e)} is a number: it has no elements")
         return self.kept(value)
 
-    def element(self, e: ast.Subscript) -> Place:
+    def element(self, e: ast.Subscript) -> CVariable:
         of = self.place(e.value)
         if isinstance(e.slice, ast.Tuple):
             raise self.refuse(e, f"write {ast.unparse(e.value)}[i][j]")
@@ -115,28 +115,28 @@ class Places(ABC):
             raise self.refuse(e, f"the slice {ast.unparse(e)}: {ast.unparse(e.value)} has the elements 0 to {size - 1}")
         return first, last - first
 
-    def attribute(self, e: ast.Attribute) -> Place:
+    def attribute(self, e: ast.Attribute) -> CVariable:
         source = dotted(e.value)
         name = self.code.flat(e.attr)
         d = self.declared.get(name)
         if source == "self":
             if e.attr in TIMES:
-                return Place(e.attr, "self", e.attr)
+                return CVariable(e.attr, "self", e.attr)
             if d is not None:
-                return Place(member(name), "self", name, d.shape)
+                return CVariable(member(name), "self", name, d.shape)
             if (x := self.code.constant(e.attr, of_self=True)) is not None:
-                return Place(repr(x), "constant")
+                return CVariable(repr(x), "constant")
             owner = self.code.owner or self.translation.source.cls
             raise self.refuse(e, f"self.{e.attr} is not declared in {owner.__name__}")
         if source == "self.der" and isinstance(d, State):
-            return Place(f"der.{member(name)}", "self", f"der.{name}", d.shape)
+            return CVariable(f"der.{member(name)}", "self", f"der.{name}", d.shape)
         if source == "self.noise" and isinstance(d, Noise):
-            return Place(f"noise.{member(name)}", "self", f"noise.{name}", d.sample_shape)
+            return CVariable(f"noise.{member(name)}", "self", f"noise.{name}", d.sample_shape)
         if source.startswith("self.") and (place := self.of_block(e, source)) is not None:
             return place
         raise self.refuse(e, f"{ast.unparse(e)!r}: only self.X, self.der.X of a State and self.noise.X of a Noise")
 
-    def of_block(self, e: ast.Attribute, source: str) -> Place | None:
+    def of_block(self, e: ast.Attribute, source: str) -> CVariable | None:
         """Return ``self.block.x``, a declaration of a block; None where there is no such block."""
         blocks = self.code.placed.blocks if self.code.placed else self.translation.source.cls.placed
         placed = blocks.get(source.removeprefix("self."))
@@ -145,10 +145,10 @@ class Places(ABC):
         if e.attr not in placed.names:
             raise self.refuse(e, f"{ast.unparse(e)} is not declared in {type(placed.block).__name__}")
         name = placed.names[e.attr]
-        return Place(member(name), "self", name, self.declared[name].shape)
+        return CVariable(member(name), "self", name, self.declared[name].shape)
 
     @abstractmethod
-    def value(self, e: ast.expr) -> Value:
+    def value(self, e: ast.expr) -> CExpression:
         """Return the value of an expression."""
 
     @abstractmethod
@@ -166,13 +166,13 @@ class Places(ABC):
         return of not in ("self", "self.der", "self.noise") and not named
 
     # ------------------------------------------------------------------------------ temporaries
-    def temporary(self, shape: Shape) -> Place:
+    def temporary(self, shape: Shape) -> CVariable:
         self.temporaries += 1
         name = f"t{self.temporaries}_"
         self.locals[name] = shape
-        return Place(name, "local", name, shape)
+        return CVariable(name, "local", name, shape)
 
-    def settled(self, p: Place) -> Place:
+    def settled(self, p: CVariable) -> CVariable:
         """Return a place whose run-time indices are computed once for all its elements."""
         if not p.shape or not any(isinstance(t, str) and t.startswith("at(") for t in p.taken):
             return p
@@ -183,9 +183,9 @@ class Places(ABC):
                 self.pre.append(f"const int t{self.temporaries}_ = {t};")
                 t = f"t{self.temporaries}_"
             taken.append(t)
-        return Place(p.base, p.kind, p.name, p.dims, tuple(taken))
+        return CVariable(p.base, p.kind, p.name, p.dims, tuple(taken))
 
-    def kept(self, v: Value) -> Place:
+    def kept(self, v: CExpression) -> CVariable:
         """Compute an array before the current statement, into a temporary."""
         at = self.temporary(v.shape)
         self.pre += [f"{at.at(*i)} = {v.element(*i)};" for i in cells(v.shape)]

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from gyrobench.component import Discrete, Input, Output, Parameter, State
-from gyrobench.packaging.arrays import Place, Shape, Value, cells, dimensions, words
+from gyrobench.packaging.c_arrays import CExpression, CVariable, Shape, cells, dimensions, words
 from gyrobench.packaging.expressions import Expressions
 from gyrobench.packaging.source import Code, Source, SubsetError, gives_value, local, member, returns
 
@@ -206,7 +206,7 @@ class Method(Expressions):
             raise self.refuse(target, f"{name!r} is something else already, {words(known)}")
         if name not in self.arguments:
             self.locals.setdefault(name, assigned.shape)
-        to = Place(local(name), "local", name, assigned.shape)
+        to = CVariable(local(name), "local", name, assigned.shape)
         if assigned.shape and not assigned.aligned and f"local.{name}" in assigned.reads:
             assigned = self.of_place(self.kept(assigned))
         self.assigned.add(name)
@@ -250,7 +250,7 @@ class Method(Expressions):
                 raise self.refuse(value, f"{text} is an array, {what} as it is: write vector({text}), a copy")
         return False
 
-    def fitting(self, target: ast.expr, value: ast.expr, to: Place) -> Value:
+    def fitting(self, target: ast.expr, value: ast.expr, to: CVariable) -> CExpression:
         assigned = self.literal(value) if isinstance(value, ast.List) else self.value(value)
         if assigned.shape != to.shape:
             text = ast.unparse(target)
@@ -259,7 +259,7 @@ class Method(Expressions):
             assigned = self.of_place(self.kept(assigned))
         return assigned
 
-    def store(self, to: Place, value: Value, pad: str) -> list[str]:
+    def store(self, to: CVariable, value: CExpression, pad: str) -> list[str]:
         lines: list[str] = []
         to = self.settled(to)
         for i in cells(to.shape):

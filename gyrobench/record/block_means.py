@@ -14,7 +14,7 @@ PART = 1 << 18  # samples that are filled in at a time
 
 
 @dataclass
-class Held:
+class BlockMeans:
     """Means over ``factor`` samples on the grid, NaN where a sample is missing; pairs are averaged when it is full."""
 
     names: Sequence[str]

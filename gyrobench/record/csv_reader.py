@@ -45,7 +45,7 @@ LARGEST = 1e30  # of a cell: no quantity of a laboratory in any unit, and square
 
 
 @dataclass(frozen=True)
-class Column:
+class CsvColumn:
     """A column that is expected: ``unit`` is the SI unit it is converted to ("1": a pure number)."""
 
     name: str
@@ -56,15 +56,15 @@ class Column:
 
 
 WINDOW_COLUMNS = (
-    Column("phase", "1", "phase of the plan, from 1", whole=True),
-    Column("t_start", "s", "start of the window"),
-    Column("t_end", "s", "end of the window"),
-    Column("angle_start", "rad", "table angle at the start, cumulative"),
-    Column("angle_end", "rad", "table angle at the end, cumulative"),
-    Column("mean", "A", "mean torquer current"),
-    Column("std", "A", "standard deviation of the samples", required=False),
-    Column("n", "1", "number of samples", required=False, whole=True),
-    Column("flagged", "1", "suspect samples", required=False, whole=True),
+    CsvColumn("phase", "1", "phase of the plan, from 1", whole=True),
+    CsvColumn("t_start", "s", "start of the window"),
+    CsvColumn("t_end", "s", "end of the window"),
+    CsvColumn("angle_start", "rad", "table angle at the start, cumulative"),
+    CsvColumn("angle_end", "rad", "table angle at the end, cumulative"),
+    CsvColumn("mean", "A", "mean torquer current"),
+    CsvColumn("std", "A", "standard deviation of the samples", required=False),
+    CsvColumn("n", "1", "number of samples", required=False, whole=True),
+    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
 )
 
 
@@ -105,7 +105,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Head:
-    """What stands above the rows of a CSV file, and how they are written."""
+    """Head of a CSV file: the lines above its rows, and how the rows are written."""
 
     names: list[str]  # of the columns, with units
     comments: dict[str, str]
@@ -182,7 +182,7 @@ def not_utf8(row: int) -> str:
 
 
 def read_measured(
-    file: Path, columns: tuple[Column, ...] = WINDOW_COLUMNS, time: str | None = "t_start"
+    file: Path, columns: tuple[CsvColumn, ...] = WINDOW_COLUMNS, time: str | None = "t_start"
 ) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
     """Return the columns of a CSV file in SI, and its comments.
 
@@ -224,14 +224,16 @@ def read_measured(
     return columns_si, meta
 
 
-def conditions(header: list[str]) -> list[Column]:
+def conditions(header: list[str]) -> list[CsvColumn]:
     """Columns that any record may have, for the nuisance model: temperature [degC], temperature 2 ..., turn_on."""
     names = [t.split("[")[0].strip() for t in header]
-    found = [Column(n, "K", "temperature", required=False) for n in names if n.startswith("temperature")]
-    return [*found, *(Column(n, "1", "number of the turn-on", required=False) for n in names if n == "turn_on")]
+    found = [CsvColumn(n, "K", "temperature", required=False) for n in names if n.startswith("temperature")]
+    return [*found, *(CsvColumn(n, "1", "number of the turn-on", required=False) for n in names if n == "turn_on")]
 
 
-def header_places(header: list[str], expected: Mapping[str, Column]) -> tuple[dict[str, tuple[int, Factor]], list[str]]:
+def header_places(
+    header: list[str], expected: Mapping[str, CsvColumn]
+) -> tuple[dict[str, tuple[int, Factor]], list[str]]:
     """Return place and factor of each expected column, and the problems of the header."""
     places: dict[str, tuple[int, Factor]] = {}
     problems = []

@@ -19,7 +19,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import Column, DataError, Head, header_places, read_head
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, header_places, read_head
 from gyrobench.record.record import Record
 from gyrobench.record.time_series import read_blocks
 
@@ -43,20 +43,20 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Table:
+class DriftTable:
     """A table of unknown length.  blocks(columns): rows in SI, missing cells as NaN; size: rows, 0 where not known."""
 
     source: Path
     head: Head
     size: int
-    blocks: Callable[[Sequence[Column]], Blocks]
+    blocks: Callable[[Sequence[CsvColumn]], Blocks]
 
     def done(self, rows: int) -> float:
         """Return the part of the table that so many rows are."""
         return rows / self.size if self.size else 0.0
 
 
-def open_table(source: Path, channel: str = "") -> Table:
+def open_table(source: Path, channel: str = "") -> DriftTable:
     """Return a CSV or Parquet file, or of a run's folder its windows, or its channels where ``channel`` is one of them.
 
     Raises DataError for anything else, RecordError for a folder that is not a run.
@@ -72,7 +72,7 @@ def open_table(source: Path, channel: str = "") -> Table:
     if parquet or source.suffix == ".parquet":
         return _of_parquet(source)
     head = read_head(source)
-    return Table(source, head, _rows_of_csv(source, head), lambda columns: read_blocks(source, head, columns))
+    return DriftTable(source, head, _rows_of_csv(source, head), lambda columns: read_blocks(source, head, columns))
 
 
 def _rows_of_csv(source: Path, head: Head) -> int:
@@ -86,7 +86,7 @@ def _rows_of_csv(source: Path, head: Head) -> int:
     return int((source.stat().st_size - start) * count / len(sample)) if count else 0
 
 
-def _of_parquet(source: Path) -> Table:
+def _of_parquet(source: Path) -> DriftTable:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -104,7 +104,7 @@ def _of_parquet(source: Path) -> Table:
                 if k not in (b"ARROW:schema", b"pandas")}  # fmt: skip
     head = Head(names, comments, 0, ",", False)
 
-    def blocks(columns: Sequence[Column]) -> Blocks:
+    def blocks(columns: Sequence[CsvColumn]) -> Blocks:
         places, wrong = header_places(names, {c.name: c for c in columns})
         for name, (k, _) in places.items():
             kind = schema.field(k).type
@@ -120,14 +120,14 @@ def _of_parquet(source: Path) -> Table:
         problems.append("no rows below the header")
     if problems:
         raise DataError(source, problems)
-    return Table(source, head, file.metadata.num_rows, blocks)
+    return DriftTable(source, head, file.metadata.num_rows, blocks)
 
 
 def _numbers(column: Any) -> Array:
     return np.asarray(column.to_numpy(zero_copy_only=False), dtype=float)
 
 
-def _of_run(record: Record, source: Path, channel: str) -> Table:
+def _of_run(record: Record, source: Path, channel: str) -> DriftTable:
     """The windows of a run, which are means (time: the middle of each), or its channels, which are point samples."""
     columns, of = record.table("channels")
     if "t_start" in record.windows and not (channel and channel.replace(",", " ").split()[0] in columns):
@@ -137,10 +137,10 @@ def _of_run(record: Record, source: Path, channel: str) -> Table:
     heads = [f"{n} [{of[n]}]" if of.get(n) not in ("", "1", None) else n for n in columns]
     head = Head(heads, {"instrument": record.run.instrument} if record.run.instrument else {}, 0, ",", False)
 
-    def blocks(asked: Sequence[Column]) -> Blocks:
+    def blocks(asked: Sequence[CsvColumn]) -> Blocks:
         yield {c.name: np.asarray(columns[c.name], dtype=float) for c in asked if c.name in columns}
 
-    return Table(source, head, len(next(iter(columns.values()), ())), blocks)
+    return DriftTable(source, head, len(next(iter(columns.values()), ())), blocks)
 
 
 def harmonic_names(order: int) -> list[str]:
@@ -148,7 +148,7 @@ def harmonic_names(order: int) -> list[str]:
     return [f"{f}{n if n > 1 else ''}θ" for n in range(1, order + 1) for f in ("cos", "sin")]
 
 
-def with_harmonics(table: Table, column: str, order: int) -> Table:
+def with_harmonics(table: DriftTable, column: str, order: int) -> DriftTable:
     """Return the table with cos nθ and sin nθ, n = 1 ... ``order``, in place of a column of angles θ.
 
     Raises DataError for a column that is missing or no angle, and for angles so far apart that n θ is not followed.
@@ -159,11 +159,11 @@ def with_harmonics(table: Table, column: str, order: int) -> Table:
     unit = there[column] or "1"
     if units.unit(unit).exponents != units.unit("rad").exponents or unit == "1":
         raise DataError(table.source, [f"column '{column}': [{unit}] is no angle; write '{column} [deg]'"])
-    angle, names = Column(column, "rad", "angle of the table"), harmonic_names(order)
+    angle, names = CsvColumn(column, "rad", "angle of the table"), harmonic_names(order)
     rest = [n for n in table.head.names if n.partition("[")[0].strip() != column]
     head = replace(table.head, names=[*rest, *(f"{n} [1]" for n in names)])
 
-    def blocks(columns: Sequence[Column]) -> Blocks:
+    def blocks(columns: Sequence[CsvColumn]) -> Blocks:
         own = [c for c in columns if c.name not in names]
         for block in table.blocks([*own, angle]):
             theta = block.pop(column)
@@ -190,7 +190,7 @@ def named(head: Head) -> dict[str, str | None]:
     return out
 
 
-def find_signals(table: Table, channel: str, scale: str, increments: bool) -> list[Signal]:
+def find_signals(table: DriftTable, channel: str, scale: str, increments: bool) -> list[Signal]:
     """Return the columns that become rates: those that ``channel`` names, or all whose unit (times scale) says so.
 
     scale: "0.5arcsec", "17.2deg/h/mA": one unit (of a column without one: 1) as rate or angle; "" for none.
@@ -256,7 +256,7 @@ def _per(si: str, unit: str | None) -> str:
     return f"{si}/({units.unit(unit).dimension})"
 
 
-def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list[Column]:
+def columns_of(table: DriftTable, signals: Sequence[Signal], regressors: str) -> list[CsvColumn]:
     """Return what is read: time, signals in SI of their own unit, flag, temperatures and the named regressors.
 
     Raises DataError for a regressor that is missing or has a wrong unit.
@@ -264,9 +264,9 @@ def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list
     there = named(table.head)
     if TIME in there and there[TIME] is None:
         raise DataError(table.source, [f"column '{TIME}': no unit; write '{TIME} [s]' (or [ms], [min], [h])"])
-    columns = [Column(TIME, "s", "time of the sample")] if TIME in there else []
-    columns += [Column(s.name, _si(s.unit), "signal") for s in signals]
-    columns += [Column(FLAG, "1", "suspect", required=False)] if FLAG in there else []
+    columns = [CsvColumn(TIME, "s", "time of the sample")] if TIME in there else []
+    columns += [CsvColumn(s.name, _si(s.unit), "signal") for s in signals]
+    columns += [CsvColumn(FLAG, "1", "suspect", required=False)] if FLAG in there else []
     names = [n for n, unit in there.items() if n.startswith("temperature") or (unit and _is_temperature(unit))]
     asked = [n for n in regressors.replace(",", " ").split() if n]
     problems = [f"regressor '{n}': no such column; columns of the file: {', '.join(there)}"
@@ -274,7 +274,7 @@ def columns_of(table: Table, signals: Sequence[Signal], regressors: str) -> list
     for n in dict.fromkeys([*names, *asked]):
         if n in there and n not in {s.name for s in signals}:
             try:
-                columns.append(Column(n, _si(there[n] or ""), "regressor", required=False))
+                columns.append(CsvColumn(n, _si(there[n] or ""), "regressor", required=False))
             except units.UnitError as error:
                 problems.append(f"column '{n}': {error}")
     if problems:

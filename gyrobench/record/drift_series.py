@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.record.block_means import Held
+from gyrobench.record.block_means import BlockMeans
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import FLAG, RATE, TIME, Signal, Table, columns_of
+from gyrobench.record.drift_columns import FLAG, RATE, TIME, DriftTable, Signal, columns_of
 from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
 
 GAP = 1.5  # steps
@@ -65,7 +65,7 @@ Observer = Callable[[str, int, Array], None]
 
 @dataclass
 class Acquisition:
-    """What the file says of its acquisition; times in s."""
+    """Acquisition as the file states it; times in s."""
 
     step: float = 0.0
     samples: int = 0
@@ -125,7 +125,9 @@ class _Angle:
 class DriftReader:
     """Reads a table once: rates of the signals on a grid, with what is known of the acquisition."""
 
-    def __init__(self, table: Table, signals: Sequence[Signal], regressors: str = "", sampling: float = 0.0) -> None:
+    def __init__(
+        self, table: DriftTable, signals: Sequence[Signal], regressors: str = "", sampling: float = 0.0
+    ) -> None:
         self.table, self.signals = table, signals
         self.columns = columns_of(table, signals, regressors)
         self.timed = any(c.name == TIME for c in self.columns)
@@ -137,7 +139,7 @@ class DriftReader:
             )  # fmt: skip
         self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
         self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
-        self.held = Held([TIME, *(s.name for s in signals), *self.others])
+        self.held = BlockMeans([TIME, *(s.name for s in signals), *self.others])
         self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (RATE, PER_SAMPLE)}
         self.position = 0  # on the grid, of the next sample
         self.cut = 0  # samples of long gaps that are left out of it
@@ -392,7 +394,7 @@ class DriftReader:
         about.wraps = {n: a.wraps for n, a in self.angles.items() if a.wraps}
 
 
-def _clock_of(table: Table) -> str:
+def _clock_of(table: DriftTable) -> str:
     """Return a question about columns in a unit of time, which may be the clock under another name; "" for none."""
     found = [n for n in table.head.names if (m := re.search(r"\[(.*)\]$", n)) and m[1].strip() in CLOCKS]
     return f" (is it '{found[0]}'? name it time)" if found else ""

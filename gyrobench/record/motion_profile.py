@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.record.csv_reader import Column, DataError, read_measured
+from gyrobench.record.csv_reader import CsvColumn, DataError, read_measured
 
 POINTS = 400  # of the part base_motion
 GAP = 3.0  # intervals longer than this many median intervals are gaps
 RECORDED = 9  # its preset
 _COLUMNS = (
-    Column("time", "s", "time of the reading, rising"),
-    Column("pitch", "rad", "pitch, about x (right)", required=False),
-    Column("roll", "rad", "roll, about y (forward)", required=False),
-    Column("heading", "rad", "heading, about z (up), counter-clockwise from above", required=False),
+    CsvColumn("time", "s", "time of the reading, rising"),
+    CsvColumn("pitch", "rad", "pitch, about x (right)", required=False),
+    CsvColumn("roll", "rad", "roll, about y (forward)", required=False),
+    CsvColumn("heading", "rad", "heading, about z (up), counter-clockwise from above", required=False),
 )
 
 

@@ -64,7 +64,7 @@ def _arrow(column: AnyArray) -> Any:
     if column.dtype.kind not in "fiu":
         return pa.array(column)
     column = np.ascontiguousarray(column)
-    return pa.AnyArray.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), [None, pa.py_buffer(column)])
+    return pa.Array.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), [None, pa.py_buffer(column)])
 
 
 def _numpy(column: Any) -> AnyArray:
@@ -201,7 +201,7 @@ class Record(Displayed):
 
     @property
     def complete(self) -> bool:
-        """Whether the run came to its end; False where it was interrupted or failed."""
+        """Return True if the run came to its end; False where it was interrupted or failed."""
         return self.run.complete
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import Column, DataError, Head, check_utf8, header_places
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, header_places
 from gyrobench.record.sampling import Successive
 
 Block = Mapping[str, Array]
@@ -43,7 +43,7 @@ class Averaging:
     most: int = 0
 
 
-def read_blocks(file: Path, head: Head, columns: Sequence[Column]) -> Iterator[dict[str, Array]]:
+def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterator[dict[str, Array]]:
     """Yield the columns in SI, missing cells as NaN.  Raises DataError with the number of rows that are not numbers."""
     import pyarrow as pa
 

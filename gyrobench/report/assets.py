@@ -1,4 +1,4 @@
-"""Where the templates, styles, schema and specifications of a bench are."""
+"""Folders of the templates, styles, schema and specifications of a bench."""
 
 from __future__ import annotations
 

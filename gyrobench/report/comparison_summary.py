@@ -1,4 +1,4 @@
-"""What a comparison opens with: the differences that chance does not explain, what was set differently, the order."""
+"""Summary of a comparison: the differences that chance does not explain, what was set differently, the order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How it was done: model, conventions, system, plan, and every digit of the estimates."""
+"""Section on the method: model, conventions, system, plan, and every digit of the estimates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a number is written: the one place where HTML and PDF get their digits from.
+"""Text of numbers: the one place where HTML and PDF get their digits from.
 
 An estimate is rounded to the second significant digit of its standard uncertainty; the uncertainty
 itself to two significant digits.  Where there is no uncertainty, four significant digits.  The full

@@ -1,4 +1,4 @@
-"""What a report is made of, before it is HTML or PDF: sections of blocks.
+"""Content of a report before it is HTML or PDF: sections of blocks.
 
 Both renderers draw the same blocks, which is why they say the same.  Every text is plain text; each
 renderer escapes it.  A number cell carries its rounded text, its full value and the JSON pointer it

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.suite.ranking import Candidate, rank
+from gyrobench.reduction.suite.ranking import RankedValue, rank
 from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
 
 Json = dict[str, Any]
@@ -63,10 +63,10 @@ def ranking_by(docs: Sequence[Json], name: str) -> Json:
     return {"name": name, "unit": best["unit"], "meaning": best["meaning"], "order": order, "void": void}
 
 
-def candidate(c: Json) -> Candidate:
+def candidate(c: Json) -> RankedValue:
     """Return a coefficient of a document as a candidate of a ranking."""
     draws = {int(seed): value for seed, value in (c.get("draws") or {}).items()}
-    return Candidate(c["estimate"], c["u"], c["k"] or NORMAL, draws)
+    return RankedValue(c["estimate"], c["u"], c["k"] or NORMAL, draws)
 
 
 def place_text(ranked: Json, entry: Json) -> str:

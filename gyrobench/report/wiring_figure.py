@@ -43,7 +43,7 @@ def merge_indices(names: Sequence[str]) -> list[str]:
 
 @dataclass
 class Layout:
-    """Where the drawing puts what, mm from its left upper corner; its text is as large as it is printed.
+    """Layout of the drawing, mm from its left upper corner; its text is as large as it is printed.
 
     centres: middle of each part's column and row.  boxes: width and height of each part's box.  names: its lines.
     labels: (row, column) -> lines of the wires' names, none where they do not fit the page.

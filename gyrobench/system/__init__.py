@@ -1,1 +1,1 @@
-"""What a system is: slots, sockets, binding, wires, order, options, plan."""
+"""Systems: slots, sockets, binding, wires, order, options, plan."""

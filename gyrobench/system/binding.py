@@ -222,7 +222,7 @@ class _Fitter:
         return element, entry
 
     def would_fit(self, name: str, connector: Connector) -> str:
-        """Which free variables of the FMU could be meant."""
+        """Return the free variables of the FMU that could be meant."""
         used = {b.variable for b in (*self.binding.inputs.values(), *self.binding.outputs.values())}
         free = {n: v for n, v in self.variables.items() if v.causality == connector.causality and n not in used}
         hints = []

@@ -1,4 +1,4 @@
-"""What a system and a suite have in common: a name, a title, options with values; and how they are loaded."""
+"""Common base of system and suite: a name, a title, options with values; loading."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Configurable:
             self.given.append(name)
 
     def unfinished(self) -> list[str]:
-        """What the declaration still lacks, as sentences: methods that its family leaves to it."""
+        """Return what the declaration still lacks, as sentences: methods that its family leaves to it."""
         lacking = [n for n in dir(type(self)) if getattr(getattr(type(self), n), "__isabstractmethod__", False)]
         return [f"{type(self).__name__} has no {n}(), which its family leaves to the test" for n in lacking]
 

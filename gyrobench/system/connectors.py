@@ -1,4 +1,4 @@
-"""What a socket consists of: its connectors, with causality, unit, shape and meaning."""
+"""Connectors of a socket, with causality, unit, shape and meaning."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Order:
+class ExecutionOrder:
     """The order and its cuts; what ``show`` prints, what both engines use and what the report states."""
 
     order: tuple[str, ...]
@@ -160,7 +160,7 @@ def _arrange(nodes: list[int], cost: Mapping[tuple[int, int], Cost]) -> list[int
 
 def execution_order(
     parts: Sequence[str], links: Sequence[Link], through: Mapping[str, Mapping[str, set[str]]]
-) -> Order:
+) -> ExecutionOrder:
     """Order and cuts of the parts (in declared order) under the given connections.
 
     through: for each part, output -> inputs with direct feedthrough (gyrobench.system.fmu_variables.feedthrough).
@@ -193,4 +193,4 @@ def execution_order(
             else:
                 why = f"no output of {link.target[0]} depends on it at once"
             cuts.append(Cut(link.wire, why))
-    return Order(tuple(parts[i] for i in order), tuple(cuts))
+    return ExecutionOrder(tuple(parts[i] for i in order), tuple(cuts))

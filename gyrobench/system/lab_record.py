@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError, read_head, read_measured
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, read_head, read_measured
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
 from gyrobench.system.lab_series import is_time_series, windows_of_series
@@ -58,7 +58,7 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
 
 def read_record(
     system: System, data: Path, values: Mapping[str, str], *, needed: Mapping[str, str] | None = None,
-    attitudes: Callable[[System], Mapping[str, str]] | None = None, columns: tuple[Column, ...] = WINDOW_COLUMNS,
+    attitudes: Callable[[System], Mapping[str, str]] | None = None, columns: tuple[CsvColumn, ...] = WINDOW_COLUMNS,
     time: str | None = "t_start", texts: Sequence[str] = TEXTS,
 ) -> Record:  # fmt: skip
     """Return the CSV as a record in SI, with the circumstances in its comments and in ``values`` (which win).

@@ -16,7 +16,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import AnyArray
 from gyrobench.record import sampling
-from gyrobench.record.csv_reader import Column, DataError, Head, conditions
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, conditions
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
 from gyrobench.system import table_motion
 from gyrobench.system.plan import Phase
@@ -24,10 +24,10 @@ from gyrobench.system.plan import Phase
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
-FLAG = Column("flag", "1", "other than 0: the sample is suspect", required=False)
+FLAG = CsvColumn("flag", "1", "other than 0: the sample is suspect", required=False)
 
 
-def is_time_series(head: Head, columns: Sequence[Column]) -> bool:
+def is_time_series(head: Head, columns: Sequence[CsvColumn]) -> bool:
     """True for a file with the column ``time``, of a test whose windows are means: time series may be averaged."""
     names = {n.split("[")[0].strip() for n in head.names}
     known = {c.name for c in columns}
@@ -42,15 +42,15 @@ class _Names:
     optional: dict[str, str]
     angles: list[str]
     keys: list[str]
-    columns: list[Column]
+    columns: list[CsvColumn]
 
     @classmethod
-    def of(cls, windows: Sequence[Column]) -> _Names:
+    def of(cls, windows: Sequence[CsvColumn]) -> _Names:
         signals: dict[str, str] = {}
         optional: dict[str, str] = {}
         angles: list[str] = []
         keys: list[str] = []
-        columns = [Column("time", "s", "time of the sample")]
+        columns = [CsvColumn("time", "s", "time of the sample")]
         for c in windows:
             base, _, end = c.name.rpartition("_")
             if c.name in ("t_start", "t_end", "n") or c.name.startswith(("std", "flagged")):
@@ -58,21 +58,21 @@ class _Names:
             if end in ("start", "end") and base:
                 if base not in angles:
                     angles.append(base)
-                    columns.append(Column(base, c.unit, c.meaning.partition(" at the ")[0], c.required))
+                    columns.append(CsvColumn(base, c.unit, c.meaning.partition(" at the ")[0], c.required))
                 continue
             if c.whole:
                 keys.append(c.name)
-                columns.append(Column(c.name, c.unit, c.meaning, required=c.required and c.name != "phase"))
+                columns.append(CsvColumn(c.name, c.unit, c.meaning, required=c.required and c.name != "phase"))
                 continue
             kind = {"A": "current", "V": "voltage"}.get(c.unit, c.name)
             name = c.name.replace("mean", kind)
             (signals if c.required else optional)[c.name] = name
-            columns.append(Column(name, c.unit, c.meaning.removeprefix("mean "), c.required))
+            columns.append(CsvColumn(name, c.unit, c.meaning.removeprefix("mean "), c.required))
         return cls(signals, optional, angles, keys, [*columns, FLAG])
 
 
 def windows_of_series(
-    system: System, file: Path, head: Head, columns: Sequence[Column], said: Mapping[str, str],
+    system: System, file: Path, head: Head, columns: Sequence[CsvColumn], said: Mapping[str, str],
     attitudes: Mapping[str, str] | None,
 ) -> tuple[dict[str, AnyArray], dict[str, str], list[str]]:  # fmt: skip
     """Return the windows, the comments ``phase N`` (those found by the motion too), and warnings: what was left out,
@@ -121,7 +121,7 @@ def windows_of_series(
 
 
 def _as_windows(
-    series: Mapping[str, AnyArray], names: _Names, keys: Sequence[str], columns: Sequence[Column]
+    series: Mapping[str, AnyArray], names: _Names, keys: Sequence[str], columns: Sequence[CsvColumn]
 ) -> dict[str, AnyArray]:
     """Return the columns named as those of a file of windows, in their order."""
     made: dict[str, AnyArray] = {k: series[k].astype(np.int64) for k in keys}
@@ -162,7 +162,7 @@ def _expected(plan: Sequence[Phase], said: Mapping[str, str], attitudes: Mapping
 
 
 def _recognise(
-    file: Path, head: Head, asked: Sequence[Column], names: _Names, phases: Sequence[Phase]
+    file: Path, head: Head, asked: Sequence[CsvColumn], names: _Names, phases: Sequence[Phase]
 ) -> tuple[float, list[table_motion.Stretch]]:
     """Return the usual step (s) and the stretch of each phase."""
     columns = [c for c in asked if c.name in ("time", *names.angles)]

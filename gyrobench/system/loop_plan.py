@@ -52,7 +52,7 @@ class LoopPlan:
     phases: list[LoopPhase] = field(default_factory=list)
 
     def problems(self) -> list[str]:
-        """What is wrong with the plan, as sentences; the exciter itself refuses what is left."""
+        """Return what is wrong with the plan, as sentences; the exciter itself refuses what is left."""
         found = []
         if not 1 <= len(self.phases) <= LIMIT:
             found.append(f"the plan has {len(self.phases)} phases: 1 to {LIMIT} are possible")

@@ -1,4 +1,4 @@
-"""Which value each parameter of each part has in a run, and how it reaches the FMU."""
+"""Value of each parameter of each part in a run, and its way into the FMU."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) 
 def resolve(
     assembly: Assembly, system: System, seed: int, base: Mapping[str, Any]
 ) -> tuple[Starts, dict[str, Any], list[str]]:
-    """What is set in each FMU, all parameters for run.json (SI, arrays nested), and notes.
+    """Return what is set in each FMU, all parameters for run.json (SI, arrays nested), and notes.
 
     In rising order of rank: the FMU's start value, the seed of the slot, what the system derives, what the user set.
     Factors of wires that follow the parts are set in the assembly.

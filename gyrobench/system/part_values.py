@@ -11,7 +11,7 @@ from gyrobench.system.values import flatten, nest
 
 
 class PartValues:
-    """What ``System.parameters(parts)`` sees: ``parts["gyro.k"]``, SI, arrays nested.
+    """Values of the parts for ``System.parameters(parts)``: ``parts["gyro.k"]``, SI, arrays nested.
 
     A value is the user's where he set one, else ``raw`` of the system, else the FMU's own.  What the FMU in the slot
     does not have is taken from the part the system is made with, and ``notes`` says so.

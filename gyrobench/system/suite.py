@@ -4,7 +4,7 @@
         title = "Drift tests of one gyro"
         sets = {"floated": "tumble_single_axis servo_polar"}
         options = {"tests": Option("floated", str, "..."), **Suite.about}
-        shared = ("torquer scale factor", "latitude")
+        shared = ("torquer.scale_factor", "latitude")
 
 A value goes to every test that has it: ``gyro.D_I`` to all with a slot gyro, ``latitude`` to all with this option; with
 the test's name before it to this one alone: ``servo_polar.turns``, ``servo_polar.table.tilt[1]``.
@@ -32,7 +32,7 @@ class Suite(Configurable):
 
     item: ClassVar[str] = "gyro"  # the slot of what is tested: the same socket and part in all tests
     sets: ClassVar[Mapping[str, str]] = {}  # word -> names of tests, for the option tests
-    shared: ClassVar[tuple[str, ...]] = ()  # sources of type B that are one and the same error in all tests
+    shared: ClassVar[tuple[str, ...]] = ()  # ids of sources that are one and the same error in all tests
     method: ClassVar[str] = ""
     sources: ClassVar[tuple[str, ...]] = ()
     conventions: ClassVar[tuple[str, ...]] = ()

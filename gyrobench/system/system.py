@@ -1,4 +1,4 @@
-"""What a system is: slots, wires, options, plan and reduction, declared in ``systems/<name>/system.py``.
+"""Systems: slots, wires, options, plan and reduction, declared in ``systems/<name>/system.py``.
 
     class Tumble(System):
         \"\"\"Single-axis tumble of a floated gyro.\"\"\"
@@ -15,7 +15,7 @@
         done = "sequencer.done"
         channels = ["gyro.u", "rebalance.i"]
         noises = ("gyro.white", "rebalance.meter")          # set to 0 by --check-step
-        reduction = "reduction"                             # reduction.py beside it: from_record(record, specification)
+        reduction = "reduction"                             # reduction.py beside it, with a class Reduction
         measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
@@ -28,7 +28,7 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -43,7 +43,7 @@ from gyrobench.system.values import InvalidValueError, flatten
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
-    from gyrobench.result import Result, Specification
+    from gyrobench.result import Reason, Result, Specification
     from gyrobench.system.part_values import PartValues
 
 __all__ = [
@@ -74,7 +74,7 @@ class Slot:
 
 @dataclass(frozen=True)
 class Windows:
-    """When ``watch`` changes, a row of the record is written: column name -> "slot.output"."""
+    """Windows of a record: a row is written when ``watch`` changes; column name -> "slot.output"."""
 
     watch: str
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -103,7 +103,7 @@ class OnRequest:
 
 @dataclass(frozen=True)
 class MeasuredData:
-    """How a laboratory's record of a test is written and read.
+    """Template and reader of a laboratory's record of a test.
 
     template: an empty record with its explanations, printed by ``gyrobench reduce SYSTEM --template``.
     read: (system, file, values) -> record; see gyrobench.system.lab_record for one that fits most tests.
@@ -135,7 +135,8 @@ class System(Configurable):
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
-    reduction: ClassVar[str] = ""  # module beside system.py, its from_record(record, specification) returns the result
+    #: a class, or the module beside system.py that has it as Reduction; its from_record(record) returns the findings
+    reduction: ClassVar[str | type] = ""
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
@@ -226,39 +227,65 @@ class System(Configurable):
         return {}
 
     def check(self) -> list[str]:
-        """What makes a run with these values impossible or meaningless (the run is refused), as sentences."""
+        """Return what makes a run with these values impossible or meaningless (the run is refused), as sentences."""
         return []
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """As :meth:`check`, knowing every parameter of every part: {"slot.name": SI value, arrays nested}."""
+        """Return problems as :meth:`check` does, from all parameters: {"slot.name": SI value, arrays nested}."""
         return []
 
     def warnings(self) -> list[str]:
-        """What the user should know about these values, as sentences."""
+        """Return what the user should know about these values, as sentences."""
         return []
 
-    def reduce(self, record: Record, specification: Specification | None = None) -> Result:
-        """Return the result of a record, judged by the limits of ``specification`` where it has any.
+    def findings(self, record: Record) -> Result:
+        """Return what a record says, without limits and verdict: estimates, and the reasons against them.
 
-        By the module that ``reduction`` names, unless a system overrides this method.  Raises UsageError for a system
+        By the reduction that the system names, unless a system overrides this method.  Raises UsageError for a system
         with neither, and for a record that lacks a column that is needed.
         """
         if not self.reduction:
             raise UsageError(f"{self.name} has no reduction")
-        owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
-        module = importlib.import_module(f".{self.reduction}", owner.__module__)
+        reduction: Any = self.reduction
+        if isinstance(reduction, str):
+            owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
+            module = importlib.import_module(f".{reduction}", owner.__module__)
+            reduction = getattr(module, "Reduction", module)
         try:
-            result: Result = module.from_record(record, specification)
+            found: Result = reduction.from_record(record)
         except KeyError as error:
             if error.args[0] in record.windows or error.args[0] not in {c.name for c in WINDOW_COLUMNS}:
                 raise
             raise UsageError(f"column '{error.args[0]}' is missing in the windows of the record") from None
-        return result
+        return found
+
+    def reduce(
+        self,
+        record: Record,
+        limits: Specification | None = None,
+        step_check: Mapping[str, Any] | None = None,
+        reasons: Sequence[Reason] = (),
+    ) -> Result:
+        """Return the result of a record: its findings, judged.  Raises as :meth:`findings`.
+
+        limits: coefficient -> low, high.  step_check: what the communication step does, to be part of u.  reasons:
+        beside those of the findings.
+        """
+        from gyrobench.reduction.estimation.verdict import conclude
+        from gyrobench.system.wiring import parse_wires
+
+        found = self.findings(record)
+        wires = [] if record.run.measured else [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(self.wires)]
+        drawn = {} if record.run.measured else {"wires": wires, "shown": list(self.shown)}
+        return conclude(
+            found, record, limits, step_check, system=self.name, title=found.title or self.title,
+            provenance={**record.run.as_dict(), **drawn}, reasons=[*found.reasons, *reasons],
+        )  # fmt: skip
 
     @property
     def has_reduction(self) -> bool:
         """False for a system whose runs end with the record."""
-        return bool(self.reduction) or type(self).reduce is not System.reduce
+        return bool(self.reduction) or type(self).findings is not System.findings
 
     def read_measured(self, data: Path, values: Mapping[str, str]) -> Record:
         """Return a laboratory's file as a record; ``values``: options, and comments of the file, which they replace.
@@ -275,9 +302,10 @@ class System(Configurable):
         if empty := [slot for slot, s in self.slots.items() if not s.part]:
             parts = ", ".join(f'{slot}="..."' for slot in empty)
             lacks.append(f"slot {', '.join(empty)}: no part; name it by with_parts({parts})")
-        if self.reduction and self.folder and not (self.folder / f"{self.reduction}.py").is_file():
-            missing = f'reduction = "{self.reduction}": no file {self.reduction}.py in {self.folder}'
-            lacks.append(f"{missing}; write from_record(record, specification) there")
+        named = self.reduction if isinstance(self.reduction, str) else ""
+        if named and self.folder and not (self.folder / f"{named}.py").is_file():
+            missing = f'reduction = "{named}": no file {named}.py in {self.folder}'
+            lacks.append(f"{missing}; write a class Reduction with from_record(record) there")
         return lacks
 
     def refuse(self) -> None:

@@ -1,4 +1,4 @@
-"""What ``show`` and the report say about a system: slots, wires, order, cuts and delays, plan."""
+"""Description of a system for ``show`` and the report: slots, wires, order, cuts and delays, plan."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ FIELDS = ("mode", "target", "rate", "way", "time")
 
 
 @dataclass(frozen=True)
-class Entry:
+class ProgramEntry:
     """One command: mode "index" or "rate", target rad or rad/s, rate of the move rad/s (0: default), way, time s."""
 
     mode: str
@@ -38,11 +38,11 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Program:
+class MotionProgram:
     """Entries of one kind: positions with their dwell, or commands with their step."""
 
     kind: str
-    entries: tuple[Entry, ...]
+    entries: tuple[ProgramEntry, ...]
 
     def parameters(self, slot: str = "sequencer") -> dict[str, Any]:
         """Return the parameters of the part table_program in ``slot`` that carry it."""
@@ -58,7 +58,7 @@ class Program:
         }
 
 
-def read_program(file: Path) -> Program:
+def read_program(file: Path) -> MotionProgram:
     """Return the program of a file.  Raises DataError with everything that is wrong, and OSError."""
     text = file.read_text(encoding="utf-8")
     kind, rows = _json(file, text) if file.suffix.lower() == ".json" else _csv(file, text)
@@ -68,7 +68,7 @@ def read_program(file: Path) -> Program:
     entries = [_entry(k, row, kind, problems) for k, row in enumerate(rows, 1)]
     if problems:
         raise DataError(file, problems)
-    return Program(kind, tuple(e for e in entries if e is not None))
+    return MotionProgram(kind, tuple(e for e in entries if e is not None))
 
 
 def _csv(file: Path, text: str) -> tuple[str, list[dict[str, str]]]:
@@ -99,7 +99,7 @@ def _json(file: Path, text: str) -> tuple[str, list[dict[str, str]]]:
     return kind, rows
 
 
-def _entry(k: int, row: dict[str, str], kind: str, problems: list[str]) -> Entry | None:
+def _entry(k: int, row: dict[str, str], kind: str, problems: list[str]) -> ProgramEntry | None:
     """Return an entry; what is wrong with it goes to ``problems``."""
     found = len(problems)
     mode, way = row.get("mode", "index"), row.get("way", "cumulative")
@@ -126,4 +126,4 @@ def _entry(k: int, row: dict[str, str], kind: str, problems: list[str]) -> Entry
     if len(problems) == found and not low <= time <= high:
         what = "dwell" if kind == "positions" else "step"
         problems.append(f"entry {k}, time: a {what} must be {low:g} s to {high:g} s, not {time:g} s")
-    return Entry(mode, target, rate, way, time) if len(problems) == found else None
+    return ProgramEntry(mode, target, rate, way, time) if len(problems) == found else None

@@ -10,7 +10,7 @@ from typing import Any
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.binding import Binding, Bound, fit, load_mapping
-from gyrobench.system.execution_order import AlgebraicLoopError, Cut, Link, Order, execution_order
+from gyrobench.system.execution_order import AlgebraicLoopError, Cut, ExecutionOrder, Link, execution_order
 from gyrobench.system.fmu_variables import feedthrough, read_description
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import socket
@@ -51,7 +51,7 @@ class Assembly:
     descriptions: dict[str, Any]
     bindings: dict[str, Binding]
     connections: list[Connection]
-    order: Order
+    order: ExecutionOrder
     notes: list[str] = field(default_factory=list)
 
     def output(self, name: str) -> tuple[str, Bound]:

@@ -21,7 +21,7 @@ from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import find_specification, load_limits
 from gyrobench.workflow.run_execution import RunRequest, open_session
 from gyrobench.workflow.run_folders import prepare_folder
-from gyrobench.workflow.saved_run import RunOutcome, lacking_phases, missing_windows, reduce_run, write_report
+from gyrobench.workflow.saved_run import RunOutcome, lacking_phases, missing_windows, write_report
 from gyrobench.workflow.user_errors import PostRunError, record_kept
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def reduce_result(request: RunRequest, system: System, source: Path | Array, fee
         record.save(folder)
     with record_kept(folder, record):
         try:
-            result = reduce_run(system, record, limits)
+            result = system.reduce(record, limits)
         except (GyrobenchError, KeyError) as error:
             if not run.complete:
                 text = f"the record is not complete, so there is no report\n{missing_windows(record)}"

@@ -75,7 +75,6 @@ def reduce_measured(
     with record_kept(folder, record, save):
         result = system.reduce(record, limits)
     save()
-    result.provenance = record.run.as_dict()
     with record_kept(folder, record):
         paths = write_report(result, folder, record, file, formats)
     return RunOutcome(record, result, folder, paths)

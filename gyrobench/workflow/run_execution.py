@@ -13,12 +13,12 @@ from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Coefficient, Specification
+from gyrobench.result import Coefficient, Reason, Specification
 from gyrobench.system.system import System
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
 from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
-from gyrobench.workflow.saved_run import RunOutcome, reduce_run, write_report
+from gyrobench.workflow.saved_run import RunOutcome, write_report
 from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 
 if TYPE_CHECKING:
@@ -151,10 +151,11 @@ def _report(
             except Exception as error:
                 stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
                 stopped.__cause__ = error
-        result = reduce_run(system, record, limits, check)
+        reasons = []
         if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
-            result.warnings.append(f"The communication step is not in u: {stopped}.".replace("\n", "; "))
-            stopped = None
+            text = f"The communication step is not in u: {stopped}.".replace("\n", "; ")
+            reasons, stopped = [Reason("step.missing", text)], None
+        result = system.reduce(record, limits, check, reasons)
         paths = write_report(result, folder, record, spec, request.formats)
         return RunOutcome(record, result, folder, paths, stopped)
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from gyrobench import reading
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
-from gyrobench.reduction.loops.loop_summary import renew
 from gyrobench.report import FORMATS, NAMES
-from gyrobench.result import Result, Specification
+from gyrobench.result import Result
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_limits
 from gyrobench.workflow.user_errors import PostRunError, record_kept
@@ -33,27 +30,6 @@ class RunOutcome:
     folder: Path | None = None
     paths: Mapping[str, Path] = field(default_factory=dict)
     stopped: PostRunError | None = None
-
-
-def reduce_run(
-    system: System, record: Record, limits: Specification | None, step_check: Mapping[str, Any] | None = None
-) -> Result:
-    """Return the result of the system's own reduction, with the run as provenance.
-
-    step_check: what the communication step does, to be part of u; see gyrobench.reduction.estimation.step_effect.
-    """
-    from gyrobench.reduction.estimation.step_effect import apply_step
-    from gyrobench.system.wiring import parse_wires
-
-    result = system.reduce(record, limits)
-    wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(system.wires)]
-    result.provenance = {**record.run.as_dict(), "wires": wires, "shown": list(system.shown)}
-    if step_check and step_check.get("rows"):
-        apply_step(result, step_check)
-    renew(result)
-    result.warnings[:0] = record.run.external
-    check_truth(result, set_values(record.run))
-    return result
 
 
 def write_report(
@@ -86,7 +62,7 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
         check = (reading.json_object(reading.read_text(old, RecordError), old, RecordError).get("step_check") or {}
                  ) if old.exists() else {}  # fmt: skip
         try:
-            result = reduce_run(system, record, limits, check if "other" in check else None)
+            result = system.reduce(record, limits, check if "other" in check else None)
         except GyrobenchError:
             if record.complete:
                 raise

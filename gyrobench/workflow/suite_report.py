@@ -22,7 +22,8 @@ from gyrobench.record.run_document import (
     package_versions,
     read_run,
 )
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
+from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.report import FORMATS
 from gyrobench.result import DriftTestResult, SuiteResult
 from gyrobench.system.suite import Suite
@@ -122,15 +123,14 @@ def write_suite_report(
             setattr(document, name, text)
     limits = load_limits(spec)
     with record_kept(folder, save=lambda: document.write(folder)):
-        result = combine_methods(
+        found = combine_methods(
             members, system=suite.name, title=suite.title, method=suite.method, sources=suite.sources,
-            conventions=suite.conventions, shared=suite.shared, specification=limits,
-            failed=document.failed, provenance=document.as_dict(),
+            conventions=suite.conventions, shared=suite.shared, failed=document.failed, provenance=document.as_dict(),
         )  # fmt: skip
-        if suite["instrument"]:
-            result.instrument = suite["instrument"]
         runs = [RunDocument.model_validate(m.result.provenance) for m in members.values()]
-        check_truth(result, list(dict.fromkeys(cause for run in runs for cause in set_values(run))))
+        missed = missed_truth(found, list(dict.fromkeys(cause for run in runs for cause in set_values(run))))
+        instrument = suite["instrument"] or found.instrument
+        result = conclude(found, None, limits, reasons=[*missed, *found.reasons], instrument=instrument)
     document.write(folder)
     with record_kept(folder):
         paths = write_report(result, folder, None, spec, formats)

@@ -44,7 +44,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
     names = tuple(f"{k},{i}" for i in geometry.SENSORS for k in geometry.TERMS)
 
     def covariances(fits: Sequence[Findings], record: Record) -> list[Array]:
-        """White noise of each sensor, and the repeatability of the head, one angle error for all four."""
+        """Return white noise of each sensor, and the repeatability of the head, one angle error for all four."""
         w = record.windows
         alpha, dwell = np.asarray(w["angle_start"], dtype=float), np.asarray(w["t_end"] - w["t_start"], dtype=float)
         V = np.diag(np.concatenate([n**2 / dwell for n in white]))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column, DataError
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -33,9 +33,9 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [V],mean_2 [V
 """
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if c.name not in ("mean", "std")),
-    Column("mean", "V", "mean voltage of sensor 1"),
-    *(Column(f"mean_{i}", "V", f"mean voltage of sensor {i}") for i in (2, 3, 4)),
-    Column("std", "V", "standard deviation of the samples of sensor 1", required=False),
+    CsvColumn("mean", "V", "mean voltage of sensor 1"),
+    *(CsvColumn(f"mean_{i}", "V", f"mean voltage of sensor {i}") for i in (2, 3, 4)),
+    CsvColumn("std", "V", "standard deviation of the samples of sensor 1", required=False),
 )
 
 

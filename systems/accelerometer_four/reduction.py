@@ -14,32 +14,38 @@ tell harmonic k from 24 - k and 24 + k: measure D1 in the same positions, so tha
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from gyrobench import frames, units
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.effects import Effect
-from gyrobench.reduction.estimation.findings import Findings, Group
-from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench import frames
+from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftTest,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Reason,
+    ReductionError,
+    Regression,
+    RunDocument,
+    Setup,
+    Site,
+    Source,
+    Table,
+    told,
+    window_problems,
+)
+from gyrobench.units import ARCSEC
 
 from . import chain, geometry
 
-__all__ = ["FourSetup", "ReductionError", "from_record", "reduce"]
-
-ARCSEC, G0 = units.factor("arcsec"), frames.G0
+COLUMNS = ("mean", "mean_2", "mean_3", "mean_4")
 MEANING = {
     "K_F": ("bias", "V"),
     "K_I": ("scale factor", "V/g"),
@@ -47,8 +53,11 @@ MEANING = {
     "K_IO": ("cross term", "V/g²"),
     "K_II": ("square term", "V/g²"),
 }
+NAMES = [(i, k) for i in geometry.SENSORS for k in geometry.TERMS]  # of the coefficients, in their order
 BIASED = ("K_F", "K_IO", "K_II")  # by the first harmonic of the head
 POSITION = math.radians(0.1)  # largest departure of an angle from its position
+FIRST = Source("head.first_harmonic.{kind}", "first harmonic of the head, {kind}", "rad", "u_D1", "as measured")
+VOLTAGES = "relative, of all voltages"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,62 +73,167 @@ class FourSetup(Setup):
 
     @property
     def gamma(self) -> float:
-        return self.gravity / G0
+        """Gravity in multiples of g0."""
+        return self.gravity / frames.G0
 
 
-def reduce(windows: Mapping[str, Array], setup: FourSetup) -> DriftTestResult:
-    """Coefficients from windows: t_start, t_end (s), angle_start, angle_end (rad, nominal), mean, mean_2, mean_3,
-    mean_4 (V).  Raises ReductionError with everything that is wrong.
+class Reduction(DriftTest[FourSetup]):
+    """Coefficients of four sensors from windows: t_start, t_end (s), angle_start, angle_end (rad, nominal), mean,
+    mean_2, mean_3, mean_4 (V).
     """
-    problems = frames.gravity_problems(setup.gravity) + window_problems(windows)
-    missing = [f"mean_{i}" for i in geometry.SENSORS[1:] if f"mean_{i}" not in windows]
-    if missing:
-        problems.append(f"column {', '.join(missing)} is missing: the four sensors are read together")
-    if problems:
-        raise ReductionError(problems)
-    alpha = np.asarray(windows["angle_start"], dtype=float)
-    problems = _position_problems(alpha, np.asarray(windows["angle_end"], dtype=float), setup.points)
-    U = np.column_stack([np.asarray(windows[n], dtype=float) for n in ("mean", "mean_2", "mean_3", "mean_4")])
-    if not problems and np.any(np.ptp(U, axis=0) == 0.0):
-        problems.append("a voltage is the same in all positions: no accelerometer was read")
-    if problems:
-        raise ReductionError(problems)
-    single, s_single = chain.alone(alpha, U, setup.gamma)
-    if np.any(single[:, 1] <= 0.0):
-        raise ReductionError(
-            f"scale factors {', '.join(f'{k:.4g}' for k in single[:, 1])} V/g: must be positive; turn the sign of a "
-            "voltage round, or the sense of the angle, or sensors stand in another order"
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> FourSetup:
+        o = run.options
+        gravity = float(o["gravity"]) if run.measured else Site.of(run).gravity
+        D1 = None if o.get("d1_unknown") else (float(o["D1c"]), float(o["D1s"]))
+        site = {"gravity / (m/s²)": gravity}
+        return FourSetup.of(run, gravity=gravity, points=int(o["points"]), truth=sensor_truth(run), D1=D1, site=site)
+
+    def problems(self) -> list[str]:
+        s, w = self.setup, self.windows
+        problems = frames.gravity_problems(s.gravity) + window_problems(w)
+        if missing := [n for n in COLUMNS[1:] if n not in w]:
+            problems.append(f"column {', '.join(missing)} is missing: the four sensors are read together")
+        if problems:
+            return problems
+        self.alpha = np.asarray(w["angle_start"], dtype=float)
+        self.U = np.column_stack([np.asarray(w[n], dtype=float) for n in COLUMNS])
+        problems = _position_problems(self.alpha, np.asarray(w["angle_end"], dtype=float), s.points)
+        if not problems and np.any(np.ptp(self.U, axis=0) == 0.0):
+            problems.append("a voltage is the same in all positions: no accelerometer was read")
+        return problems
+
+    def regression(self) -> Regression:
+        self.single, self.s_single = chain.alone(self.alpha, self.U, self.setup.gamma)
+        scale = self.single[:, 1]
+        if np.any(scale <= 0.0):
+            raise ReductionError(
+                f"scale factors {', '.join(f'{k:.4g}' for k in scale)} V/g: must be positive; turn the sign of a "
+                "voltage round, or the sense of the angle, or sensors stand in another order"
+            )
+        first = joint(self.alpha, self.U, self.setup, scale).fit()
+        return joint(self.alpha, self.U, self.setup, first.est.beta[1:20:5])
+
+    def derived(self, found: Findings) -> Findings:
+        truth, self.joint = self.setup.truth or {}, found
+        quantities = [
+            Quantity(f"{k},{i}", f"{MEANING[k][0]}, sensor {i}", MEANING[k][1], 1.0, truth.get(f"{k},{i}"))
+            for i, k in NAMES
+        ]
+        return found.derive(quantities, lambda b: b[:20])
+
+    def effects(self, found: Findings) -> list[Effect]:
+        s, beta = self.setup, found.est.beta
+        scale = beta[1:20:5] * s.gamma
+        tangent = [scale[j] * geometry.axes(i, self.alpha)[1] for j, i in enumerate(geometry.SENSORS)]
+        lines = [np.concatenate([-t * f(self.alpha) for t in tangent]) for f in (np.cos, np.sin)]
+        power = np.tile([0.0, 1.0, 1.0, 2.0, 2.0], 4)  # of 1/gravity in the coefficients
+        both = zip(("cosine", "sine"), lines, strict=True) if s.D1 is not None else ()
+        return [
+            VOLTMETER.effect(s, found.error(self.U.T.ravel()), note=VOLTAGES),
+            GRAVITY.effect(s, values=-power * beta[:20] / s.gravity),
+            *(FIRST.of(kind=kind).effect(s, found.error(line)) for kind, line in both),
+        ]
+
+    def account(self, found: Findings) -> Account:
+        points, unknowns = self.setup.points, found.X.shape[1]
+        return Account(
+            method=f"{points} positions, four sensors read together; joint least squares of 20 coefficients and "
+            f"{unknowns - 20} harmonics of the head [TEST-ACCEL4]",
+            sources=["TEST-ACCEL4, ACCEL-MODEL; Dong 2014, eq. 1-31, corrected by EA1 to EA13"],
+            equation='U_i = K_F + K_I a_I + K_O a_O + K_"IO" a_I a_O + K_"II" a_I^2 + K_I a_O D(alpha)',
+            conventions=[
+                "a in g0 = 9.80665 m/s²; specific force: an axis that points up reads +1.",
+                "Sensor 1 is level at angle 0 and rises with the angle; sensors 2, 3, 4 are 90°, 180°, 270° ahead.",
+                "No third order. Misalignment and the zero of the head are in K_O.",
+            ],
+            tables=[self._compared(), self._head()],
+            reasons=self._biased(),
+            random="noise of the voltages",
         )
-    found = estimate(alpha, U, setup, single[:, 1])
-    reported = found.derive(_quantities(setup), lambda b: b[:20])
-    result = linear_result(
-        reported,
-        system="accelerometer_four",
-        title="Four accelerometers on one indexing head",
-        method=f"{setup.points} positions, four sensors read together; joint least squares of 20 coefficients and "
-        f"{found.X.shape[1] - 20} harmonics of the head [TEST-ACCEL4]",
-        sources=["TEST-ACCEL4, ACCEL-MODEL; Dong 2014, eq. 1-31, corrected by EA1 to EA13"],
-        equation='U_i = K_F + K_I a_I + K_O a_O + K_"IO" a_I a_O + K_"II" a_I^2 + K_I a_O D(alpha)',
-        conventions=[
-            "a in g0 = 9.80665 m/s²; specific force: an axis that points up reads +1.",
-            "Sensor 1 is level at angle 0 and rises with the angle; sensors 2, 3, 4 are 90°, 180°, 270° ahead.",
-            "No third order. Misalignment and the zero of the head are in K_O.",
-        ],
-        effects=_effects(setup, found, reported, alpha, U),
-        specification=setup.specification,
-        site={"gravity / (m/s²)": setup.gravity},
-        instrument=setup.instrument,
-        simulated=setup.truth is not None,
-        tables=_tables(setup, found, alpha, U, single, s_single),
-        random="noise of the voltages",
-    )  # fmt: skip
-    return _judged(result, setup, found)
+
+    def _biased(self) -> list[Reason]:
+        """Return that the first harmonic of the head is in the coefficients, where it was not measured."""
+        if self.setup.D1 is not None:
+            return []
+        scale = float(np.mean(self.joint.est.beta[1:20:5]))
+        text = (
+            f"The first harmonic of the head is not known: {', '.join(BIASED)} of each sensor are biased by K_I D1, "
+            f"{scale * ARCSEC:.2g} V for each arcsecond; the residuals do not show it. Measure it in the same "
+            "positions."
+        )
+        names = tuple(f"{k},{i}" for i, k in NAMES if k in BIASED)
+        return [Reason("head.first_harmonic_unknown", text, ("pass", "fail"), names)]
+
+    def _compared(self) -> Table:
+        s, beta, u = self.setup, self.joint.est.beta, self.joint.est.u
+        three = chain.three_steps(self.alpha, self.U, s.gamma)
+        if s.D1 is not None:
+            three = three + _first_harmonic(beta[1:20:5], s.D1)
+        each = zip(NAMES, beta[:20], u[:20], three.ravel(), self.single.ravel(), strict=True)
+        rows = [[f"{k},{i}", *map(float, values), MEANING[k][1]] for (i, k), *values in each]
+        scatter = ", ".join(f"{v:.3g}" for v in self.s_single)
+        caption = (
+            "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
+            f"Alone: five terms of each sensor, errors of the head in them. Residuals of the sensors alone: {scatter} "
+            f"V, of the joint fit {self.joint.residual_std:.3g} V."
+        )
+        head = ["coefficient", "joint", "u, type A", "chain", "alone", "unit"]
+        return Table("fits.compared", "Joint fit, chain of the source, each sensor alone", caption, head, rows)
+
+    def _head(self) -> Table:
+        s, beta, u = self.setup, self.joint.est.beta, self.joint.est.u
+        rows = [
+            [k, kind, float(beta[20 + m]) / ARCSEC, float(u[20 + m]) / ARCSEC]
+            for m, (k, kind) in enumerate(geometry.orders(s.points))
+        ]
+        known = zip(("cos", "sin"), s.D1 or (), strict=False)
+        rows = [[1, kind, v / ARCSEC, s.u_D1 / ARCSEC] for kind, v in known] + rows
+        caption = "Positions minus their nominal angles; the first harmonic is that of the autocollimator"
+        head = ["harmonic", "of", "amplitude / ″", "u / ″"]
+        return Table("head.harmonics", "Angle errors of the head by harmonics", caption, head, rows)
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        scales = "; ".join(f"sensor {i} {{K_I,{i}}}" for i in geometry.SENSORS)
+        scatter, dof = self.joint.residual_std, self.joint.dof
+        return [
+            *told(coefficients, f"Scale factors: {scales}."),
+            f"Residual standard deviation {scatter:.3g} V with {dof:.0f} degrees of freedom.",
+        ]
+
+
+reduce = Reduction.reduce
 
 
 def estimate(alpha: Array, U: Array, setup: FourSetup, scale: Array) -> Findings:
     """Return the joint fit of voltages U (n, 4) at the nominal angles; scale (4,): first scale factors, V/g."""
-    first = _fitted(alpha, U, setup, scale)
-    return _fitted(alpha, U, setup, first.est.beta[1:20:5])
+    first = joint(alpha, U, setup, scale).fit()
+    return joint(alpha, U, setup, first.est.beta[1:20:5]).fit()
+
+
+def joint(alpha: Array, U: Array, s: FourSetup, scale: Array) -> Regression:
+    """Return the regression of all voltages with the columns of D of these scale factors."""
+    n, basis = alpha.size, geometry.harmonics(alpha, s.points)
+    X = np.zeros((4 * n, 20 + basis.shape[1]))
+    y = U.T.ravel().copy()
+    first = s.D1 or (0.0, 0.0)
+    D1 = first[0] * np.cos(alpha) + first[1] * np.sin(alpha)
+    groups = []
+    dense = np.radians(np.arange(0.0, 361.0, 3.0))
+    shown = np.degrees(np.mod(alpha + 1e-6, 2.0 * math.pi) - 1e-6)
+    for j, i in enumerate(geometry.SENSORS):
+        rows, own = slice(j * n, (j + 1) * n), slice(5 * j, 5 * j + 5)
+        tangent = scale[j] * s.gamma * geometry.axes(i, alpha)[1]
+        X[rows, own] = chain.design(i, alpha, s.gamma)
+        X[rows, 20:] = basis * tangent[:, None]
+        y[rows] -= tangent * D1
+        curve = np.zeros((dense.size, X.shape[1]))
+        curve[:, own] = chain.design(i, dense, s.gamma)
+        drawn = (np.degrees(dense), curve)
+        groups.append(Group(f"sensor {i}", np.arange(n) + j * n, shown, "angle of the head", "°", drawn))
+    names = [*(f"{k},{i}" for i, k in NAMES), *(f"D{k}{kind[0]}" for k, kind in geometry.orders(s.points))]
+    return Regression(names, X, y, None, None, groups, "voltage", "V", 1.0, "white")
 
 
 def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
@@ -127,10 +241,8 @@ def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
     number = np.rint(alpha / step)
     off = np.flatnonzero((np.abs(alpha - number * step) > POSITION) | (np.abs(end - alpha) > POSITION))
     if off.size:
-        return [
-            f"row {off[0] + 1}: {math.degrees(float(alpha[off[0]])):.6g}° to {math.degrees(float(end[off[0]])):.6g}° "
-            f"is not one of {points} equally spaced positions"
-        ]
+        a, b = (math.degrees(float(x[off[0]])) for x in (alpha, end))
+        return [f"row {off[0] + 1}: {a:.6g}° to {b:.6g}° is not one of {points} equally spaced positions"]
     counts = np.bincount(np.mod(number, points).astype(int), minlength=points)
     if np.any(counts != counts[0]) or counts[0] == 0:
         few = int(np.argmin(counts))
@@ -139,128 +251,21 @@ def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
     return [] if 16 <= points <= 24 else [f"points = {points}: 16 to 24 positions"]
 
 
-def _fitted(alpha: Array, U: Array, s: FourSetup, scale: Array) -> Findings:
-    """The joint fit with the columns of D of these scale factors."""
-    n, basis = alpha.size, geometry.harmonics(alpha, s.points)
-    X = np.zeros((4 * n, 20 + basis.shape[1]))
-    y = U.T.ravel().copy()
-    first = s.D1 or (0.0, 0.0)
-    D1 = first[0] * np.cos(alpha) + first[1] * np.sin(alpha)
-    groups = []
-    dense = np.radians(np.arange(0.0, 361.0, 3.0))
-    for j, i in enumerate(geometry.SENSORS):
-        rows = slice(j * n, (j + 1) * n)
-        tangent = scale[j] * s.gamma * geometry.axes(i, alpha)[1]
-        X[rows, 5 * j : 5 * j + 5] = chain.design(i, alpha, s.gamma)
-        X[rows, 20:] = basis * tangent[:, None]
-        y[rows] -= tangent * D1
-        curve = np.zeros((dense.size, X.shape[1]))
-        curve[:, 5 * j : 5 * j + 5] = chain.design(i, dense, s.gamma)
-        shown = np.degrees(np.mod(alpha + 1e-6, 2.0 * math.pi) - 1e-6)
-        groups.append(Group(f"sensor {i}", np.arange(j * n, (j + 1) * n), shown, "angle of the head", "°",
-                            (np.degrees(dense), curve)))  # fmt: skip
-    names = [f"{k},{i}" for i in geometry.SENSORS for k in geometry.TERMS]
-    names += [f"D{k}{kind[0]}" for k, kind in geometry.orders(s.points)]
-    return fit(names, X, y, None, None, groups, "voltage", "V", 1.0, noise="white")
-
-
-def _quantities(s: FourSetup) -> list[Quantity]:
-    truth = s.truth or {}
-    return [
-        Quantity(f"{k},{i}", f"{MEANING[k][0]}, sensor {i}", MEANING[k][1], 1.0, truth.get(f"{k},{i}"))
-        for i in geometry.SENSORS
-        for k in geometry.TERMS
-    ]
-
-
-def _effects(s: FourSetup, found: Findings, reported: Findings, alpha: Array, U: Array) -> list[Effect]:
-    scale = found.est.beta[1:20:5] * s.gamma
-    tangent = [scale[j] * geometry.axes(i, alpha)[1] for j, i in enumerate(geometry.SENSORS)]
-    lines = [np.concatenate([-t * f(alpha) for t in tangent]) for f in (np.cos, np.sin)]
-    power = np.tile([0.0, 1.0, 1.0, 2.0, 2.0], 4)  # of 1/gravity in the coefficients
-    out = [
-        Effect("voltmeter", s.u_voltage, "1", reported.error(U.T.ravel()), "relative, of all voltages"),
-        Effect("gravity", s.u_gravity, "m/s²", None, values=-power * found.est.beta[:20] / s.gravity),
-    ]
-    if s.D1 is not None:
-        out += [
-            Effect(f"first harmonic of the head, {kind}", s.u_D1, "rad", reported.error(line), "as measured")
-            for kind, line in zip(("cosine", "sine"), lines, strict=True)
-        ]
-    return out
-
-
-def _tables(
-    s: FourSetup, found: Findings, alpha: Array, U: Array, single: Array, s_single: Array
-) -> list[dict[str, Any]]:
-    beta, u = found.est.beta, found.est.u
-    three = chain.three_steps(alpha, U, s.gamma)
-    if s.D1 is not None:
-        three = three + _first_harmonic(beta[1:20:5], s.D1)
-    rows = [
-        [f"{k},{i}", *(float(v) for v in (beta[5 * j + m], u[5 * j + m], three[j, m], single[j, m])), MEANING[k][1]]
-        for j, i in enumerate(geometry.SENSORS)
-        for m, k in enumerate(geometry.TERMS)
-    ]
-    compared = {
-        "title": "Joint fit, chain of the source, each sensor alone",
-        "caption": "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
-        "Alone: five terms of each sensor, errors of the head in them. Residuals of the sensors alone: "
-        + ", ".join(f"{v:.3g}" for v in s_single) + f" V, of the joint fit {found.residual_std:.3g} V.",
-        "columns": ["coefficient", "joint", "u, type A", "chain", "alone", "unit"],
-        "rows": rows,
-    }  # fmt: skip
-    head = [
-        [k, kind, float(beta[20 + m]) / ARCSEC, float(u[20 + m]) / ARCSEC]
-        for m, (k, kind) in enumerate(geometry.orders(s.points))
-    ]
-    if s.D1 is not None:
-        given = zip(("cos", "sin"), s.D1, strict=True)
-        head = [[1, kind, v / ARCSEC, s.u_D1 / ARCSEC] for kind, v in given] + head
-    errors = {
-        "title": "Angle errors of the head by harmonics",
-        "caption": "Positions minus their nominal angles; the first harmonic is that of the autocollimator",
-        "columns": ["harmonic", "of", "amplitude / ″", "u / ″"],
-        "rows": head,
-    }
-    return [compared, errors]
-
-
 def _first_harmonic(scale: Array, D1: tuple[float, float]) -> Array:
-    """What takes the first harmonic out of terms (4, 5) that were fitted with it.  [Dong 2014, eq. 27, 28, by EA8]"""
+    """Return what takes the first harmonic out of terms (4, 5) fitted with it.  [Dong 2014, eq. 27, 28, by EA8]"""
     c, s = D1
     of_unit = np.array([[-c, 0, 0, -s, c], [s, 0, 0, c, -s], [c, 0, 0, s, -c], [-s, 0, 0, -c, s]])
     out: Array = scale[:, None] * of_unit
     return out
 
 
-def _judged(result: DriftTestResult, s: FourSetup, found: Findings) -> DriftTestResult:
-    by_name = {c.name: c for c in result.coefficients}
-    scales = "; ".join(f"sensor {i} {plus_minus(by_name[f'K_I,{i}'])}" for i in geometry.SENSORS)
-    result.summary = [
-        f"Scale factors: {scales}.",
-        f"Residual standard deviation {found.residual_std:.3g} V with {found.dof:.0f} degrees of freedom.",
-    ]
-    if s.D1 is None:
-        names = [f"{k},{i}" for i in geometry.SENSORS for k in BIASED]
-        scale = float(np.mean(found.est.beta[1:20:5]))
-        text = (
-            f"The first harmonic of the head is not known: {', '.join(BIASED)} of each sensor are biased by K_I D1, "
-            f"{scale * ARCSEC:.2g} V for each arcsecond; the residuals do not show it. Measure it in the same "
-            "positions."
-        )
-        result.warnings.insert(0, text)
-        return uncertainty.withhold(result, [text], ["pass", "fail"], names)
-    return result
-
-
-def truth_of(run: RunDocument) -> dict[str, float] | None:
-    """Coefficients that the simulated sensors have about the axes of the head: misalignment and zero turned in."""
+def sensor_truth(run: RunDocument) -> dict[str, float] | None:
+    """Return the coefficients of simulated sensors about the axes of the head: misalignment and zero turned in."""
     p = run.parameters
     if run.measured or not all(f"accelerometer_{i}.K_I" in p for i in geometry.SENSORS):
         return None
     zero = float(np.mean(np.asarray(p["table.error"])[: int(run.options["points"])]))
-    site = run_metadata.Site.of(run)
+    site = Site.of(run)
     found: dict[str, float] = {}
     for i in geometry.SENSORS:
         F, I, O, IO, II = (float(p[f"accelerometer_{i}.{k}"]) for k in geometry.TERMS)  # noqa: E741
@@ -272,18 +277,3 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
         )  # fmt: skip
         found |= {f"{k},{i}": v for k, v in zip(geometry.TERMS, values, strict=True)}
     return found
-
-
-def setup_of(run: RunDocument, specification: Specification | None = None) -> FourSetup:
-    """Return the setup that a run.json describes."""
-    o = run.options
-    gravity = float(o["gravity"]) if run.measured else run_metadata.Site.of(run).gravity
-    return FourSetup.of(
-        run, specification, gravity=gravity, points=int(o["points"]), truth=truth_of(run),
-        D1=None if o.get("d1_unknown") else (float(o["D1c"]), float(o["D1s"])),
-    )  # fmt: skip
-
-
-def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """:func:`reduce` of a record with its run.json as provenance."""
-    return run_metadata.finish(reduce(record.windows, setup_of(record.run, specification)), record)

@@ -80,7 +80,7 @@ class AccelerometerFour(TableTest):
     channel_period = 1.0
 
     def plan(self) -> Plan:
-        """The head goes on through the turns, position after position."""
+        """Return phases in which the head goes on through the turns, position after position."""
         n = self["points"]
         each = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"]}
         phases = [

@@ -13,22 +13,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup import sources
+from gyrobench.reduction.setup.sources import Source
 
 from . import closed
 from .geometry import specific_force
-from .model import Model, Setup, Visits
+from .model import MultipointSetup, Polynomial, Visits
 
 STEP = 1e-4
+SCALE = Source("accelerometer.scale", "scale λ", "1", "u_scale", "relative")
+ZERO = replace(sources.CURRENT_OFFSET, name="zero of the current meter")
+RESOLUTION = replace(sources.CURRENT_RESOLUTION, name="resolution of the current meter")
+PLACES = Source(
+    "head.positions", "positions of the head", "rad", "u_angle", "independent, the same in each turn and mount"
+)
+AXIS = Source("head.axis", "axis of the head above the horizon", "rad", "u_axis")
+TURNED = Source("accelerometer.mount.{k}", "accelerometer turned about its {axis} axis", "rad", "u_mount")
 
 
-def effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float], k: Array, s: Setup) -> list[Effect]:
+def effects(
+    found: Findings, model: Polynomial, v: Visits, zeros: Mapping[str, float], k: Array, s: MultipointSetup
+) -> list[Effect]:
     """Return all sources with their sensitivities; sizes come from ``s`` and may be 0.  k: coefficients of the model's
     terms; what a mount alone or four positions do not see is taken as 0.
     """
@@ -42,27 +55,25 @@ def effects(found: Findings, model: Model, v: Visits, zeros: Mapping[str, float]
     stations, at = np.unique(_stations(v.angle), return_inverse=True)
     alone = np.array([found.error(np.where(at == p, slope, 0.0)) for p in range(stations.size)])
     axis, turned = _mounted(model, v, zeros, k, s.gamma, slope)
+    of_head = "of the readings of the head"
 
     def misread(n: int) -> Array:  # the head stands short of what it reads
         return np.array([found.error(-slope * f(n * v.angle)) for f in (np.sin, np.cos)])
 
     return [
-        Effect("scale λ", s.u_scale, "1", found.error(v.y), "relative"),
-        Effect("zero of the current meter", s.u_current, "A", offset),
-        Effect("resolution of the current meter", s.quantum / math.sqrt(12.0), "A", offset, "as if never dithered"),
-        Effect("gravity", s.u_gravity, "m/s²", found.error(dX=stretched)),
-        Effect(
-            "positions of the head", s.u_angle, "rad", alone, "independent, the same in each turn and mount",
-            tuple(f"{x:g}°" for x in stations.tolist()),
-        ),
-        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "of the readings of the head", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "of the readings of the head", SINES),
-        Effect("axis of the head above the horizon", s.u_axis, "rad", found.error(axis)),
+        SCALE.effect(s, found.error(v.y)),
+        ZERO.effect(s, offset),
+        RESOLUTION.effect(s.quantum / math.sqrt(12.0), offset),
+        sources.GRAVITY.effect(s, found.error(dX=stretched)),
+        PLACES.effect(s, alone, parts=tuple(f"{x:g}°" for x in stations.tolist())),
+        sources.ANGLE_ONCE.effect(s, misread(1), note=of_head),
+        sources.ANGLE_TWICE.effect(s, misread(2), note=of_head),
+        AXIS.effect(s, found.error(axis)),
         *(
-            Effect(f"accelerometer turned about its {n} axis", s.u_mount, "rad", found.error(row))
-            for n, row in zip(("input", "output", "pendulum"), turned, strict=True)
+            TURNED.of(k=str(n), axis=name).effect(s, found.error(row))
+            for n, (name, row) in enumerate(zip(("input", "output", "pendulum"), turned, strict=True), 1)
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _stations(angle: Array) -> Array:
@@ -74,7 +85,7 @@ def _stations(angle: Array) -> Array:
 
 
 def _mounted(
-    model: Model, v: Visits, zeros: Mapping[str, float], k: Array, gamma: float, slope: Array
+    model: Polynomial, v: Visits, zeros: Mapping[str, float], k: Array, gamma: float, slope: Array
 ) -> tuple[Array, Array]:
     """Return what the data are wrong by per rad of the axis above the horizon (n,), and of the accelerometer turned
     about each of its axes (3, n).

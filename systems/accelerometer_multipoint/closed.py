@@ -33,7 +33,7 @@ LEAST = 7  # equally spaced positions for three harmonics  [ACC-MINPTS]
 
 
 def spacing(angle: Array) -> tuple[int, str]:
-    """Number of different positions of a turn, and why they are not equally spaced over it ("" if they are)."""
+    """Return the number of different positions of a turn, and why they are not equally spaced ("" if they are)."""
     turn = 2.0 * math.pi
     place = np.sort(np.mod(angle + EQUAL, turn))
     first = np.concatenate([[True], np.diff(place) > 10.0 * EQUAL])
@@ -50,7 +50,7 @@ def spacing(angle: Array) -> tuple[int, str]:
 
 
 def harmonics(angle: Array, y: Array, order: int = 3) -> dict[str, float]:
-    """A0, A1, B1 ... by sums over equally spaced positions (more than 2 ``order`` of them), whole turns."""
+    """Return A0, A1, B1 ... by sums over equally spaced positions (more than 2 ``order`` of them), whole turns."""
     found = {"A0": float(np.mean(y))}
     for n in range(1, order + 1):
         found[f"A{n}"] = 2.0 * float(np.mean(y * np.cos(n * angle)))
@@ -59,7 +59,7 @@ def harmonics(angle: Array, y: Array, order: int = 3) -> dict[str, float]:
 
 
 def formulas(h: Mapping[str, float], mount: str, gamma: float) -> dict[str, float]:
-    """k0 ... k3, k4 or k5 in multiples of g0 (per g0^n) and theta_0 in rad; k1 must be positive."""
+    """Return k0 ... k3, k4 or k5 in multiples of g0 (per g0^n) and theta_0 in rad; k1 must be positive."""
     zero = math.atan2(-h["A1"], -h["B1"])
     c = {n: math.cos(n * zero) for n in (1, 2, 3)}
     s = {n: math.sin(n * zero) for n in (1, 2, 3)}
@@ -76,7 +76,9 @@ def formulas(h: Mapping[str, float], mount: str, gamma: float) -> dict[str, floa
 
 
 def four_points(angle: Array, y: Array, gamma: float) -> dict[str, float]:
-    """k0, k1, k2 (which stand for the combinations above) and theta_0 from positions at 0, 90, 180, 270 degrees."""
+    """Return k0, k1, k2 (which stand for the combinations above) and theta_0 from positions at 0, 90, 180, 270
+    degrees.
+    """
     quarter = np.mod(np.rint(angle / (math.pi / 2.0)).astype(int), 4)
     p = [float(np.mean(y[quarter == q])) for q in range(4)]
     s0, s90, d0, d90 = (p[0] + p[2]) / 2.0, (p[1] + p[3]) / 2.0, (p[0] - p[2]) / 2.0, (p[1] - p[3]) / 2.0
@@ -91,7 +93,9 @@ def four_points(angle: Array, y: Array, gamma: float) -> dict[str, float]:
 
 
 def stands_for(truth: Mapping[str, float], zeros: Mapping[str, float], gamma: float) -> dict[str, float]:
-    """What four positions see of a true polynomial; ``zeros``: mount -> theta_0; two mounts: the mean of them."""
+    """Return what four positions see of a true polynomial; ``zeros``: mount -> theta_0; two mounts: the mean of
+    them.
+    """
     out = {"k0": 0.0, "k1": 0.0, "k2": 0.0}
     for mount, zero in zeros.items():
         cross = truth["k5"] if mount == "a" else -truth["k4"]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.design.visit_protocol import Channel, Noise, VisitProtocol, phases_of
+from gyrobench.design.visit_protocol import Channel, DataNoise, VisitProtocol, phases_of
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.run_metadata import Site
@@ -16,7 +16,7 @@ from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
 from . import geometry
-from .model import Model, Visits
+from .model import Polynomial, Visits
 
 TURN = 2.0 * math.pi
 STATIONS = 24
@@ -34,14 +34,14 @@ def protocol_of(system: System, record: Record) -> VisitProtocol:
     mount = np.repeat(np.array(mounts), STATIONS)
     angle = np.tile(np.arange(STATIONS) * TURN / STATIONS, len(mounts))
     zeros = {m: geometry.zero_angle(m, p["accelerometer.mount"]) for m in mounts}
-    model, gamma = Model(mounts, False), Site.of(record.run).gravity / G0
+    model, gamma = Polynomial(mounts, False), Site.of(record.run).gravity / G0
     k = np.array([float(p[f"accelerometer.{n}"]) for n in model.terms])
     v = Visits(mount, angle, angle, angle, np.zeros_like(angle), math.nan)
     slopes = model.slopes(v, zeros, gamma, k)
     white = math.hypot(
         float(p["accelerometer.white"]) / G0, float(p["accelerometer.meter"]) * p["accelerometer.scale"] / G0
     )
-    noise = Noise(white, float(p["accelerometer.markov"]) / G0, float(p["accelerometer.markov_tau"]))
+    noise = DataNoise(white, float(p["accelerometer.markov"]) / G0, float(p["accelerometer.markov_tau"]))
     channel = Channel(
         tuple(model.names),
         np.column_stack([model.columns(v, zeros, gamma), slopes]),

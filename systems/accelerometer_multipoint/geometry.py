@@ -30,13 +30,15 @@ CROSS = {"a": "k5", "b": "k4"}  # which cross term a mount sees
 
 
 def specific_force(mount: str, t: Array, gamma: float) -> tuple[Array, Array, Array]:
-    """X, Y, Z (n,) of a mount with the input axis at the elevations ``t`` (n,), rad."""
+    """Return X, Y, Z (n,) of a mount with the input axis at the elevations ``t`` (n,), rad."""
     zero = np.zeros_like(t)
     x, c = -gamma * np.sin(t), gamma * np.cos(t)
     return (x, zero, -c) if mount == "a" else (x, c, zero)
 
 
 def zero_angle(mount: str, axes: ArrayLike) -> float:
-    """theta_0 (rad) of an accelerometer whose axes are the rows of ``axes`` in the mount (a parameter of the part)."""
+    """Return theta_0 (rad) of an accelerometer whose axes are the rows of ``axes`` in the mount (a parameter of the
+    part).
+    """
     x = FACES[mount].T @ np.asarray(axes, dtype=float)[0]  # input axis in table axes
     return math.atan2(float(x[1]), float(x[0]))

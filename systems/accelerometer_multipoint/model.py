@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +23,9 @@ from .geometry import CROSS, specific_force
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(setups.Setup):
+class MultipointSetup(setups.Setup):
     """scale: lambda, m/s2/A.  mounts: phase -> "a" or "b".  truth: k0 ... k5; zeros: mount -> true theta_0.  quantum:
-    resolution of the current reading.  site: as the report shows it.
+    resolution of the current reading.
     """
 
     gravity: float
@@ -34,7 +33,6 @@ class Setup(setups.Setup):
     mounts: Mapping[int, str]
     zeros: Mapping[str, float] | None = None
     quantum: float = 0.0
-    site: Mapping[str, Any] = field(default_factory=dict)
     u_scale: float = 0.0
     u_current: float = 0.0
     u_gravity: float = 0.0
@@ -65,8 +63,8 @@ class Visits:
         return sorted(set(self.mount.tolist()))
 
 
-def visits(windows: Mapping[str, Array], s: Setup) -> Visits:
-    """Neighbouring windows of the same phase and angle averaged by their length."""
+def visits(windows: Mapping[str, Array], s: MultipointSetup) -> Visits:
+    """Return neighbouring windows of the same phase and angle, averaged by their length."""
     phase = np.asarray(windows["phase"]).astype(int)
     angle, t0, t1, mean = (np.asarray(windows[c], dtype=float) for c in ("angle_start", "t_start", "t_end", "mean"))
     new = np.concatenate([[True], (np.diff(phase) != 0) | (np.abs(np.diff(angle)) > closed.EQUAL)])
@@ -82,7 +80,7 @@ def visits(windows: Mapping[str, Array], s: Setup) -> Visits:
     return Visits(mount, angle[new], t0[new], t1[last], means, within)
 
 
-class Model:
+class Polynomial:
     """Columns of the linearized model at zeros (mount -> theta_0); four: three terms, which stand for combinations."""
 
     def __init__(self, mounts: Sequence[str], four: bool) -> None:
@@ -93,7 +91,7 @@ class Model:
         self.names = [*self.terms, *(f"θ₀ {m}" for m in self.mounts)]
 
     def columns(self, v: Visits, zeros: Mapping[str, float], gamma: float) -> Array:
-        """(n, terms): what each k multiplies."""
+        """Return (n, terms): what each k multiplies."""
         X, cross = np.empty_like(v.y), {k: np.zeros_like(v.y) for k in ("k4", "k5")}
         for m in self.mounts:
             mine = v.mount == m
@@ -104,7 +102,7 @@ class Model:
         return np.column_stack([every[k] for k in self.terms])
 
     def slopes(self, v: Visits, zeros: Mapping[str, float], gamma: float, k: Array) -> Array:
-        """(n, mounts): change of the data per rad of each theta_0."""
+        """Return (n, mounts): change of the data per rad of each theta_0."""
         step = 1e-4
         out = np.zeros((v.y.size, len(self.mounts)))
         high, low = ({m: z + d for m, z in zeros.items()} for d in (step, -step))
@@ -114,7 +112,9 @@ class Model:
         return out
 
     def solve(self, v: Visits, gamma: float) -> tuple[dict[str, float], Array]:
-        """theta_0 of the mounts and k by ordinary least squares; the start is theta_0 from the first harmonic."""
+        """Return theta_0 of the mounts and k by ordinary least squares; the start is theta_0 from the first
+        harmonic.
+        """
         zeros = {}
         for m in self.mounts:
             mine = v.mount == m

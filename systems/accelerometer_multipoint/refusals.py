@@ -16,14 +16,14 @@ from .closed import spacing
 from .geometry import FACES
 
 if TYPE_CHECKING:
-    from .model import Setup
+    from .model import MultipointSetup
 
 ZERO = math.radians(1.0)  # largest theta_0
 STILL = 1e-6  # rad, largest motion within a window
 
 
 def points_problems(points: int, mounts: str = "both", turns: int = 1) -> list[str]:
-    """Why ``points`` equally spaced positions cannot give the coefficients, as sentences."""
+    """Return why ``points`` equally spaced positions cannot give the coefficients, as sentences."""
     if points < 4:
         return [f"{points} positions a turn: at least 4 are needed, 7 for the third order"]
     if points < 7:
@@ -38,7 +38,7 @@ def points_problems(points: int, mounts: str = "both", turns: int = 1) -> list[s
 
 
 def few_problems(points: int, alone: bool) -> list[str]:
-    """Why so few positions will not do, as sentences; whether they tell the terms apart is up to the fit.
+    """Return why so few positions will not do, as sentences; whether they tell the terms apart is up to the fit.
 
     The seven of :func:`points_problems` are those of three harmonics.  The model has no cosine of the third, and both
     mounts share k0 to k3: the six positions 30°, 90°, 150° ... determine all terms of a mount, those from 0° on do not.
@@ -49,7 +49,7 @@ def few_problems(points: int, alone: bool) -> list[str]:
 
 
 def zero_problems(zeros: Mapping[str, float]) -> list[str]:
-    """Mounts whose input axis is not level at angle 0; ``zeros``: mount -> theta_0, rad."""
+    """Return mounts whose input axis is not level at angle 0; ``zeros``: mount -> theta_0, rad."""
     return [
         f"mount {m}: θ₀ = {math.degrees(z):.4g}°: the input axis must be horizontal at angle 0 to 1° (head zero and "
         "mount together); a larger angle is a mistake of the mount"
@@ -58,7 +58,7 @@ def zero_problems(zeros: Mapping[str, float]) -> list[str]:
     ]
 
 
-def setup_problems(s: Setup) -> list[str]:
+def setup_problems(s: MultipointSetup) -> list[str]:
     found = frames.gravity_problems(s.gravity)
     if not (math.isfinite(s.scale) and s.scale > 0.0):
         found.append(f"scale λ = {s.scale:g} m/s²/A: a finite positive number is expected")
@@ -68,8 +68,8 @@ def setup_problems(s: Setup) -> list[str]:
     return found
 
 
-def record_problems(s: Setup, windows: Mapping[str, Array]) -> list[str]:
-    """Phases without a mount and windows in which the head moved; rows count from 1."""
+def record_problems(s: MultipointSetup, windows: Mapping[str, Array]) -> list[str]:
+    """Return the phases without a mount and windows in which the head moved; rows count from 1."""
     phase = np.asarray(windows["phase"]).astype(int)
     strange = sorted(set(phase.tolist()) - set(s.mounts))
     found = [f"phase {p}: its mount is not given" for p in strange]
@@ -83,7 +83,7 @@ def record_problems(s: Setup, windows: Mapping[str, Array]) -> list[str]:
 
 
 def position_problems(mount: NDArray[np.str_], angle: Array) -> list[str]:
-    """Mounts with too few positions, or with four that are not quarters of a turn."""
+    """Return mounts with too few positions, or with four that are not quarters of a turn."""
     found = []
     four, mounts = four_positions(mount, angle), sorted(set(mount.tolist()))
     for m in mounts:

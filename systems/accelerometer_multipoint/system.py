@@ -82,7 +82,7 @@ class AccelerometerMultipoint(TableTest):
     channel_period = 1.0
 
     def plan(self) -> Plan:
-        """Mount a, then mount b, position after position; the head goes on through the turns and never back.
+        """Return mount a, then mount b, position after position; the head goes on through the turns and never back.
 
         Of visits, in their order; the head takes the shorter way.
         """

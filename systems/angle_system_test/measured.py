@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import Column, DataError
+from gyrobench.record.csv_reader import CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -44,22 +44,22 @@ TEMPLATE = """\
 phase,t_start [s],t_end [s],rate [ERU],position [deg],turned,reading [deg],reading_2 [deg],reference [deg]
 """
 READOUTS = tuple(
-    Column(f"{of}_{name}", unit, f"{name} of a reading of the {meaning}", required=False)
+    CsvColumn(f"{of}_{name}", unit, f"{name} of a reading of the {meaning}", required=False)
     for of, meaning in (("gate", "gate"), ("inverse", "inverse rate"))
     for name, unit in (("number", "1"), ("rate", "rad/s"), ("start", "s"), ("end", "s"))
 )
 COLUMNS = (
-    Column("phase", "1", "number of the position or rate, from 1", whole=True),
-    Column("t_start", "s", "start of the reading"),
-    Column("t_end", "s", "end of the reading"),
-    Column("rate", "rad/s", "rate of the table, 0 at a position"),
-    Column("position", "rad", "position of the table"),
-    Column("turned", "1", "1 after the scale was turned on its shaft", required=False, whole=True),
-    Column("reading", "rad", "reading of the scale"),
-    Column("reading_2", "rad", "reading of the scale by the second head", required=False),
-    Column("reference", "rad", "reading of the reference"),
-    Column("t_reading", "s", "instant of the reading", required=False),
-    Column("t_reference", "s", "instant of the reference", required=False),
+    CsvColumn("phase", "1", "number of the position or rate, from 1", whole=True),
+    CsvColumn("t_start", "s", "start of the reading"),
+    CsvColumn("t_end", "s", "end of the reading"),
+    CsvColumn("rate", "rad/s", "rate of the table, 0 at a position"),
+    CsvColumn("position", "rad", "position of the table"),
+    CsvColumn("turned", "1", "1 after the scale was turned on its shaft", required=False, whole=True),
+    CsvColumn("reading", "rad", "reading of the scale"),
+    CsvColumn("reading_2", "rad", "reading of the scale by the second head", required=False),
+    CsvColumn("reference", "rad", "reading of the reference"),
+    CsvColumn("t_reading", "s", "instant of the reading", required=False),
+    CsvColumn("t_reference", "s", "instant of the reference", required=False),
     *READOUTS,
 )
 NEEDED = {"head": "50.1deg", "quantum": "0.18arcsec"}

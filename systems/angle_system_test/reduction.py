@@ -24,8 +24,9 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity, fit, linear_result, plus_minus
 from gyrobench.reduction.setup import run_metadata
+from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 
 from . import harmonics
 from .readings import (
@@ -191,7 +192,7 @@ def _groups(rows: Rows, kind: NDArray[np.str_], seen: NDArray[np.bool_]) -> list
     return groups
 
 
-def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[dict[str, Any]]:
+def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[Table]:
     """Return the table of rates by gates and by degrees, less what the errors of the scale make of them."""
     names = {q.name: j for j, q in enumerate(found.linear)}
     weights = np.ones_like(found.y) if found.weights is None else found.weights
@@ -208,14 +209,14 @@ def _readouts(found: Findings, rows: Rows, kind: NDArray[np.str_]) -> list[dict[
             lines.append([name, round(r / ERU, 6), share * 1e6, u * 1e6, u * abs(r) / ERU])
     caption = "Errors of the scale taken out; u: counting, LSB and noise. Type A"
     head = ["readout", "rate of the table / ERU", "rate read, deviation / 1e-6", "u / 1e-6", "u / ERU"]
-    return [{"title": "Rate readouts", "caption": caption, "columns": head, "rows": lines}] if lines else []
+    return [Table("rate_readouts", "Rate readouts", caption, head, lines)] if lines else []
 
 
 def _effects(found: Findings, X: Array, run: RunDocument) -> list[Effect]:
     """The rate of the table, which gates and degrees are compared with: faster than known, they show more."""
     clocks = [j for j, q in enumerate(found.linear) if q.name.startswith("clock")]
     u = float(run.options.get("u_rate", 0.0))
-    return [Effect("rate of the table", u, "1", -X[:, clocks].sum(axis=1), "relative")]
+    return [Source("rate_of_the_table", "rate of the table", "1").effect(u, -X[:, clocks].sum(axis=1), note="relative")]
 
 
 def _conventions(a: Arrangement) -> list[str]:
@@ -227,7 +228,7 @@ def _conventions(a: Arrangement) -> list[str]:
     ]
 
 
-def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[dict[str, Any]]:
+def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[Table]:
     value = {q.name: float(v) for q, v in zip(found.quantities, found.value, strict=True)}
     own = [
         [k, math.hypot(value[f"cos_{k}"], value[f"sin_{k}"]) / ARCSEC,
@@ -238,13 +239,14 @@ def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[dict[str, Any
     waves = harmonics.waves(a.orders, angle)
     error = waves @ np.array([value[f"{f}_{k}"] for k in a.orders for f in ("cos", "sin")]) if a.orders else 0.0 * angle
     tables: list[dict[str, Any]] = [
-        {
-            "title": "Harmonics of the reader",
-            "caption": "Amplitude and phase of a sin(kθ + φ). Separation: share of an order by which the two readings "
+        Table(
+            "harmonics_of_the_reader",
+            "Harmonics of the reader",
+            "Amplitude and phase of a sin(kθ + φ). Separation: share of an order by which the two readings "
             "differ, of 2",
-            "columns": ["order", "amplitude / ″", "phase / °", "separation"],
-            "rows": own,
-        }
+            ["order", "amplitude / ″", "phase / °", "separation"],
+            own,
+        )
     ]
     p = a.pole_pairs
     if 2 * p in a.orders and 4 * p in a.orders:
@@ -254,23 +256,41 @@ def _tables(found: Findings, a: Arrangement, slips: Slips) -> list[dict[str, Any
             ["e5 − e3, windings", p * value[f"sin_{4 * p}"] * 1e3, "1e-3"],
         ]
         tables.append(
-            {"title": "Electrical errors of the reader", "caption": "By eq. 5-51, from orders 2p and 4p",
-             "columns": ["error", "value", "unit"], "rows": electrical}
-        )  # fmt: skip
+            Table(
+                "electrical_errors_of_the_reader",
+                "Electrical errors of the reader",
+                "By eq. 5-51, from orders 2p and 4p",
+                ["error", "value", "unit"],
+                electrical,
+            )
+        )
     local = np.array([np.ptp(error[k : k + 21]) for k in range(0, 7180, 20)])
     tables.append(
-        {"title": "Error of the reader around a turn", "caption": "By the harmonics above, constant left out",
-         "columns": ["quantity", "value / ″"],
-         "rows": [["largest", float(error.max()) / ARCSEC], ["smallest", float(error.min()) / ARCSEC],
-                  ["largest range within 1°", float(local.max()) / ARCSEC]]}
-    )  # fmt: skip
+        Table(
+            "error_of_the_reader_around",
+            "Error of the reader around a turn",
+            "By the harmonics above, constant left out",
+            ["quantity", "value / ″"],
+            [
+                ["largest", float(error.max()) / ARCSEC],
+                ["smallest", float(error.min()) / ARCSEC],
+                ["largest range within 1°", float(local.max()) / ARCSEC],
+            ],
+        )
+    )
     if slips.cycles.size:
         tables.append(
-            {"title": "Readings off by whole fine cycles", "caption": "Carry of the coarse channel, or a lost angle",
-             "columns": ["table angle / °", "cycles", "at"],
-             "rows": [[float(np.degrees(x)), int(n), "a rate" if t else "rest"]
-                      for x, n, t in zip(slips.angle, slips.cycles, slips.turning, strict=True)][:99]}
-        )  # fmt: skip
+            Table(
+                "readings_off_by_whole_fine",
+                "Readings off by whole fine cycles",
+                "Carry of the coarse channel, or a lost angle",
+                ["table angle / °", "cycles", "at"],
+                [
+                    [float(np.degrees(x)), int(n), "a rate" if t else "rest"]
+                    for x, n, t in zip(slips.angle, slips.cycles, slips.turning, strict=True)
+                ][:99],
+            )
+        )
     return tables
 
 

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.component.blocks.gyro import DEG_H
-from gyrobench.frames import G0
-from gyrobench.system.families.loop_test import FLOWN, LoopTest, three
+from gyrobench.system.families.loop_test import FLOWN, LoopTest, by_phase, three
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot
+from gyrobench.units import DEG, G0
 
-DEG = math.pi / 180.0
 PHASES = ("rest", "rocking", "turn", "acceleration", "recovery")
 AXES = ("x", "y", "z")
 #: static and dynamic errors of each gyro, of the size of a floated gyro in a stiff analogue loop; the others are 0
@@ -85,24 +83,15 @@ class AttitudeEstimatorTest(LoopTest):
     )  # fmt: skip
     shown = ("motion.angle", "estimator.angle", "imu.bias", "estimator.bias", "estimator.aided")
 
-    def done_phases(self) -> list[str]:
-        return [str(p) for p in self["phases"].replace(",", " ").split()]
-
     def phases(self) -> list[LoopPhase]:
         lengths = {
-            "rest": self["rest"],
-            "recovery": self["rest"],
-            "rocking": self["period"] * self["cycles"],
-            "acceleration": self["time"],
-            "turn": self["time"],
-        }
-        return [LoopPhase(p, dwell=lengths.get(p, 0.0)) for p in self.done_phases()]
+            "rest": self["rest"], "recovery": self["rest"], "rocking": self["period"] * self["cycles"],
+            "acceleration": self["time"], "turn": self["time"],
+        }  # fmt: skip
+        return [LoopPhase(p, dwell=lengths.get(p, 0.0)) for p in self.asked()]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        """Manoeuvres by phase; the compensation knows the errors, the filters the noise of the instruments."""
-        table: dict[str, list[float]] = {
-            n: [0.0] * LIMIT for n in ("forward", "turn", "pitch", "roll", "yaw", "frequency")
-        }
+        """Return manoeuvres by phase; the compensation knows the errors, the filters the noise of the instruments."""
         peak = math.pi / self["period"] * self["rocking"] if self["period"] else 0.0  # of the rate, for the angle's
         rows = {
             "acceleration": {"forward": self["acceleration"]},
@@ -112,9 +101,7 @@ class AttitudeEstimatorTest(LoopTest):
                 "frequency": 1.0 / self["period"] if self["period"] else 0.0,
             },
         }  # fmt: skip
-        for k, p in enumerate(self.done_phases()[:LIMIT]):
-            for name, value in rows.get(p, {}).items():
-                table[name][k] = value
+        table = by_phase(self.asked(), ("forward", "turn", "pitch", "roll", "yaw", "frequency"), rows)
         errors = parts.all_given(IMU_ERRORS)
         known = {n.replace("imu", "compensation", 1) + "?": self["known"] * x for n, x in errors.items()}
         told = {f"estimator.noise_of_{n}?": parts.get(f"imu.noise_x_{own}", 0.0) for n, own in TOLD.items()}
@@ -129,12 +116,11 @@ class AttitudeEstimatorTest(LoopTest):
         }
 
     def check(self) -> list[str]:
-        found = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.done_phases() if p not in PHASES]
-        return found + self.not_positive("rest", "period", "time", "gate")
+        return self.not_offered(PHASES) + self.not_positive("rest", "period", "time", "gate")
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """A base that flies no manoeuvres moves by itself: phases named after manoeuvres would say what is not so."""
-        moving = [p for p in self.done_phases() if p in ("rocking", "turn", "acceleration")]
+        """Refuse phases named after manoeuvres on a base that flies none, but moves by itself."""
+        moving = [p for p in self.asked() if p in ("rocking", "turn", "acceleration")]
         if not moving or "motion.forward[1]" in parameters or "motion.forward" in parameters:
             return []
         return [

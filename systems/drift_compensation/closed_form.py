@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 
 
 @dataclass(frozen=True)
-class Model:
+class CompensatedDrift:
     """Drift (rms rad/s, tau s, white rad/s/sqrt(Hz)), lag of the table (s), standard deviation of a reading (rad).
 
     gain: of the torquer, 1 where its scale factor is the one that the filter believes.
@@ -43,7 +43,7 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedErrors:
     """Standard deviations after each reading (n,): drift less its estimate, drift less u, table angle, table angle
     without compensation; ``stated``: of the estimated drift, as the filter has it."""
 
@@ -54,7 +54,7 @@ class Expected:
     stated: Array
 
 
-def expected(true: Model, believed: Model, h: float, n: int, T_c: float) -> Expected:
+def expected(true: CompensatedDrift, believed: CompensatedDrift, h: float, n: int, T_c: float) -> ExpectedErrors:
     """Return what n readings, h s apart, lead to; T_c = 0: the rate alone is compensated.  u is not limited."""
     Phi, Q, B = true.sampled(h)
     Phi_b, Q_b, B_b = believed.sampled(h)
@@ -82,4 +82,4 @@ def expected(true: Model, believed: Model, h: float, n: int, T_c: float) -> Expe
         error[0], error[3] = 1.0, -1.0
         rate[0], rate[3:] = 1.0, -law
         rows.append([error @ joint @ error, rate @ joint @ rate, joint[2, 2], free[2, 2], P[0, 0]])
-    return Expected(*np.sqrt(np.maximum(np.array(rows), 0.0)).T)
+    return ExpectedErrors(*np.sqrt(np.maximum(np.array(rows), 0.0)).T)

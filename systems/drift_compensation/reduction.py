@@ -8,99 +8,141 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
-from gyrobench.reduction.loops.estimator_result import Measures
-from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import LoopResult, Response, Specification, Test
+from gyrobench.reduction.loops.estimator_result import consistency_test
+from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, RunDocument, over_time
 from gyrobench.units import ARCSEC, DPH
 
-from .closed_form import Expected, Model, expected
+from .closed_form import CompensatedDrift, ExpectedErrors, expected
 
 SHOWN = 400  # points of a drawn line
 ENOUGH = 1e-3  # p below which a filter is called inconsistent
 
 
-def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
-    """The result of a record; raises ReductionError where it holds fewer than three whole records."""
-    c, run = record.channels, record.run
-    rows = whole_records(c, float(run.options["length"]), float(run.options["Ts"]))
-    limits = specification or {}
-    parts = {n: np.asarray(x, dtype=float)[rows] for n, x in c.items()}  # (records, readings)
-    count, n = rows.shape
-    half = n // 2
-    model = _expected(run, n) if _known(run) else None
-    m = Measures()
+class Reduction(MeasureTest):
+    """Rms of residual rate and angle over records that each begin with the table at zero."""
 
-    def size(name: str, meaning: str, values: Array, unit: str, scale: float, closed: float | None) -> None:
-        v = rms_of_records(values)
-        about = closed / scale if closed is not None else None
-        m.add(name, meaning, unit, UncertainValue(v.value / scale, v.u / scale, v.dof), closed=about)
+    part = "compensator"
+    said = (
+        "The drift alone turns the table by {angle free} (rms) in a record, compensated it turns by {angle}.",
+        "The drift rate of {rate free} is reduced to {rate}; the drift is known to {error}.",
+    )
+    ranked_by = "angle"
 
-    def at(k: int, name: str) -> float | None:
-        return None if model is None else float(getattr(model, name)[k])
-
-    rate = parts["table.M"] - parts["compensator.u"]
-    error = parts["table.M"] - parts["compensator.estimate"]
-    size("angle", "rms table angle at the end of a record", parts["table.theta"][:, -1:], "″", ARCSEC, at(-1, "angle"))
-    middle = parts["table.theta"][:, half - 1 : half]
-    size("angle half", "rms table angle in the middle of a record", middle, "″", ARCSEC,
-         at(half - 1, "angle"))  # fmt: skip
-    size("angle free", "rms table angle at the end of a record, without compensation",
-         parts["table.theta_free"][:, -1:], "″", ARCSEC, at(-1, "free"))  # fmt: skip
-    size("rate", "rms drift rate that is left, second half of the records", rate[:, half:], "°/h", DPH, at(-1, "rate"))
-    size("error", "rms error of the estimated drift, second half (closed: as the filter states it)", error[:, half:],
-         "°/h", DPH, at(-1, "stated"))  # fmt: skip
-    size("rate free", "rms of the drift", parts["table.M"], "°/h", DPH, _true(run, "drift"))
-    size("torquer", "rms rate by the torquer", parts["compensator.u"], "°/h", DPH, None)
-    share = float(np.mean(parts["compensator.saturated"])) if "compensator.saturated" in parts else 0.0
-    if share > 0.0:
-        m.warnings.append(
+    def measure(self) -> Account:
+        """Measure the records.  Raises ReductionError for fewer than three whole ones."""
+        run, c, found = self.run, self.record.channels, self.found
+        rows = whole_records(c, float(run.options["length"]), float(run.options["Ts"]))
+        self.parts = parts = {n: np.asarray(x, dtype=float)[rows] for n, x in c.items()}  # (records, readings)
+        count, n = rows.shape
+        half = n // 2
+        self.model = _expected(run, n) if _known(run) else None
+        theta, free = parts["table.theta"], parts["table.theta_free"]
+        rate = parts["table.M"] - parts["compensator.u"]
+        error = parts["table.M"] - parts["compensator.estimate"]
+        end, middle = "at the end of a record", "in the middle of a record"
+        self._size("angle", f"rms table angle {end}", theta[:, -1:], self._at(-1, "angle"))
+        self._size("angle half", f"rms table angle {middle}", theta[:, half - 1 : half], self._at(half - 1, "angle"))
+        self._size("angle free", f"rms table angle {end}, without compensation", free[:, -1:], self._at(-1, "free"))
+        self._size("rate", "rms drift rate that is left, second half of the records", rate[:, half:],
+                   self._at(-1, "rate"), "°/h")  # fmt: skip
+        self._size("error", "rms error of the estimated drift, second half (closed: as the filter states it)",
+                   error[:, half:], self._at(-1, "stated"), "°/h")  # fmt: skip
+        true = run.parameters.get("table.drift")
+        self._size("rate free", "rms of the drift", parts["table.M"], None if true is None else float(true), "°/h")
+        self._size("torquer", "rms rate by the torquer", parts["compensator.u"], None, "°/h")
+        share = float(np.mean(parts["compensator.saturated"])) if "compensator.saturated" in parts else 0.0
+        text = (
             f"The torquer is at its limit in {100.0 * share:.3g} % of the readings. There the drift is not compensated "
             "and the closed forms do not apply. Raise u_max or trim the constant drift."
         )
-    _consistency(m, parts, run, half)
-    for x in m.coefficients:
-        x.limit = limits.get(x.name)
-        x.verdict = uncertainty.assess_conformity(x.estimate, x.k * x.u, x.limit)
-    m.warnings += _against_closed(m)
-    name = run.parts["compensator"].name if "compensator" in run.parts else ""
-    result = LoopResult(
-        system="drift_compensation",
-        title="Compensation of random drift",
-        method="Rms of residual rate and angle over records that each begin with the table at zero",
-        sources=["COMP-RANDOM-DRIFT; Hu 1981, section 6.2, eq. 6-24..6-31, corrected by ER39, ER40"],
-        equation='dot(M) = -M\\/tau + w, quad dot(alpha) = M - u, quad dot(theta) = (alpha - theta)\\/T, quad '
-        'u = hat(M) + hat(alpha)\\/T_c',
-        conventions=[
-            "k i = ω_IA − ω_d: the current i = −u/k turns the gyro against its drift M.",
-            "Angle: of the table, inertial; Earth rate is taken off.",
-            f"{count} records of {n} readings; u from their number (angles at one time) or their scatter.",
-            "Closed forms: covariance of table and filter together, torquer not limited.",
-        ],
-        coefficients=m.coefficients,
-        dof=float(error.size),
-        residual_std=m.named("error").estimate,
-        residual_unit="°/h",
-        tests=m.tests,
-        warnings=m.warnings,
-        summary=told(
-            m.coefficients,
-            "The drift alone turns the table by {angle free} (rms) in a record, compensated it turns by {angle}.",
-            "The drift rate of {rate free} is reduced to {rate}; the drift is known to {error}.",
-        ),
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(x.verdict for x in m.coefficients),
-        instrument=name,
-        ranked_by="angle",
-        responses=_figures(parts, rows.shape[1], float(run.options["Ts"]), model),
-    )  # fmt: skip
-    return run_metadata.finish(result, record)
+        found.warn("torquer.limit", text if share > 0.0 else "")
+        self._consistency(half)
+        self._against_closed()
+        found.facts |= {
+            "dof": float(error.size), "residual_std": found["error"].estimate, "residual_unit": "°/h",
+        }  # fmt: skip
+        self._figures(n, float(run.options["Ts"]))
+        return Account(
+            method="Rms of residual rate and angle over records that each begin with the table at zero",
+            sources=["COMP-RANDOM-DRIFT; Hu 1981, section 6.2, eq. 6-24..6-31, corrected by ER39, ER40"],
+            equation="dot(M) = -M\\/tau + w, quad dot(alpha) = M - u, quad dot(theta) = (alpha - theta)\\/T, quad "
+            "u = hat(M) + hat(alpha)\\/T_c",
+            conventions=[
+                "k i = ω_IA − ω_d: the current i = −u/k turns the gyro against its drift M.",
+                "Angle: of the table, inertial; Earth rate is taken off.",
+                f"{count} records of {n} readings; u from their number (angles at one time) or their scatter.",
+                "Closed forms: covariance of table and filter together, torquer not limited.",
+            ],
+        )
+
+    def _size(self, name: str, meaning: str, values: Array, closed: float | None, unit: str = "″") -> None:
+        scale = ARCSEC if unit == "″" else DPH
+        self.found.add(name, meaning, unit, rms_of_records(values), scale=scale, closed=closed)
+
+    def _at(self, k: int, name: str) -> float | None:
+        """Return a standard deviation after reading k by the closed form."""
+        return None if self.model is None else float(getattr(self.model, name)[k])
+
+    def _consistency(self, half: int) -> None:
+        """Test NEES and NIS of the second half of the records, u from the scatter of the records."""
+        parts, p = {n: x[:, half:] for n, x in self.parts.items()}, self.run.parameters
+        if "compensator.covariance[1,1]" in parts and "compensator.rms" in p:
+            squares = nees(parts, float(p["compensator.rms"]), float(p["compensator.sigma"]))
+            self._mean_of_squares("NEES", "error of drift and angles", squares, 3.0)
+        if "compensator.nis" in parts and np.any(self.parts["compensator.nis"] > 0.0):
+            self._mean_of_squares("NIS", "innovation", parts["compensator.nis"], 1.0)
+
+    def _mean_of_squares(self, name: str, what: str, squares: Array, wanted: float) -> None:
+        each = squares.mean(axis=1)
+        v = UncertainValue(float(each.mean()), float(np.std(each, ddof=1) / math.sqrt(each.size)), each.size - 1.0)
+        self.found.add(name, f"mean squared {what} over its stated covariance", "1", v, truth=wanted)
+        t = (v.value - wanted) / v.u if v.u > 0.0 else 0.0
+        p = 2.0 * float(special.stdtr(v.dof, -abs(t)))
+        seeks = f"mean {wanted:g} where the stated covariance is right"
+        wrong = consistency_test(self.found, name, v.value, wanted, p, p >= ENOUGH, seeks, what)
+        text = (
+            f"{name} = {v.value:.3g} instead of {wanted:g}, {p_text(p)}. {wrong.capitalize()}. Its model of drift, "
+            "table or torquer is not the one of the table."
+        )
+        self.found.warn(f"estimator.consistency:{name}", text if wrong else "")
+
+    def _against_closed(self) -> None:
+        """Name the figures that lie more than four u from their closed form."""
+        known = [c for c in self.found.coefficients if c.closed is not None and c.u > 0.0 and c.name != "error"]
+        off = [c.name for c in known if abs(c.estimate - (c.closed or 0.0)) > 4.0 * c.u]
+        text = (
+            f"More than four u from the closed form: {', '.join(off)}. It holds for a torquer within its limit and "
+            "independent records. Look at both."
+        )
+        self.found.warn("closed_form.missed", text if off else "")
+
+    def _figures(self, n: int, step: float) -> None:
+        parts, model = self.parts, self.model
+        hours: Array = (np.arange(n, dtype=np.float64) + 1) * step / 3600.0
+        lines = {
+            "without": np.sqrt(np.mean(parts["table.theta_free"] ** 2, axis=0)),
+            "with": np.sqrt(np.mean(parts["table.theta"] ** 2, axis=0)),
+        }
+        if model is not None:
+            lines |= {"without, expected": model.free, "with, expected": model.angle}
+        floor = 1e-3 * ARCSEC  # an angle of 0 has no place on a logarithmic axis
+        lines = {k: np.log10(np.maximum(y, floor) / ARCSEC) for k, y in lines.items()}
+        caption = (
+            "Rms over all records of the table angle with and without compensation, by the time since the record "
+            "began: logarithm to base 10 of the angle in ″; expected: closed form."
+        )
+        rates = {"drift": parts["table.M"], "estimate": parts["compensator.estimate"]}
+        rates["left"] = parts["table.M"] - parts["compensator.u"]
+        drawn = {k: rate[-1] / DPH for k, rate in rates.items()}
+        said = "Last record: drift, its estimate, and the rate that is left (drift less u)."
+        self.found.responses += [
+            over_time("angle", hours, lines, unit="″", y_name="log₁₀ of the angle", caption=caption, shown=SHOWN,
+                      envelope=False, x_unit="h", compared="with"),
+            over_time("drift", hours, drawn, unit="°/h", y_name="rate", caption=said, shown=SHOWN, envelope=False,
+                      x_unit="h", compared="left"),
+        ]  # fmt: skip
 
 
 def whole_records(channels: dict[str, Array], length: float, step: float) -> NDArray[np.int_]:
@@ -149,109 +191,21 @@ def nees(parts: dict[str, Array], rms: float, sigma: float) -> Array:
     return np.asarray(np.einsum("...i,...i->...", e, np.linalg.solve(P, e[..., None])[..., 0]))
 
 
-def _consistency(m: Measures, parts: dict[str, Array], run: RunDocument, half: int) -> None:
-    """NEES and NIS of the second half of the records, u from the scatter of the records."""
-    if "compensator.covariance[1,1]" in parts and "compensator.rms" in run.parameters:
-        squares = nees(
-            {n: x[:, half:] for n, x in parts.items()},
-            float(run.parameters["compensator.rms"]),
-            float(run.parameters["compensator.sigma"]),
-        )
-        _mean_of_squares(m, "NEES", "error of drift and angles", squares, 3.0)
-    if "compensator.nis" in parts and np.any(parts["compensator.nis"] > 0.0):
-        _mean_of_squares(m, "NIS", "innovation", parts["compensator.nis"][:, half:], 1.0)
-
-
-def _mean_of_squares(m: Measures, name: str, what: str, squares: Array, wanted: float) -> None:
-    per_record = squares.mean(axis=1)
-    v = UncertainValue(
-        float(per_record.mean()), float(np.std(per_record, ddof=1) / math.sqrt(per_record.size)), per_record.size - 1.0
-    )
-    m.add(name, f"mean squared {what} over its stated covariance", "1", v, truth=wanted)
-    t = (v.value - wanted) / v.u if v.u > 0.0 else 0.0
-    p = 2.0 * float(special.stdtr(v.dof, -abs(t)))
-    if p >= ENOUGH:
-        finding = "consistent with the stated covariance"
-    else:
-        finding = f"inconsistent: the filter {'understates' if t > 0.0 else 'overstates'} its {what}"
-        m.warnings.append(
-            f"{name} = {v.value:.3g} instead of {wanted:g}, {uncertainty.p_text(p)}. {finding.capitalize()}. Its "
-            "model of drift, table or torquer is not the one of the table."
-        )
-    m.tests.append(Test(name, v.value, p, f"mean {wanted:g} where the stated covariance is right", finding))
-
-
 def _known(run: RunDocument) -> bool:
     return all(f"table.{n}" in run.parameters for n in ("drift", "drift_tau", "lag", "reading", "k")) and all(
         f"compensator.{n}" in run.parameters for n in ("rms", "tau", "lag", "sigma", "k", "T_c")
     )
 
 
-def _true(run: RunDocument, name: str) -> float | None:
-    value = run.parameters.get(f"table.{name}")
-    return None if value is None else float(value)
-
-
-def _expected(run: RunDocument, n: int) -> Expected:
+def _expected(run: RunDocument, n: int) -> ExpectedErrors:
     p = {k: float(v) for k, v in run.parameters.items() if isinstance(v, int | float)}
     gain = p["table.k"] * (1.0 + p.get("table.k_error", 0.0)) / p["compensator.k"]
     reading = math.hypot(p["table.reading"], p.get("table.quantum", 0.0) / math.sqrt(12.0))
-    true = Model(
+    true = CompensatedDrift(
         p["table.drift"], p["table.drift_tau"], p["table.lag"], reading, p.get("table.white", 0.0), gain
     )  # fmt: skip
-    believed = Model(
+    believed = CompensatedDrift(
         p["compensator.rms"], p["compensator.tau"], p["compensator.lag"], p["compensator.sigma"],
         p.get("compensator.white", 0.0),
     )  # fmt: skip
     return expected(true, believed, float(run.options["Ts"]), n, p["compensator.T_c"])
-
-
-def _against_closed(m: Measures) -> list[str]:
-    """Name the figures that lie more than four u from their closed form."""
-    off = [
-        c.name
-        for c in m.coefficients
-        if c.closed is not None and c.u > 0.0 and c.name != "error" and abs(c.estimate - c.closed) > 4.0 * c.u
-    ]
-    if not off:
-        return []
-    return [
-        f"More than four u from the closed form: {', '.join(off)}. It holds for a torquer within its limit and "
-        "independent records. Look at both."
-    ]
-
-
-def _figures(parts: dict[str, Array], n: int, step: float, model: Expected | None) -> list[Response]:
-    pick = np.unique(np.linspace(0, n - 1, min(SHOWN, n)).astype(int))
-    hours = ((pick + 1) * step / 3600.0).tolist()
-    lines = {
-        "without": np.sqrt(np.mean(parts["table.theta_free"] ** 2, axis=0)),
-        "with": np.sqrt(np.mean(parts["table.theta"] ** 2, axis=0)),
-    }
-    if model is not None:
-        lines |= {"without, expected": model.free, "with, expected": model.angle}
-    floor = 1e-3 * ARCSEC  # an angle of 0 has no place on a logarithmic axis
-    curves = [
-        {"label": k, "x": hours, "y": np.log10(np.maximum(y[pick], floor) / ARCSEC).tolist(), "phase": []}
-        for k, y in lines.items()
-    ]
-    last = (pick.size and parts["table.M"].shape[0]) - 1
-    drift = {
-        "drift": parts["table.M"][last],
-        "estimate": parts["compensator.estimate"][last],
-        "left": parts["table.M"][last] - parts["compensator.u"][last],
-    }
-    return [
-        Response(
-            "angle", "time",
-            "Rms over all records of the table angle with and without compensation, by the time since the record "
-            "began: logarithm to base 10 of the angle in ″; expected: closed form.",
-            hours, "time", "h", curves[1]["y"], "log₁₀ of the angle", "″", curves=curves,
-        ),
-        Response(
-            "drift", "time", "Last record: drift, its estimate, and the rate that is left (drift less u).",
-            hours, "time", "h",
-            (drift["left"][pick] / DPH).tolist(), "rate", "°/h",
-            curves=[{"label": k, "x": hours, "y": (y[pick] / DPH).tolist(), "phase": []} for k, y in drift.items()],
-        ),
-    ]  # fmt: skip

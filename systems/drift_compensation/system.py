@@ -94,7 +94,7 @@ class DriftCompensation(System):
         return float(self["Ts"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        """The compensator knows the torquer of the table."""
+        """Return the options' parameters; the compensator knows the torquer of the table."""
         return {**self.owned(), "compensator.k?": parts["table.k"]}
 
     def check(self) -> list[str]:

@@ -19,11 +19,11 @@ from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficient
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.report.numbers import write_number, write_p
+from gyrobench.result import Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
 from .preparation import Prepared
 
-Json = dict[str, Any]
 STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
 WILD = 20.0  # standard deviations
 COUNTS = 3.0  # steps of the values' resolution within which a sample is not called wild
@@ -37,11 +37,7 @@ def number(x: float, u: float | None = None) -> str:
     return write_number(x, u, 3).text
 
 
-def table(title: str, caption: str, columns: list[str], rows: list[list[Any]]) -> Json:
-    return {"title": title, "caption": caption, "columns": columns, "rows": rows}
-
-
-def acquisition(p: Prepared, run: RunDocument) -> Json:
+def acquisition(p: Prepared, run: RunDocument) -> Table:
     about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
     step = about.get("step", p.step)
     rows: list[list[Any]] = [
@@ -57,7 +53,9 @@ def acquisition(p: Prepared, run: RunDocument) -> Json:
     if p.averaged > 1:
         rows.append(["samples in a mean of spectrum and models, because of gaps", p.averaged, "1"])
     rows.append(["longest stretch without a gap", p.stretch.size * p.stretch_step / 3600.0, "h"])
-    return table("Acquisition", "What was recorded, and what is missing", ["quantity", "value", "unit"], rows)
+    return Table(
+        "acquisition", "Acquisition", "What was recorded, and what is missing", ["quantity", "value", "unit"], rows
+    )
 
 
 def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]], list[list[Any]]]:
@@ -103,7 +101,7 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     return out
 
 
-def regression(p: Prepared) -> list[Json]:
+def regression(p: Prepared) -> list[Table]:
     rows, turns = [], list[list[Any]]()
     by = {r.name: r for r in p.regressions}
     for r in p.regressions:
@@ -124,13 +122,13 @@ def regression(p: Prepared) -> list[Json]:
         "test. Selection makes p and u of what stays too small; 'all' is the 95 % interval with every column. Share: "
         "of the sum of squares of the rate, after the columns above it"
     )
-    out = [table("Regression", caption, head, rows)] if rows else []
+    out = [Table("regression", "Regression", caption, head, rows)] if rows else []
     caption = "C sin(n θ + φ), θ the angle of the table; u of C from those of its cosine and sine"
     head = ["harmonic n", "C / (°/h)", "u(C) / (°/h)", "φ / °", "p"]
-    return out + ([table("Harmonics over the angle", caption, head, turns)] if turns else [])
+    return out + ([Table("harmonics", "Harmonics over the angle", caption, head, turns)] if turns else [])
 
 
-def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Json:
+def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Table:
     """Return the coefficients beside those read from the slopes of the Allan deviation."""
     read = slopes(allan)
     rows = []
@@ -145,10 +143,10 @@ def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Json:
         "slope is that of the term; 95 % intervals; without an estimate: below the upper end. The slopes take each "
         "term as if alone: their intervals need not cover"
     )
-    return table("Two ways to the coefficients", caption, head, rows)
+    return Table("two_ways", "Two ways to the coefficients", caption, head, rows)
 
 
-def lines(p: Prepared, removed: bool) -> list[Json]:
+def lines(p: Prepared, removed: bool) -> list[Table]:
     rows = [
         [k, x.frequency, x.u_frequency, x.amplitude / DPH, x.u_amplitude / DPH, x.false_alarm]
         for k, x in enumerate(p.model.lines.lines, 1)
@@ -156,7 +154,7 @@ def lines(p: Prepared, removed: bool) -> list[Json]:
     head = ["line", "frequency / Hz", "u(f) / Hz", "amplitude / (°/h)", "u(A) / (°/h)", "p"]
     use = "taken out before the noise model" if removed else "left in (remove_lines = false)"
     caption = f"Sines, {use}; p: probability of a line as clear in a record without any"
-    return [table("Lines", caption, head, rows)] if rows else []
+    return [Table("lines", "Lines", caption, head, rows)] if rows else []
 
 
 def line_texts(p: Prepared) -> list[str]:
@@ -210,10 +208,11 @@ def explained_text(p: Prepared) -> str:
     )
 
 
-def doubts(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[str]:
+def doubts(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> dict[str, str]:
     """Return why no limit can be judged by the coefficients: the model or the readings are not as assumed."""
     misfit = misfit_text(noise) if noise.check is not None and noise.check.p <= MISFIT else ""
-    return [text for text in (misfit, coarse_text(p.name, run), explained_text(p)) if text]
+    found = {"misfit": misfit, "coarse": coarse_text(p.name, run), "explained": explained_text(p)}
+    return {f"drift_record.{id}": text for id, text in found.items() if text}
 
 
 def _p(p: float) -> str:
@@ -221,51 +220,60 @@ def _p(p: float) -> str:
     return text if text.startswith("<") else f"= {text}"
 
 
-def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[str]:
+def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[Reason]:
     about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
     column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
-    out = list[str]()
+    out = list[Reason]()
+
+    def say(id: str, text: str) -> None:
+        out.append(Reason(f"drift_record.{id}", text))
+
     if (check := noise.check) is not None and check.p <= MISFIT:
-        out.append(
+        say(
+            "misfit",
             f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
-            "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time."
+            "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time.",
         )
     if just := [term for term in TERMS if getattr(noise, term).just_determined]:
-        out.append(f"{', '.join(just)}: {JUST}.")
+        say("just_determined", f"{', '.join(just)}: {JUST}.")
     coarse = 0.0  # rad/s: where most samples are the same number of counts, one more is neither wild nor a step
     if column and (q := column["resolution"]):
         coarse = COUNTS * (q if column["kind"] == "rate" else q / p.step)
-    out += step_warnings(p, coarse)
+    out += [Reason("drift_record.step", text) for text in step_warnings(p, coarse)]
     off = np.abs(p.clean - np.nanmedian(p.clean))
     spread = 1.4826 * float(np.nanmedian(off))
     if spread and (wild := np.flatnonzero(off > max(WILD * spread, coarse))).size:
         many = f"{wild.size} samples lie" if wild.size > 1 else "A sample lies"
-        out.append(
+        say(
+            "wild",
             f"{many} more than {WILD:g} standard deviations from the median, the first at {number(p.time[wild[0]])} s. "
-            "They raise N and hide the rest. Where they are no drift, mark them in a column flag."
+            "They raise N and hide the rest. Where they are no drift, mark them in a column flag.",
         )
     if about and about["jitter"] > 0.01 and not about["rounded"]:
-        out.append(
+        say(
+            "jitter",
             f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
-            "models take the samples as even. Sample by a clock, or resample."
+            "models take the samples as even. Sample by a clock, or resample.",
         )
     ends = about["stuck"].get(p.name, 0) if about and column["kind"] != ANGLE and column["white"] else 0
     if ends > max(10, 1e-4 * about.get("samples", 0)):
-        out.append(
+        say(
+            "saturated",
             f"{ends} samples stay at the largest or smallest value of the file: the converter may "
-            "have been at its limit. The coefficients are too small then. Use a larger range."
+            "have been at its limit. The coefficients are too small then. Use a larger range.",
         )
     if rounding := coarse_text(p.name, run):
-        out.append(f"{rounding} {MORE_DIGITS if column['kind'] == 'rate' else FINER_ANGLE}")
+        say("coarse", f"{rounding} {MORE_DIGITS if column['kind'] == 'rate' else FINER_ANGLE}")
     if explained := explained_text(p):
         remedy = " Leave out what was computed from the rate." if any(r.kept for r in p.regressions) else ""
-        out.append(explained + remedy)
+        say("explained", explained + remedy)
     bandwidth = float(run.options.get("bandwidth") or 0.0)
     means = (run.series or {}).get("samples") == "means"
     if about and bandwidth and not means and (excess := folded(about["step"], bandwidth)).ratio > 1.0:
-        out.append(
+        say(
+            "folded",
             f"Point samples every {about['step']:.3g} s of a signal of {bandwidth:.3g} Hz alias: N² is up to "
-            f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means."
+            f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means.",
         )
     return out
 

@@ -10,16 +10,17 @@ import numpy as np
 from gyrobench.reduction.series.autoregression import Autoregression
 from gyrobench.reduction.series.drift_model import DriftModel
 from gyrobench.reduction.series.stationarity import RunsTest
+from gyrobench.result import Table
 from gyrobench.units import DPH
 
-from .description import Json, number, table
+from .description import number
 
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 RAN = {"runs": "runs of block statistics", "up_down": "runs up and down", "trend": "trend", "unit_root": "unit root",
        "normality": "normality"}  # fmt: skip
 
 
-def stationarity(m: DriftModel) -> Json:
+def stationarity(m: DriftModel) -> Table:
     """Return the tests of stationarity and of the distribution; those that cannot be made say why."""
     rows: list[list[Any]] = [[f"runs of {t.statistic}", t.z, t.p, _runs_word(t)] for t in m.runs or ()]
     if m.up_down:
@@ -47,7 +48,7 @@ def stationarity(m: DriftModel) -> Json:
         "Of the longest stretch without its lines. Runs test the independence of blocks, not stationarity; a small p "
         "of Dickey-Fuller is evidence for a constant level, of KPSS against it"
     )
-    return table("Stationarity and distribution", caption, ["test", "statistic", "p", "finding"], rows)
+    return Table("stationarity", "Stationarity and distribution", caption, ["test", "statistic", "p", "finding"], rows)
 
 
 def _runs_word(t: RunsTest) -> str:
@@ -56,7 +57,7 @@ def _runs_word(t: RunsTest) -> str:
     return f"{t.runs} runs, {'too few: slow variation' if t.z < 0.0 else 'too many: alternation'}"
 
 
-def models(m: DriftModel) -> list[Json]:
+def models(m: DriftModel) -> list[Table]:
     """Return orders, coefficients and whiteness of the models of the block means."""
     tables = []
     if m.orders is not None:
@@ -65,16 +66,20 @@ def models(m: DriftModel) -> list[Json]:
                  float(o.fpe[k] / np.min(o.fpe)), ", ".join(n.upper() for n, c in chosen.items() if c == p)]
                 for k, p in enumerate(o.order)]  # fmt: skip
         head = ["order", "innovation variance / (°/h)²", "AIC − least", "SBC − least", "FPE over least", "least"]
-        tables.append(table("Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows))
+        tables.append(
+            Table("orders", "Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows)
+        )
     if m.burg is not None:
-        walker = m.yule_walker.phi if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)
+        walker = m.yule_walker if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)
         rows = [[*row, float(w), -row[1]] for row, w in zip(_coefficients(m.burg), walker, strict=True)]
         caption = (
             "x(t) = φ₁ x(t−1) + ... + w(t), by Burg with 95 % intervals, and by Yule-Walker; a = −φ is what arburg "
             "prints: a table of a read as φ gives another, often explosive model"
         )
         head = ["coefficient", "Burg", "u", "95 % from", "95 % to", "Yule-Walker", "a (arburg)"]
-        tables.append(table(f"Autoregression of order {m.burg.phi.size}, by SBC", caption, head, rows))
+        tables.append(
+            Table("autoregression", f"Autoregression of order {m.burg.phi.size}, by SBC", caption, head, rows)
+        )
     rows = []
     if (a := m.ma) is not None:  # one difference too many has no interval
         rows.append(["MA(1)", "θ₁", *(None if math.isnan(v) else float(v) for v in (a.theta[0], a.u[0], a.low[0],
@@ -87,7 +92,8 @@ def models(m: DriftModel) -> list[Json]:
     if rows:
         head = ["model", "coefficient", "estimate", "u", "95 % from", "95 % to"]
         tables.append(
-            table(
+            Table(
+                "other_models",
                 "Other models",
                 "ARMA: x(t) = φ₁ x(t−1) + e(t) + θ₁ e(t−1), MA without φ₁ (θ in Hu 1981 has the other sign); ARIMA: of "
                 "differences",
@@ -100,7 +106,9 @@ def models(m: DriftModel) -> list[Json]:
         rows = [[names.get(n, n), w.lags, w.dof, w.q, w.p, "white" if w.white else "not white"]
                 for n, w in m.whiteness.items()]  # fmt: skip
         caption = "Ljung-Box test of the residuals, degrees of freedom less the fitted coefficients"
-        tables.append(table("Whiteness", caption, ["model", "lags", "dof", "statistic", "p", "finding"], rows))
+        tables.append(
+            Table("whiteness", "Whiteness", caption, ["model", "lags", "dof", "statistic", "p", "finding"], rows)
+        )
     return tables
 
 

@@ -15,7 +15,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
-from gyrobench.reduction.series.lines import Line
+from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -120,7 +120,7 @@ def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
     return Prepared(name, time, columns.step, rate, clean, regressions, model, stretch, step, averaged, first)
 
 
-def sum_of(lines: Sequence[Line], t: Array, step: float, averaged: int) -> Array:
+def sum_of(lines: Sequence[SpectralLine], t: Array, step: float, averaged: int) -> Array:
     """Return the lines at times t, s; what the mean over ``averaged`` samples had weakened is restored."""
     out = np.zeros_like(t)
     for line in lines:

@@ -24,7 +24,6 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
@@ -34,7 +33,7 @@ from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Specification
+from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason
 from gyrobench.units import DPH
 
 from . import description, model_tables
@@ -60,46 +59,40 @@ class Analysed:
     deviations: Mapping[str, Deviation]
 
 
-def from_record(record: Record, specification: Specification | None = None) -> DriftRecordResult:
-    """Return the result of a record.  Raises ReductionError where it is too short or cannot be analysed."""
+def from_record(record: Record) -> DriftRecordResult:
+    """Return what a record says.  Raises ReductionError where it is too short or cannot be analysed."""
     run = record.run
     columns = columns_of(record)
     remove = bool(run.options.get("remove_lines", True))
     analysed = [analyse(prepare(name, columns, remove), run.series) for name in columns.rates]
-    truth = truth_of(run)
-    relative = float(run.options.get("u_scale_factor", 0.0))
     several = len(analysed) > 1
-    coefficients = [
-        _coefficient(a, term, several, truth.get(term), relative) for a in analysed for term in TERMS
-    ]  # fmt: skip
-    for c in coefficients:
-        c.limit = (specification or {}).get(c.name)
-        c.verdict = _verdict(c)
-    of = {a.of.name: f"Column {a.of.name}: " if several else "" for a in analysed}
-    warnings = [of[a.of.name] + w for a in analysed for w in description.warnings(a.of, a.noise, run)]
-    result = DriftRecordResult(
-        system="drift_record",
-        title="Drift record",
+    return DriftRecordResult(
         method="Noise coefficients by restricted maximum likelihood, deviations, spectrum, model of the random drift",
         sources=["DRIFT-ALLAN; IEEE 952, annex C", "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
         equation='S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0), quad '
         'sigma_"A"^2 = N^2/tau + (2 ln 2)/pi B^2 + K^2 tau/3 + R^2 tau^2/2 + 3 Q^2/tau^2',
         conventions=[*columns.conventions, *description.conventions(run)],
-        coefficients=coefficients,
-        warnings=warnings,
+        coefficients=[c for a in analysed for c in _coefficients(a, run, several)],
+        reasons=[r for a in analysed for r in _reasons(a, run, several)],
         summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
         instrument=run.instrument,
         site={} if run.measured else run_metadata.Site.of(run).shown(),
         simulated=not run.measured,
         columns=[_column(a, run, remove) for a in analysed],
     )  # fmt: skip
-    for a in analysed:
-        names = {c.name for c in coefficients if c.name.partition(" ")[2] in ("", a.of.name)}
-        reasons = [of[a.of.name] + text for text in description.doubts(a.of, a.noise, run)]
-        uncertainty.withhold(result, reasons, names=names)
-    return run_metadata.finish(result, record)
+
+
+def _named(term: str, a: Analysed, several: bool) -> str:
+    return f"{term} {a.of.name}" if several else term
+
+
+def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
+    """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
+    of = f"Column {a.of.name}: " if several else ""
+    said = [replace(r, text=of + r.text) for r in description.warnings(a.of, a.noise, run)]
+    names = tuple(_named(term, a, several) for term in TERMS)
+    against = description.doubts(a.of, a.noise, run).items()
+    return said + [Reason(id, of + text, ("pass", "fail"), names, severity="doubt") for id, text in against]
 
 
 def stretches(x: Array, least: int = 2) -> list[Array]:
@@ -153,10 +146,14 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
 MANY = 200  # stretches of a record that are fitted one by one
 
 
-def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, relative: float) -> Coefficient:
+def _coefficients(a: Analysed, run: RunDocument, several: bool) -> list[Coefficient]:
+    truth, relative = truth_of(run), float(run.options.get("u_scale_factor", 0.0))
+    return [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+
+
+def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
     unit, si, meaning = TERMS[term]
     e: Estimate = getattr(a.noise, term)
-    name = f"{term} {a.of.name}" if several else term
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not e.determined:
@@ -173,14 +170,6 @@ def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, rel
         name, meaning, unit, value, u, NORMAL, (low - more, high + more), u_a=u_a, truth=true,
         z=None if true is None else (value - true) / u,
     )  # fmt: skip
-
-
-def _verdict(c: Coefficient) -> str:
-    """By the interval, which is not symmetric; of a coefficient that is not determined from zero to its bound."""
-    low, high = c.interval
-    return (
-        c.verdict if c.limit is None else uncertainty.assess_conformity(0.5 * (low + high), 0.5 * (high - low), c.limit)
-    )
 
 
 def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:

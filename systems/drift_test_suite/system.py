@@ -23,7 +23,7 @@ class DriftTestSuite(Suite):
         "tests": Option("floated", str, "names of tests; floated or two_axis: all of that gyro"),
         **Suite.about,
     }
-    shared = ("torquer scale factor", "latitude")
+    shared = ("torquer.scale_factor", "latitude")
     method = (
         "Each test is reduced by itself; its estimates are mapped to the coefficients of the drift model [CROSS-MAP] "
         "and compared where two methods or more see the same quantity"

@@ -13,7 +13,7 @@ from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
 from . import model, positions
-from .reduction import setup_of
+from .reduction import Reduction
 
 OTHER = {"x": "y", "y": "x"}  # the current about x measures the y channel
 
@@ -23,7 +23,7 @@ def protocol_of(system: System, record: Record) -> VisitProtocol:
 
     A change of position takes no time of its own in the simulation: state it in the option settle.
     """
-    s, p = setup_of(record.run), record.run.parameters
+    s, p = Reduction.setup_of(record.run), record.run.parameters
     true, number = model.truth(s), np.array(list(positions.ATTITUDES))
     d = model.directions(number, s.latitude)
     phases = phases_of(system)

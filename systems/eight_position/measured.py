@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import Column, DataError
+from gyrobench.record.csv_reader import CsvColumn, DataError
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -36,18 +36,18 @@ TEMPLATE = """\
 cycle,position,t_start [s],t_end [s],mean_x [mA],mean_y [mA]
 """
 COLUMNS = (
-    Column("cycle", "1", "cycle of the day, from 1", whole=True),
-    Column("position", "1", "position, 1 to 8", whole=True),
-    Column("t_start", "s", "start of the reading"),
-    Column("t_end", "s", "end of the reading"),
-    Column("mean_x", "A", "mean current of the torquer about x"),
-    Column("mean_y", "A", "mean current of the torquer about y"),
-    Column("day", "1", "day, from 1", required=False, whole=True),
-    Column("std_x", "A", "standard deviation of the samples of the x current", required=False),
-    Column("std_y", "A", "standard deviation of the samples of the y current", required=False),
-    Column("n", "1", "number of samples", required=False, whole=True),
-    Column("flagged_x", "1", "suspect samples of the x current", required=False, whole=True),
-    Column("flagged_y", "1", "suspect samples of the y current", required=False, whole=True),
+    CsvColumn("cycle", "1", "cycle of the day, from 1", whole=True),
+    CsvColumn("position", "1", "position, 1 to 8", whole=True),
+    CsvColumn("t_start", "s", "start of the reading"),
+    CsvColumn("t_end", "s", "end of the reading"),
+    CsvColumn("mean_x", "A", "mean current of the torquer about x"),
+    CsvColumn("mean_y", "A", "mean current of the torquer about y"),
+    CsvColumn("day", "1", "day, from 1", required=False, whole=True),
+    CsvColumn("std_x", "A", "standard deviation of the samples of the x current", required=False),
+    CsvColumn("std_y", "A", "standard deviation of the samples of the y current", required=False),
+    CsvColumn("n", "1", "number of samples", required=False, whole=True),
+    CsvColumn("flagged_x", "1", "suspect samples of the x current", required=False, whole=True),
+    CsvColumn("flagged_y", "1", "suspect samples of the y current", required=False, whole=True),
 )
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench import units
+from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
@@ -36,6 +36,7 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import positions
 
+SMALL = 1e-5  # rad, step of the perturbations
 MEANING = {
     "k_x": "scale factor of the torquer about x",
     "k_y": "scale factor of the torquer about y",
@@ -56,7 +57,7 @@ EXTRA = {"x": ("Dy_yy − Dy_xx", "Dy_x"), "y": ("Dx_xx − Dx_yy", "Dx_y")}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class EightPositionSetup(SiteSetup):
     """terms: unknowns of a channel, 4 or 6.  sigma: two cycles are needed.  truth: coefficients Dx_0 ... Dy_xz (rad/s
     per g0^n), k_x, k_y of a simulated gyro.  quantum: resolution of the current readings.  u_nonlinearity: relative, at
     the largest current.
@@ -76,19 +77,21 @@ class Setup(SiteSetup):
 
 
 def directions(position: NDArray[np.int_], latitude: float, turned: Mapping[int, Array] | None = None) -> Array:
-    """(n, 2, 3): unit vectors of Earth rate and gravity in gyro axes; ``turned``: attitudes in place of the nominal."""
+    """Return (n, 2, 3): unit vectors of Earth rate and gravity in gyro axes; ``turned``: attitudes in place of the
+    nominal.
+    """
     known = {**positions.ATTITUDES, **(turned or {})}
     each = {n: np.stack(positions.earth_and_gravity(a, latitude)) for n, a in known.items()}
     return np.array([each[n] for n in position.tolist()])
 
 
 def rate(channel: str, d: Array, earth_rate: float) -> Array:
-    """Earth rate (rad/s) that the current of ``channel`` measures."""
+    """Return the Earth rate (rad/s) that the current of ``channel`` measures."""
     return earth_rate * d[:, 0, 1 if channel == "x" else 0]
 
 
 def drift_columns(channel: str, d: Array, terms: int) -> Array:
-    """Columns of the drift w - k I of a channel: R, u, u_z and, with six terms, q, s; unit: rad/s each."""
+    """Return the columns of the drift w - k I of a channel: R, u, u_z and, with six terms, q, s; unit: rad/s each."""
     g = d[:, 1]
     along, across = (g[:, 1], g[:, 0]) if channel == "x" else (g[:, 0], g[:, 1])
     constant = np.ones_like(along) if channel == "x" else -np.ones_like(along)
@@ -97,7 +100,7 @@ def drift_columns(channel: str, d: Array, terms: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearCurrent:
     """y = X a for a current: X (n, terms), y (n,) in rad/s; unknowns k - k0 (rad/s/A), R, u, u_z, q, s (rad/s)."""
 
     k0: float
@@ -106,8 +109,10 @@ class Linear:
     y: Array
 
 
-def linear(channel: str, current: Array, d: Array, setup: Setup) -> Linear:
-    """The fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's rate."""
+def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) -> LinearCurrent:
+    """Return the fit of one current (A).  Raises ReductionError where the current does not depend on the Earth's
+    rate.
+    """
     w, D = rate(channel, d, setup.earth_rate), drift_columns(channel, d, setup.terms)
     names = (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]
     A = np.column_stack([w, -D])
@@ -128,11 +133,30 @@ def linear(channel: str, current: Array, d: Array, setup: Setup) -> Linear:
             f"the {channel} current round (or the positions {a} and {b} are exchanged)"
         )
     predicted = (w - D @ start) / k0
-    return Linear(k0, start, np.column_stack([predicted, D]), w - k0 * current)
+    return LinearCurrent(k0, start, np.column_stack([predicted, D]), w - k0 * current)
 
 
-def quantities(channel: str, setup: Setup, closed: Mapping[str, float]) -> list[Quantity]:
-    """What is reported of a channel: k, R, u, u_z and, with six terms, the two differences per g0^n."""
+def turned(axis: str, angle: float, numbers: tuple[int, ...]) -> dict[int, Array]:
+    """Return attitudes with the gyro turned by ``angle`` (rad) about its own ``axis`` in the positions ``numbers``."""
+    R = frames.rotation(np.eye(3)["xyz".index(axis)], angle)
+    return {n: R.T @ positions.ATTITUDES[n] for n in numbers}
+
+
+def attitude_error(
+    channel: str, setup: EightPositionSetup, found: Findings, lin: LinearCurrent, position: NDArray[np.int_],
+    attitudes: dict[int, Array],
+) -> Array:  # fmt: skip
+    """Return the error of the data (n,) when the positions were ``attitudes`` and the nominal ones are believed."""
+    believed = directions(position, setup.latitude)
+    real = directions(position, setup.latitude, attitudes)
+    # y = w - k I is formed with the believed w while k I = w_real - drift_real
+    dw = rate(channel, real, setup.earth_rate) - rate(channel, believed, setup.earth_rate)
+    D = drift_columns(channel, real, setup.terms) - drift_columns(channel, believed, setup.terms)
+    return found.error(D @ lin.start - dw)
+
+
+def quantities(channel: str, setup: EightPositionSetup, closed: Mapping[str, float]) -> list[Quantity]:
+    """Return what is reported of a channel: k, R, u, u_z and, with six terms, the two differences per g0^n."""
     true = truth(setup)
     found = []
     for name in (*positions.UNKNOWNS[channel], *EXTRA[channel])[: setup.terms]:
@@ -150,8 +174,8 @@ def quantities(channel: str, setup: Setup, closed: Mapping[str, float]) -> list[
     return found
 
 
-def made_of(name: str, setup: Setup) -> dict[str, float]:
-    """The coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
+def made_of(name: str, setup: EightPositionSetup) -> dict[str, float]:
+    """Return the coefficients behind an unknown, per g0^n; Dy_xx and Dx_yy folded into the others."""
     g = setup.gamma
     return {
         "R_x": {"Dy_0": 1.0},
@@ -165,8 +189,8 @@ def made_of(name: str, setup: Setup) -> dict[str, float]:
     }.get(name, {name: 1.0})
 
 
-def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -> Findings:
-    """The unknowns of :class:`Linear` in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
+def reported(found: Findings, wanted: list[Quantity], setup: EightPositionSetup, k0: float) -> Findings:
+    """Return the unknowns of a current in the form of :func:`quantities`: k = k0 + (k - k0), compliance per g0^n."""
     r, after = found.reported, found.quantities[len(wanted) :]  # effects of the nuisance model stay as they are
     factor, offset = np.ones(r.value.size), np.zeros(r.value.size)
     offset[0] = k0
@@ -180,8 +204,8 @@ def reported(found: Findings, wanted: list[Quantity], setup: Setup, k0: float) -
     return replace(found, quantities=(*wanted, *after), reported=values)
 
 
-def truth(setup: Setup) -> dict[str, float]:
-    """What the unknowns are for the simulated gyro, SI; empty without truth."""
+def truth(setup: EightPositionSetup) -> dict[str, float]:
+    """Return what the unknowns are for the simulated gyro, SI; empty without truth."""
     t = setup.truth
     if not t:
         return {}

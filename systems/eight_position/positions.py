@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.frames import E, N, U
@@ -36,7 +37,7 @@ UNKNOWNS = {"x": ("k_x", "R_x", "u_y", "u_zx"), "y": ("k_y", "R_y", "u_x", "u_zy
 def estimates(
     I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, latitude: float
 ) -> dict[str, list[float]]:
-    """Every single value inside the means of eq. 3-10, 3-11: name -> values.
+    """Return every single value inside the means of eq. 3-10, 3-11: name -> values.
 
     I_x, I_y: current (A) by position.  rate: Earth rate, rad/s.  k in rad/s/A, all others in rad/s (at local g).
     Raises ZeroDivisionError for I_x1 = I_x3 or I_y2 = I_y4.
@@ -57,24 +58,29 @@ def estimates(
     }
 
 
+def means(position: NDArray[np.int_], value: Array) -> dict[int, float]:
+    """Return the mean of values (n,) in each position that is there."""
+    return {n: float(np.mean(value[position == n])) for n in ATTITUDES if np.any(position == n)}
+
+
 def closed(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, latitude: float) -> dict[str, float]:
-    """Means of :func:`estimates`."""
+    """Return the means of :func:`estimates`."""
     return {n: float(np.mean(v)) for n, v in estimates(I_x, I_y, rate, latitude).items()}
 
 
 def spreads(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, latitude: float) -> dict[str, float]:
-    """Largest minus smallest value inside each mean of :func:`estimates`; 0 for the scale factors."""
+    """Return the largest minus smallest value inside each mean of :func:`estimates`; 0 for the scale factors."""
     return {n: max(v) - min(v) for n, v in estimates(I_x, I_y, rate, latitude).items()}
 
 
 def earth_and_gravity(attitude: Array, latitude: float) -> tuple[Array, Array]:
-    """Direction of the Earth's rate and of the specific force of Hu 1981 (down) in gyro axes, unit vectors."""
+    """Return unit vectors of the Earth's rate and of the specific force of Hu 1981 (down) in gyro axes."""
     pole = np.array([0.0, math.cos(latitude), math.sin(latitude)])
     return attitude @ pole, attitude @ -U
 
 
 def attitude_error(actual: Any, nominal: Array) -> float:
-    """Angle (rad) of the rotation between two attitudes."""
+    """Return the angle (rad) of the rotation between two attitudes."""
     off = np.asarray(actual, dtype=float) @ nominal.T
     skew = np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]])
     return float(math.atan2(0.5 * float(np.linalg.norm(skew)), 0.5 * (float(np.trace(off)) - 1.0)))

@@ -21,7 +21,7 @@ ATTITUDE = 1.0 * DEG  # largest error of a position
 
 
 def latitude(value: float) -> list[str]:
-    """Why there is no scale factor at this latitude (rad); empty when there is."""
+    """Return why there is no scale factor at this latitude (rad); empty when there is."""
     if problems := frames.latitude_problems(value):
         return problems
     if abs(value) > LATITUDE:
@@ -33,7 +33,7 @@ def latitude(value: float) -> list[str]:
 
 
 def near_pole(value: float) -> list[str]:
-    """A warning above 80 degrees."""
+    """Return a warning above 80 degrees."""
     if NEAR < abs(value) <= LATITUDE:
         return [
             f"Latitude {value / DEG:.4g}°: beyond 80° W cos φ is small; the scale factors, and with them all "
@@ -43,7 +43,7 @@ def near_pole(value: float) -> list[str]:
 
 
 def options(system: Any) -> list[str]:
-    """What is wrong with the options of the system."""
+    """Return what is wrong with the options of the system."""
     found = latitude(system["latitude"])
     if system["terms"] not in (4, 6):
         found.append(f"terms = {system['terms']}: no such model; a channel has 4 or 6 unknowns")
@@ -59,7 +59,7 @@ def options(system: Any) -> list[str]:
 
 
 def _visits(system: Any) -> list[str]:
-    """What is wrong with the option visits: positions that are missing, or none that is visited twice."""
+    """Return what is wrong with the option visits: positions that are missing, or none that is visited twice."""
     try:
         numbers = [int(v.place[0]) for v in system.visits()]
     except InvalidValueError as error:
@@ -74,7 +74,7 @@ def _visits(system: Any) -> list[str]:
 
 
 def attitudes(actual: Mapping[int, Array]) -> list[str]:
-    """Positions that are more than a degree off; ``actual``: position -> rows x, y, z in E, N, U."""
+    """Return positions that are more than a degree off; ``actual``: position -> rows x, y, z in E, N, U."""
     found = []
     for n, matrix in actual.items():
         error = positions.attitude_error(matrix, positions.ATTITUDES[n])
@@ -96,7 +96,7 @@ def _words(n: int) -> str:
 
 
 def record(position: NDArray[np.int_], cycle: NDArray[np.int_], sigma: bool, where: str = "") -> list[str]:
-    """Positions and cycles that a record lacks."""
+    """Return positions and cycles that a record lacks."""
     found = []
     there = set(position.tolist())
     missing = [n for n in positions.ATTITUDES if n not in there]

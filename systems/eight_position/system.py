@@ -64,7 +64,7 @@ class EightPosition(TwoChannelTest):
     )
 
     def plan(self) -> Plan:
-        """The eight positions, ``cycles`` times, or visits; the table does not turn, the mount changes."""
+        """Return the eight positions, ``cycles`` times, or visits; the table does not turn, the mount changes."""
         faces = {positions.NAMES[n]: a for n, a in positions.ATTITUDES.items()}
         if self["visits"]:
             return Plan(self._visiting(self.visits()), faces)
@@ -86,7 +86,7 @@ class EightPosition(TwoChannelTest):
         return found
 
     def _visiting(self, visits: list[Visit]) -> list[Phase]:
-        """A cycle of a position is its visit: the n-th of each."""
+        """Return the phases of visits.  A cycle of a position is its visit: the n-th of each."""
         phases, seen = [], dict.fromkeys(positions.ATTITUDES, 0)
         for v in visits:
             n = int(v.place[0])

@@ -47,7 +47,7 @@ def linear(A: Matrix, W: Matrix, R: float) -> dict[str, float]:
 
 
 def sloped(q: float, T: float = 1e-3) -> dict[str, float]:
-    """Value and slope, the slope driven by white noise of density q."""
+    """Return value and slope, the slope driven by white noise of density q."""
     W = [[q * T**3 / 3.0, q * T**2 / 2.0], [q * T**2 / 2.0, q * T]]
     return linear([[1.0, T], [0.0, 1.0]], W, SIGMA**2)
 

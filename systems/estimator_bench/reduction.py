@@ -9,40 +9,68 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.fit_result import plus_minus
-from gyrobench.reduction.loops import estimator_result
-from gyrobench.reduction.loops.estimator_result import Measures, Signals
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import LoopResult, Response, Specification
+from gyrobench.reduction.loops.estimator_result import RANKED, Signals, measure
+from gyrobench.reduction.loops.toolkit import Account, Array, MeasureTest, ReductionError, Response, line, told, trace
 
 from .benchmarks import BENCHMARKS
 
 SHOWN, COMPARED = 1000, 1000  # intervals of the whole time, and readings of the close-up
 
 
-def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
-    """The result of a record; raises ReductionError where it cannot be reduced."""
-    run = record.run
-    known = BENCHMARKS.get(str(run.options.get("benchmark")))
-    if known is None:
-        raise ReductionError(f"the record does not say which benchmark it is of: one of {', '.join(BENCHMARKS)}")
-    options, p = run.options, run.parameters
-    skip = int(options["skip"]) if options.get("skip", -1) >= 0 else known.skip
-    s = signals(record.channels, skip, known.Ts)
-    sine = float(p.get("source.amplitude", 0.0)) != 0.0
-    random = any(float(p.get(f"source.{n}", 0.0)) != 0.0 for n in ("p", "walk", "markov"))
-    frequency = float(p["source.frequency"]) if sine and not random else None
-    m = estimator_result.measure(s, frequency, true_variance(p, s.time))
-    name = run.parts["estimator"].name if "estimator" in run.parts else ""
-    return run_metadata.finish(_result(m, s, known.title, name, specification or {}), record)
+class Reduction(MeasureTest):
+    """Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency."""
+
+    part = "estimator"
+    ranked_by = RANKED
+
+    def measure(self) -> Account:
+        options, p = self.run.options, self.run.parameters
+        known = BENCHMARKS.get(str(options.get("benchmark")))
+        if known is None:
+            raise ReductionError(f"the record does not say which benchmark it is of: one of {', '.join(BENCHMARKS)}")
+        skip = int(options["skip"]) if options.get("skip", -1) >= 0 else known.skip
+        s = signals(self.record.channels, skip, known.Ts)
+        sine = float(p.get("source.amplitude", 0.0)) != 0.0
+        random = any(float(p.get(f"source.{n}", 0.0)) != 0.0 for n in ("p", "walk", "markov"))
+        frequency = float(p["source.frequency"]) if sine and not random else None
+        measure(self.found, s, frequency, true_variance(p, s.time))
+        self.found.responses += [last_second(s), *errors_and_innovations(s)]
+        return Account(
+            method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
+            sources=[
+                "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; Xia 2008, sections 3.4.5, 4.4.2",
+                "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; Xia 2008, sections 4.2, 4.3, corrected by EX14, "
+                "EX19-EX23",
+            ],
+            equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
+            conventions=[
+                f"Truth and readings: {known.title}.",
+                "Error: estimate less the truth of the same instant. Late error: less the truth one latency ago, where "
+                "the estimator states a latency.",
+                "dB: 20 log10 of the ratio of rms values; below 0 is better than the reading itself.",
+                "Noise reduction is what is left beside the truth as it comes through; it means nothing without the "
+                "gain.",
+            ],
+        )
+
+    def summary(self) -> list[str]:
+        found = self.found
+        re_raw, noise = (found[n].estimate for n in ("error re raw", "noise re raw"))
+        phase = ", phase {phase}" if "phase" in found.estimates else ""
+        tests = " ".join(f"{t.name}: {t.finding}." for t in found.tests)
+        return [
+            *told(
+                found.coefficients,
+                f"{self.name or 'The estimator'}: rms error {{error}} against the truth of the same instant, "
+                f"{re_raw:+.1f} dB against the readings themselves.",
+                f"Noise {noise:+.1f} dB, and what that costs: gain {{gain}}{phase}, delay {{delay}}.",
+            ),
+            tests or "The estimator states no variance: it cannot be asked whether it is consistent.",
+        ]
 
 
 def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
-    """The channels without the row at t = 0 and the first ``skip`` readings.  Raises ReductionError."""
+    """Return the channels without the row at t = 0 and the first ``skip`` readings.  Raises ReductionError."""
     needed = ("time", "source.z", "source.truth", "estimator.estimate")
     missing = [n for n in needed if n not in channels]
     if missing:
@@ -62,7 +90,7 @@ def signals(channels: Mapping[str, Array], skip: int, Ts: float) -> Signals:
 
 
 def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
-    """Variance of a reading as the source had it; None where it changes inside the record or is not known."""
+    """Return the variance of a reading as the source had it; None where it changes in the record or is not known."""
     if "source.white" not in p:
         return None
     after = float(p.get("source.change_time", math.inf))
@@ -72,84 +100,35 @@ def true_variance(p: Mapping[str, Any], time: Array) -> float | None:
     return (float(p["source.white"]) * (factor if time[0] >= after else 1.0)) ** 2
 
 
-def _result(m: Measures, s: Signals, title: str, name: str, limits: Specification) -> LoopResult:
-    for c in m.coefficients:
-        c.limit = limits.get(c.name)
-        c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
-    error, re_raw = m.named(estimator_result.RANKED), m.named("error re raw")
-    gain, noise, delay = (m.named(n) for n in ("gain", "noise re raw", "delay"))
-    return LoopResult(
-        system="estimator_bench",
-        title="Bench of estimators",
-        method="Estimate against the known truth: error, delay, noise reduction with gain and phase, consistency",
-        sources=[
-            "BENCH-DYN-SINE, BENCH-DRIFT-LL, BENCH-DRIFT-AR3; Xia 2008, sections 3.4.5, 4.4.2",
-            "EST-KF-AR, EST-SAGE-HUSA, EST-WAVELET-ONLINE; Xia 2008, sections 4.2, 4.3, corrected by EX14, EX19-EX23",
-        ],
-        equation='z = x + v, quad e = hat(x) - x, quad "NEES" = e^2\\/P, quad "NIS" = y^2\\/S',
-        conventions=[
-            f"Truth and readings: {title}.",
-            "Error: estimate less the truth of the same instant. Late error: less the truth one latency ago, where the "
-            "estimator states a latency.",
-            "dB: 20 log10 of the ratio of rms values; below 0 is better than the reading itself.",
-            "Noise reduction is what is left beside the truth as it comes through; it means nothing without the gain.",
-        ],
-        coefficients=m.coefficients,
-        dof=float(s.time.size),
-        tests=m.tests,
-        residual_std=float(np.sqrt(np.mean(m.error**2))),
-        residual_unit="1",
-        acf=m.acf,
-        warnings=m.warnings,
-        summary=[
-            f"{name or 'The estimator'}: rms error {plus_minus(error).replace(' 1 ', ' ')} against the truth of the "
-            f"same instant, {re_raw.estimate:+.1f} dB against the readings themselves.",
-            f"Noise {noise.estimate:+.1f} dB, and what that costs: gain {plus_minus(gain).replace(' 1 ', ' ')}"
-            + "".join(f", phase {plus_minus(c)}" for c in m.coefficients if c.name == "phase")
-            + f", delay {plus_minus(delay)}.",
-            " ".join(f"{t.name}: {t.finding}." for t in m.tests)
-            or "The estimator states no variance: it cannot be asked whether it is consistent.",
-        ],
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in m.coefficients),
-        instrument=name,
-        ranked_by=estimator_result.RANKED,
-        responses=[last_second(s), *errors_and_innovations(s)],
-    )
-
-
 def last_second(s: Signals) -> Response:
-    """The estimate over the last readings with the truth; a comparison draws those of all runs in one figure."""
+    """Return the estimate over the last readings with the truth; a comparison draws those of all runs in one figure."""
     last = slice(-COMPARED, None)
-    t, truth = s.time[last].tolist(), s.truth[last].tolist()
-    return Response(
-        "estimate", "step", "The last 1000 readings: estimate (points) and truth (line). What lies between them is the "
-        "error that ranks; a shift along the time axis is the delay.", t, "time", "s", s.estimate[last].tolist(),
-        "estimate", "1", curves=[{"label": "truth", "x": t, "y": truth, "phase": []}],
-    )  # fmt: skip
+    caption = (
+        "The last 1000 readings: estimate (points) and truth (line). What lies between them is the error that ranks; a "
+        "shift along the time axis is the delay."
+    )
+    lines = {"truth": s.truth[last]}
+    return trace("estimate", caption, s.time[last], s.estimate[last], "estimate", "1", lines, COMPARED)
 
 
 def over_the_run(name: str, caption: str, time: Array, y: Array, sigma: Array | None) -> Response:
-    """A figure of the whole time: y and, where it is stated, twice its standard deviation.
+    """Return a figure of the whole time: y and, where it is stated, twice its standard deviation.
 
     Of each of SHOWN intervals the least and the largest y are drawn, and the mean of the standard deviation.
     """
     parts = np.array_split(np.arange(y.size), min(SHOWN, y.size))
     ends = np.unique([k for part in parts for k in (part[np.argmin(y[part])], part[np.argmax(y[part])])])
-    curves = [{"label": name, "x": time[ends].tolist(), "y": y[ends].tolist(), "phase": []}]
+    curves = [line(name, time[ends], y[ends])]
     if sigma is not None:
-        middle = [float(time[part].mean()) for part in parts]
+        middle = np.array([float(time[part].mean()) for part in parts])
         bound = np.array([float(np.sqrt(np.mean(sigma[part] ** 2))) for part in parts])
         caption += " Lines beside it: twice the standard deviation that the estimator states, 95 % if it is right."
-        curves += [
-            {"label": f"{sign}2σ stated", "x": middle, "y": (factor * bound).tolist(), "phase": []}
-            for sign, factor in (("+", 2.0), ("−", -2.0))
-        ]
+        curves += [line(f"{sign}2σ stated", middle, factor * bound) for sign, factor in (("+", 2.0), ("−", -2.0))]
     return Response(name, "time", caption, time[ends].tolist(), "time", "s", y[ends].tolist(), name, "1", curves=curves)
 
 
 def errors_and_innovations(s: Signals) -> list[Response]:
-    """Error of the estimate and innovations over the whole time that is evaluated."""
+    """Return the figures of error and innovations over the whole time that is evaluated."""
     skipped = "The readings left out at the start are not shown."
     sigma = np.sqrt(s.variance) if s.variance is not None and np.all(s.variance > 0.0) else None
     caption = f"Error: estimate less truth of the same instant, the whole time. {skipped}"

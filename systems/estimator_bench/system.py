@@ -13,13 +13,9 @@ from gyrobench.system.values import InvalidValueError
 from .benchmarks import BENCHMARKS, Benchmark
 
 SOURCE = Socket(
-    "SignalSource",
-    "a noisy signal and its truth",
-    (
-        out("z", "", "the reading"),
-        out("truth", "", "what an estimator should find"),
-    ),
-)
+    "SignalSource", "a noisy signal and its truth",
+    (out("z", "", "the reading"), out("truth", "", "what an estimator should find")),
+)  # fmt: skip
 
 
 class EstimatorBench(System):
@@ -45,15 +41,9 @@ class EstimatorBench(System):
         "skip": Option(-1, int, "readings left out at the start; -1: those of the benchmark", -1),
     }
     channels = (
-        "source.z",
-        "source.truth",
-        "estimator.estimate",
-        "estimator.innovation",
-        "estimator.R_hat",
-        "estimator.nis",
-        "estimator.variance",
-        "estimator.latency",
-    )
+        "source.z", "source.truth", "estimator.estimate", "estimator.innovation", "estimator.R_hat", "estimator.nis",
+        "estimator.variance", "estimator.latency",
+    )  # fmt: skip
     shown = ("source.z source.truth estimator.estimate", "estimator.variance estimator.R_hat", "estimator.latency")
 
     @property
@@ -70,7 +60,7 @@ class EstimatorBench(System):
 
     @property
     def step(self) -> float:
-        """The sampling period of the benchmark: the source makes one reading a step, so no other step has a meaning."""
+        """Return the sampling period of the benchmark: the source makes one reading a step, no other has a meaning."""
         return self.benchmark.Ts
 
     @step.setter

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import Column
+from gyrobench.record.csv_reader import CsvColumn
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -34,12 +34,12 @@ t_start [s],t_end [s],mean [mA]
 """
 ATTITUDE = "service attitude"
 COLUMNS = (
-    Column("t_start", "s", "start of the reading"),
-    Column("t_end", "s", "end of the reading"),
-    Column("mean", "A", "mean torquer current"),
-    Column("day", "1", "day, from 1", required=False, whole=True),
-    Column("std", "A", "standard deviation of the samples", required=False),
-    Column("flagged", "1", "suspect samples", required=False, whole=True),
+    CsvColumn("t_start", "s", "start of the reading"),
+    CsvColumn("t_end", "s", "end of the reading"),
+    CsvColumn("mean", "A", "mean torquer current"),
+    CsvColumn("day", "1", "day, from 1", required=False, whole=True),
+    CsvColumn("std", "A", "standard deviation of the samples", required=False),
+    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
 )
 
 

@@ -11,38 +11,47 @@ Not modelled: drift slower than the record beyond a linear trend, change of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
-from gyrobench import drift, frames, units
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
-from gyrobench.reduction.estimation import nuisances, repeatability
-from gyrobench.reduction.estimation.effects import Effect, with_set_up
-from gyrobench.reduction.estimation.findings import Findings, Group
-from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench import drift, frames
+from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
-from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.reduction.setup.setups import scale_factor_problems
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftTest,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Record,
+    Regression,
+    RunDocument,
+    SiteSetup,
+    Table,
+    attitude_of,
+    number,
+    told,
+    truth_of,
+    window_problems,
+)  # fmt: skip
+from gyrobench.units import DPH
 
-__all__ = ["ReductionError", "Setup", "from_record", "reduce"]
-
-DPH, DEG = units.factor("deg/h"), units.factor("deg")
 LEAST = 8  # readings
-STATED = "positive where the stated one is too large"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class FixedPositionSetup(SiteSetup):
     """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A.  quantum: resolution of the current
     reading.
     """
@@ -67,58 +76,98 @@ class Setup(SiteSetup):
         return float(self.attitude[0] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
-    """Composite drift of one day: t_start, t_end (s), mean (A) and, optional, flagged.
+class Reduction(DriftTest[FixedPositionSetup]):
+    """Composite drift of one attitude, of one day or of several."""
 
-    Raises ReductionError with everything that is wrong with setup or record.
-    """
-    problems = frames.latitude_problems(setup.latitude) + frames.gravity_problems(setup.gravity)
-    problems += scale_factor_problems(setup.k) + frames.rotation_problems({"attitude": setup.attitude})
-    still = np.zeros(len(windows.get("mean", ())))
-    problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **windows})
-    if not problems and still.size < LEAST:
-        problems.append(f"{still.size} readings: at least {LEAST} are needed to estimate the noise")
-    if problems:
-        raise ReductionError(problems)
-    t0, t1, i = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "mean"))
-    y = setup.input_rate - setup.k * i
-    true = None if setup.truth is None else float(drift.drift(setup.xyz, setup.truth))
-    book = float(np.average(y, weights=t1 - t0))
-    middle = (t0 + t1) / 2.0
-    shown = Group("composite drift", np.arange(y.size), (middle - t0[0]) / 3600.0, "time", "h")
-    wanted = Quantity.of("ω_d", "composite drift along the input axis in this attitude", "deg/h", true, book)
-    names = drift.terms(9)
-    share = drift.regressors(setup.xyz, names)
-    wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
-    found = fit([wanted], np.ones((y.size, 1)), y, t0, t1, [shown], "drift rate", "°/h", DPH,
-                candidates=nuisances.common(windows) if setup.nuisances else ())  # fmt: skip
-    found = with_set_up(found, lambda f: _effects(setup, f, i), setup.corrections)
-    trend = _trend(found, middle)
-    result = linear_result(
-        found,
-        system="fixed_position",
-        title="Fixed-position test of a floated gyro",
-        method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
-        sources=["TEST-FIXED; Hu 1981, ch. 3 par. 2.2",
-                 "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
-        equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
-        conventions=_conventions(setup),
-        effects=_effects(setup, found, i),
-        **setup.reported(),
-        closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
-        tables=[_table(setup, i, t0, t1, book)],
-    )  # fmt: skip
-    if trend is not None:
-        result.repeatability = {"trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
-                                "record / s": float(np.ptp(middle))}  # fmt: skip
-    c = result.coefficients[0]
-    result.summary = [
-        f"Composite drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
-        "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
-        found.noise_sentence("readings"),
-        *found.nuisance_sentences(),
-    ]
-    return result
+    handling = staticmethod(handling_candidates.at_rest)
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> FixedPositionSetup:
+        return FixedPositionSetup.of(
+            run,
+            attitude=attitude_of(run),
+            k=number(run, "k", "gyro.k", "torquer scale factor"),
+            truth=truth_of(run, drift.NAMES),
+            quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
+        )
+
+    def problems(self) -> list[str]:
+        s, still = self.setup, np.zeros(len(self.windows.get("mean", ())))
+        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        problems += scale_factor_problems(s.k) + frames.rotation_problems({"attitude": s.attitude})
+        problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **self.windows})
+        if not problems and still.size < LEAST:
+            problems.append(f"{still.size} readings: at least {LEAST} are needed to estimate the noise")
+        return problems
+
+    def regression(self) -> Regression:
+        s = self.setup
+        columns = ("t_start", "t_end", "mean")
+        self.t0, self.t1, self.current = (np.asarray(self.windows[n], dtype=float) for n in columns)
+        y = s.input_rate - s.k * self.current
+        true = None if s.truth is None else float(drift.drift(s.xyz, s.truth))
+        self.book = float(np.average(y, weights=self.t1 - self.t0))
+        self.middle = (self.t0 + self.t1) / 2.0
+        shown = Group("composite drift", np.arange(y.size), (self.middle - self.t0[0]) / 3600.0, "time", "h")
+        meaning = "composite drift along the input axis in this attitude"
+        share = dict(zip(drift.terms(9), drift.regressors(s.xyz, drift.terms(9)).tolist(), strict=True))
+        wanted = replace(Quantity.of("ω_d", meaning, "deg/h", true, self.book), combination=share)
+        candidates = nuisances.common(self.windows) if s.nuisances else ()
+        return Regression([wanted], np.ones((y.size, 1)), y, self.t0, self.t1, [shown], candidates=candidates)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        s, small = self.setup, 1e-5
+        by_latitude = s.earth_rate * float(
+            s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
+        )
+        offset = found.error(-s.k)
+        return [
+            *attitude_effects(s, found, EARTH_ONLY),
+            LATITUDE.effect(s, found.error(by_latitude)),
+            TORQUER_SCALE.effect(s, found.error(-s.k * self.current)),
+            CURRENT_OFFSET.effect(s, offset),
+            CURRENT_RESOLUTION.effect(s.quantum / 12.0**0.5, offset),
+        ]
+
+    def test(self, found: Findings) -> None:
+        self.trend = _trend(found, self.middle)
+
+    def account(self, found: Findings) -> Account:
+        s, trend = self.setup, self.trend
+        return Account(
+            method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
+            sources=["TEST-FIXED; Hu 1981, ch. 3 par. 2.2", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
+            equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
+            conventions=_conventions(s),
+            closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
+            tables=[_table(s, self.current, self.t0, self.t1, self.book)],
+            repeatability={} if trend is None else {
+                "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
+                "record / s": float(np.ptp(self.middle)),
+            },
+        )  # fmt: skip
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        return [
+            *told(coefficients, "Composite drift ω_d = {ω_d} in one attitude."),
+            "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
+            found.noise_sentence("readings"),
+            *found.nuisance_sentences(),
+        ]
+
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        setup = cls.setup_of(record.run)
+        return reduce_days(record, lambda windows: cls.reduce(windows, setup))
+
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says; a long one has a table of its noise coefficients."""
+        result = super().from_record(record)
+        return replace(result, tables=[*result.tables, *noise_coefficients_table(result, record)])
+
+
+reduce = Reduction.reduce
 
 
 def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
@@ -131,34 +180,13 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
         j, hours = names.index("trend"), span / 3600.0
         return float(found.value[j]) * hours, float(found.u[j]) * hours
     tested = found.f_test(
-        "trend", ((middle - middle.mean()) / span)[:, None], "drift that changes with time",
+        "trend", "trend", ((middle - middle.mean()) / span)[:, None], "drift that changes with time",
         "the drift changes over the record; its mean holds for this record only", "no trend beyond the noise",
     )  # fmt: skip
     return None if tested is None else (float(tested[0][0]), float(tested[1][0]))
 
 
-def _effects(s: Setup, found: Any, current: Array) -> list[Effect]:
-    small = 1e-5
-    by_latitude = s.earth_rate * float(
-        s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
-    )
-    turned = []
-    for axis, name in ((1, "output"), (2, "spin")):
-        R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
-        rate = float((R[0] - s.attitude[0]) @ frames.earth_rate_local(s.latitude, s.earth_rate)) / small
-        text = "the Earth's rate only; the drift itself changes with the attitude by its g coefficients"
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate), text))
-    offset = found.error(-s.k)
-    return [
-        *turned,
-        Effect("latitude", s.u_latitude, "rad", found.error(by_latitude), STATED),
-        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-s.k * current), f"relative, {STATED}"),
-        Effect("offset of the current reading", s.u_current, "A", offset),
-        Effect("resolution of the current reading", s.quantum / 12.0**0.5, "A", offset, "as if never dithered"),
-    ]
-
-
-def _conventions(s: Setup) -> list[str]:
+def _conventions(s: FixedPositionSetup) -> list[str]:
     axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
     return [
         "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
@@ -168,13 +196,14 @@ def _conventions(s: Setup) -> list[str]:
     ]
 
 
-def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, Any]:
+def _table(s: FixedPositionSetup, i: Array, t0: Array, t1: Array, book: float) -> Table:
     X, Y, Z = s.xyz.tolist()
-    return {
-        "title": "From current to drift",
-        "caption": "Means over the record",
-        "columns": ["quantity", "value", "unit"],
-        "rows": [
+    return Table(
+        "from_current_to_drift",
+        "From current to drift",
+        "Means over the record",
+        ["quantity", "value", "unit"],
+        [
             ["Earth rate along the input axis ω_IA", s.input_rate / DPH, "°/h"],
             ["mean current i", float(np.average(i, weights=t1 - t0)) * 1e3, "mA"],
             ["k i", s.k * float(np.average(i, weights=t1 - t0)) / DPH, "°/h"],
@@ -182,44 +211,4 @@ def _table(s: Setup, i: Array, t0: Array, t1: Array, book: float) -> dict[str, A
             ["X, Y, Z = −f/g0 along I, O, S", f"{X:.6f}, {Y:.6f}, {Z:.6f}", "1"],
             ["time of the readings", float(np.sum(t1 - t0)), "s"],
         ],
-    }
-
-
-def setup_of(run: RunDocument, specification: Specification | None = None) -> Setup:
-    """Return the setup that a run.json describes."""
-    return Setup.of(
-        run,
-        specification,
-        attitude=attitude_of(run),
-        k=run_metadata.number(run, "k", "gyro.k", "torquer scale factor"),
-        truth=run_metadata.truth_of(run, drift.NAMES),
-        quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
     )
-
-
-def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """:func:`reduce` of a record, day by day where it holds several, with its run.json as provenance.
-
-    A long record has a table of its noise coefficients.
-    """
-    result = _examined(record, specification)
-    result.tables += noise_coefficients_table(result, record)
-    return result
-
-
-@handling_errors.examined(handling_candidates.at_rest)
-def _examined(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    setup = setup_of(record.run, specification)
-    day = {row.phase: row.day for row in record.run.plan}
-    phases = np.asarray(record.windows["phase"]).astype(int).tolist()
-    names = np.array([day.get(p, "") for p in phases])
-    each = {}
-    for name in dict.fromkeys(names.tolist()) or [""]:
-        mine = {n: np.asarray(v)[names == name] for n, v in record.windows.items()}
-        try:
-            each[name] = reduce(mine, setup)
-        except ReductionError as error:
-            raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
-    if len(each) == 1:
-        return run_metadata.finish(next(iter(each.values())), record)
-    return run_metadata.finish(repeatability.combine_days(each, specification=specification), record)

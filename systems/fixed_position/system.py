@@ -44,7 +44,7 @@ class FixedPosition(RebalanceTest):
     measured_data = MEASURED
 
     def plan(self) -> Plan:
-        """One phase; the mount is the attitude itself, as the table stands level at angle 0."""
+        """Return one phase; the mount is the attitude itself, as the table stands level at angle 0."""
         try:
             face = parse(self["attitude"], self["latitude"])
         except ValueError:

@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 from gyrobench.system.connectors import Socket, inp, limit_flag, out
-from gyrobench.system.families.loop_test import FLOWN, LoopTest
+from gyrobench.system.families.loop_test import FLOWN, LoopTest, by_phase
+from gyrobench.system.families.option_groups import MOVING
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot
+from gyrobench.units import DEG
 
 from .field import Field, FieldError, field_at
 
-DEG = math.pi / 180.0
 MOST = 85.0 * DEG  # latitude
 
 GYRO = Socket(
@@ -102,8 +102,7 @@ class GyroMagneticCompass(LoopTest):
         "field_time": Option(60.0, "s", "its time", 1.0),
         "random_drift": Option("0.1deg/sqrt(h)", "rad/s/sqrt(Hz)", "angle random walk", 0.0),
         "noise": Option("0.1deg/sqrt(Hz)", "rad/sqrt(Hz)", "noise of the magnetic heading", 0.0),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
+        **MOVING,
     }
     noises = ("gyro.white", "sensor.white")
     step = 0.1
@@ -120,7 +119,7 @@ class GyroMagneticCompass(LoopTest):
         return field_at(str(self["date"]), *site) if self["date"] else None
 
     def phases(self) -> list[LoopPhase]:
-        """Alignment, rest, sines about the cut-off k/2 pi, the turn and what it leaves, the disturbed field."""
+        """Return alignment, rest, sines about the cut-off k/2 pi, the turn and what it leaves, the disturbed field."""
         corner, wait = self["k"] / (2.0 * math.pi), 6.0 / self["k"]
         tones = [corner * x for x in (0.4, 0.7, 1.0, 1.5, 3.0)]
         aligned = abs(self["offset"]) / self["limit"] + 2.0 * wait
@@ -135,25 +134,19 @@ class GyroMagneticCompass(LoopTest):
         ]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        turn = [0.0] * LIMIT
-        labels = [p.label for p in self.phases()]
-        turn[labels.index("turn")] = -self["turn"]  # the motion counts counter-clockwise
+        # the motion counts counter-clockwise
+        motion = by_phase([p.label for p in self.phases()], ("turn",), {"turn": {"turn": -self["turn"]}})
         try:
             field = self.field()
         except FieldError:  # check() says it
             field = None
         declination = field.declination if field else self["declination"]
-        sensor: dict[str, Any] = {}
-        if field:
-            sensor = {
-                "sensor.declination": declination,
-                "sensor.inclination?": field.inclination,
-                "sensor.field?": field.horizontal,
-            }
+        of_day = {"inclination?": field.inclination, "field?": field.horizontal} if field else {}
+        sensor = {f"sensor.{n}": x for n, x in {"declination": declination, **of_day}.items()} if field else {}
         correction = self["earth_rate"] * math.sin(self["latitude"]) if self["corrected"] else 0.0
         return {
             **sensor,
-            "motion.turn": turn,
+            "motion.turn": motion["turn"],
             "gyro.start_error?": 0.0 if self["true_heading"] else -declination,  # aligned
             "gyro.white?": self["random_drift"],
             "sensor.white?": self["noise"],

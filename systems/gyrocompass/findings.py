@@ -8,19 +8,14 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import LoopFindings
+from gyrobench.reduction.loops.toolkit import DEG, Gate, LoopFindings, wrapped
 
 from .linear import LinearCompass, Steaming
 from .oscillation import Oscillation, fit
 
+SCALES = {"h": 3600.0, "min": 60.0, "°": DEG, "1": 1.0}  # of the printed units, SI
 SAMPLES = 160  # of a fit
 KNOWN = 0.05  # relative, of poles between courses, where a phase holds no swing of its own
-
-
-def wrapped(angle: Array) -> Array:
-    """Return angles in -pi to pi."""
-    return np.asarray(angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5))
 
 
 def error(gate: Gate) -> Array:
@@ -52,17 +47,18 @@ class CompassFindings(LoopFindings):
     """Findings of one record; after its settling each phase knows the poles and the error before it."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record)
-        self.warnings.clear()  # there is no loop to be linearized here
+        super().__init__(record, linearized=False)
         self.linear_compass = LinearCompass.of(record.run.parameters)
         self.poles: tuple[Array, Array] | None = None
         self.before: Oscillation | None = None  # of the settled phase before
         self.unsettled = ""
-        self.doubts: list[str] = []
 
-    def note(self, name: str, meaning: str, unit: str, value: float, u: float, closed: float | None = None) -> None:
-        """Add a measure; void after a phase that has not settled."""
-        self.measure(name, meaning, unit, value, u, closed=closed, unsettled=self.unsettled)
+    def note(
+        self, name: str, meaning: str, unit: str, value: float, u: float, closed: float | None = None, why: str = ""
+    ) -> None:
+        """Add a measure, SI; void after a phase that has not settled, or for a reason of its own."""
+        void = self.unsettled or why
+        self.measure(name, meaning, unit, value, u, scale=SCALES[unit], closed=closed, unsettled=void)
 
     def guess(self, at: Steaming, free: bool) -> Array:
         """Return first poles: of the linear model, else those of a Schuler-tuned compass."""
@@ -75,9 +71,8 @@ class CompassFindings(LoopFindings):
         if abs(pair.imag) < 1e-9:  # it creeps: two real roots for the pair
             slow = np.sort(-roots.real)
             return np.array([0.5 * (slow[0] + slow[1]), math.sqrt(slow[0] * slow[1]), *slow[2:]])
-        return np.array(
-            [max(-pair.real, 1e-3 * abs(pair)), abs(pair), *(-r.real for r in roots if abs(r.imag) < 1e-12)]
-        )
+        real = (-r.real for r in roots if abs(r.imag) < 1e-12)
+        return np.array([max(-pair.real, 1e-3 * abs(pair)), abs(pair), *real])
 
     def fitted(self, gate: Gate, label: str, *, free: bool = False, after: float = 0.0) -> Oscillation | None:
         """Return the oscillation of a phase from ``after`` s on; with the poles of the settling, where it has none."""
@@ -93,9 +88,8 @@ class CompassFindings(LoopFindings):
         known = None if free or label == "settling" else self.poles
         found = fit(t, z, self.guess(at, free) if known is None else known[0], trend=trend, known=known)
         if found is not None and found.whiteness < 1e-3:
-            self.doubts.append(
-                f"The residuals of {label} are correlated (p < 0.001): neither noise of the reading nor drift."
-            )
+            text = f"The residuals of {label} are correlated (p < 0.001): neither noise of the reading nor drift."
+            self.doubt(f"residuals.correlated:{label}", text)
         return found
 
     def block(self, dt: float, n: int) -> int:

@@ -18,6 +18,7 @@ from scipy import linalg, optimize, special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.estimator_metrics import whiteness
 
 LEAST = 30  # samples
 ROUNDS = 3  # of noise and of poles in turn
@@ -137,9 +138,10 @@ def fit(
     transient = np.abs(modes(own, later) @ beta[steady.shape[1] :]).max()
     if trend:  # it is not quite straight
         covariance[order, order] += (BENT * beta[1]) ** 2
+    white = whiteness(e - e.mean())[2] if e.size > 40 else 1.0
     return Oscillation(
         float(own[0]), abs(float(own[1])), float(own[2]) if order == 3 else math.nan, float(beta[0] + step[order]),
-        float(transient), s, wander, covariance[np.ix_(pick, pick)] * np.outer(units, units), _white(e),
+        float(transient), s, wander, covariance[np.ix_(pick, pick)] * np.outer(units, units), white,
     )  # fmt: skip
 
 
@@ -198,14 +200,3 @@ def _averaged(J: Array, left: Array, prior: Array, drifts: list[Array]) -> tuple
     )  # fmt: skip
     white, drift = (float(sum(w * v[k] for w, v in zip(weights, values, strict=True))) for k in (3, 4))
     return mean, np.asarray(covariance), math.sqrt(white), math.sqrt(drift)
-
-
-def _white(e: Array, lags: int = 20) -> float:
-    """Return the probability of residuals as correlated as these if they were white (Ljung and Box)."""
-    n, e = e.size, e - e.mean()
-    total = float(e @ e)
-    if n <= 2 * lags or total == 0.0:
-        return 1.0
-    r = np.array([float(e[k:] @ e[:-k]) / total for k in range(1, lags + 1)])
-    q = n * (n + 2.0) * float(np.sum(r * r / (n - np.arange(1, lags + 1))))
-    return float(special.chdtrc(lags, q))

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gyrobench.frames import G0
 from gyrobench.system.connectors import Socket, inp, out
-from gyrobench.system.families.loop_test import LoopTest
+from gyrobench.system.families.loop_test import LoopTest, by_phase
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot
+from gyrobench.units import DEG, G0
 
 from .linear import LIQUID, liquid_decay, liquid_share
 
-DEG = math.pi / 180.0
 MOST = 85.0 * DEG  # latitude
 RADIUS = 6.371e6  # m
 PHASES = ("settling", "undamped", "speed", "turn", "rolling")
@@ -117,23 +115,20 @@ class GyrocompassTest(LoopTest):
     shown = ("compass.psi ship.heading", "compass.tilt", "ship.speed", "ship.angle", "exciter.test")
     channel_period = 1.0
 
-    def done_phases(self) -> list[str]:
-        return [str(p) for p in self["phases"].replace(",", " ").split()]
-
     @property
     def north(self) -> float:
-        """Horizontal Earth rate, rad/s."""
+        """Return the horizontal Earth rate, rad/s."""
         return float(self["earth_rate"]) * math.cos(self["latitude"])
 
     @property
     def omega(self) -> float:
-        """Frequency without damping, rad/s, as the compass is designed."""
+        """Return the frequency without damping, rad/s, as the compass is designed."""
         if self["period"] > 0.0:
             return 2.0 * math.pi / float(self["period"])
         return math.sqrt(G0 / RADIUS + self.north**2)
 
     def damped(self) -> float:
-        """s, length of a damped phase: eight times the slowest decay time."""
+        """Return the length (s) of a damped phase: eight times the slowest decay time."""
         if self["settle"] > 0.0:
             return float(self["settle"])
         ratio = float(self["damping_ratio"])
@@ -144,8 +139,8 @@ class GyrocompassTest(LoopTest):
         return ten(6.0 * math.pi / self.omega)
 
     def phases(self) -> list[LoopPhase]:
-        """The phases asked for, each with what has to come before and after it; the settling is always first."""
-        wanted, wait = self.done_phases(), self.damped()
+        """Return the phases asked for, each with what has to come before and after it; the settling is always first."""
+        wanted, wait = self.asked(), self.damped()
         free = ten(5.0 * math.pi / self.omega)
         cut: dict[str, Any] = {"kind": "test", "amplitude": 1.0} if self["cut"] else {}
         found = [LoopPhase("settling", dwell=wait)]
@@ -171,14 +166,12 @@ class GyrocompassTest(LoopTest):
         return found
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        table: dict[str, list[float]] = {n: [0.0] * LIMIT for n in ("forward", "turn", "roll", "roll_frequency")}
-        for k, phase in enumerate(self.phases()):
-            if phase.label == "change of speed":
-                table["forward"][k] = self["speed"] / self["speed_time"]
-            elif phase.label == "turn":
-                table["turn"][k] = self["turn"]
-            elif phase.label == "rolling":
-                table["roll"][k], table["roll_frequency"][k] = self["roll"], 1.0 / self["roll_period"]
+        rows = {
+            "change of speed": {"forward": self["speed"] / self["speed_time"]}, "turn": {"turn": self["turn"]},
+            "rolling": {"roll": self["roll"], "roll_frequency": 1.0 / self["roll_period"]},
+        }  # fmt: skip
+        labels = [phase.label for phase in self.phases()]
+        table = by_phase(labels, ("forward", "turn", "roll", "roll_frequency"), rows)
         H, omega, ratio = parts["compass.H"], self.omega, self["damping_ratio"]
         pendulum = H * (omega * omega / self.north - self.north)
         liquid = liquid_share(ratio) * H * omega * omega / self.north if self["damping"] == "horizontal" else 0.0
@@ -199,8 +192,7 @@ class GyrocompassTest(LoopTest):
         }
 
     def check(self) -> list[str]:
-        problems = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.done_phases() if p not in PHASES]
-        problems += self.no_choice(damping=DAMPINGS)
+        problems = self.not_offered(PHASES) + self.no_choice(damping=DAMPINGS)
         if abs(self["latitude"]) > MOST:
             problems.append(
                 f"latitude = {self['latitude'] / DEG:.4g}°: beyond 85° the horizontal Earth rate gives no direction"
@@ -212,10 +204,10 @@ class GyrocompassTest(LoopTest):
             )
         if self["damping"] == "horizontal" and self["damping_ratio"] > LIQUID:
             problems.append(f"damping_ratio = {self['damping_ratio']:g}: a liquid gives {LIQUID} at most")
-        steady = [p for p in self.done_phases() if p in ("speed", "turn", "rolling")]
+        steady = [p for p in self.asked() if p in ("speed", "turn", "rolling")]
         if self["damping"] == "none" and steady:
             problems.append(f"damping = none: {', '.join(steady)} begin with a settled compass; take phases=undamped")
-        if "turn" in self.done_phases():
+        if "turn" in self.asked():
             problems += self.not_positive("turned")
             if self["turn"] == 0.0:
                 problems.append("turn = 0: the turn must have a rate")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -33,11 +33,11 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [deg/h],mean_
 """
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if c.name not in ("mean", "std")),
-    Column("mean", "rad/s", "mean rate along y"),
-    Column("mean_x", "rad/s", "mean rate along x", required=False),
-    Column("f_x", "m/s2", "mean specific force along x", required=False),
-    Column("f_y", "m/s2", "mean specific force along y", required=False),
-    Column("std", "rad/s", "standard deviation of the samples", required=False),
+    CsvColumn("mean", "rad/s", "mean rate along y"),
+    CsvColumn("mean_x", "rad/s", "mean rate along x", required=False),
+    CsvColumn("f_x", "m/s2", "mean specific force along x", required=False),
+    CsvColumn("f_y", "m/s2", "mean specific force along y", required=False),
+    CsvColumn("std", "rad/s", "standard deviation of the samples", required=False),
 )
 
 

@@ -31,8 +31,9 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.sources import LATITUDE, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Specification, Table
 
 from . import plans
 from .model import Place, Problem, attitude, of_windows, tilted_heading
@@ -178,24 +179,42 @@ def _effects(s: Setup, found: Findings, p: Problem) -> list[Effect]:
     psi = float(found.value[0])
     on_heading = np.zeros(q)
     on_heading[0] = 1.0
-    out = [Effect("zero of the head against the reference", s.u_angle, "rad", None, values=on_heading)]
+    out = [
+        Source("zero_of_the_head_against", "zero of the head against the reference", "rad", "u_angle").effect(
+            s, values=on_heading
+        )
+    ]
     if p.force is None:
         towards = psi + p.along
         out += [
-            Effect(f"tilt of the head about {n}", s.u_level, "rad", found.error(s.place.up * c), "right-handed")
+            Source(f"tilt_of_the_head_about:{n}", f"tilt of the head about {n}", "rad", "u_level").effect(
+                s, found.error(s.place.up * c), note="right-handed"
+            )
             for n, c in (("east", np.cos(towards)), ("north", -np.sin(towards)))
         ]
     if s.method == "strapdown":
         for name, axis in (("x", 0.0), ("y", 1.0)):
-            out.append(Effect(f"bias of the gyro along {name}", s.u_bias, "rad/s", found.error((p.axis == axis) * 1.0)))
+            out.append(
+                Source(f"bias_of_the_gyro_along:{name}", f"bias of the gyro along {name}", "rad/s", "u_bias").effect(
+                    s, found.error((p.axis == axis) * 1.0)
+                )
+            )
     if p.force is not None:
         f = p.force
         for name, u, moved in (("x", f.u_x, (1.0, 0.0)), ("y", f.u_y, (0.0, 1.0))):
             values = _by_heading(s, found, p, force=moved)
-            out.append(Effect(f"noise of the accelerometers along {name}", u, "m/s2", None, values=values))
+            out.append(
+                Source(
+                    f"noise_of_the_accelerometers_along:{name}", f"noise of the accelerometers along {name}", "m/s2"
+                ).effect(u, values=values)
+            )
             if s.method == "strapdown":  # two positions and a turning head take it out
                 size = s.u_accelerometer
-                out.append(Effect(f"bias of the accelerometer along {name}", size, "m/s2", None, values=values))
+                out.append(
+                    Source(
+                        f"bias_of_the_accelerometer_along:{name}", f"bias of the accelerometer along {name}", "m/s2"
+                    ).effect(size, values=values)
+                )
         out.append(_latitude(s, _by_heading(s, found, p, latitude=1.0)))
     elif s.method == "two":
         on_heading = np.zeros(q)
@@ -205,7 +224,7 @@ def _effects(s: Setup, found: Findings, p: Problem) -> list[Effect]:
 
 
 def _latitude(s: Setup, values: Array) -> Effect:
-    return Effect("latitude", s.u_latitude, "rad", None, "positive where the stated one is too large", values=values)
+    return LATITUDE.effect(s, values=values)
 
 
 def _by_heading(
@@ -225,7 +244,7 @@ def _by_heading(
     return np.concatenate([change, np.zeros(found.value.size - 2)])
 
 
-def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
+def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[Table]:
     rows: list[list[Any]] = []
     if not math.isnan(A):
         rows += [
@@ -242,11 +261,11 @@ def _tables(s: Setup, p: Problem, psi: float, A: float) -> list[dict[str, Any]]:
             ["its status (1 valid, 2 ill-conditioned, 3 rate wrong, 4 base moves)", s.finder["status"], "1"],
         ]
     caption = "What speaks for the heading besides its interval"
-    integrity = {"title": "Integrity", "caption": caption, "columns": ["quantity", "value", "unit"], "rows": rows}
+    integrity = Table("integrity", "Integrity", caption, ["quantity", "value", "unit"], rows)
     return [integrity, *_methods(s, psi)]
 
 
-def _methods(s: Setup, psi: float) -> list[dict[str, Any]]:
+def _methods(s: Setup, psi: float) -> list[Table]:
     """What each method reaches in the same total time with the noise of this gyro."""
     if not s.density > 0.0 or not s.time > 0.0:
         return []
@@ -263,7 +282,7 @@ def _methods(s: Setup, psi: float) -> list[dict[str, Any]]:
         "total time, moves of the head included"
     )
     head = ["method", "time of readings / s", "σ(ψ) / ′", "needs", "bias of the gyro", "tilt of the head"]
-    return [{"title": "Methods in the same time", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("methods_in_the_same_time", "Methods in the same time", caption, head, rows)]
 
 
 def _judged(result: DriftTestResult, s: Setup, p: Problem) -> DriftTestResult:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import Column
+from gyrobench.record.csv_reader import CsvColumn
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -29,11 +29,11 @@ TEMPLATE = """\
 t_start [s],t_end [s],angle [deg],u [mV]
 """
 COLUMNS = (
-    Column("t_start", "s", "start of the reading"),
-    Column("t_end", "s", "end of the reading"),
-    Column("angle", "rad", "case angle about the input axis"),
-    Column("u", "V", "pickoff voltage", required=False),
-    Column("flagged", "1", "suspect samples", required=False, whole=True),
+    CsvColumn("t_start", "s", "start of the reading"),
+    CsvColumn("t_end", "s", "end of the reading"),
+    CsvColumn("angle", "rad", "case angle about the input axis"),
+    CsvColumn("u", "V", "pickoff voltage", required=False),
+    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
 )
 
 

@@ -19,38 +19,49 @@ rate at which the null runs away from the hand (1e-4 of it for 0.7 deg/h/g and a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from gyrobench import drift, frames
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
+from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift.drift_terms import attitude_effects
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import SINES, Effect, with_set_up
-from gyrobench.reduction.estimation.findings import Findings, Group
-from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
-from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, Source
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftTest,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Reason,
+    ReductionError,
+    Regression,
+    RunDocument,
+    SiteSetup,
+    Table,
+    attitude_of,
+    told,
+    truth_of,
+    window_problems,
+)
 from gyrobench.units import ARCSEC, DPH
 
 from . import refusals
 
-__all__ = ["ReductionError", "Setup", "from_record", "reduce"]
-
 LEAST = 9  # readings
+SMALL = 1e-5  # rad
+ANGLE = Source("angle.span", "angle between first and last reading", "rad", "u_angle")
+GAIN = Source("float.gain", "float gain H/C", "1", "u_float_gain", "Earth rate along the spin axis times b")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup(SiteSetup):
+class OpenLoopSetup(SiteSetup):
     """attitude: rows I, O, S in (E, N, U) at table angle 0; the table turns about I.  float_gain: H/C.  wait: time
     between a step of the case and the reading after it, s; None: the step takes no time.  reach: case angle at which
     the pickoff saturates, rad (None: unknown).
@@ -68,24 +79,25 @@ class Setup(SiteSetup):
     u_float_gain: float = 0.0
 
     def earth(self, axis: int = 0) -> float:
-        """Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
+        """Return the Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""
         return float(self.attitude[axis] @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
     def xyz(self, angle: float) -> Array:
-        """X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
+        """Return X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
         c, s = math.cos(angle), math.sin(angle)
         I, O, S = self.attitude  # noqa: E741
         out: Array = np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0
         return out
 
     def true_drift(self, angle: float) -> float:
-        """Drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
+        """Return the drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
         return float(drift.drift(self.xyz(angle), self.truth or {}))
 
 
 def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
-    """Mean case angle (rad) between the middles of successive readings: half a reading before the step, the step at
-    even mean rate, the rest after it.
+    """Return the mean case angle (rad) between the middles of successive readings.
+
+    Half a reading before the step, the step at even mean rate, the rest after it.
     """
     pause = t0[1:] - t1[:-1]
     move = np.zeros_like(pause) if wait is None else np.clip(pause - wait, 0.0, pause)
@@ -95,9 +107,11 @@ def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array
     return out
 
 
-def null_angles(theta: Array, between: Array, t: Array, u: Array, setup: Setup) -> tuple[Array, float | None, Array]:
-    """Case angle (rad, against the Earth) of the null at each reading; the gain G (V/rad; None where all u are 0); the
-    mean rate w_S b (rad/s) of each interval, ``between``: its mean case angle.
+def null_angles(
+    theta: Array, between: Array, t: Array, u: Array, setup: OpenLoopSetup
+) -> tuple[Array, float | None, Array]:
+    """Return the case angle (rad, against the Earth) of the null at each reading; the gain G (V/rad; None if all u are
+    0); the mean rate w_S b (rad/s) of each interval, ``between``: its mean case angle.
     """
     dt, earth = np.diff(t), setup.earth()
     spin = np.cos(between) * setup.earth(2) - np.sin(between) * setup.earth(1)
@@ -125,169 +139,150 @@ def null_angles(theta: Array, between: Array, t: Array, u: Array, setup: Setup) 
     return null, G, cross
 
 
-def reduce(windows: Mapping[str, Array], setup: Setup) -> DriftTestResult:
-    """Drift from readings: t_start, t_end (s), angle_start, angle_end (rad), mean (V; pickoff), flagged (optional).
+class Reduction(DriftTest[OpenLoopSetup]):
+    """Drift from readings: t_start, t_end (s), angle_start, angle_end (rad), mean (V; pickoff), flagged (optional)."""
 
-    Raises ReductionError with everything that is wrong with setup or record.
-    """
-    problems = frames.latitude_problems(setup.latitude) + frames.gravity_problems(setup.gravity)
-    problems += frames.rotation_problems({"attitude": setup.attitude})
-    problems += window_problems({"phase": np.zeros(len(windows.get("mean", ()))), **windows})
-    if not problems and len(windows["mean"]) < LEAST:
-        problems.append(f"{len(windows['mean'])} readings: at least {LEAST} are needed to estimate the noise")
-    if problems:
-        raise ReductionError(problems)
-    t0, t1, a0, a1, u = (
-        np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "angle_start", "angle_end", "mean")
-    )
-    t, theta, earth = (t0 + t1) / 2.0, (a0 + a1) / 2.0, setup.earth()
-    between = case_angles(theta, t0, t1, setup.wait)
-    null, G, cross = null_angles(theta, between, t, u, setup)
-    dt, span = np.diff(t), float(t[-1] - t[0])
+    handling = staticmethod(handling_candidates.followed)
 
-    def data(angle: Array) -> Array:
-        at, _, beside = null_angles(angle, case_angles(angle, t0, t1, setup.wait), t, u, setup)
-        return np.asarray(np.diff(at) / dt + earth - beside)
-
-    y = data(theta)
-    book = float((null[-1] - null[0]) / span) + earth - float(cross @ dt) / span
-    true = None
-    if setup.truth is not None:
-        true = float(np.array([setup.true_drift(a) for a in between]) @ dt / span)
-    wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, book)
-    names = drift.terms(9)
-    share = dt @ drift.regressors(np.array([setup.xyz(a) for a in between]), names) / span
-    wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
-    shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
-    ones = np.ones((y.size, 1))  # the intervals share their readings, and so the errors of these
-    between_readings = {n: (v[1:] + v[:-1]) / 2.0 for n, v in windows.items() if n.startswith("temperature")}
-    weighed = nuisances.common({**between_readings, "t_start": t[:-1], "t_end": t[1:]}) if setup.nuisances else []
-    found = fit(
-        [wanted], ones, y, t[:-1], t[1:], [shown], "drift rate", "°/h", DPH, noise="readings", candidates=weighed
-    )
-    used = float(np.max(np.abs(theta - null)))
-    coupled = float(cross @ dt) / span / max(setup.float_gain, 1e-9)
-
-    def sources(f: Findings) -> list[Effect]:
-        return _effects(setup, f, t, theta, data, coupled)
-
-    found = with_set_up(found, sources, setup.corrections)
-    result = linear_result(
-        found,
-        system="open_loop_drift",
-        title="Open-loop drift test of a floated gyro",
-        method="Case turned about the input axis to the null of the pickoff, no loop closed; mean over the intervals "
-        "between readings under an estimated noise model [TEST-OPEN]",
-        sources=[
-            "TEST-OPEN; Hu 1981, ch. 3 par. 1",
-            "DYN-CROSS; Hu 1981, eq. 2-50..2-56",
-            "RED-GLS; Hu 1981, eq. 4-79..4-88",
-        ],
-        equation='omega_d = (Delta theta) / (Delta t) + omega_"E,I" - omega_"E,S" b',
-        conventions=[
-            "Drift ω_d in precession sign; θ: table angle about the input axis, right-handed.",
-            "θ is the case angle of the null: the reading of the table less u/G.",
-            "Valid only while the pickoff is inside its range; flagged (saturated) readings are refused.",
-        ],
-        effects=sources(found),
-        **setup.reported(),
-        closed_caption="Least squares under the noise model; closed: angle between first and last null over the time",
-        tables=[_table(setup, G, used, null, t, book)],
-        warnings=_warnings(setup, theta, used),
-    )  # fmt: skip
-    c = result.coefficients[0]
-    reach = "" if setup.reach is None else f" of {setup.reach / ARCSEC:.4g}″ to saturation"
-    result.summary = [
-        f"Drift ω_d = {plus_minus(c) if not found.ideal else f'{c.estimate:.6g} {c.unit}'} in one attitude.",
-        f"Range of the pickoff used: {used / ARCSEC:.4g}″ of case angle{reach}.",
-        found.noise_sentence("intervals"),
-        *found.nuisance_sentences(),
-    ]
-    return result
-
-
-def _warnings(s: Setup, theta: Array, used: float) -> list[str]:
-    out = []
-    turned = math.degrees(float(np.ptp(theta)))
-    if turned > 2.0:
-        out.append(
-            f"The case turned by {turned:.3g}° against gravity as it followed the sky: its drift changed on the way, "
-            "and the result is some mean of it; take a shorter test, or an input axis east or west."
-        )
-    if s.reach is not None and used > 0.8 * s.reach:
-        out.append(f"{used / s.reach:.0%} of the range of the pickoff used: let the hand follow, option follow.")
-    return out
-
-
-def _effects(
-    s: Setup, found: Findings, t: Array, theta: Array, data: Callable[[Array], Array], coupled: float
-) -> list[Effect]:
-    """All sources with their sensitivities; data: drift (n-1,) of the intervals from readings of the angle (n,), which
-    give the gain of the pickoff, too.
-    """
-    small, local = 1e-5, frames.earth_rate_local
-    by_latitude = (s.attitude[0] @ (local(s.latitude + small, s.earth_rate) - local(s.latitude, s.earth_rate))) / small
-    turned = []
-    for axis, name in ((1, "output"), (2, "spin")):
-        R = frames.rotation(np.eye(3)[axis], small).T @ s.attitude
-        rate = float((R[0] - s.attitude[0]) @ local(s.latitude, s.earth_rate)) / small
-        turned.append(Effect(f"gyro turned about its {name} axis", s.u_attitude, "rad", found.error(-rate)))
-    whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
-
-    def misread(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
-        return np.array(
-            [found.error(data(theta + small * f(n * theta)) - data(theta)) / small for f in (np.sin, np.cos)]
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> OpenLoopSetup:
+        return OpenLoopSetup.of(
+            run,
+            attitude=attitude_of(run),
+            float_gain=_float_gain(run),
+            wait=None if run.measured else next((row.settle for row in run.plan), None),
+            reach=refusals.case_range(run.parameters),
+            truth=truth_of(run, drift.NAMES),
         )
 
-    return [
-        *turned,
-        Effect(
-            "latitude",
-            s.u_latitude,
-            "rad",
-            found.error(float(by_latitude)),
-            "positive where the stated one is too large",
-        ),
-        Effect("angle between first and last reading", s.u_angle, "rad", whole),
-        Effect("angle error, once a turn", s.u_angle1, "rad", misread(1), "encoder", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", misread(2), "encoder", SINES),
-        Effect("float gain H/C", s.u_float_gain, "1", found.error(-coupled), "Earth rate along the spin axis times b"),
-    ]
+    def problems(self) -> list[str]:
+        s, w = self.setup, self.windows
+        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        problems += frames.rotation_problems({"attitude": s.attitude})
+        problems += window_problems({"phase": np.zeros(len(w.get("mean", ()))), **w})
+        if not problems and len(w["mean"]) < LEAST:
+            problems.append(f"{len(w['mean'])} readings: at least {LEAST} are needed to estimate the noise")
+        return problems
+
+    def _data(self, angle: Array) -> Array:
+        """Return the drift (n-1,) of the intervals from readings of the angle (n,), which give the gain, too."""
+        at, _, beside = null_angles(angle, self._between(angle), self.t, self.u, self.setup)
+        return np.asarray(np.diff(at) / np.diff(self.t) + self.setup.earth() - beside)
+
+    def _between(self, angle: Array) -> Array:
+        return case_angles(angle, self.t0, self.t1, self.setup.wait)
+
+    def regression(self) -> Regression:
+        s = self.setup
+        columns = ("t_start", "t_end", "angle_start", "angle_end", "mean")
+        self.t0, self.t1, a0, a1, self.u = (np.asarray(self.windows[n], dtype=float) for n in columns)
+        self.t, self.theta = (self.t0 + self.t1) / 2.0, (a0 + a1) / 2.0
+        t, between = self.t, self._between(self.theta)
+        self.null, self.gain, cross = null_angles(self.theta, between, t, self.u, s)
+        dt, span = np.diff(t), float(t[-1] - t[0])
+        y, mean_cross = self._data(self.theta), float(cross @ dt) / span
+        self.used = float(np.max(np.abs(self.theta - self.null)))
+        self.coupled = mean_cross / max(s.float_gain, 1e-9)
+        self.book = float((self.null[-1] - self.null[0]) / span) + s.earth() - mean_cross
+        true = None
+        if s.truth is not None:
+            true = float(np.array([s.true_drift(a) for a in between]) @ dt / span)
+        wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, self.book)
+        names = drift.terms(9)
+        share = dt @ drift.regressors(np.array([s.xyz(a) for a in between]), names) / span
+        wanted = replace(wanted, combination=dict(zip(names, share.tolist(), strict=True)))
+        shown = Group("drift between readings", np.arange(y.size), (t[1:] + t[:-1]) / 2.0 - t[0], "time", "s")
+        warm = {n: (v[1:] + v[:-1]) / 2.0 for n, v in self.windows.items() if n.startswith("temperature")}
+        weighed = nuisances.common({**warm, "t_start": t[:-1], "t_end": t[1:]}) if s.nuisances else []
+        ones = np.ones((y.size, 1))  # the intervals share their readings, and so the errors of these
+        return Regression([wanted], ones, y, t[:-1], t[1:], [shown], noise="readings", candidates=weighed)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        s, t, local = self.setup, self.t, frames.earth_rate_local
+        here, north = (local(x, s.earth_rate) for x in (s.latitude, s.latitude + SMALL))
+        whole = found.error(np.full(t.size - 1, 1.0 / float(t[-1] - t[0])))
+
+        def misread(n: int) -> Array:  # an encoder that reads too much by sin n theta, and by cos n theta
+            right, waves = self._data(self.theta), (np.sin, np.cos)
+            wrong = (self._data(self.theta + SMALL * f(n * self.theta)) for f in waves)
+            return np.array([found.error(y - right) / SMALL for y in wrong])
+
+        return [
+            *attitude_effects(s, found),
+            LATITUDE.effect(s, found.error(float((s.attitude[0] @ (north - here)) / SMALL))),
+            ANGLE.effect(s, whole),
+            ANGLE_ONCE.effect(s, misread(1)),
+            ANGLE_TWICE.effect(s, misread(2)),
+            GAIN.effect(s, found.error(-self.coupled)),
+        ]
+
+    def account(self, found: Findings) -> Account:
+        return Account(
+            method="Case turned about the input axis to the null of the pickoff, no loop closed; mean over the "
+            "intervals between readings under an estimated noise model [TEST-OPEN]",
+            sources=[
+                "TEST-OPEN; Hu 1981, ch. 3 par. 1",
+                "DYN-CROSS; Hu 1981, eq. 2-50..2-56",
+                "RED-GLS; Hu 1981, eq. 4-79..4-88",
+            ],
+            equation='omega_d = (Delta theta) / (Delta t) + omega_"E,I" - omega_"E,S" b',
+            conventions=[
+                "Drift ω_d in precession sign; θ: table angle about the input axis, right-handed.",
+                "θ is the case angle of the null: the reading of the table less u/G.",
+                "Valid only while the pickoff is inside its range; flagged (saturated) readings are refused.",
+            ],
+            closed_caption="Least squares under the noise model; closed: angle between first and last null over the "
+            "time",
+            tables=[self._table()],
+            reasons=self._reasons(),
+        )
+
+    def _reasons(self) -> list[Reason]:
+        reach, out = self.setup.reach, []
+        turned = math.degrees(float(np.ptp(self.theta)))
+        if turned > 2.0:
+            text = (
+                f"The case turned by {turned:.3g}° against gravity as it followed the sky: its drift changed on the "
+                "way, and the result is some mean of it; take a shorter test, or an input axis east or west."
+            )
+            out.append(Reason("case.turned", text))
+        if reach is not None and self.used > 0.8 * reach:
+            share = f"{self.used / reach:.0%}"
+            text = f"{share} of the range of the pickoff used: let the hand follow, option follow."
+            out.append(Reason("pickoff.range", text))
+        return out
+
+    def _table(self) -> Table:
+        s = self.setup
+        rows: list[list[Any]] = [
+            ["Earth rate along the input axis", s.earth() / DPH, "°/h"],
+            ["angle of the null, last less first reading", float(self.null[-1] - self.null[0]) / ARCSEC, "″"],
+            ["time between them", float(self.t[-1] - self.t[0]), "s"],
+            ["drift of the two", self.book / DPH, "°/h"],
+            ["gain of the pickoff G", self.gain, "V/rad"],
+            ["case angle off the null, largest (range used)", self.used / ARCSEC, "″"],
+            ["case angle at saturation", None if s.reach is None else s.reach / ARCSEC, "″"],
+        ]
+        head = ["quantity", "value", "unit"]
+        return Table("angle_to_drift", "From angle to drift", "What the drift is made of", head, rows)
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        reach = self.setup.reach
+        beyond = "" if reach is None else f" of {reach / ARCSEC:.4g}″ to saturation"
+        return [
+            *told(coefficients, "Drift ω_d = {ω_d} in one attitude."),
+            f"Range of the pickoff used: {self.used / ARCSEC:.4g}″ of case angle{beyond}.",
+            found.noise_sentence("intervals"),
+            *found.nuisance_sentences(),
+        ]
 
 
-def _table(s: Setup, G: float | None, used: float, null: Array, t: Array, book: float) -> dict[str, Any]:
-    rows: list[list[Any]] = [
-        ["Earth rate along the input axis", s.earth() / DPH, "°/h"],
-        ["angle of the null, last less first reading", float(null[-1] - null[0]) / ARCSEC, "″"],
-        ["time between them", float(t[-1] - t[0]), "s"],
-        ["drift of the two", book / DPH, "°/h"],
-        ["gain of the pickoff G", G, "V/rad"],
-        ["case angle off the null, largest (range used)", used / ARCSEC, "″"],
-        ["case angle at saturation", None if s.reach is None else s.reach / ARCSEC, "″"],
-    ]
-    head = ["quantity", "value", "unit"]
-    return {"title": "From angle to drift", "caption": "What the drift is made of", "columns": head, "rows": rows}
+reduce = Reduction.reduce
 
 
 def _float_gain(run: RunDocument) -> float:
-    """The option, else H/C of the gyro, else 1."""
+    """Return the option, else H/C of the gyro, else 1."""
     given, parameters = float(run.options.get("float_gain", 0.0)), run.parameters
     if given > 0.0 or not {"gyro.H", "gyro.C"} <= set(parameters):
         return given or 1.0
     return float(parameters["gyro.H"]) / float(parameters["gyro.C"])
-
-
-@handling_errors.examined(handling_candidates.followed)
-def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """:func:`reduce` of a record with its run.json as provenance."""
-    run = record.run
-    setup = Setup.of(
-        run,
-        specification,
-        attitude=attitude_of(run),
-        float_gain=_float_gain(run),
-        wait=None if run.measured else next((row.settle for row in run.plan), None),
-        reach=refusals.case_range(run.parameters),
-        truth=run_metadata.truth_of(run, drift.NAMES),
-    )
-    return run_metadata.finish(reduce(record.windows, setup), record)

@@ -10,7 +10,7 @@ ARCMIN = math.pi / 10800.0
 
 
 def pickoff_range(bracket: float, parameters: Mapping[str, Any]) -> list[str]:
-    """A step that already leaves the range of the pickoff, where the part says it."""
+    """Return that a step already leaves the range of the pickoff, where the part says it."""
     reach = case_range(parameters)
     if reach is None or bracket < reach:
         return []
@@ -21,7 +21,9 @@ def pickoff_range(bracket: float, parameters: Mapping[str, Any]) -> list[str]:
 
 
 def case_range(parameters: Mapping[str, Any]) -> float | None:
-    """Case angle (rad) about the input axis at which the pickoff saturates: u_max C/(K_sg H); None if unknown."""
+    """Return the case angle (rad) about the input axis at which the pickoff saturates: u_max C/(K_sg H); None if
+    unknown.
+    """
     names = ("gyro.u_max", "gyro.C", "gyro.K_sg", "gyro.H")
     if not all(n in parameters for n in names):
         return None

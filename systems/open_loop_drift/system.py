@@ -23,7 +23,7 @@ ACCELERATION, RATE = 1e-3, 0.01  # rad/s2, rad/s: a gentle hand; the float sees 
 
 
 def move_time(way: float) -> float:
-    """Time (s) of a move with trapezoidal rate."""
+    """Return the time (s) of a move with trapezoidal rate."""
     way = abs(way)
     return 2.0 * math.sqrt(way / ACCELERATION) if way < RATE**2 / ACCELERATION else way / RATE + RATE / ACCELERATION
 
@@ -68,7 +68,7 @@ class OpenLoopDrift(OpenLoopTest):
         return axes
 
     def plan(self) -> Plan:
-        """2 pairs + 1 steps; the table axis is the input axis, so the mount only names the axes."""
+        """Return 2 pairs + 1 steps; the table axis is the input axis, so the mount only names the axes."""
         try:
             C = parse(self["attitude"], self["latitude"])
         except ValueError:

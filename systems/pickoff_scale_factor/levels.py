@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import special
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.result import Coefficient, Series
+from gyrobench.result import Coefficient, Series, Table
 
 ARCMIN = units.factor("arcmin")
 
@@ -38,8 +36,8 @@ class Levels:
 
     @classmethod
     def of(cls, angle: Array, seen: Array, t: Array, u: Array, moved: Array, fitted: int) -> Levels:
-        """seen: what the float sees of the angle.  moved: what the drift changed of the voltage, V, by ``fitted``
-        coefficients.
+        """Return the levels.  seen: what the float sees of the angle.  moved: what the drift changed of the voltage, V,
+        by ``fitted`` coefficients.
         """
         steady = u - moved
         slope, zero = (float(v) for v in np.polyfit(seen, steady, 1))
@@ -53,37 +51,24 @@ class Levels:
         """V"""
         return self.slope * float(np.ptp(self.angle))
 
-    def coefficients(self, limits: dict[str, tuple[float | None, float | None]]) -> list[Coefficient]:
+    def coefficients(self) -> list[Coefficient]:
+        """Return the zero and the largest departure from the line."""
         k = int(np.argmax(np.abs(self.departure)))
         where = f"at {self.angle[k] / ARCMIN:.4g}′"
+        zero = ("u_0", "voltage at table angle 0 in the middle of the test", "mV")
+        straight = ("linearity", f"largest departure from the line, {where}, of the span", "%")
         return [
-            self._one(
-                "u_0", "voltage at table angle 0 in the middle of the test", "mV", self.zero * 1e3, self.scatter * 1e3,
-                limits.get("u_0"),
-            ),
-            self._one(
-                "linearity", f"largest departure from the line, {where}, of the span", "%",
-                float(self.departure[k]) / self.span * 100.0, self.scatter / self.span * 100.0, limits.get("linearity"),
-            ),
-        ]  # fmt: skip
+            self._one(*zero, self.zero * 1e3, self.scatter * 1e3),
+            self._one(*straight, float(self.departure[k]) / self.span * 100.0, self.scatter / self.span * 100.0),
+        ]
 
-    def _one(
-        self,
-        name: str,
-        meaning: str,
-        unit: str,
-        value: float,
-        u: float,
-        limit: tuple[float | None, float | None] | None,
-    ) -> Coefficient:
+    def _one(self, name: str, meaning: str, unit: str, value: float, u: float) -> Coefficient:
         k = float(special.stdtrit(self.dof, 0.975))
-        return Coefficient(
-            name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=k, interval=(value - k * u, value + k * u),
-            u_a=u, dof=float(self.dof), limit=limit, verdict=uncertainty.assess_conformity(value, k * u, limit),
-        )  # fmt: skip
+        interval = (value - k * u, value + k * u)
+        return Coefficient(name, meaning, unit, value, u, k, interval, u_a=u, dof=float(self.dof))
 
     def series(self, dense: Array, seen: Array) -> Series:
-        """Voltage over angle; dense, seen: of the drawn line."""
+        """Return the voltage over angle; dense, seen: of the drawn line."""
         order = np.argsort(self.angle, kind="stable")
         return Series(
             label="pickoff voltage", x=(self.angle[order] / ARCMIN).tolist(), x_name="table angle", x_unit="′",
@@ -93,10 +78,10 @@ class Levels:
             shown_fit_y=((self.zero + self.slope * seen) * 1e3).tolist(),
         )  # fmt: skip
 
-    def table(self) -> dict[str, Any]:
+    def table(self) -> Table:
         rows = [
             [k + 1, float(a / ARCMIN), float(v * 1e3), float(d * 1e6)]
             for k, (a, v, d) in enumerate(zip(self.angle, self.u, self.departure, strict=True))
         ]
         head = ["reading", "angle / ′", "u / mV", "departure from the line / µV"]
-        return {"title": "Readings", "caption": "In the order taken", "columns": head, "rows": rows}
+        return Table("readings", "Readings", "In the order taken", head, rows)

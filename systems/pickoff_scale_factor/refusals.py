@@ -22,7 +22,7 @@ def points_problems(points: int) -> list[str]:
 
 
 def drift_problems(drift: float, duration: float, span: float) -> list[str]:
-    """Drift (rad/s) times duration (s) above a hundredth of the span of the angles (rad).  [PICKOFF]"""
+    """Return that drift (rad/s) times duration (s) is above a hundredth of the span of the angles (rad).  [PICKOFF]"""
     angle = abs(drift) * duration
     if angle <= SHARE * span:
         return []
@@ -33,7 +33,7 @@ def drift_problems(drift: float, duration: float, span: float) -> list[str]:
 
 
 def range_problems(largest: float, limit: float) -> list[str]:
-    """Angles (rad) beyond the range of the pickoff."""
+    """Return angles (rad) beyond the range of the pickoff."""
     if largest <= limit:
         return []
     return [
@@ -43,7 +43,7 @@ def range_problems(largest: float, limit: float) -> list[str]:
 
 
 def record_problems(windows: Mapping[str, Array]) -> list[str]:
-    """Readings taken while the table moved, and too few different angles; rows count from 1."""
+    """Return readings taken while the table moved, and too few different angles; rows count from 1."""
     a, b = (np.asarray(windows[c], dtype=float) for c in ("angle_start", "angle_end"))
     found = [
         f"row {k + 1}: the table moved by {abs(b[k] - a[k]) / ARCSEC:.3g}″ while its reading was taken"

@@ -62,11 +62,13 @@ class PickoffScaleFactor(OpenLoopTest):
     channel_period = 0.01
 
     def base(self) -> Array:
-        """The axis sees no Earth rate, nor does the spin axis, so that the float's angle lets none in."""
+        """Return axes of which the first sees no Earth rate, nor does the spin axis, so that the float's angle lets
+        none in.
+        """
         return frames.equatorial_base(self["latitude"])
 
     def angles(self) -> list[float]:
-        """The angles in their order, rad; back over the same ones with both_ways."""
+        """Return the angles in their order, rad; back over the same ones with both_ways."""
         there: list[float] = np.linspace(-self["range"], self["range"], self["points"]).tolist()
         return there + there[-2::-1] if self["both_ways"] else there
 
@@ -79,7 +81,7 @@ class PickoffScaleFactor(OpenLoopTest):
         return Plan(phases, {FACE: ON_TABLE})
 
     def duration(self, acceleration: float = TABLE["acceleration"], index_rate: float = TABLE["index_rate"]) -> float:
-        """From the first reading to the last with the ways between them, s."""
+        """Return the time from the first reading to the last with the ways between them, s."""
         step = 2.0 * self["range"] / max(self["points"] - 1, 1)
         peak = min(index_rate, math.sqrt(step * acceleration))
         move = peak / acceleration + step / peak if peak > 0.0 else 0.0

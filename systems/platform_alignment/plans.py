@@ -36,6 +36,14 @@ PHI, J, I, V, D, M, A, KAPPA, Y = 0, 3, 5, 6, 8, 11, 14, 16, 17  # noqa: E741
 NOISE = {3: (1.2640, 0.9939), 2: (0.5746, 0.6139)}
 #: white drift, Gauss-Markov drift, tilt: number of the noise, and the states that it drives
 DRIVEN = ((0, slice(D, D + 3)), (1, slice(M, M + 3)), (2, slice(A, A + 2)))
+#: sources of a heading's error, by their ids
+SOURCES = {
+    **{f"gyro.drift.{axis}": f"constant drift along {axis}" for axis in "xyz"},
+    **{f"accelerometer.bias.{axis}": f"accelerometer bias along {axis}" for axis in "xy"},
+    "latitude": "latitude", "torquer.azimuth": "azimuth torquer", "gyro.white": "white drift",
+    "gyro.markov": "Gauss-Markov drift", "accelerometer.noise": "accelerometer noise",
+    "start": "start: tilt 0.1 rad, heading unknown", "base.vibration": "vibration of the base",
+}  # fmt: skip
 FREQUENCIES = 20  # that a gyrocompass may fall to: those that are tried
 SHARE = 0.3  # of a goal, noise of the gyrocompass at last
 
@@ -117,7 +125,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Piece:
+class AlignmentStretch:
     """A stretch of time with one law: heading in its middle, rate of turning (of the heading), weight of the window."""
 
     stage: int
@@ -143,26 +151,24 @@ class History:
     variance: Array
 
     def sources(self, settings: Settings, s: Sensors) -> dict[str, tuple[float, str, Array]]:
-        """Return, by source, size and unit of a constant error (0 of a noise), and what it does to phi over t (n, 3).
+        """Return, by the ids of :data:`SOURCES`, size and unit of a constant error (0 of a noise), and what it does to
+        phi over t (n, 3).
 
         Of constant errors with sign, the response to one standard deviation; of noises their standard deviation.
         """
-        r, g = self.response, settings.gravity
-        north = settings.north
+        r, g, north = self.response, settings.gravity, settings.north
         lean = s.accelerometer / g
-        out = {
-            f"constant drift along {axis}": (s.bias, "rad/s", s.bias * r[:, :, D + k]) for k, axis in enumerate("xyz")
-        }
-        out["accelerometer bias along x"] = (s.accelerometer, "m/s2", -lean * r[:, :, A + 1])  # t_y = phi_y - b_x/g
-        out["accelerometer bias along y"] = (s.accelerometer, "m/s2", lean * r[:, :, A])
+        out = {f"gyro.drift.{axis}": (s.bias, "rad/s", s.bias * r[:, :, D + k]) for k, axis in enumerate("xyz")}
+        out["accelerometer.bias.x"] = (s.accelerometer, "m/s2", -lean * r[:, :, A + 1])  # t_y = phi_y - b_x/g
+        out["accelerometer.bias.y"] = (s.accelerometer, "m/s2", lean * r[:, :, A])
         out["latitude"] = (s.latitude, "rad", s.latitude * (north * r[:, :, D + 2]))
-        out["azimuth torquer"] = (s.scale, "1", s.scale * r[:, :, KAPPA])
-        names = ("white drift", "Gauss-Markov drift", "accelerometer noise")
-        for k, (name, size) in enumerate(zip(names, (s.white, s.markov, s.force / g), strict=True)):
+        out["torquer.azimuth"] = (s.scale, "1", s.scale * r[:, :, KAPPA])
+        noises = {"gyro.white": s.white, "gyro.markov": s.markov, "accelerometer.noise": s.force / g}
+        for k, (name, size) in enumerate(noises.items()):
             out[name] = (0.0, "", size * np.sqrt(np.maximum(self.variance[:, k], 0.0)))
-        out["start: tilt 0.1 rad, heading unknown"] = (0.0, "", np.sqrt(
-            np.sum((0.1 * r[:, :, :2]) ** 2, axis=2) + 0.5 * north**2 * np.sum(r[:, :, J : J + 2] ** 2, axis=2)
-        ))  # fmt: skip
+        tilts = np.sum((0.1 * r[:, :, :2]) ** 2, axis=2)
+        heading = 0.5 * north**2 * np.sum(r[:, :, J : J + 2] ** 2, axis=2)
+        out["start"] = (0.0, "", np.sqrt(tilts + heading))
         return out
 
     def sigma(self, settings: Settings, s: Sensors) -> Array:
@@ -170,7 +176,7 @@ class History:
         return np.asarray(np.sqrt(sum(v**2 for _, _, v in self.sources(settings, s).values())))
 
 
-def models(c: Settings, stretches: list[Piece]) -> Array:
+def models(c: Settings, stretches: list[AlignmentStretch]) -> Array:
     """Return F of each stretch (n, 18, 18)."""
     k1, k2, j1, j2, kz, ki = np.array([c.gains(p.stage, p.w, p.rise) for p in stretches]).T
     turning, weight, w = np.array([(p.turning, p.weight, p.w) for p in stretches]).T
@@ -213,33 +219,33 @@ def windowed(c: Settings, stage: int, psi: float) -> Array:
     return T
 
 
-def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
+def pieces(c: Settings, psi: float, total: float) -> Iterator[AlignmentStretch]:
     """Yield the stretches of an alignment whose axis y points to psi at switch-on, for ``total`` s."""
     w = c.level_frequency
-    yield from (Piece(LEVEL, c.level / 60, psi, w=w) for _ in range(60))
+    yield from (AlignmentStretch(LEVEL, c.level / 60, psi, w=w) for _ in range(60))
 
-    def window(stage: int, at: float) -> Iterator[Piece]:
+    def window(stage: int, at: float) -> Iterator[AlignmentStretch]:
         n = 40
         for k in range(n):
             x = (k + 0.5) / n
-            yield Piece(stage, c.coarse_time / n, at, weight=6.0 * x * (1.0 - x) / c.coarse_time, w=w)
+            yield AlignmentStretch(stage, c.coarse_time / n, at, weight=6.0 * x * (1.0 - x) / c.coarse_time, w=w)
 
-    def turn(stage: int, start: float, angle: float) -> Iterator[Piece]:
+    def turn(stage: int, start: float, angle: float) -> Iterator[AlignmentStretch]:
         n = max(1, math.ceil(abs(angle) / 0.2))
         for k in range(n):
             rate = math.copysign(c.rate_max, angle)
-            yield Piece(stage, abs(angle) / c.rate_max / n, start + angle * (k + 0.5) / n, rate, w=w)
+            yield AlignmentStretch(stage, abs(angle) / c.rate_max / n, start + angle * (k + 0.5) / n, rate, w=w)
 
     yield from window(COARSE, psi)
     if c.positions == 2:
         yield from turn(TURN, psi, math.pi)
         rest = 3.0 / (c.damping * w)
-        yield from (Piece(TURN, rest / 5, psi + math.pi, w=w) for _ in range(5))
+        yield from (AlignmentStretch(TURN, rest / 5, psi + math.pi, w=w) for _ in range(5))
         psi = math.remainder(psi + math.pi, 2.0 * math.pi)
         yield from window(SECOND, psi)
     yield from turn(TO_NORTH, psi, -psi)
     level = 1.0 / (c.damping * c.fast_frequency)
-    yield from (Piece(TO_NORTH, level / 10, 0.0, w=c.fast_frequency) for _ in range(10))
+    yield from (AlignmentStretch(TO_NORTH, level / 10, 0.0, w=c.fast_frequency) for _ in range(10))
     begun = c.level + c.positions * c.coarse_time + abs(psi) / c.rate_max + level
     if c.positions == 2:
         begun += math.pi / c.rate_max + rest
@@ -251,7 +257,7 @@ def pieces(c: Settings, psi: float, total: float) -> Iterator[Piece]:
             frequency = max(c.slow_frequency, 1.0 / (1.0 / frequency + FALL * (elapsed - c.fast_time)))
         step = min(0.15 / frequency, left - elapsed, *([c.fast_time - elapsed] if fast else []))
         rise = min((elapsed + 0.5 * step) * c.fast_frequency / RISE, 1.0)
-        yield Piece(FAST if fast else SLOW, step, 0.0, w=frequency, rise=rise)
+        yield AlignmentStretch(FAST if fast else SLOW, step, 0.0, w=frequency, rise=rise)
         elapsed += step
 
 
@@ -261,7 +267,7 @@ def transition(F: Array) -> Array:
     return np.asarray(unit + F @ (unit + F @ (unit + F @ (unit + F / 4.0) / 3.0) / 2.0))
 
 
-def steps(c: Settings, stretches: list[Piece], tau: float) -> tuple[Array, Array]:
+def steps(c: Settings, stretches: list[AlignmentStretch], tau: float) -> tuple[Array, Array]:
     """Return the transition over each stretch (n, 18, 18) and what each noise adds to the covariance (n, 3, 18, 18)."""
     F = models(c, stretches)
     F[:, M : M + 3, M : M + 3] = -np.eye(3) / tau
@@ -298,15 +304,8 @@ def history(c: Settings, psi: float, total: float, tau: float = 300.0) -> Histor
         X, P = T @ X, T @ P @ T.T + driven
         t += p.time
         at = p.psi
-        rows.append(
-            (
-                t,
-                p.stage,
-                p.stage >= FAST or (p.stage == TO_NORTH and not p.turning),
-                X[:3].copy(),
-                P[:, [0, 1, 2], [0, 1, 2]].copy(),
-            )
-        )
+        usable = p.stage >= FAST or (p.stage == TO_NORTH and not p.turning)
+        rows.append((t, p.stage, usable, X[:3].copy(), P[:, [0, 1, 2], [0, 1, 2]].copy()))
     return History(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

@@ -1,26 +1,33 @@
-"""The record of an alignment as columns, with the true attitude of a simulated platform."""
+"""The record of an alignment: its columns, the true attitude of a simulated platform, the error model beside it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.loops.loop_measures import wrapped
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import plans
 
-ARCMIN, ARCSEC, DEG = units.factor("arcmin"), units.factor("arcsec"), math.pi / 180.0
 K = uncertainty.NORMAL
+#: parameters of the controller: settings, and errors of its sensors
+SET = (
+    "latitude", "gravity", "earth_rate", "positions", "coarse_time", "order", "damping", "level_frequency",
+    "fast_frequency", "fast_time", "slow_frequency", "rate_max",
+)  # fmt: skip
+TOLD = ("bias", "markov", "white", "accelerometer", "force", "tau", "latitude", "scale")
 
 
 @dataclass(frozen=True)
-class Run:
+class AlignmentColumns:
     """What a record holds, as columns over time; true, lean: true heading, true tilt about x and y."""
 
     t: Array
@@ -36,8 +43,7 @@ class Run:
 
     @property
     def error(self) -> Array:
-        d = self.psi - self.true
-        return np.asarray(d - 2.0 * np.pi * np.floor(d / (2.0 * np.pi) + 0.5))
+        return wrapped(self.psi - self.true)
 
     @property
     def north(self) -> int | None:
@@ -70,7 +76,7 @@ def attitude(theta: Array, tilt: Array) -> tuple[Array, Array]:
     return np.arctan2(C[1, 0], C[1, 1]), np.column_stack([C[1, 2], -C[0, 2]])
 
 
-def read(record: Record) -> Run:
+def read(record: Record) -> AlignmentColumns:
     """Return the columns of a record.  Raises ReductionError where one is missing."""
     c = record.channels
     names = ("controller.heading", "controller.sigma", "controller.mode", "controller.status", "controller.ready")
@@ -85,7 +91,40 @@ def read(record: Record) -> Run:
     tilt = columns("site.tilt", 3) if "site.tilt[1]" in c else np.zeros_like(theta)
     true, lean = attitude(theta, tilt)
     psi, sigma, mode, status, ready = (np.asarray(c[n], dtype=float) for n in names)
-    return Run(
+    return AlignmentColumns(
         np.asarray(c["time"], dtype=float), mode, status, ready, psi, sigma, columns("controller.tilt", 2),
         columns("controller.sigma_tilt", 2), true, lean,
     )  # fmt: skip
+
+
+class Alignment:
+    """A record with its columns, what the controller was set to and told of its sensors, and the error model.
+
+    Raises ReductionError where a column is missing.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self.record, self.run = record, read(record)
+        p = record.run.parameters
+        known: dict[str, Any] = {n: float(p[f"controller.{n}"]) for n in SET if f"controller.{n}" in p}
+        known |= {n: int(known[n]) for n in ("positions", "order") if n in known}
+        self.settings = plans.Settings(**{"latitude": float(record.run.options["latitude"]), **known})
+        errors = {name: float(p[f"controller.errors_{name}"]) for name in TOLD if f"controller.errors_{name}" in p}
+        self.sensors = replace(plans.GRADES["navigation"], **errors)
+        #: rms velocity of the base that the controller is told of, m/s
+        self.shaken = float(p.get("controller.errors_vibration", 0.0))
+        self.fine = self.run.first(plans.FAST)  # first row of the gyrocompass
+
+    @cached_property
+    def history(self) -> plans.History:
+        """Return the error model along this run: its levelling time and its coarse heading."""
+        run, first, north = self.run, self.run.first(plans.COARSE), self.run.first(plans.TO_NORTH)
+        assert first is not None and north is not None
+        psi = float(run.psi[north]) + (math.pi if self.settings.positions == 2 else 0.0)
+        settings = replace(self.settings, level=max(float(run.t[first]), 1.0))
+        return plans.history(settings, math.remainder(psi, 2.0 * math.pi), float(run.t[-1]), self.sensors.tau)
+
+    @cached_property
+    def sigma(self) -> Array:
+        """Return the standard deviation of the heading by the error model, at the instants of its history."""
+        return self.history.sigma(self.settings, self.sensors)[:, 2]

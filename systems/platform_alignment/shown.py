@@ -6,56 +6,42 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.result import BudgetLine, Response
+from gyrobench.reduction.loops.loop_curves import line, over_time
+from gyrobench.result import BudgetLine, Response, Table
+from gyrobench.units import ARCMIN, ARCSEC, DEG
 
 from . import plans
-from .record import ARCMIN, ARCSEC, DEG, K, Run
+from .record import Alignment, AlignmentColumns, K
 
 GOALS = (60.0, 30.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5)  # ′
-SHOWN = 700  # points of a drawn line
+UNITS = {"rad/s": (plans.DPH, "°/h"), "m/s2": (1e-6 * 9.80665, "µg"), "rad": (DEG, "°"), "1": (1.0, "1")}
 
 
-def figures(run: Run, fine: int) -> list[Response]:
-    """Heading error with its interval, from the coarse heading on and in the gyrocompass; tilt; standard deviation."""
+def figures(run: AlignmentColumns, fine: int) -> list[Response]:
+    """Return the heading error with its interval, from the coarse heading on and in the gyrocompass; tilt; standard
+    deviation.
+    """
     north = run.first(plans.TO_NORTH)
     assert north is not None
-    pick = np.unique(np.linspace(north, run.t.size - 1, min(SHOWN, run.t.size - north)).astype(int))
-    t = run.t[pick].tolist()
-
-    def curve(label: str, y: Array) -> dict[str, Any]:
-        return {"label": label, "x": t, "y": y[pick].tolist(), "phase": []}
-
-    error, half = run.error / ARCMIN, K * run.sigma / ARCMIN
+    error, half = run.error[north:] / ARCMIN, K * run.sigma[north:] / ARCMIN
+    lines = {"error": error, "interval, high": half, "interval, low": -half}
     caption = (
         "Heading as computed less the true one, and the 95 % interval of the controller about 0, from the coarse "
         "heading on: turn to north, gyrocompass."
     )
-    curves = [curve("error", error), curve("interval, high", half), curve("interval, low", -half)]
-    y = error[pick].tolist()
-    drawn = [
-        Response("heading error", "time", caption, t, "time", "s", y, "heading error", "′", curves=curves),
-    ]
-    span = np.unique(np.linspace(0, run.t.size - 1, min(SHOWN, run.t.size)).astype(int))
-    x = run.t[span].tolist()
-
-    def decades(label: str, y: Array) -> dict[str, Any]:
-        size = np.log10(np.maximum(np.hypot(*y.T) / ARCSEC, 1e-3))[span]
-        return {"label": label, "x": x, "y": size.tolist(), "phase": []}
-
-    both = [decades("true tilt", run.lean), decades("standard deviation", run.sigma_tilt)]
+    heading = over_time("heading error", run.t[north:], lines, unit="′", caption=caption, envelope=False)
+    tilts = {"true tilt": run.lean, "standard deviation": run.sigma_tilt}
+    lines = {label: np.log10(np.maximum(np.hypot(*y.T) / ARCSEC, 1e-3)) for label, y in tilts.items()}
     caption = (
         "Tilt of the platform, common logarithm of arcseconds, and its standard deviation: levelling, then what the "
         "accelerometers leave."
     )
     name = "log₁₀ of the tilt in ″"
-    drawn.append(Response("tilt", "time", caption, x, "time", "s", both[0]["y"], name, "1", curves=both))
-    drawn.append(_against(run, fine))
-    return drawn
+    tilt = over_time("tilt", run.t, lines, unit="1", y_name=name, caption=caption, envelope=False)
+    return [heading, tilt, _against(run, fine)]
 
 
-def _reached(run: Run, goal: float) -> int | None:
+def _reached(run: AlignmentColumns, goal: float) -> int | None:
     """Return the row from which the standard deviation of the heading at north stays at the goal (rad); None: never."""
     bad = run.sigma > goal
     if run.north is None or bad[-1]:
@@ -64,64 +50,58 @@ def _reached(run: Run, goal: float) -> int | None:
     return max(stays, run.north)
 
 
-def _against(run: Run, fine: int) -> Response:
-    """Time to be ready against the standard deviation wanted."""
+def _against(run: AlignmentColumns, fine: int) -> Response:
+    """Return the figure of the time to be ready against the standard deviation wanted."""
     goals = np.geomspace(max(run.sigma[fine:].min(), 1e-9), run.sigma[fine:].max(), 60)
     rows = [(g / ARCMIN, float(run.t[k])) for g in goals for k in [_reached(run, float(g))] if k is not None]
-    x, y = [r[0] for r in rows], [r[1] for r in rows]
+    x, y = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
     caption = "Time from switch-on to a standard deviation of the heading that is then kept, against that deviation."
-    curves = [{"label": "this run", "x": x, "y": y, "phase": []}]
-    name = "standard deviation wanted"
-    return Response("ready time", "time", caption, x, name, "′", y, "time to be ready", "s", curves=curves)
+    curves, name = [line("this run", x, y)], "standard deviation wanted"
+    return Response("ready time", "time", caption, x.tolist(), name, "′", y.tolist(), "time to be ready", "s",
+                    curves=curves)  # fmt: skip
 
 
-def tables(
-    record: Record, run: Run, settings: plans.Settings, sensors: plans.Sensors, h: plans.History | None
-) -> list[dict[str, Any]]:
-    found = [_stages(run, settings)]
-    if h is None:
+def tables(a: Alignment) -> list[Table]:
+    """Return the stages, and where the gyrocompass was reached the time to be ready against accuracy."""
+    run, found = a.run, [_stages(a)]
+    if a.fine is None:
         return found
-    sigma, truth = h.sigma(settings, sensors)[:, 2], not record.run.measured
     rows: list[list[Any]] = []
     for goal in GOALS:
         at = _reached(run, goal * ARCMIN)
-        expected = plans.ready_after(h, sigma, goal * ARCMIN)
-        error = run.error[at] / ARCMIN if at is not None and truth else None
+        expected = plans.ready_after(a.history, a.sigma, goal * ARCMIN)
+        error = run.error[at] / ARCMIN if at is not None and not a.record.run.measured else None
         rows.append([goal, float(run.t[at]) if at is not None else None, expected, error])
-    found.append({
-        "title": "Time to be ready against accuracy",
-        "caption": "From switch-on until the platform is at north and the standard deviation of its heading stays at "
-        "the one wanted, within this run; by the controller and by the error model; true error at that time",
-        "columns": ["standard deviation wanted / ′", "ready / s", "by the error model / s", "true error / ′"],
-        "rows": rows,
-    })  # fmt: skip
-    return found
+    caption = (
+        "From switch-on until the platform is at north and the standard deviation of its heading stays at "
+        "the one wanted, within this run; by the controller and by the error model; true error at that time"
+    )
+    columns = ["standard deviation wanted / ′", "ready / s", "by the error model / s", "true error / ′"]
+    return [*found, Table("ready_times", "Time to be ready against accuracy", caption, columns, rows)]
 
 
-def _stages(run: Run, settings: plans.Settings) -> dict[str, Any]:
-    """When each stage began, its frequency and poles, and what it left."""
+def _stages(a: Alignment) -> Table:
+    """Return when each stage began, its frequency and poles, and what it left."""
+    run, settings = a.run, a.settings
     rows: list[list[Any]] = []
+    frequency = {plans.FAST: settings.fast_frequency, plans.SLOW: settings.slow_frequency}
     for stage in range(plans.LEVEL, plans.SLOW + 1):
         inside = np.flatnonzero(run.mode == stage)
         if not inside.size:
             continue
-        w = {plans.FAST: settings.fast_frequency, plans.SLOW: settings.slow_frequency}.get(
-            stage, settings.level_frequency
-        )
+        w = frequency.get(stage, settings.level_frequency)
         poles = ", ".join(_pole(p) for p in settings.poles(stage, w) if p.imag >= 0.0)
         last = inside[-1]
         known = run.sigma[last] < 3.0
         rows.append([plans.STAGES[stage - 1], float(run.t[inside[0]]), float(run.t[last] - run.t[inside[0]]), w, poles,
                      run.sigma[last] / ARCMIN if known else None, run.error[last] / ARCMIN if known else None,
                      float(np.hypot(*run.lean[last])) / ARCSEC])  # fmt: skip
-    return {
-        "title": "Stages",
-        "caption": "Natural frequency (of the falling one: the last) and poles of the levelling or gyrocompass loop; "
-        "standard deviation and true error of the heading and true tilt at the end of each stage",
-        "columns": ["stage", "from / s", "time / s", "ω / (rad/s)", "poles / (rad/s)", "σ(ψ) / ′", "error / ′",
-                    "tilt / ″"],
-        "rows": rows,
-    }  # fmt: skip
+    caption = (
+        "Natural frequency (of the falling one: the last) and poles of the levelling or gyrocompass loop; "
+        "standard deviation and true error of the heading and true tilt at the end of each stage"
+    )
+    columns = ["stage", "from / s", "time / s", "ω / (rad/s)", "poles / (rad/s)", "σ(ψ) / ′", "error / ′", "tilt / ″"]
+    return Table("stages", "Stages", caption, columns, rows)
 
 
 def _pole(p: complex) -> str:
@@ -129,29 +109,28 @@ def _pole(p: complex) -> str:
     return text.replace("-", "−")
 
 
-def budget(
-    h: plans.History, run: Run, at: int, settings: plans.Settings, sensors: plans.Sensors, velocity: float
-) -> list[BudgetLine]:
-    """Sources of the heading's uncertainty at the instant it is stated for, by the error model.
+def budget(a: Alignment, at: int) -> list[BudgetLine]:
+    """Return the sources of the heading's uncertainty at the row it is stated for, by the error model.
 
-    velocity: rms of a base that vibrates, m/s; its line is what the controller's variance has beyond the others.
+    The line of a base that vibrates is what the controller's variance has beyond the others.
     """
     lines = []
-    for source, (size, unit, response) in h.sources(settings, sensors).items():
-        effect = float(np.interp(run.t[at], h.t, response[:, 2])) / DEG
+
+    def add(id: str, size: float, unit: str, effect: float, note: str = "") -> None:
+        per = "1" if unit == "°" else f"°/({unit})"
+        slope = 1.0 if unit == "°" else effect / size
+        name = plans.SOURCES[id]
+        lines.append(BudgetLine(id, name, size, unit, slope, per, abs(effect), "°", "ψ", note=note))
+
+    for id, (size, unit, response) in a.history.sources(a.settings, a.sensors).items():
+        effect = float(np.interp(a.run.t[at], a.history.t, response[:, 2])) / DEG
         if size > 0.0:
-            shown = {"rad/s": (plans.DPH, "°/h"), "m/s2": (1e-6 * 9.80665, "µg"), "rad": (DEG, "°"), "1": (1.0, "1")}
-            scale, name = shown[unit]
-            note = "sign: of the error, computed less true"
-            slope = effect / (size / scale)
-            line = BudgetLine(source, size / scale, name, slope, f"°/({name})", abs(effect), "°", "ψ", note=note)
-            lines.append(line)
+            scale, name = UNITS[unit]
+            add(id, size / scale, name, effect, "sign: of the error, computed less true")
         elif effect > 0.0:
-            lines.append(BudgetLine(source, effect, "°", 1.0, "1", effect, "°", "ψ"))
-    rest = run.sigma[at] ** 2 - sum((x.contribution * DEG) ** 2 for x in lines)
-    if velocity > 0.0 and rest > 0.0:
-        effect, size = float(np.sqrt(rest)) / DEG, 1e3 * velocity
+            add(id, effect, "°", effect)
+    rest = a.run.sigma[at] ** 2 - sum((x.contribution * DEG) ** 2 for x in lines)
+    if a.shaken > 0.0 and rest > 0.0:
         note = "by the controller: its variance less that of the other sources"
-        lines.append(BudgetLine("vibration of the base", size, "mm/s", effect / size, "°/(mm/s)", effect, "°", "ψ",
-                                note=note))  # fmt: skip
+        add("base.vibration", 1e3 * a.shaken, "mm/s", float(np.sqrt(rest)) / DEG, note)
     return sorted(lines, key=lambda x: -x.contribution)

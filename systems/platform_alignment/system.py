@@ -11,9 +11,11 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families import loop_test as loop
-from gyrobench.system.families.loop_test import AXES, data_sheet, three
+from gyrobench.system.families.loop_test import AXES, three
 from gyrobench.system.families.moving_bases import BASES, velocity
 from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.three_gyros import MOUNTS, commands
+from gyrobench.system.families.three_gyros import design as three_gyros
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
@@ -21,15 +23,7 @@ from . import plans
 
 DEG = math.pi / 180.0
 MOST = 85.0 * DEG  # latitude
-#: rows: gyro axes I, O, S in platform axes [GYRO-OA-COUPLING-Y2]
-MOUNTS = {
-    "gyro_x": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
-    "gyro_y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
-    "gyro_z": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
-}
-GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2}  # [GYRO-SDF-EOM]
-MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current
-COMMANDS = {f"controller.command[{k}] -> {gyro}.i": loop.torquer(f"{gyro}.k", 9) for k, gyro in enumerate(MOUNTS, 1)}
+COMMANDS = commands("controller.command")
 CONTROLLER = Socket(
     "AlignmentController",
     "levels a platform and finds its heading: specific force in, rates of the platform out",
@@ -134,12 +128,12 @@ class PlatformAlignment(System):
 
     @property
     def stop(self) -> float:  # type: ignore[override]
-        """Past the end by ``time``, which the controller says, s."""
+        """Return a time past the end by ``time``, which the controller says, s."""
         return float(self["time"]) + 1.0
 
     @property
     def sensors(self) -> plans.Sensors:
-        """What the controller is told of its sensors: the grade, and the options of type B."""
+        """Return what the controller is told of its sensors: the grade, and the options of type B."""
         grade = plans.GRADES.get(self["grade"], plans.GRADES["navigation"])
         return replace(grade, latitude=self["u_latitude"], scale=self["u_scale"])
 
@@ -153,33 +147,17 @@ class PlatformAlignment(System):
         return plans.designed(given, self.sensors, self["wanted"], psi, self["time"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        found: dict[str, Any] = {
+        sensors = self.sensors
+        noise = {"turn_on": "bias", "markov": "markov", "white": "white", "markov_tau": "tau"}
+        return {
             **self.owned(),
             **BASES.get(self["base"], {}),
             "platform.theta_0": [self["pitch"], self["roll"], -self["heading"]],
-            **parts.all_given({f"platform.{n}": [x] * 3 for n, x in MOTOR.items()}),
-            "platform.i_max": [48.0] * 3,
+            **three_gyros(parts, self["crossover"]),
+            **{f"{slot}.{n}?": getattr(sensors, field) for slot in MOUNTS for n, field in noise.items()},
+            **{f"accelerometers.white_{a}?": sensors.force for a in "xyz"},
+            **self._controller(parts),
         }
-        sensors = self.sensors
-        for k, (axis, (slot, mount)) in enumerate(zip(AXES, MOUNTS.items(), strict=True)):
-            gyro = {n: parts.given(f"{slot}.{n}", x) for n, x in GYRO.items()}
-            found |= {f"{slot}.mount": mount, f"{slot}.reaction": True, **{f"{slot}.{n}": x for n, x in gyro.items()}}
-            found[f"{slot}.k"] = data_sheet(parts[f"{slot}.k"])
-            noise = {"turn_on": "bias", "markov": "markov", "white": "white", "markov_tau": "tau"}
-            found |= {f"{slot}.{n}?": getattr(sensors, field) for n, field in noise.items()}
-            gain = found["platform.k_t"][k] / found["platform.R"][k]
-            found |= {f"{axis}.{n}?": x for n, x in self.stabilizer(_inertia(parts)[k], gain, gyro).items()}
-        found |= {f"accelerometers.white_{a}?": sensors.force for a in "xyz"}
-        return found | self._controller(parts)
-
-    def stabilizer(self, inertia: float, motor: float, gyro: dict[str, float]) -> dict[str, float]:
-        """F of PLATFORM-1AXIS, as in platform_three_axis: the loop crosses at the option crossover."""
-        wc = 2.0 * math.pi * self["crossover"]
-        s = 1j * wc
-        f = (1 + 1 / 15j) * (1 + 4j) / (1 + 0.25j)
-        sensor = gyro["K_sg"] * gyro["H"] / gyro["C"] / (s * (gyro["J"] / gyro["C"] * s + 1))
-        K = 1.0 / abs(f * sensor / (inertia * s)) / motor
-        return {"K": K, "tau1": 1.0, "T1": 1.0, "tau2": 4 / wc, "T2": 0.25 / wc, "integral": wc / 15, "v_max": 48.0}
 
     def _controller(self, parts: PartValues) -> dict[str, Any]:
         c, s = self.settings(), self.sensors
@@ -230,23 +208,17 @@ class PlatformAlignment(System):
             arcmin = DEG / 60.0
             h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
             sources = {n: float(np.abs(v[-1, 2])) for n, (_, _, v) in h.sources(c, s).items()}
-            worst = max(sources, key=lambda n: sources[n])
+            worst, most = max(sources.items(), key=lambda x: x[1])
             found.append(
                 f"A standard deviation of {self['wanted'] / arcmin:.3g}′ is not expected within {self['time']:g} s: "
-                f"{sigma[-1] / arcmin:.3g}′ then, {sources[worst] / arcmin:.3g}′ of it by {worst}. Take two positions, "
-                "better sensors, or more time."
+                f"{sigma[-1] / arcmin:.3g}′ then, {most / arcmin:.3g}′ of it by {plans.SOURCES[worst]}. Take two "
+                "positions, better sensors, or more time."
             )
         return found
 
 
-def _inertia(parts: PartValues) -> list[float]:
-    """Inertia about each motor axis (A order) at joint angles 0, as in platform_three_axis."""
-    roll, pitch, inner = (parts[f"platform.{name}"] for name in ("I_r", "I_f", "I_a"))
-    return [pitch[0] + inner[0], roll[1] + pitch[1] + inner[1], inner[2]]
-
-
 def _level_drift(parts: PartValues, gravity: float) -> list[float]:
-    """Static drift of each gyro on the level platform, from the coefficients that the parts have."""
+    """Return the static drift of each gyro on the level platform, from the coefficients that the parts have."""
     found = []
     for slot, mount in MOUNTS.items():
         values = {n: float(parts.get(f"{slot}.{n}", 0.0)) for n in drift.NAMES}

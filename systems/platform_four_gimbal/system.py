@@ -56,11 +56,11 @@ class PlatformFourGimbal(TwoGyroTest):
         return FLIGHTS.get(self["flight"], FLIGHTS["crossing"])
 
     def at_rest(self) -> list[LoopPhase]:
-        """Steps and sweeps, with a load, and the hold; only the hold before a flight that begins out of the null."""
+        """Return steps and sweeps, with a load, and the hold; the hold alone before a flight out of the null."""
         return [*(self.steps() if self["load"] != 0.0 and not self.flown().inner else []), self.drift()]
 
     def phases(self) -> list[LoopPhase]:
-        """The flight comes last, but where it begins out of the null, which would not wait."""
+        """Return what is done at rest, then the flight, but where it begins out of the null, which would not wait."""
         legs = flight_plan.phases(self.flown().legs)
         return [*legs, *self.at_rest()] if self.flown().inner else [*self.at_rest(), *legs]
 

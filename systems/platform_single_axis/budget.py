@@ -24,11 +24,11 @@ from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import base_ways
+from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
 LOWEST = 0.02  # Hz, where the integral over the noise begins: the running mean takes what is slower
 WRONG = 0.2  # relative: a measured ride that differs more from the computed one is not the linear model's
-TITLE = "Error budget of the ride, by source"
 
 
 def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[str, float]:
@@ -52,10 +52,11 @@ def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[
     whole = math.hypot(base, *(size for *_, size in noise.values()))
     measured = found.estimates["platform error"]
     if not whole or abs(measured * ARCSEC / whole - 1.0) > WRONG:
-        found.warnings.append(
+        text = (
             f"No error budget by source: the linear model gives {whole / ARCSEC:.3g}″ for the ride, measured are "
             f"{measured:.3g}″ (friction that slips, or a limit)."
         )
+        found.warn("budget.not_linear", text)
         return {}
     swings: list[list[Any]] = [[f"base about x, by {way}", degrees, "°", rms * size] for way, size in ways.items()]
     # the ways add as phasors: each has its share of the sum's square
@@ -68,16 +69,13 @@ def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[
     if across is not None:
         size = rms * abs(complex(across[0])) / ARCSEC
         shown.append(["not in the ride: base about y, output-axis coupling", degrees, "°", size, None])
-    found.tables.append(
-        {
-            "title": TITLE,
-            "caption": f"Angle of the platform computed from the linear model for the ride at {ride.f:g} Hz, and its "
-            "share of the variance. Size: amplitude of the base, or density of the noise (two-sided). The ways of the "
-            "base add as phasors and share its variance as their sizes, noise adds by squares.",
-            "columns": ["source", "size", "unit", "angle, rms / ″", "share / %"],
-            "rows": shown,
-        }
+    caption = (
+        f"Angle of the platform computed from the linear model for the ride at {ride.f:g} Hz, and its share of the "
+        "variance. Size: amplitude of the base, or density of the noise (two-sided). The ways of the base add as "
+        "phasors and share its variance as their sizes, noise adds by squares."
     )
+    columns = ["source", "size", "unit", "angle, rms / ″", "share / %"]
+    found.tables.append(Table("budget.sources", "Error budget of the ride, by source", caption, columns, shown))
     return {row[0]: row[3] for row in rows}
 
 

@@ -49,14 +49,14 @@ def kalman_gain(F: Array, Q: Array, R: float) -> Array:
 
 
 def rate_response(q: float, R: float, f: float, step: float) -> complex:
-    """Of estimator_kalman_rate, the same with a gate or aided, and of estimator_sage_husa whose R is right."""
+    """Return that of estimator_kalman_rate, also with a gate or aided, and of estimator_sage_husa whose R is right."""
     T = step
     F = np.array([[1.0, T], [0.0, 1.0]])
     return response(F, kalman_gain(F, q * np.array([[T**3 / 3.0, T**2 / 2.0], [T**2 / 2.0, T]]), R), f, T)
 
 
 def autoregressive_response(Q: float, R: float, f: float, step: float) -> complex:
-    """Of estimator_kalman_ar of order 1 with a correlation time of CORRELATION."""
+    """Return that of estimator_kalman_ar of order 1 with a correlation time of CORRELATION."""
     F = np.array([[math.exp(-step / CORRELATION)]])
     return response(F, kalman_gain(F, np.array([[Q]]), R), f, step)
 
@@ -67,7 +67,7 @@ def tracking_gains(theta: float) -> tuple[float, float, float]:
 
 
 def tracking_response(theta: float, f: float, step: float) -> complex:
-    """Of estimator_alpha_beta_gamma."""
+    """Return that of estimator_alpha_beta_gamma."""
     T, (alpha, beta, gamma) = step, tracking_gains(theta)
     F = np.array([[1.0, T, 0.5 * T * T], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
     return response(F, np.array([[alpha], [beta / T], [0.5 * gamma / T**2]]), f, T)

@@ -64,7 +64,7 @@ class Contest:
     noise: float
 
     def phases(self) -> list[LoopPhase]:
-        """Sines of the loop about the crossover and about the bending mode, the calm ride, the disturbed rides."""
+        """Return sines of the loop about the crossover and the bending mode, the calm ride, the disturbed rides."""
         tones = [self.crossover * x for x in (0.4, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0)]
         modes = [MODE * x for x in (0.92, 0.96, 1.0, 1.04, 1.08)]
         rides = ["ride", *RIDES.values()]

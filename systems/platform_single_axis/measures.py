@@ -30,14 +30,14 @@ PURPOSES = {
 
 
 def jitter(y: Array, n: int) -> Array:
-    """y less its running mean over n samples, without the ends: the wander of the gyro is no error of the loop."""
+    """Return y less its running mean over n samples, without the ends: the gyro's wander is no error of the loop."""
     slow = np.convolve(y, np.full(n, 1.0 / n), "valid")
     first = (n - 1) // 2
     return np.asarray(y[first : first + slow.size] - slow)
 
 
 def level(y: Array, stretches: int = 10) -> UncertainValue:
-    """Root mean square of a ride by a sine, with noise.  u from the scatter of the mean squares of ten stretches."""
+    """Return the rms of a ride by a sine, with noise; u from the scatter of the mean squares of ten stretches."""
     squares = [float(np.mean(part * part)) for part in np.array_split(y, stretches)]
     whole = math.sqrt(float(np.mean(y * y)))
     u = float(np.std(squares, ddof=1)) / math.sqrt(stretches) / (2.0 * whole) if whole else 0.0
@@ -54,11 +54,11 @@ def effort(found: LoopFindings, ride: Gate) -> None:
     size = level if ride.f else rms  # a recorded motion is random
     v = ride[VOLTAGE]
     total = size(v - v.mean())
-    found.measure("motor voltage", "voltage of the motor in the ride, rms about its mean", "V", total.value, total.u)
+    found.measure("motor voltage", "voltage of the motor in the ride, rms about its mean", "V", *total.pair)
     crossover = float(found.record.run.options["crossover"])
     fast = size(jitter(v, max(2, round(1.0 / (crossover * period(ride))))))
     meaning = "the same about the running mean over one period of the crossover asked for"
-    found.measure("voltage ripple", meaning, "V", fast.value, fast.u)
+    found.measure("voltage ripple", meaning, "V", *fast.pair)
     limited = ride["platform.saturated"] > 0.5
     v_max = found.record.run.parameters.get("stabilizer.v_max")
     if v_max is not None:
@@ -103,16 +103,16 @@ def disturbed(found: LoopFindings) -> None:
         elif ride.label == RIDES["aided"]:
             off = level(ride["reference.off"])
             meaning = "angle from the direction of the reference in the ride with one, rms: the wander counts"
-            found.measure("error, aided", meaning, "″", off.value / ARCSEC, off.u / ARCSEC)
+            found.measure("error, aided", meaning, "″", *off.pair, scale=ARCSEC)
         elif ride.label in RIDES.values():
             what = ride.label.removeprefix("ride, ")
             error = level(jitter(ride[ANGLE], round(2.0 / ride.f / period(ride))))
             meaning = f"platform error in the ride with {what} in the reading"
-            found.measure(f"error, {what}", meaning, "″", error.value / ARCSEC, error.u / ARCSEC)
+            found.measure(f"error, {what}", meaning, "″", *error.pair, scale=ARCSEC)
             if every := PERIODS.get(ride.label):
                 peak = peaks(ride.t, ride[VOLTAGE], every)
                 meaning = f"largest voltage of the motor from one of the {what} to the next, mean"
-                found.measure(f"peak voltage, {what}", meaning, "V", peak.value, peak.u)
+                found.measure(f"peak voltage, {what}", meaning, "V", *peak.pair)
 
 
 def peaks(t: Array, v: Array, every: float) -> UncertainValue:

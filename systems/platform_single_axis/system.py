@@ -104,7 +104,7 @@ class PlatformSingleAxisLoop(OneAxisTest):
                 self.request(slot)
 
     def phases(self) -> list[LoopPhase]:
-        """Step of torque, step of commanded rate, test sines for the loop, sines of the base, ride, drift."""
+        """Return step of torque, step of commanded rate, test sines for the loop, sines of the base, ride, drift."""
         fc = self["crossover"]
         if self["contest"]:
             return self.contest().phases()
@@ -127,14 +127,14 @@ class PlatformSingleAxisLoop(OneAxisTest):
         return Contest(self["crossover"], self["base"], self["ride"], self._whole(), self["reading_noise"])
 
     def amplitude(self, f: float) -> float:
-        """Of the base, rad: falls with the square of the frequency above the ride's."""
+        """Return that of the base, rad: falls with the square of the frequency above the ride's."""
         return float(self["base"] * min(1.0, (self["ride"] / f) ** 2))
 
     def _whole(self) -> float:
         return float(math.ceil(self["hold"] * self["ride"]) / self["ride"])
 
     def stabilizer(self, parts: PartValues, k: float, wr: float) -> dict[str, float]:
-        """Lag (an integration of the rate), lead and integral for the crossover wanted.
+        """Return lag (an integration of the rate), lead and integral for the crossover wanted.
 
         |L(j wc)| = 1 with L = 1/k R(s) K G(s) M(s)/(J s): R = wr/(s + wr) the rebalance, M = k_t/(R + L s) with the
         back EMF the motor, k the torquer of the gyro.

@@ -40,6 +40,7 @@ from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.rides import still
 from gyrobench.reduction.series.gyro_noise import slow_density
+from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
 Complex = NDArray[np.complex128]
@@ -51,23 +52,19 @@ POINTS = 400  # of it
 LEAST = 1e-3  # of the variance: what is less in size and share is one row
 WRONG = 0.2  # relative: a measured angle that differs more from the computed one is not the linear model's
 OUTPUT_AXES = "output axes of the gyros"
-TITLE = "Error budget of the platform, by source"
-GYRO = ("H", "J", "C", "K_sg", "mount")
-NOISE = (
-    "white",
-    "pickoff",
-    "markov",
-    "markov_tau",
-    "flicker",
-    "flicker_tau",
-    "walk",
-    "quantization",
-    "quantization_tau",
+CAPTION = (
+    "Angle of the inner element in each motion, root sum of squares of the three axes about mean and slope (commands: "
+    "the two other axes), computed from the linear model, and its share of the variance. Ways of one motion add with "
+    "their phases: a negative share cancels part of the others. Without it: what would be left if this source were "
+    "switched off."
 )
+GYRO = ("H", "J", "C", "K_sg", "mount")
+SLOW = "markov markov_tau flicker flicker_tau walk quantization quantization_tau"
+NOISE = ("white", "pickoff", *SLOW.split())
 PLATFORM = ("viscous", "k_t", "k_e", "R", "L", "friction", "stiction", "presliding", "I_r", "I_f", "I_a")
 
 
-class Loop:
+class ElementResponses:
     """Responses of the element's angles (rows x, y, z) in the closed linear model of a run.
 
     slides: the joints move.  The linear model takes dry friction for its elastic contact, K_c = K + s sqrt(K J); a
@@ -84,7 +81,6 @@ class Loop:
         self.platform = {n: np.asarray(p[f"platform.{n}"], float) for n in PLATFORM}
         self.gyros = [{n: np.asarray(p[f"{gyro}.{n}"], float) for n in GYRO} for gyro in GYROS]
         self.noise = [{n: float(p.get(f"{g}.{n}") or 0.0) for n in NOISE} for g in GYROS]
-
         self.contact = _stiffness(self.platform) if slides else np.zeros((2, 3))
         self.f_noise = m.grid(LOWEST, 0.5 / model.step, POINTS)
         self.by_noise = self.to("command", self.f_noise)
@@ -164,7 +160,7 @@ def _stiffness(p: Mapping[str, Array]) -> Array:
 
 # --------------------------------------------------------------------------------------- torques of the base
 def _turn(axis: int, angle: Array) -> Array:
-    """Passive rotations (samples, 3, 3) about an axis 0, 1, 2."""
+    """Return passive rotations (samples, 3, 3) about an axis 0, 1, 2."""
     c, s = np.cos(angle), np.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out = np.zeros((angle.size, 3, 3))
@@ -175,7 +171,7 @@ def _turn(axis: int, angle: Array) -> Array:
 
 
 def joints(base: Array, start: Array) -> Array:
-    """Joint angles (3, samples; A order) of an element at rest in space.  base: pitch, roll, heading (3, samples)."""
+    """Return the joint angles (3, samples; A order) of an element at rest in space; base: pitch, roll, heading."""
     of_base = _turn(1, base[1]) @ _turn(0, base[0]) @ _turn(2, base[2])
     first = [np.array([x]) for x in start]
     element = (_turn(2, first[2]) @ _turn(0, first[0]) @ _turn(1, first[1]) @ of_base[:1])[0]
@@ -183,7 +179,7 @@ def joints(base: Array, start: Array) -> Array:
     return np.array([-np.arcsin(c[:, 2, 1]), np.arctan2(c[:, 2, 0], c[:, 2, 2]), np.arctan2(c[:, 0, 1], c[:, 1, 1])])
 
 
-def torques(loop: Loop, base: Array, theta: Array, dt: float) -> dict[str, Array]:
+def torques(loop: ElementResponses, base: Array, theta: Array, dt: float) -> dict[str, Array]:
     """Return source -> torque (3, samples; A order, N.m) of the moving base about the motor axes."""
     p = loop.platform
 
@@ -206,7 +202,7 @@ def torques(loop: Loop, base: Array, theta: Array, dt: float) -> dict[str, Array
 
 
 def _contact(theta: Array, friction: float, presliding: float) -> Array:
-    """Torque of an elastic contact that slides: twice round, so that it begins as it ends."""
+    """Return the torque of an elastic contact that slides: twice round, so that it begins as it ends."""
     out, anchor = np.zeros(theta.size), float(theta[0])
     if friction > 0.0:
         for k, x in enumerate([*theta, *theta]):
@@ -216,7 +212,7 @@ def _contact(theta: Array, friction: float, presliding: float) -> Array:
 
 
 def _reaction(p: Mapping[str, Array], base: Array, theta: Array, rate: Any) -> Array:
-    """Torque about the motor axes of the inertia of roll and pitch gimbal, which the base takes along."""
+    """Return the torque about the motor axes of the inertia of roll and pitch gimbal, which the base takes along."""
     (p_, r_, _), turn = base, rate(base)
     w_b = np.array([np.cos(r_) * turn[0] - np.sin(r_) * np.cos(p_) * turn[2], turn[1] + np.sin(p_) * turn[2],
                     np.sin(r_) * turn[0] + np.cos(r_) * np.cos(p_) * turn[2]])  # fmt: skip
@@ -237,7 +233,7 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
     Nothing without a linear model of the bench's own parts.
     """
     try:
-        loops = {slides: Loop(found, angles, slides) for slides in (True, False)}
+        loops = {slides: ElementResponses(found, angles, slides) for slides in (True, False)}
     except (LookupError, ValueError, StopIteration):
         return {}
     rows: list[list[Any]] = []
@@ -255,10 +251,11 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
         if abs(measured / math.sqrt(square) - 1.0) > WRONG + random / square:  # a random walk has few independent parts
             if gate.kind == "command":
                 continue  # hardly coupled: what is left is of large angles
-            found.warnings.append(
+            text = (
                 f"No error budget by source for {name}: the linear model gives {math.sqrt(square) / ARCSEC:.3g}″, "
                 f"measured are {measured / ARCSEC:.3g}″ (a limit, unbalance, stiction, or a motion beyond it)."
             )
+            found.warn(f"budget.not_linear:{name}", text)
             continue
         entries = [(n, _mean(x, x), _mean(x, whole), -2.0 * _mean(x, whole) + _mean(x, x)) for n, x in parts.items()]
         entries += [(n, x * x, x * x, -x * x) for n, x in noise.items()]
@@ -273,17 +270,9 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
         rows.append([name, "together", math.sqrt(square) / ARCSEC, None, None])
         rows.append([name, "measured", measured / ARCSEC, None, None])
     if rows:
-        found.tables.append(
-            {
-                "title": TITLE,
-                "caption": "Angle of the inner element in each motion, root sum of squares of the three axes about "
-                "mean and slope (commands: the two other axes), computed from the linear model, and its share of the "
-                "variance. Ways of one motion add with their phases: a negative share cancels part of the others. "
-                "Without it: what would be left if this source were switched off.",
-                "columns": ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"],
-                "rows": rows,
-            }
-        )
+        columns = ["motion", "source", "angle, rms / ″", "share / %", "without it / ″"]
+        title = "Error budget of the platform, by source"
+        found.tables.append(Table("budget.sources", title, CAPTION, columns, rows))
     return shares
 
 
@@ -291,7 +280,7 @@ def _mean(x: Array, y: Array) -> float:
     return float(np.mean(np.sum(x * y, axis=0)))
 
 
-def _moved(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
+def _moved(loop: ElementResponses, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     """Return the parts of the base's motion (3, samples), rad, and the measured rms.
 
     A motion that does not close to whole periods is weighted by Hann's window, scaled to a mean square of 1.
@@ -311,7 +300,7 @@ def _moved(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     return loop.split(of_base, dt), size
 
 
-def _commanded(loop: Loop, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
+def _commanded(loop: ElementResponses, gate: Gate, dt: float) -> tuple[dict[str, Array], float]:
     """Return the parts of the angle about the two other axes (3, samples), rad, and the measured rms of it."""
     k = gate.axis - 1
     f = np.array([gate.f])

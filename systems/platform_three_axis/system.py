@@ -6,31 +6,19 @@ import math
 from typing import Any
 
 from gyrobench.system.families import loop_test as loop
-from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, data_sheet, three
+from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, three
+from gyrobench.system.families.three_gyros import MOUNTS, commands
+from gyrobench.system.families.three_gyros import design as three_gyros
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option, Slot
 
 DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
-# rows: gyro axes I, O, S in platform axes [GYRO-OA-COUPLING-Y2]
-MOUNTS = {
-    "gyro_x": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
-    "gyro_y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
-    "gyro_z": [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
-}
 GYROS = tuple(MOUNTS)
 ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
-GYRO = {"H": 0.02, "J": 2.5e-5, "C": 0.02, "K_sg": 10.0, "u_max": 0.2}  # of this test [GYRO-SDF-EOM]
 COMMAND = 1e-3  # rad/s, of the command step
-MOTOR = {"k_t": 1.0, "R": 1.0, "L": 0.0, "k_e": 0.0}  # driven by current: 1 N.m a volt, no back EMF
-COMMANDS = {f"exciter.command[{k}] -> {gyro}.i": loop.torquer(f"{gyro}.k", 9) for k, gyro in enumerate(GYROS, 1)}
-
-
-def neutral_inertia(parts: PartValues) -> list[float]:
-    """Return the inertia about each motor axis (A order) at joint angles 0, to which each drive is normalized."""
-    roll, pitch, inner = (parts[f"platform.{name}"] for name in ("I_r", "I_f", "I_a"))
-    return [pitch[0] + inner[0], roll[1] + pitch[1] + inner[1], inner[2]]
+COMMANDS = commands("exciter.command")
 
 
 class PlatformThreeAxis(ThreeAxisTest):
@@ -94,7 +82,7 @@ class PlatformThreeAxis(ThreeAxisTest):
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:
-        """Load steps, commands, base sines at 0.5, 0.7, 0.9 Hz and a sweep about x, test sines of each axis, drift."""
+        """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift."""
         f, fc = self["frequency"], self["crossover"]
         rate = self["swing"] * 2.0 * math.pi * f
         phases = [
@@ -115,32 +103,12 @@ class PlatformThreeAxis(ThreeAxisTest):
                 phases += sweep(f"loop {axis}", "test", tones, 2e-3, axis=k, settle=4.0, periods=20)
         return [*phases, LoopPhase("drift", "hold", settle=3.0, dwell=self["hold"])]
 
-    def stabilizer(self, inertia: float, motor: float, gyro: dict[str, float]) -> dict[str, float]:
-        """F of PLATFORM-1AXIS: (1 + wc/(15 s))(1 + 4 s/wc)/(1 + s/(4 wc)), K so that the loop crosses at wc.
-
-        L = K F K_sg (H/C)/(s (tau s + 1)) k_t/R / (J s), J the neutral inertia of the axis; motor: k_t/R.
-        """
-        wc = 2.0 * math.pi * self["crossover"]
-        s = 1j * wc
-        f = (1 + 1 / 15j) * (1 + 4j) / (1 + 0.25j)
-        sensor = gyro["K_sg"] * gyro["H"] / gyro["C"] / (s * (gyro["J"] / gyro["C"] * s + 1))
-        K = 1.0 / abs(f * sensor / (inertia * s)) / motor
-        return {"K": K, "tau1": 1.0, "T1": 1.0, "tau2": 4 / wc, "T2": 0.25 / wc, "integral": wc / 15, "v_max": 48.0}
-
     def design(self, parts: PartValues) -> dict[str, Any]:
         found: dict[str, Any] = {
             "platform.theta_0": [self["pitch"], self["roll"], self["azimuth"]],
-            **parts.all_given({f"platform.{n}": [x] * 3 for n, x in MOTOR.items()}),
-            "platform.i_max": [48.0] * 3,
             "decoupler.theta_f_max?": 80 * DEG,
+            **three_gyros(parts, self["crossover"]),
         }
-        for k, (axis, (slot, mount)) in enumerate(zip(AXES, MOUNTS.items(), strict=True)):
-            gyro = {n: parts.given(f"{slot}.{n}", x) for n, x in GYRO.items()}
-            found |= {f"{slot}.mount": mount, f"{slot}.reaction": True, **{f"{slot}.{n}": x for n, x in gyro.items()}}
-            found[f"{slot}.k"] = data_sheet(parts[f"{slot}.k"])
-            motor = found["platform.k_t"][k] / found["platform.R"][k]
-            stabilizer = self.stabilizer(neutral_inertia(parts)[k], motor, gyro)
-            found |= {f"{axis}.{n}?": x for n, x in stabilizer.items()}
         for slot in (n for n in ESTIMATORS if n in self.slots):
             found |= self.estimator(slot, parts[f"{ESTIMATORS[slot]}.pickoff"] ** 2 / self.step)
         return found

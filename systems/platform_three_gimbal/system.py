@@ -72,7 +72,7 @@ class PlatformThreeGimbal(TwoGyroTest):
     )  # fmt: skip
 
     def legs(self) -> list[Leg]:
-        """The flight and the way back; whole steps, so that the angles are exact."""
+        """Return the flight and the way back; whole steps, so that the angles are exact."""
         found: list[Leg] = []
         for name, way in (("roll", 1.0), ("yaw", 1.0), ("yaw", -1.0), ("roll", -1.0)):
             angle = way * self[name]
@@ -89,7 +89,7 @@ class PlatformThreeGimbal(TwoGyroTest):
         return [*self.steps(), command, self.drift()]
 
     def phases(self) -> list[LoopPhase]:
-        """The flight comes first: after a drift of minutes the gimbals would no longer meet at exactly 90 deg."""
+        """Return the flight, then the rest: after a drift of minutes the gimbals would not meet at exactly 90 deg."""
         return [*flight_plan.phases(self.legs()), *self.at_rest()]
 
     def design(self, parts: PartValues) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +31,28 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import nuisances, uncertainty
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, with_set_up
+from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import SiteSetup, scale_factor_problems
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_VERTICAL_EAST,
+    AXIS_VERTICAL_NORTH,
+    CURRENT_OFFSET,
+    INPUT_TO_OUTPUT,
+    INPUT_TO_SPIN,
+    TIME_BASE,
+    TORQUER_SCALE,
+    WOBBLE,
+    Source,
+)
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import Coefficient, DriftTestResult, Specification
+from gyrobench.result import Coefficient, DriftTestResult, Specification, Table
 from gyrobench.system.families.table_test import FACE, ON_TABLE
 
 from .measured import REST, TURNING
@@ -187,21 +199,23 @@ def _effects(s: Setup, found: Findings, turning: window_regressors.Turning, rate
     cone = window_regressors.wobbles(turning, LEVEL, s.site, (), SMALL)
     wobbling = np.array([found.error(-rates[:, 0] / s.k) for rates, _ in cone])
     return [
-        Effect("table axis off the vertical, about east", s.u_axis, "rad", axis(LEVEL[0])),
-        Effect("table axis off the vertical, about north", s.u_axis, "rad", axis(LEVEL[1])),
-        Effect("input axis towards output axis", s.u_mount, "rad", mount(along_s)),
-        Effect("input axis towards spin axis", s.u_mount, "rad", mount(-along_o)),
-        Effect("wobble of the table axis, twice a turn", s.u_wobble, "rad", wobbling, "", PHASES),
-        Effect("angle error, once a turn", s.u_angle1, "rad", angles(1), "encoder", SINES),
-        Effect("angle error, twice a turn", s.u_angle2, "rad", angles(2), "encoder", SINES),
-        Effect("torquer scale factor", s.u_scale_factor, "1", found.error(-rate / s.k), "relative, where it is stated"),
-        Effect("drift rate of the gyro", s.u_drift, "rad/s", found.error(one / s.k)),
-        Effect("offset of the current reading", s.u_current, "A", found.error(-one)),
-        Effect("time base", s.u_time, "1", found.error(-rate / s.k), "relative, seconds read too long"),
+        AXIS_VERTICAL_EAST.effect(s, axis(LEVEL[0])),
+        AXIS_VERTICAL_NORTH.effect(s, axis(LEVEL[1])),
+        INPUT_TO_OUTPUT.effect(s, mount(along_s)),
+        INPUT_TO_SPIN.effect(s, mount(-along_o)),
+        WOBBLE.effect(s, wobbling),
+        ANGLE_ONCE.effect(s, angles(1)),
+        ANGLE_TWICE.effect(s, angles(2)),
+        TORQUER_SCALE.effect(s, found.error(-rate / s.k), note="relative, where it is stated"),
+        Source("drift_rate_of_the_gyro", "drift rate of the gyro", "rad/s", "u_drift").effect(
+            s, found.error(one / s.k)
+        ),
+        CURRENT_OFFSET.effect(s, found.error(-one)),
+        TIME_BASE.effect(s, found.error(-rate / s.k), note="relative, seconds read too long"),
     ]
 
 
-def _levels(s: Setup, phase: Array, rate: Array, x: Array, found: Findings) -> dict[str, Any]:
+def _levels(s: Setup, phase: Array, rate: Array, x: Array, found: Findings) -> Table:
     residual = found.y - found.X @ found.est.beta[: found.X.shape[1]]
     rows = []
     for label in dict.fromkeys(s.labels.values()):
@@ -211,12 +225,13 @@ def _levels(s: Setup, phase: Array, rate: Array, x: Array, found: Findings) -> d
             [label, float(np.mean(rate[mine])) / DPH, float(np.mean(x[mine])) / MA, scatter / 1e-6,
              float(np.mean(residual[mine])) / 1e-6, int(np.sum(mine))]
         )  # fmt: skip
-    return {
-        "title": "Readings",
-        "caption": "Means of each rate; departure: mean of the residuals of the fit",
-        "columns": ["rate", "input / (°/h)", "reading / mA", "std of a reading / µA", "departure / µA", "readings"],
-        "rows": rows,
-    }
+    return Table(
+        "readings",
+        "Readings",
+        "Means of each rate; departure: mean of the residuals of the fit",
+        ["rate", "input / (°/h)", "reading / mA", "std of a reading / µA", "departure / µA", "readings"],
+        rows,
+    )
 
 
 def _at_rest(s: Setup, w: Mapping[str, Array], at_rest: NDArray[np.bool_], x: Array) -> list[Coefficient]:

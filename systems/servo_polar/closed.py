@@ -32,8 +32,8 @@ Amplitudes = Mapping[str, float]
 def amplitudes(
     angle_start: Array, angle_end: Array, rate: Array, order: int = 2
 ) -> tuple[dict[str, float], regression.Fit]:
-    """A0, A1, B1, A2, B2 of theta' (A: sine, B: cosine) by least squares over window means, and the fit itself (whose
-    names are the other way round: A cosine, B sine).
+    """Return A0, A1, B1, A2, B2 of theta' (A: sine, B: cosine) by least squares over window means, and the fit itself
+    (whose names are the other way round: A cosine, B sine).
     """
     fit = harmonic.fit(angle_start, angle_end, rate, order)
     other = {"A": "B", "B": "A"}
@@ -42,8 +42,8 @@ def amplitudes(
 
 
 def separate(S: Amplitudes, N: Amplitudes, latitude: float, g: float, earth_rate: float) -> dict[str, float]:
-    """U_x, U_z, U_y, dK, K_xz, K_zy, K_xy and "R+" = R + K_zx gamma2 s2 from the amplitudes of both mounts, in the
-    names and sign of Hu 1981, rad/s per g0^n.
+    """Return U_x, U_z, U_y, dK, K_xz, K_zy, K_xy and "R+" = R + K_zx gamma2 s2 from the amplitudes of both mounts, in
+    the names and sign of Hu 1981, rad/s per g0^n.
     """
     s, c, s2 = math.sin(latitude), math.cos(latitude), math.sin(2.0 * latitude)
     B2 = (S["B2"] + N["B2"]) / 2.0
@@ -60,7 +60,7 @@ def separate(S: Amplitudes, N: Amplitudes, latitude: float, g: float, earth_rate
 
 
 def resolve(found: Mapping[str, float], latitude: float, g: float, R: float | None, equal: bool) -> dict[str, float]:
-    """R and K_zx from "R+": (ii) with R of the dwells, (i) with K_zx = K_xz, or not at all."""
+    """Return R and K_zx from "R+": (ii) with R of the dwells, (i) with K_zx = K_xz, or not at all."""
     square = (g * math.sin(latitude)) ** 2
     rest = {n: v for n, v in found.items() if n != "R+"}
     if R is not None:
@@ -71,7 +71,7 @@ def resolve(found: Mapping[str, float], latitude: float, g: float, R: float | No
 
 
 def ours(book: Mapping[str, float]) -> dict[str, float]:
-    """The names and torque sign of Hu 1981 into ours.  [CROSS-MAP]"""
+    """Return coefficients in the names and torque sign of Hu 1981 as ours.  [CROSS-MAP]"""
     return {name: sign * book[symbol] for name, (symbol, sign) in BOOK.items() if symbol in book}
 
 
@@ -79,7 +79,7 @@ def reduce(
     start: Array, end: Array, length: Array, groups: Mapping[str, NDArray[np.bool_]], latitude: float, g: float,
     earth_rate: float, route: str,
 ) -> tuple[dict[str, float], dict[str, regression.Fit], str]:  # fmt: skip
-    """Our coefficients by the formulas, the harmonic fit of each mount, and why not ("" when all is well).
+    """Return our coefficients by the formulas, the harmonic fit of each mount, and why not ("" when all is well).
 
     start, end (rad), length (s): of the windows.  groups: attitude -> rows.  Harmonics want a whole turn: least squares
     over part of one would give them large and correlated errors.

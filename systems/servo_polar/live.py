@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Table
 from gyrobench.system.system import OnRequest, Slot
 from gyrobench.units import DPH
 
@@ -39,12 +38,10 @@ ON_REQUEST = OnRequest(
 )
 
 
-def tables(
-    windows: Mapping[str, Array], labels: Mapping[int, str], parameters: Mapping[str, Any]
-) -> list[dict[str, Any]]:
+def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: Sequence[float]) -> list[Table]:
     """Return the tables of the live estimate; none for a record without it.
 
-    windows: columns of the record.  labels: phase -> attitude.  parameters: of the run.
+    windows: columns of the record.  labels: phase -> attitude.  wanted: standard deviations, rad/s; 0: not stated.
     """
     if MAY_STOP not in windows:
         return []
@@ -66,29 +63,24 @@ def tables(
                 for k in (stop, end)
             )
             values.append([label, name, *then, *last])
-    wanted = list(dict.fromkeys(f"{x / DPH:.3g}" for x in parameters.get(f"{SLOT}.wanted", ()) if x > 0.0))
-    asked = f"Standard deviation wanted of mean and harmonics: {', '.join(wanted) or 'none stated'} °/h."
-    model = "Type A only, for the noise that the estimator is told; NIS is 1 on average where that is right."
+    sizes = ", ".join(dict.fromkeys(f"{x / DPH:.3g}" for x in wanted if x > 0.0)) or "none stated"
+    asked = (
+        f"Standard deviation wanted of mean and harmonics: {sizes} °/h. Type A only, for the noise that the estimator "
+        "is told; NIS is 1 on average where that is right."
+    )
+    over = (
+        "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, and at the end "
+        "(generalized least squares over all windows)"
+    )
+    head = ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"]
+    terms = ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"]
     return [
-        {
-            "title": "Live estimate: time to the wanted uncertainty",
-            "caption": f"{asked} {model}",
-            "columns": ["mount", "windows", "plan / h", "reached after / h", "saved / h", "mean NIS", "consistent"],
-            "rows": stops,
-        },
-        {
-            "title": "Live estimate: drift over the angle",
-            "caption": "Drift rate = A0 + A1 cos θ + B1 sin θ + A2 cos 2θ + B2 sin 2θ; when the wanted u was reached, "
-            "and at the end (generalized least squares over all windows)",
-            "columns": ["mount", "term", "then / (°/h)", "u then / (°/h)", "end / (°/h)", "u end / (°/h)"],
-            "rows": values,
-        },
+        Table("live.time", "Live estimate: time to the wanted uncertainty", asked, head, stops),
+        Table("live.drift", "Live estimate: drift over the angle", over, terms, values),
     ]
 
 
-def had_it_stopped(
-    record: Record, result: DriftTestResult, reduce: Callable[[Record], DriftTestResult]
-) -> list[dict[str, Any]]:
+def had_it_stopped(record: Record, result: DriftTestResult, reduce: Callable[[Record], DriftTestResult]) -> list[Table]:
     """Return the coefficients of the test beside those of the same record with each mount left when it might have been.
 
     [] for a record without the live estimate, or where no mount could have been left.
@@ -109,21 +101,18 @@ def had_it_stopped(
         then = {c.name: c for c in reduce(shorter).coefficients}
     except ReductionError as error:
         why = "; ".join(error.problems)
-        return [{"title": LEFT, "caption": "Not estimable from these windows", "columns": ["reason"], "rows": [[why]]}]
+        return [Table("live.left", LEFT, "Not estimable from these windows", ["reason"], [[why]])]
     both = [
         [c.name, c.unit, c.estimate, c.u, then[c.name].estimate, then[c.name].u]
         for c in result.coefficients
         if c.name in then
     ]
-    return [
-        {
-            "title": LEFT,
-            "caption": "Reduction of this report over all windows, and over those until each mount could have been "
-            "left; here the noise is estimated from the windows used, there it is told",
-            "columns": ["coefficient", "unit", "whole plan", "u", "left then", "u then"],
-            "rows": both,
-        }
-    ]
+    caption = (
+        "Reduction of this report over all windows, and over those until each mount could have been left; here the "
+        "noise is estimated from the windows used, there it is told"
+    )
+    head = ["coefficient", "unit", "whole plan", "u", "left then", "u then"]
+    return [Table("live.left", LEFT, caption, head, both)]
 
 
 def stopped(windows: Mapping[str, Array], rows: NDArray[np.int_]) -> int | None:
@@ -132,11 +121,11 @@ def stopped(windows: Mapping[str, Array], rows: NDArray[np.int_]) -> int | None:
     return int(ready[0]) if ready.size else None
 
 
-def sentence(tables: list[dict[str, Any]]) -> list[str]:
+def sentence(tables: Sequence[Table]) -> list[str]:
     """Return what the summary says of it: hours saved of those planned, or that the uncertainty was not reached."""
     if not tables:
         return []
-    rows = tables[0]["rows"]
+    rows = tables[0].rows
     late = [row[0] for row in rows if row[4] is None]
     saved, planned = sum(row[4] or 0.0 for row in rows), sum(row[2] for row in rows)
     words = f"The live estimate would have saved {saved:.1f} h of {planned:.1f} h"

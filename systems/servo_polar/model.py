@@ -27,12 +27,12 @@ Mixed = tuple[tuple[str, int, int], ...]  # other coefficient, sign and power of
 
 
 def terms(which: int) -> tuple[str, ...]:
-    """Coefficients of the model: 4 (R, U_z, U_x, ΔK), 8 (Hu 1981), 9 (with D_O)."""
+    """Return the coefficients of the model: 4 (R, U_z, U_x, ΔK), 8 (Hu 1981), 9 (with D_O)."""
     return {4: FOUR, 8: drift.terms(8), 9: drift.terms(9)}[which]
 
 
 @dataclass(frozen=True)
-class Model:
+class PolarModel:
     """names: of the terms; fitted: of the columns; mixed: what a fitted coefficient holds beside itself."""
 
     names: tuple[str, ...]
@@ -41,8 +41,10 @@ class Model:
     equal: bool = False
 
     @classmethod
-    def of(cls, route: str, mounts: Sequence[str], which: int) -> Model:
-        """mounts: attitudes of the turns.  One mount alone decides by itself, whatever the route."""
+    def of(cls, route: str, mounts: Sequence[str], which: int) -> PolarModel:
+        """Return the model of a plan.  mounts: attitudes of the turns.  One mount alone decides by itself, whatever the
+        route.
+        """
         names = terms(which)
         if len(set(mounts)) == 1:
             m = 1 if mounts[0] == "polar S" else -1
@@ -58,8 +60,8 @@ class Model:
             gone = {"D_II"}
         return cls(names, tuple(n for n in names if n not in gone), mixed, equal)
 
-    def columns(self, held: servo_regression.Held, site: Site) -> Array:
-        """(n, len(fitted))"""
+    def columns(self, held: servo_regression.HeldWindows, site: Site) -> Array:
+        """Return the columns (n, len(fitted)) of windows."""
         X = servo_regression.design(held, site, self.names)
         if self.equal:
             X[:, self.names.index("D_SS")] -= X[:, self.names.index("D_II")]
@@ -68,7 +70,7 @@ class Model:
     def quantities(
         self, site: Site, truth: Mapping[str, float] | None, book: Mapping[str, float]
     ) -> tuple[list[Quantity], list[Quantity]]:
-        """Of what is fitted, and of what is reported."""
+        """Return the quantities of what is fitted, and of what is reported."""
         share = site.g * math.sin(site.latitude)
 
         def one(name: str) -> Quantity:
@@ -84,7 +86,7 @@ class Model:
         return fitted, [one(n) for n in self.names] if self.equal else fitted
 
     def report(self, found: Findings, reported: Sequence[Quantity]) -> Findings:
-        """The fit with D_II = -D_SS written out."""
+        """Return the fit with D_II = -D_SS written out."""
         if not self.equal:
             return found
         order = [self.fitted.index("D_SS" if n == "D_II" else n) for n in self.names]
@@ -92,7 +94,7 @@ class Model:
         return found.derive(reported, lambda v: sign * v[order])
 
     def words(self, name: str, book: bool = False) -> str:
-        """D_F + γ² sin²φ D_II, or R + γ² sin²φ K_zx."""
+        """Return D_F + γ² sin²φ D_II, or R + γ² sin²φ K_zx."""
         symbol, way = servo_regression.BOOK[name]
         out = [symbol if book else name]
         for n, s, k in self.mixed[name]:

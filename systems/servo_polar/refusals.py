@@ -17,28 +17,32 @@ from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.units import DPH
 
-from .model import ROUTES, Model
+from .model import ROUTES, PolarModel
 
 
-def held(latitude: float, phases: Sequence[str], points: int = 36) -> tuple[servo_regression.Held, NDArray[np.int_]]:
-    """Ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase numbers."""
+def held(
+    latitude: float, phases: Sequence[str], points: int = 36
+) -> tuple[servo_regression.HeldWindows, NDArray[np.int_]]:
+    """Return ideal windows of ``points`` angles over a turn in polar mounts, of one at angle 0 in dwells; phase
+    numbers.
+    """
     angles = [np.arange(points) * 2.0 * math.pi / points if p in POLAR else np.zeros(1) for p in phases]
     axes = np.concatenate(
         [np.repeat(on_servo_table(p, latitude)[None], a.size, axis=0) for p, a in zip(phases, angles, strict=True)]
     )
     phase = np.repeat(np.arange(len(phases)), [a.size for a in angles])
     a, t = np.concatenate(angles), np.arange(phase.size, dtype=float)
-    return servo_regression.Held(a, a, t, t + 1.0, axes), phase
+    return servo_regression.HeldWindows(a, a, t, t + 1.0, axes), phase
 
 
 def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
-    """What phases at a latitude can tell apart: rank, condition, lost combinations."""
+    """Return what phases at a latitude can tell apart: rank, condition, lost combinations."""
     windows, _ = held(latitude, phases)
     return regression.examine(servo_regression.design(windows, Site(latitude, g * 9.80665), names), names)
 
 
 def latitude_problems(latitude: float) -> list[str]:
-    """Below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
+    """Return that below 10 and above 80 degrees the coefficients run together; what is lost, in their names."""
     if problems := frames.latitude_problems(latitude):
         return problems
     if 10.0 <= abs(math.degrees(latitude)) <= 80.0:
@@ -47,14 +51,14 @@ def latitude_problems(latitude: float) -> list[str]:
     phases = ("x east, y up", "x east, y down", *POLAR)
     found = examine(latitude, phases, names)
     where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
-    if found.rank < 8:
-        return [f"{where}rank {found.rank} of 8, the record does not see {'; '.join(found.lost)}"]
+    if found.short:
+        return [f"{where}{found.weakness}"]
     X = servo_regression.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
-    return [f"{where}condition {np.linalg.cond(X):.3g}, hardly seen is {found.weakest}"]
+    return [f"{where}condition {np.linalg.cond(X):.3g}, least determined: {found.weakest}"]
 
 
 def option_problems(options: Mapping[str, Any]) -> list[str]:
-    """What is wrong with the options, as sentences."""
+    """Return what is wrong with the options, as sentences."""
     found = latitude_problems(options["latitude"])
     mounts = options["mounts"].replace(",", " ").split()
     if not mounts or any(m not in ("S", "N") for m in mounts):
@@ -73,7 +77,7 @@ def option_problems(options: Mapping[str, Any]) -> list[str]:
 
 
 def model_problems(parameters: Mapping[str, Any]) -> list[str]:
-    """What the simulated gyro has and the model has not."""
+    """Return what the simulated gyro has and the model has not."""
     square = parameters.get("gyro.D_OO", 0.0) / DPH
     if square:
         return [
@@ -84,11 +88,11 @@ def model_problems(parameters: Mapping[str, Any]) -> list[str]:
 
 
 def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
-    """What the plan cannot see, said before the run."""
+    """Return what the plan cannot see, said before the run."""
     found = []
     if which == 4:
         found.append("Four terms: the other coefficients stay in the residuals and bias D_F (low grades only).")
-    model = Model.of(route, mounts, which)
+    model = PolarModel.of(route, mounts, which)
     together = [model.words(n) for n in model.fitted if model.mixed[n]]
     if len(set(mounts)) == 1:
         found.append(
@@ -102,26 +106,5 @@ def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
 
 
 def turned(start: Array, end: Array) -> float:
-    """Degrees turned by the windows of a mount, rad, in their order."""
+    """Return the degrees turned by the windows of a mount, rad, in their order."""
     return math.degrees(abs(float(end[-1] - start[0])))
-
-
-def turned_words(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> str:
-    """How far each mount turned, for a record that does not tell the coefficients apart."""
-    words = []
-    for p, label in labels.items():
-        if label in POLAR:
-            words.append(f"{label} {turned(held.angle_start[phase == p], held.angle_end[phase == p]):.4g}°")
-    return f"the mounts turned by {', '.join(words)}: more of a turn tells more"
-
-
-def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
-    """Too few windows in a polar mount."""
-    found = []
-    for p, label in labels.items():
-        mine = phase == p
-        if label not in POLAR or not mine.any():
-            continue
-        if np.count_nonzero(mine) < 8:
-            found.append(f"phase {p} ({label}) has {np.count_nonzero(mine)} windows: at least 8 are needed")
-    return found

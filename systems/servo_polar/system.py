@@ -51,11 +51,11 @@ class ServoPolar(ServoTest):
     channel_period = 60.0
 
     def mounts(self) -> list[str]:
-        """Attitudes of the turns, in their order."""
+        """Return the attitudes of the turns, in their order."""
         return [f"polar {m}" for m in self["mounts"].replace(",", " ").split()]
 
     def holds(self) -> list[Hold]:
-        """Two dwells (route dwells), then each mount; every phase begins at a whole turn."""
+        """Return two dwells (route dwells), then each mount; every phase begins at a whole turn."""
         common = {"settle": self["settle"]}
         holds = []
         if self["route"] == "dwells":
@@ -73,7 +73,9 @@ class ServoPolar(ServoTest):
         return holds
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        """The live estimator is told the noise of the gyro in the slot, and the readings' quantum."""
+        """Return parameters that tell the live estimator the noise of the gyro in the slot, and the readings'
+        quantum.
+        """
         found = super().parameters(parts)
         if live.SLOT not in self.slots:
             return found

@@ -7,7 +7,6 @@ with its sign where the readings are wrong, with the opposite one where the axes
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,54 +14,48 @@ from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
+from gyrobench.reduction.drift.held_test import HeldSetup
+from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.sources import ANGLE_OF, INNER_SQUARE, TIME_BASE, TURNED, WOBBLE_OF, Source
 
 from .windows import Track
 
 SMALL = 1e-5  # rad, size of the perturbations
-SIZES = ("u_axis", "u_square", "u_mount", "u_angle1", "u_angle2", "u_wobble", "u_time")
 AXES = ("outer", "inner")
+SET_UP = Source("table.set_up.{axis}", "table set up, about {axis}", "rad", "u_axis", "each mount set up by itself")
+ON_PLATE = {n: replace(TURNED[n], name=f"gyro on the plate, about {n}") for n in "xyz"}
 
 
 def effects(
-    channel: int, found: Findings, seen: Track, phase: NDArray[np.int_], site: Site, names: tuple[str, ...],
-    sizes: Mapping[str, float],
-) -> list[Effect]:  # fmt: skip
-    """channel: 0 x, 1 y.  Each mount is set up by itself: its errors are independent of those of the others, and so are
-    sine and cosine of an angle error.
+    channel: int, found: Findings, seen: Track, phase: NDArray[np.int_], names: tuple[str, ...], setup: HeldSetup
+) -> list[Effect]:
+    """Return all sources with their sensitivities.  channel: 0 x, 1 y.  Each mount is set up by itself: its errors are
+    independent of those of the others, and so are sine and cosine of an angle error.
     """
+    site = setup.place
     y, X = seen.inertial(site)[:, channel], seen.design(site, names)
 
     def moved(other: Track) -> Array:
         return found.error(other.inertial(site)[:, channel] - y, other.design(site, names) - X) / SMALL
 
-    other = _others(seen)
-    each, mounts = "each mount set up by itself", tuple(f"mount {p}" for p in np.unique(phase))
-    out = [
-        Effect(f"table set up, about {a}", sizes["u_axis"], "rad", one_by_one(-moved(one), phase), each, mounts)
-        for a, one in zip("XYZ", other["base"], strict=True)
+    def both(which: str) -> Array:
+        return np.array([moved(one) for one in other[which]])
+
+    other, mounts = _others(seen), tuple(f"mount {p}" for p in np.unique(phase))
+    set_up = ((SET_UP.of(axis=a), one) for a, one in zip("XYZ", other["base"], strict=True))
+    return [
+        *(source.effect(setup, one_by_one(-moved(one), phase), parts=mounts) for source, one in set_up),
+        *(ON_PLATE[a].effect(setup, -moved(one)) for a, one in zip("xyz", other["body"], strict=True)),
+        INNER_SQUARE.effect(setup, -moved(*other["square"])),
+        *(
+            ANGLE_OF[often].of(axis=name).effect(setup, both(f"{name} {n}"))
+            for n, often in ((1, "once"), (2, "twice"))
+            for name in AXES
+        ),
+        *(WOBBLE_OF.of(axis=name).effect(setup, -both(f"{name} wobble")) for name in AXES),
+        TIME_BASE.effect(setup, moved(*other["time"])),
     ]
-    out += [
-        Effect(f"gyro on the plate, about {a}", sizes["u_mount"], "rad", -moved(one))
-        for a, one in zip("xyz", other["body"], strict=True)
-    ]
-    out.append(Effect("right angle of the table axes", sizes["u_square"], "rad", -moved(*other["square"])))
-    for n, often in ((1, "once"), (2, "twice")):
-        for name in AXES:
-            change = np.array([moved(one) for one in other[f"{name} {n}"]])
-            out.append(
-                Effect(f"{name} angle error, {often} a turn", sizes[f"u_angle{n}"], "rad", change, "encoder", SINES)
-            )
-    for name in AXES:
-        change = -np.array([moved(one) for one in other[f"{name} wobble"]])
-        out.append(
-            Effect(
-                f"wobble of the {name} axis, twice a turn", sizes["u_wobble"], "rad", change, "unknown phase", PHASES
-            )
-        )
-    return [*out, Effect("time base", sizes["u_time"], "1", moved(*other["time"]), "relative")]
 
 
 @functools.lru_cache(maxsize=1)
@@ -94,5 +87,5 @@ def _others(seen: Track) -> dict[str, list[Track]]:
 
 
 def _turned(k: int) -> Array:
-    """Rows: axes turned by SMALL about the k-th of them, in what they were."""
+    """Return rows: axes turned by SMALL about the k-th of them, in what they were."""
     return frames.rotation(np.eye(3)[k], SMALL).T

@@ -35,7 +35,7 @@ EMPIRICAL = {"x": "Dx_y", "y": "Dy_x"}
 
 
 def appendix_2(mount: int, latitude: float) -> tuple[Array, Array]:
-    """Earth rate / W and SF / g along X, Y, Z of a mount.  [APP2]"""
+    """Return the Earth rate / W and SF / g along X, Y, Z of a mount.  [APP2]"""
     c, s = math.cos(latitude), math.sin(latitude)
     rate, force = {
         1: ((0, c, s), (0, 0, -1)),
@@ -55,13 +55,13 @@ def appendix_2(mount: int, latitude: float) -> tuple[Array, Array]:
 
 
 def gyro_rates(x: Array, y: Array, x_rate: Array, y_rate: Array, earth: Array) -> tuple[Array, Array]:
-    """alpha', beta' (n,) of 3-97; earth (3,) along X, Y, Z of the mount."""
+    """Return alpha', beta' (n,) of 3-97; earth (3,) along X, Y, Z of the mount."""
     cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
     return x_rate * cy + earth[0] * cy + earth[1] * sx * sy - earth[2] * cx * sy, y_rate + earth[1] * cx + earth[2] * sx
 
 
 def force(x: Array, y: Array, base: Array) -> Array:
-    """SF along the gyro axes (n, 3) from that along the axes of the mount (3,).  [3-96, E47]"""
+    """Return SF along the gyro axes (n, 3) from that along the axes of the mount (3,).  [3-96, E47]"""
     cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
     return np.column_stack([
         cy * base[0] + sx * sy * base[1] - cx * sy * base[2],
@@ -71,7 +71,9 @@ def force(x: Array, y: Array, base: Array) -> Array:
 
 
 def rows(channel: str, g: Array) -> Array:
-    """What the coefficients of Hu 1981 of a line (in the order of BOOK) multiply in alpha' or beta', (n, 8).  [3-95]"""
+    """Return what the coefficients of Hu 1981 of a line (in the order of BOOK) multiply in alpha' or beta', (n, 8).
+    [3-95]
+    """
     X, Y, Z = g.T
     one = np.ones_like(X)
     if channel == "x":
@@ -80,7 +82,9 @@ def rows(channel: str, g: Array) -> Array:
 
 
 def separate(channel: str, rate: Array, g: Array, terms: int = 8) -> dict[str, float]:
-    """Our coefficients of a channel from alpha' (x) or beta' (y) (n,) at SF ``g`` (n, 3) in g0; 9 terms: with ours."""
+    """Return our coefficients of a channel from alpha' (x) or beta' (y) (n,) at SF ``g`` (n, 3) in g0; 9 terms: with
+    ours.
+    """
     X = rows(channel, g)
     if terms == 9:
         X = np.column_stack([X, g[:, 1 if channel == "x" else 0]])
@@ -91,10 +95,13 @@ def separate(channel: str, rate: Array, g: Array, terms: int = 8) -> dict[str, f
 
 
 def reduce(
-    x: Array, y: Array, x_rate: Array, y_rate: Array, mount: NDArray[np.int_], latitude: float, g: float,
-    earth_rate: float, terms: int,
-) -> dict[str, float]:  # fmt: skip
-    """Our coefficients of both channels, rad/s per g0^n, from angles and rates of both axes (n,) in mounts (n,)."""
+    angles: tuple[Array, Array, Array, Array], mount: NDArray[np.int_], place: tuple[float, float, float], terms: int
+) -> dict[str, float]:
+    """Return our coefficients of both channels, rad/s per g0^n, from angles and rates of both axes (n,) in mounts (n,).
+
+    place: latitude, rad; gravity, g0; Earth rate, rad/s.
+    """
+    (x, y, x_rate, y_rate), (latitude, g, earth_rate) = angles, place
     alpha, beta, forces = np.empty_like(x), np.empty_like(x), np.empty((x.size, 3))
     for m in np.unique(mount).tolist():
         k = mount == m
@@ -105,5 +112,5 @@ def reduce(
 
 
 def in_book(ours: Mapping[str, float], channel: str) -> dict[str, float]:
-    """The coefficients of Hu 1981 of a line from ours."""
+    """Return the coefficients of Hu 1981 of a line from ours."""
     return {b: sign * ours[name] for b, (name, sign) in BOOK[channel].items()}

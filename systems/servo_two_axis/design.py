@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.design.option_protocol import Choice, OptionProtocol
-from gyrobench.design.visit_protocol import Noise, gyro_noise, gyro_unseen
+from gyrobench.design.visit_protocol import DataNoise, gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.run_metadata import Site
@@ -72,7 +72,7 @@ class TestModel:
     window: float
     settle: float
     lost: float
-    noise: Mapping[str, Noise]
+    noise: Mapping[str, DataNoise]
     reading: Mapping[str, float]
     rates: geometry.Rates
     rate: Array

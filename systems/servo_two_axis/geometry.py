@@ -32,12 +32,12 @@ DAY = 2.0 * math.pi / frames.EARTH_RATE
 
 
 def base(mount: int, latitude: float) -> Array:
-    """Rows X, Y, Z of a mount in ENU.  KeyError for a number that is none of the twelve."""
+    """Return rows X, Y, Z of a mount in ENU.  KeyError for a number that is none of the twelve."""
     return axes(*MOUNTS[mount], latitude)
 
 
 def attitude(x: ArrayLike, y: ArrayLike) -> Array:
-    """A (..., 3, 3) of outer and inner angles.  [SERVO2-A, E47]"""
+    """Return A (..., 3, 3) of outer and inner angles.  [SERVO2-A, E47]"""
     cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
     zero = np.zeros_like(cx * cy)
     rows = [[cy + zero, sx * sy, -cx * sy], [zero, cx + zero, sx + zero], [sy + zero, -cy * sx, cx * cy]]
@@ -46,7 +46,7 @@ def attitude(x: ArrayLike, y: ArrayLike) -> Array:
 
 
 def swing(mount: int, latitude: float) -> float:
-    """Largest inner angle over a day of a gyro without drift, rad.  [SERVO2-LOCK]
+    """Return the largest inner angle over a day of a gyro without drift, rad.  [SERVO2-LOCK]
 
     a, b: angles of X and Z to the pole; z goes round the pole at b while X stays at a.
     """
@@ -59,7 +59,7 @@ def path(
     mount: int, latitude: float, time: float, points: int = 241, earth_rate: float = frames.EARTH_RATE,
     rates: Rates | None = None,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Times (points,), outer and inner angle from 0, of a gyro that starts in ``mount``; the outer unwrapped.
+    """Return times (points,), outer and inner angle from 0, of a gyro that starts in ``mount``; the outer unwrapped.
 
     rates: drift (omega_dx, omega_dy), rad/s, at (X, Y, Z) = SF / g along the gyro axes, up to where cos y = LEAST is
     passed (the angles then stay); None: no drift, in closed form, through gimbal lock too.
@@ -100,6 +100,6 @@ def path(
 
 
 def force(mount: int, latitude: float, x: Array, y: Array) -> Array:
-    """SF / g along the gyro axes (n, 3): gamma of Hu 1981."""
+    """Return SF / g along the gyro axes (n, 3): gamma of Hu 1981."""
     out: Array = attitude(x, y) @ (base(mount, latitude) @ -frames.U)
     return out

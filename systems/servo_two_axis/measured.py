@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -37,8 +37,8 @@ phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],
 """
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if not c.name.startswith("angle") and c.name not in ("mean", "std")),
-    *(Column(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
-    *(Column(f"{c}_{a}", "V", f"{a} pickoff voltage", required=False) for a in "xy" for c in ("mean", "std")),
+    *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
+    *(CsvColumn(f"{c}_{a}", "V", f"{a} pickoff voltage", required=False) for a in "xy" for c in ("mean", "std")),
 )
 NEEDED = {"latitude": "45.75deg"}
 ATTITUDES = {f"mount {m}": "servo" for m in MOUNTS}

@@ -27,7 +27,7 @@ STEP_MAX = 1e-3  # s, the largest internal step of table_servo
 
 
 def designs(mounts: Sequence[int], latitude: float, time: float, terms: int, earth_rate: float) -> dict[str, Array]:
-    """Regressors of both channels at 241 times in each mount, at 1 g, of a gyro without drift."""
+    """Return the regressors of both channels at 241 times in each mount, at 1 g, of a gyro without drift."""
     forces = []
     for m in mounts:
         _, x, y = geometry.path(m, latitude, time, earth_rate=earth_rate)
@@ -37,7 +37,7 @@ def designs(mounts: Sequence[int], latitude: float, time: float, terms: int, ear
 
 
 def condition(X: Mapping[str, Array]) -> float:
-    """The worse of both channels; infinite where the rank is short."""
+    """Return the worse of both channels; infinite where the rank is short."""
     worst = 1.0
     for x in X.values():
         s = np.linalg.svd(x, compute_uv=False)
@@ -46,7 +46,7 @@ def condition(X: Mapping[str, Array]) -> float:
 
 
 def locked(mount: int, latitude: float, time: float, earth_rate: float, rates: Rates | None = None) -> float:
-    """Largest inner angle in ``time``, rad."""
+    """Return the largest inner angle in ``time``, rad."""
     if rates is None and time * earth_rate >= 2.0 * math.pi:
         return geometry.swing(mount, latitude)
     return float(np.max(np.abs(geometry.path(mount, latitude, time, 361, earth_rate, rates)[2])))
@@ -55,7 +55,9 @@ def locked(mount: int, latitude: float, time: float, earth_rate: float, rates: R
 def lock_by_drift(
     mount: int, latitude: float, time: float, earth_rate: float, rates: Rates
 ) -> tuple[float, float, float] | None:
-    """s, outer and inner angle (rad) at which drift brings a gyro too near to gimbal lock; None: not in ``time``."""
+    """Return s, outer and inner angle (rad) at which drift brings a gyro too near to gimbal lock; None: not in
+    ``time``.
+    """
     t, x, y = geometry.path(mount, latitude, time, 1441, earth_rate, rates)
     near = np.flatnonzero(np.cos(y) < geometry.LEAST)
     return (float(t[near[0]]), float(x[near[0]]), float(y[near[0]])) if near.size else None
@@ -64,7 +66,7 @@ def lock_by_drift(
 def best_pairs(
     latitude: float, time: float, terms: int, earth_rate: float, count: int = 4
 ) -> list[tuple[float, int, int]]:
-    """(condition, mount, mount) of the pairs that tell most, best first."""
+    """Return (condition, mount, mount) of the pairs that tell most, best first."""
     most = math.acos(geometry.LEAST)
     free = [m for m in geometry.MOUNTS if locked(m, latitude, time, earth_rate) < most]
     each = {m: designs([m], latitude, time, terms, earth_rate) for m in free}
@@ -83,7 +85,7 @@ def _advice(latitude: float, time: float, terms: int, earth_rate: float) -> str:
 
 
 def numbers(text: str) -> list[int] | None:
-    """Mounts from "2 4" or "2, 4"; None if one is none of the twelve."""
+    """Return mounts from "2 4" or "2, 4"; None if one is none of the twelve."""
     words = text.replace(",", " ").split()
     if not words or not all(w.isdigit() and int(w) in geometry.MOUNTS for w in words):
         return None
@@ -91,7 +93,9 @@ def numbers(text: str) -> list[int] | None:
 
 
 def lock_problems(mounts: Sequence[int], latitude: float, time: float, earth_rate: float, terms: int) -> list[str]:
-    """Mounts that come too near to gimbal lock by the Earth's turn alone, and what the others would leave unseen."""
+    """Return mounts that come too near to gimbal lock by the Earth's turn alone, and what the others would leave
+    unseen.
+    """
     bad = {m: a for m in dict.fromkeys(mounts) if math.cos(a := locked(m, latitude, time, earth_rate)) < geometry.LEAST}
     found = []
     for m, a in bad.items():
@@ -101,7 +105,7 @@ def lock_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
             f"mount {m}: gimbal lock: at latitude {math.degrees(latitude):.4g}° its inner angle reaches "
             f"{math.degrees(a):.4g}° ({math.degrees(math.acos(geometry.LEAST)):.3g}° allowed), where the outer axis "
             "turns the gyro about its spin axis and the x channel, x' cos y, is lost; "
-            f"{'the mounts that are left do not see ' + lost + '; ' if lost else ''}"
+            f"{'the mounts that are left: ' + lost + '; ' if lost else ''}"
             f"{_advice(latitude, time, terms, earth_rate)}"
         )
     return found
@@ -111,18 +115,18 @@ def _lost(mounts: Sequence[int], latitude: float, time: float, terms: int, earth
     out = []
     for c, X in designs(mounts, latitude, time, terms, earth_rate).items():
         seen = regression.examine(X, drift.terms_2dof(c, terms))
-        if seen.lost:
-            out.append(f"{c} channel, rank {seen.rank} of {len(seen.names)}: {'; '.join(seen.lost)}")
+        if seen.short:
+            out.append(f"{c} channel, {seen.weakness}")
     return out
 
 
 def rank_problems(mounts: Sequence[int], latitude: float, time: float, earth_rate: float, terms: int) -> list[str]:
-    """Mounts that do not tell the coefficients apart, with the combinations lost."""
+    """Return mounts that do not tell the coefficients apart, with the combinations lost."""
     which = f"mount{'s' if len(set(mounts)) > 1 else ''} {' '.join(map(str, dict.fromkeys(mounts)))}"
     where = f"{which} at latitude {math.degrees(latitude):.4g}° for {time / 3600.0:.3g} h"
     lost = _lost(mounts, latitude, time, terms, earth_rate)
     if lost:
-        text = f"{where} do not see {'; and '.join(lost)}"
+        text = f"{where}: {'; and '.join(lost)}"
     else:
         k = condition(designs(mounts, latitude, time, terms, earth_rate))
         most = MOST_SINGLE if len(set(mounts)) == 1 else MOST
@@ -135,11 +139,11 @@ def rank_problems(mounts: Sequence[int], latitude: float, time: float, earth_rat
 def _weakest(mounts: Sequence[int], latitude: float, time: float, terms: int, earth_rate: float) -> str:
     X = designs(mounts, latitude, time, terms, earth_rate)
     words = [f"{regression.examine(v, drift.terms_2dof(c, terms)).weakest} ({c} channel)" for c, v in X.items()]
-    return f"hardly seen are {' and '.join(words)}"
+    return f"least determined: {' and '.join(words)}"
 
 
 def cautions(mounts: Sequence[int], latitude: float, time: float, earth_rate: float, terms: int) -> list[str]:
-    """What is allowed but weak, said before the run."""
+    """Return what is allowed but weak, said before the run."""
     k = condition(designs(mounts, latitude, time, terms, earth_rate))
     if not WARN < k < math.inf:
         return []
@@ -149,7 +153,7 @@ def cautions(mounts: Sequence[int], latitude: float, time: float, earth_rate: fl
 
 
 def option_problems(options: Mapping[str, Any], step: float, earth_rate: float) -> list[str]:
-    """What is wrong with the options, as sentences."""
+    """Return what is wrong with the options, as sentences."""
     found, mounts = [], numbers(options["mounts"])
     if step > STEP_MAX:
         found.append(f"step = {step:g} s: the servo loops exchange once a step and need at most {STEP_MAX:g} s")
@@ -171,7 +175,7 @@ def option_problems(options: Mapping[str, Any], step: float, earth_rate: float) 
 
 
 def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options: Mapping[str, Any]) -> list[str]:
-    """What the parts make impossible: terms that are not seen, gimbal lock by drift, axes that are mixed up."""
+    """Return what the parts make impossible: terms that are not seen, gimbal lock by drift, axes that are mixed up."""
     found = []
     for c, square in (("x", "Dx_yy"), ("y", "Dy_xx")):
         value = parameters.get(f"gyro.{square}", 0.0) / DPH
@@ -221,7 +225,7 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
 def _capture_problems(
     parameters: Mapping[str, Any], mounts: Sequence[int], latitude: float, earth_rate: float, rates: Rates
 ) -> list[str]:
-    """Drift with which the tables would not find the null of their pickoff."""
+    """Return the drift with which the tables would not find the null of their pickoff."""
     at: dict[str, dict[str, tuple[float, float]]] = {"outer": {}, "inner": {}}
     for m in dict.fromkeys(mounts):
         rows = geometry.base(m, latitude)

@@ -94,7 +94,7 @@ COLUMNS = {
 
 
 def plan(mounts: Sequence[int], time: float, window: float, settle: float) -> Plan:
-    """Each mount after a phase that brings both axes to 0 with the rotor caged."""
+    """Return each mount after a phase that brings both axes to 0 with the rotor caged."""
     phases = []
     for m in mounts:
         phases.append(Phase(f"mount {m}: to the start", "index", FACE, settle=1.0, dwell=0.1, window=0.1))

@@ -74,13 +74,13 @@ class ServoTwoAxis(TableTest):
     channel_period = 60.0
 
     def mounts(self) -> list[int]:
-        """Numbers of the mounts; those of the default where the option is no list of them (check says so)."""
+        """Return the numbers of the mounts; the default where the option is no list of them (check says so)."""
         from .refusals import numbers
 
         return numbers(self["mounts"]) or [2, 4]
 
     def earth_rate(self) -> float:
-        """rad/s, as the site will have it."""
+        """Return the Earth rate as the site will have it, rad/s."""
         return float(parse("site.earth_rate", self.overrides.get("site.earth_rate", frames.EARTH_RATE), "rad/s"))
 
     def plan(self) -> Plan:

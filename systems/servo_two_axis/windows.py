@@ -46,7 +46,7 @@ class Track:
     _seen: dict[Site, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def turns(self) -> list[tuple[Array, Array]]:
-        """From the mount to the gyro: passive rotations (..., 3, 3) in turn and the rate (..., 3) each adds."""
+        """Return, from the mount to the gyro, passive rotations (..., 3, 3) in turn and the rate (..., 3) each adds."""
         x, y = self.angle[..., 0], self.angle[..., 1]
         zero, e = np.zeros_like(x), np.eye(3)
         outer, inner = (self.rate[..., k, None] * e[k] for k in (0, 1))
@@ -59,7 +59,7 @@ class Track:
         return steps if self.body is None else [*steps, (self.body, np.zeros(3))]
 
     def _wobble(self, axis: int) -> tuple[Array, Array]:
-        """Of the outer (0) or inner (1) axis, to first order: as the part axis_wobble, order 2."""
+        """Return the wobble of the outer (0) or inner (1) axis, to first order: as the part axis_wobble, order 2."""
         size, phase = self.wobble[axis], self.wobble[2]
         a = 2.0 * self.angle[..., axis] + phase
         turned = np.zeros((*a.shape, 3))
@@ -70,11 +70,13 @@ class Track:
         return np.eye(3) - np.swapaxes(cross, -1, -2), 2.0 * self.rate[..., axis, None] * rate
 
     def inertial(self, site: Site) -> Array:
-        """Means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
+        """Return the means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
         return self._along(site)[0]
 
     def _along(self, site: Site) -> tuple[Array, Array]:
-        """Means of the inertial rate (n, 3) and -f/g0 at the nodes (n, nodes, 3), which both channels ask for."""
+        """Return the means of the inertial rate (n, 3) and -f/g0 at the nodes (n, nodes, 3), which both channels ask
+        for.
+        """
         if site not in self._seen:
             w = (self.base @ frames.earth_rate_local(site.latitude, site.earth_rate))[:, None, :]
             g = (self.base @ np.array([0.0, 0.0, -site.g]))[:, None, :]
@@ -85,34 +87,34 @@ class Track:
         return self._seen[site]
 
     def middle(self) -> tuple[Array, Array, Array, Array]:
-        """Outer and inner angle and their rates at the middle of each window, (n,) each."""
+        """Return outer and inner angle and their rates at the middle of each window, (n,) each."""
         at = np.concatenate([self.angle, self.rate], axis=2)
         x, y, x_rate, y_rate = np.einsum("nkj,k->jn", at, MIDDLE)
         return x, y, x_rate, y_rate
 
     def force(self, site: Site) -> Array:
-        """-f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
+        """Return -f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
         return self._along(site)[1]
 
     def design(self, site: Site, names: tuple[str, ...]) -> Array:
-        """Means (n, p) of the regressors ``names`` of a channel."""
+        """Return the means (n, p) of the regressors ``names`` of a channel."""
         return average(drift.regressors(self.force(site), names))
 
 
 def average(values: Array) -> Array:
-    """Mean over the nodes (axis 1)."""
+    """Return the mean over the nodes (axis 1)."""
     out: Array = np.einsum("nk...,k->n...", values, WEIGHTS)
     return out
 
 
 def stretches(t_start: Array, t_end: Array, phase: NDArray[np.int_]) -> list[NDArray[np.int_]]:
-    """Indices of windows that follow one another without a gap in the same phase."""
+    """Return the indices of windows that follow one another without a gap in the same phase."""
     gap = (np.abs(t_start[1:] - t_end[:-1]) > 1e-6 * (t_end[1:] - t_start[1:])) | (phase[1:] != phase[:-1])
     return np.split(np.arange(phase.size), np.flatnonzero(gap) + 1)
 
 
 def track(windows: Mapping[str, Array], phase: NDArray[np.int_], base: Array) -> Track:
-    """From the columns ANGLES, t_start, t_end of the rows of held phases (n,)."""
+    """Return the track from the columns ANGLES, t_start, t_end of the rows of held phases (n,)."""
     t0, t1 = windows["t_start"], windows["t_end"]
     n = phase.size
     angle, rate = np.empty((n, NODES.size, 2)), np.empty((n, NODES.size, 2))

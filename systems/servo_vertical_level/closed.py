@@ -14,8 +14,8 @@ from collections.abc import Mapping
 
 
 def three_term(rate_down: float, rate_up: float, rate_z_down: float, earth_up: float, g: float) -> dict[str, float]:
-    """R, U_z, U_x of 5.3 in the sign of Hu 1981 from table rates (x east for the third), compliance ignored: R takes
-    + K_zx g2, U_x g takes + (K_xz + K_zx) g2.  earth_up: W sin(latitude).
+    """Return R, U_z, U_x of 5.3 in the sign of Hu 1981 from table rates (x east for the third), compliance ignored: R
+    takes + K_zx g2, U_x g takes + (K_xz + K_zx) g2.  earth_up: W sin(latitude).
     """
     R = -(rate_down + rate_up) / 2.0
     U_z = (rate_up - rate_down + 2.0 * earth_up) / (2.0 * g)
@@ -23,8 +23,8 @@ def three_term(rate_down: float, rate_up: float, rate_z_down: float, earth_up: f
 
 
 def formulas(d: Mapping[str, float], g: float) -> dict[str, float]:
-    """Our coefficients from the mean drift d of the classes x down, x up, y down, y up, z down, z up (rad/s), as many
-    as there are; empty where no formula of Hu 1981 applies.
+    """Return our coefficients from the mean drift d of the classes x down, x up, y down, y up, z down, z up (rad/s), as
+    many as there are; empty where no formula of Hu 1981 applies.
     """
     vertical = {"x down", "x up"} <= d.keys()
     out = {}

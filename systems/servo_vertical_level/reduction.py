@@ -11,195 +11,145 @@ gyrobench.reduction.drift.servo_regression.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gyrobench import drift, frames
-from gyrobench.arrays import Array
 from gyrobench.attitudes import LEVEL, VERTICAL
-from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
-from gyrobench.reduction.drift import composite, servo_regression
-from gyrobench.reduction.estimation.effects import Effect, remounts, with_set_up
-from gyrobench.reduction.estimation.findings import Findings, Group
-from gyrobench.reduction.estimation.fit_result import linear_result, plus_minus
-from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup import run_metadata, setups
-from gyrobench.reduction.setup.simulated_errors import simulated_errors
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.drift.held_test import HeldSetup, HeldTest
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    Findings,
+    Group,
+    Quantity,
+    Reason,
+    Regression,
+    Table,
+    told,
+)
 from gyrobench.units import DPH
 
 from . import closed, refusals
 
-SIZES = ("u_axis", "u_mount", "u_wobble", "u_angle1", "u_angle2", "u_unbalance", "u_time")
 
+class Reduction(HeldTest[HeldSetup]):
+    """Coefficients and composite drift of a table that is held with its axis vertical or level."""
 
-def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """Coefficients and composite drift of a record (gyrobench.record.record.Record).  Raises ReductionError.
+    setup_of = HeldSetup.of
+    attitudes = (*VERTICAL, *LEVEL)
 
-    A long record has a table of its noise coefficients.
-    """
-    result = _examined(record, specification)
-    result.tables += noise_coefficients_table(result, record, residual=True)
-    return result
+    def record_problems(self) -> list[str]:
+        """Return level attitudes beyond 1 degree."""
+        found, angles = [], np.maximum(np.abs(self.held.angle_start), np.abs(self.held.angle_end))
+        for p, label in self.setup.labels.items():
+            worst = float(np.max(angles[self.mine(p)], initial=0.0))
+            if label in LEVEL and worst > refusals.LIMIT * 1.001:
+                found.append(
+                    f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
+                    "small-angle test: shorten the dwell, or start on the other side of level"
+                )
+        return found
 
+    def columns(self, held: servo_regression.HeldWindows) -> Array:
+        return servo_regression.design(held, self.setup.place, self.seen.names)
 
-@handling_errors.examined(handling_candidates.servo)
-def _examined(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    run, windows = record.run, record.windows
-    options = dict(run.options)
-    site = run_metadata.Site.of(run)
-    labels = {row.phase: row.label for row in run.plan if row.mode == "servo"}
-    held, phase, rows = servo_regression.held_windows(windows, labels, (*VERTICAL, *LEVEL), site.latitude)
-    t0, t1 = held.t_start, held.t_end
-    limit = float(options.get("tracking", servo_regression.TRACKING))
-    wrong = refusals.record_problems(held, phase, labels)
-    wrong += servo_regression.tracking_problems(windows, rows, run.parameters, limit)
-    if wrong:
-        raise ReductionError(wrong)
-    seen = refusals.seen(list(labels.values()))
+    def regression(self) -> Regression:
+        s, labels = self.setup, list(self.setup.labels.values())
+        self.seen = refusals.seen(labels)
+        self.y = servo_regression.drift_rate(self.held, s.place)
+        self.book = closed.formulas(self._class_means(), s.gamma)
+        groups = [self._together(label) for label in dict.fromkeys(labels)]
+        return self.drift_rates([self._quantity(n) for n in self.seen.names], groups)
 
-    def columns(h: servo_regression.Held) -> Array:
-        return servo_regression.design(h, site, seen.names)
+    def _class_means(self) -> dict[str, float]:
+        """Return the mean drift of the attitudes with the same vertical axis (x down, x up, y down ...), rad/s, each
+        phase alike (end to end: (5.0)).
+        """
+        length, each = self.held.t_end - self.held.t_start, dict[str, list[float]]()
+        for p, label in self.setup.labels.items():
+            rows = self.mine(p)
+            mean = float(np.sum((self.y * length)[rows]) / np.sum(length[rows]))
+            each.setdefault(label.rpartition(", ")[2], []).append(mean)
+        return {n: float(np.mean(v)) for n, v in each.items()}
 
-    y, X = servo_regression.drift_rate(held, site), columns(held)
-    means = _class_means(y, t1 - t0, phase, labels)
-    book = closed.formulas(means, site.g)
-    truth = run_metadata.truth_of(run, drift.NAMES)
-    quantities = [_quantity(n, seen, book, truth, site.g) for n in seen.names]
-    weighed = [] if not setups.weighed(run) else servo_regression.candidates(
-        held, site, columns, phase, {n: np.asarray(v)[rows] for n, v in windows.items()}
-    )  # fmt: skip
-    found = fit(quantities, X, y, t0, t1, _groups(labels, phase, held), "drift rate", "°/h", DPH, noise="readings",
-                candidates=weighed)  # fmt: skip
-    sizes = run_metadata.sizes(run.options, SIZES)
+    def _quantity(self, name: str) -> Quantity:
+        s, seen, g = self.setup, self.seen, self.setup.gamma
+        true = None if s.truth is None else seen.truth(name, s.truth, g)
+        q = replace(Quantity.drift(name, true, self.book.get(name)), combination=seen.combination(name, g))
+        shown = seen.shown(name)
+        return replace(q, meaning=f"{q.meaning}, with compliance in it", shown=shown) if shown else q
 
-    def effects_of(found: Findings) -> list[Effect]:
-        return servo_regression.effects(held, site, found, columns, phase, sizes)
+    def _together(self, label: str) -> Group:
+        """Return drift against time, cycles of the same attitude together."""
+        rows = np.isin(self.phase, [p for p, n in self.setup.labels.items() if n == label])
+        t0, middle = self.held.t_start, (self.held.t_start + self.held.t_end) / 2.0
+        first = np.array([t0[self.mine(p)][0] for p in self.phase[rows].tolist()])
+        return Group(label, rows, middle[rows] - first, "time in the dwell", "s")
 
-    found = with_set_up(found, effects_of, run.options.get("corrections", ""), remount=run_metadata.remount_of(run))
-    statistics: dict[str, composite.Composite | str] = {}
-    for p, label in labels.items():
-        rows = phase == p
-        earth = float((held.axes[rows][0] @ (site.earth_rate * frames.pole(site.latitude)))[0])
-        name = label if list(labels.values()).count(label) == 1 else f"{label}, phase {p}"
-        bad = composite.problems(y[rows], t0[rows], t1[rows], earth)
-        statistics[name] = "; ".join(bad) if bad else composite.composite(y[rows], t0[rows], t1[rows], earth)
-    warnings = refusals.unseen(list(labels.values()))
-    both = [n for n in seen.lost if (truth or {}).get(n, 0.0)]
-    worst = float(
-        np.max(
-            np.abs(np.concatenate([held.angle_start, held.angle_end])[np.tile(_level(labels, phase), 2)]), initial=0.0
+    def account(self, found: Findings) -> Account:
+        formulas = "Hu 1981 has formulas for class 1, for the three-term route and for complete pairs"
+        return Account(
+            method="The gyro holds a table with its axis vertical or level; least squares over all windows under an "
+            "estimated noise model with shared angle readings [TEST-SERVO-VERT, TEST-SERVO-LEVEL]",
+            sources=[
+                "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; Hu 1981, eq. 3-60..3-83, corrected "
+                "by E36-E38, E41",
+                "TEST-COMPOSITE; Hu 1981, eq. 3-91..3-93, corrected by E45, E46",
+                "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
+            ],
+            equation=self.equation(self.seen.names),
+            conventions=servo_regression.CONVENTIONS,
+            no_closed="" if self.book else formulas,
+            closed_caption="From the same windows; the formulas take every attitude as at angle 0",
+            tables=[
+                self._attitudes_table(found.est.residual),
+                servo_regression.book_table(found, self._book_words()),
+                *self.composite_tables(self.composites(self.y)),
+            ],
+            reasons=self._unseen(),
         )
-    )
-    if both and worst > 0.0:
-        size = max(abs((truth or {})[n]) for n in both) * worst / DPH
-        warnings.append(f"Of {', '.join(both)} angles up to {np.degrees(worst):.2g}° let {size:.1g} °/h in.")
-    result = linear_result(
-        found,
-        system="servo_vertical_level",
-        title="Vertical and level servo test of a floated gyro",
-        method="The gyro holds a table with its axis vertical or level; least squares over all windows under an "
-        "estimated noise model with shared angle readings [TEST-SERVO-VERT, TEST-SERVO-LEVEL]",
-        sources=[
-            "TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-C1, SERVO-C2; Hu 1981, eq. 3-60..3-83, corrected "
-            "by E36-E38, E41",
-            "TEST-COMPOSITE; Hu 1981, eq. 3-91..3-93, corrected by E45, E46",
-            "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
-        ],
-        equation=servo_regression.equation(seen.names),
-        conventions=servo_regression.CONVENTIONS,
-        effects=[*effects_of(found), *remounts(found, run_metadata.remount_of(run))],
-        specification=specification,
-        site=site.shown(),
-        instrument=run.instrument,
-        errors=simulated_errors(run),
-        simulated=truth is not None,
-        no_closed="" if book else "Hu 1981 has formulas for class 1, for the three-term route and for complete pairs",
-        closed_caption="From the same windows; the formulas take every attitude as at angle 0",
-        tables=[
-            _attitudes_table(means, found.est.residual, y, phase, labels),
-            servo_regression.book_table(found, _book_words(seen)),
-            *composite.tables(statistics, DPH, "°/h"),
-        ],
-        warnings=warnings,
-        robust=bool(options.get("robust", False)),
-    )  # fmt: skip
-    result.summary = [
-        *(f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {plus_minus(c)}." for c in result.coefficients[:2]),
-        found.noise_sentence(),
-        *found.nuisance_sentences(),
-    ]
-    return run_metadata.finish(result, record)
 
+    def _unseen(self) -> list[Reason]:
+        """Return what the attitudes do not tell, and what angles off level let in of it."""
+        labels, truth = self.setup.labels, self.setup.truth or {}
+        found = [Reason("attitudes.unseen", text) for text in refusals.unseen(list(labels.values()))]
+        level = np.isin(self.phase, [p for p, n in labels.items() if not n.startswith(("x down", "x up"))])
+        angles = np.concatenate([self.held.angle_start[level], self.held.angle_end[level]])
+        worst = float(np.max(np.abs(angles), initial=0.0))
+        both = [n for n in self.seen.lost if truth.get(n, 0.0)]
+        if both and worst > 0.0:
+            size = max(abs(truth[n]) for n in both) * worst / DPH
+            text = f"Of {', '.join(both)} angles up to {np.degrees(worst):.2g}° let {size:.1g} °/h in."
+            found.append(Reason("attitudes.off_level", text))
+        return found
 
-def _class(name: str) -> str:
-    """x down, x up, y down ...: which axis is vertical."""
-    return name.rpartition(", ")[2]
+    def _book_words(self) -> dict[str, str]:
+        """Return the combinations in the notation of Hu 1981: R + γ² K_zx."""
+        out = {}
+        for name in self.seen.names:
+            symbol, sign = servo_regression.BOOK[name]
+            words = [symbol]
+            for other, s, k in self.seen.mixed[name]:
+                its, way = servo_regression.BOOK[other]
+                words.append(f"{'+' if s * way * sign > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{its}")
+            out[name] = " ".join(words)
+        return out
 
+    def _attitudes_table(self, residual: Array) -> Table:
+        rows = []
+        for p, label in self.setup.labels.items():
+            mine = self.mine(p)
+            means = (float(x[mine].mean()) / DPH for x in (self.y, residual))
+            rows.append([label, p, int(mine.sum()), *means])
+        caption = "Mean of the windows of a phase; residual: less the fitted model"
+        head = ["attitude", "phase", "windows", "drift / (°/h)", "residual / (°/h)"]
+        return Table("attitudes", "Drift in each attitude", caption, head, rows)
 
-def _class_means(y: Array, length: Array, phase: NDArray[np.int_], labels: Mapping[int, str]) -> dict[str, float]:
-    """Mean drift of the attitudes with the same vertical axis, rad/s, each phase alike (end to end: (5.0))."""
-    each: dict[str, list[float]] = {}
-    for p, label in labels.items():
-        rows = phase == p
-        each.setdefault(_class(label), []).append(float(np.sum((y * length)[rows]) / np.sum(length[rows])))
-    return {n: float(np.mean(v)) for n, v in each.items()}
-
-
-def _level(labels: Mapping[int, str], phase: NDArray[np.int_]) -> NDArray[np.bool_]:
-    return np.isin(phase, [p for p, n in labels.items() if not n.startswith(("x down", "x up"))])
-
-
-def _quantity(
-    name: str, seen: refusals.Seen, book: Mapping[str, float], truth: Mapping[str, float] | None, g: float
-) -> Quantity:
-    true = None if truth is None else seen.truth(name, truth, g)
-    q = replace(Quantity.drift(name, true, book.get(name)), combination=seen.combination(name, g))
-    shown = seen.shown(name)
-    return replace(q, meaning=f"{q.meaning}, with compliance in it", shown=shown) if shown else q
-
-
-def _book_words(seen: refusals.Seen) -> dict[str, str]:
-    """Combinations in the notation of Hu 1981: R + γ² K_zx."""
-    out = {}
-    for name in seen.names:
-        symbol, sign = servo_regression.BOOK[name]
-        words = [symbol]
-        for other, s, k in seen.mixed[name]:
-            its, way = servo_regression.BOOK[other]
-            words.append(f"{'+' if s * way * sign > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{its}")
-        out[name] = " ".join(words)
-    return out
-
-
-def _groups(labels: Mapping[int, str], phase: NDArray[np.int_], held: servo_regression.Held) -> list[Group]:
-    """Drift against time, cycles of the same attitude together."""
-    middle, out = (held.t_start + held.t_end) / 2.0, []
-    for label in dict.fromkeys(labels.values()):
-        rows = np.isin(phase, [p for p, n in labels.items() if n == label])
-        first = np.array([held.t_start[phase == p][0] for p in phase[rows].tolist()])
-        out.append(Group(label, rows, middle[rows] - first, "time in the dwell", "s"))
-    return out
-
-
-def _attitudes_table(
-    means: Mapping[str, float], residual: Array, y: Array, phase: NDArray[np.int_], labels: Mapping[int, str]
-) -> dict[str, Any]:
-    rows: list[list[Any]] = []
-    for p, label in labels.items():
-        mine = phase == p
-        rows.append([label, p, int(mine.sum()), float(y[mine].mean()) / DPH, float(residual[mine].mean()) / DPH])
-    return {
-        "title": "Drift in each attitude",
-        "caption": "Mean of the windows of a phase; residual: less the fitted model",
-        "columns": ["attitude", "phase", "windows", "drift / (°/h)", "residual / (°/h)"],
-        "rows": rows,
-    }
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        first = (f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {{{c.name}}}." for c in coefficients[:2])
+        return [*told(coefficients, *first), found.noise_sentence(), *found.nuisance_sentences()]

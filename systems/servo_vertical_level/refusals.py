@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, UP, VERTICAL
-from gyrobench.reduction.drift import servo_regression
 
 LIMIT = math.radians(1.0)  # of the angle in a level attitude
 #: in the order in which they are kept while the attitudes tell more
@@ -21,7 +19,7 @@ CROSS = ("D_IO", "D_OS", "D_IS")
 
 
 def gravity_along(name: str) -> Array:
-    """SF/g along x, y, z at angle 0: +1 along an axis that points down."""
+    """Return SF/g along x, y, z at angle 0: +1 along an axis that points down."""
     x, y = SERVO_ATTITUDES[name]
     axis = 0 if abs(x) == UP else 1 if abs(y) == UP else 2
     out = np.zeros(3)
@@ -40,21 +38,21 @@ class Seen:
     lost: tuple[str, ...]
 
     def shown(self, name: str) -> str:
-        """D_F + γ² D_II; "" where a coefficient stands for itself."""
+        """Return D_F + γ² D_II; "" where a coefficient stands for itself."""
         words = [f"{'+' if s > 0 else '−'} {('', 'γ ', 'γ² ')[k]}{n}" for n, s, k in self.mixed[name]]
         return " ".join([name, *words]) if words else ""
 
     def combination(self, name: str, g: float) -> dict[str, float]:
-        """What an ideal record gives for ``name``: coefficients with their factors, per g0^n."""
+        """Return what an ideal record gives for ``name``: coefficients with their factors, per g0^n."""
         return {name: 1.0} | {n: s * g**k for n, s, k in self.mixed[name]}
 
     def truth(self, name: str, true: Mapping[str, float], g: float) -> float:
-        """What an ideal record gives for ``name``, rad/s per g0^n."""
+        """Return what an ideal record gives for ``name``, rad/s per g0^n."""
         return sum(x * true.get(n, 0.0) for n, x in self.combination(name, g).items())
 
 
 def seen(attitudes: Sequence[str]) -> Seen:
-    """What the attitudes tell apart.  A coefficient that adds no rank is held by those before it, exactly."""
+    """Return what the attitudes tell apart.  A coefficient that adds no rank is held by those before it, exactly."""
     rows = drift.regressors(np.array([gravity_along(n) for n in attitudes]), TERMS)
     kept: list[int] = []
     mixed: dict[str, list[tuple[str, int, int]]] = {}
@@ -76,7 +74,7 @@ def seen(attitudes: Sequence[str]) -> Seen:
 
 
 def unseen(attitudes: Sequence[str]) -> list[str]:
-    """What cannot be seen, said before the run."""
+    """Return what cannot be seen, said before the run."""
     known = [n for n in attitudes if n in SERVO_ATTITUDES]
     if not known:
         return []
@@ -89,7 +87,9 @@ def unseen(attitudes: Sequence[str]) -> list[str]:
 def option_problems(
     attitudes: Sequence[str], rates: Mapping[str, float], time: float, what: str = "the Earth turns"
 ) -> list[str]:
-    """What is wrong with attitudes and times.  rates: at which ``what`` the table of the level attitudes, rad/s."""
+    """Return what is wrong with attitudes and times.  rates: at which ``what`` the table of the level attitudes,
+    rad/s.
+    """
     known = (*VERTICAL, *LEVEL)
     unknown = [n for n in attitudes if n not in known]
     if unknown or not attitudes:
@@ -101,21 +101,5 @@ def option_problems(
             found.append(
                 f"{name}: {what} the table by {math.degrees(abs(rate) * time):.3g}° in settle and dwell of "
                 f"{time:g} s; 1° either side of level allows {most:.0f} s"
-            )
-    return found
-
-
-def record_problems(held: servo_regression.Held, phase: NDArray[np.int_], labels: Mapping[int, str]) -> list[str]:
-    """Level attitudes beyond 1 degree."""
-    found = []
-    for p, label in labels.items():
-        mine = phase == p
-        if label not in LEVEL or not mine.any():
-            continue
-        worst = float(np.max(np.abs(np.concatenate([held.angle_start[mine], held.angle_end[mine]]))))
-        if worst > LIMIT * 1.001:
-            found.append(
-                f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
-                "small-angle test: shorten the dwell, or start on the other side of level"
             )
     return found

@@ -51,13 +51,13 @@ class ServoVerticalLevel(ServoTest):
     measured_data = MEASURED
 
     def attitudes(self) -> list[str]:
-        """Those of one cycle, in their order."""
+        """Return those of one cycle, in their order."""
         text = SETS.get(self["attitudes"], self["attitudes"])
         return [name.strip() for name in text.split(";") if name.strip()]
 
     def holds(self) -> list[Hold]:
-        """Each level dwell begins so that what the Earth turns the table is half before and half after angle 0; what
-        the drift turns it too, where that is more than DRIFTED.
+        """Return the holds.  Each level dwell begins so that what the Earth turns the table is half before and half
+        after angle 0; what the drift turns it too, where that is more than DRIFTED.
         """
         from .refusals import LIMIT
 
@@ -75,7 +75,7 @@ class ServoVerticalLevel(ServoTest):
         return [h for h in holds if h.attitude in SERVO_ATTITUDES]
 
     def earth(self, name: str) -> float:
-        """Earth rate along the input axis, rad/s."""
+        """Return the Earth rate along the input axis, rad/s."""
         return float(self.expected().rates(name)[1][0])
 
     def check(self) -> list[str]:

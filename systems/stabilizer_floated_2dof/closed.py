@@ -14,7 +14,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Loop:
+class LagLeadLoop:
     """J: kg.m2; K: K_m K_x K_G, torque per angle at rest, N.m/rad; time constants in s, T1 and T2 above 0."""
 
     J: float
@@ -25,23 +25,23 @@ class Loop:
     T2: float
 
     def network(self, s: Any) -> Any:
-        """G / K_G at s, rad/s."""
+        """Return G / K_G at s, rad/s."""
         return (1.0 + self.tau1 * s) * (1.0 + self.tau2 * s) / ((1.0 + self.T1 * s) * (1.0 + self.T2 * s))
 
     def gain(self, s: Any) -> Any:
-        """Loop gain L = K_m K_x G / (J_x s2)."""
+        """Return the loop gain L = K_m K_x G / (J_x s2)."""
         return self.K * self.network(s) / (self.J * s * s)
 
     def compliance(self, s: Any) -> Any:
-        """theta/M, rad/(N.m): 1 / (J_x s2 + K_m K_x G); at rest 1/K, which the lag of finite T1 does not remove."""
+        """Return theta/M, rad/(N.m): 1 / (J_x s2 + K_m K_x G); at rest 1/K, which a lag of finite T1 leaves."""
         return 1.0 / (self.J * s * s + self.K * self.network(s))
 
     def isolation(self, s: Any, drag: float) -> Any:
-        """Platform over base angle, when a torque ``drag`` (N.m.s/rad) times the rate against the base acts."""
+        """Return platform over base angle, when a torque ``drag`` (N.m.s/rad) times the rate against the base acts."""
         return drag * s / (self.J * s * s + drag * s + self.K * self.network(s))
 
     def limit(self) -> tuple[float, float] | None:
-        """Where the phase of L is -180 degrees: (frequency in rad/s, share of K at which the loop is at its limit).
+        """Return where the phase of L is -180 degrees: frequency, rad/s, and share of K at the limit of the loop.
 
         G is real where (t)(1 - T w2) = (T')(1 - tau w2), t = tau1 + tau2, T' = T1 + T2, tau = tau1 tau2, T = T1 T2;
         there G/K_G = t/T'.  A share below 1: the loop is conditionally stable, unstable when its gain falls below.
@@ -55,13 +55,13 @@ class Loop:
         return w, self.J * w * w * big / (t * self.K)
 
     def stable(self) -> bool:
-        """Routh: the loop of two integrations needs a net lead, and a gain above the limit where it has one."""
+        """Return whether, by Routh, there is the net lead that two integrations need, and a gain above a limit."""
         t, big = self.tau1 + self.tau2, self.T1 + self.T2
         below = big * self.tau1 * self.tau2 - t * self.T1 * self.T2
         return self.K * t * below > self.J * big * (big - t)
 
     def margin(self) -> tuple[float, float]:
-        """Crossover (rad/s) and phase margin (degrees); |L| falls with the frequency, so there is one crossover."""
+        """Return crossover (rad/s) and phase margin (degrees); |L| falls with the frequency: there is one."""
         low, high = 1e-6, 1e6
         for _ in range(200):
             middle = math.sqrt(low * high)
@@ -72,7 +72,7 @@ class Loop:
         return low, math.degrees(turn)
 
     def slope(self, w: float) -> float:
-        """d 20 log|L| / d log10 w at w, dB per decade: -40 without the network."""
+        """Return d 20 log|L| / d log10 w at w, dB per decade: -40 without the network."""
         lead = sum((x * w) ** 2 / (1.0 + (x * w) ** 2) for x in (self.tau1, self.tau2))
         lag = sum((x * w) ** 2 / (1.0 + (x * w) ** 2) for x in (self.T1, self.T2))
         return 20.0 * (lead - lag - 2.0)

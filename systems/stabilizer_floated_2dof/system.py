@@ -12,7 +12,7 @@ from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
-from .closed import Loop
+from .closed import LagLeadLoop
 
 RANGE = 0.1  # rad, of the pickoffs
 CAGE = 12.0  # A/V, from u_y to the torquer about x: the second channel follows the case with about 10 1/s
@@ -27,12 +27,12 @@ TIMES = ("tau1", "T1", "tau2", "T2")
 NAMES = ("platform.J", "platform.k_t", "platform.R", "gyro.K_sg_x", "stabilizer.K", *(f"stabilizer.{n}" for n in TIMES))
 
 
-def loop_of(parameters: Mapping[str, Any]) -> Loop | None:
-    """The closed form of the parts with these parameters; None where they do not have them (another stabilizer)."""
+def loop_of(parameters: Mapping[str, Any]) -> LagLeadLoop | None:
+    """Return the closed form of parts with these parameters; None of other ones (another stabilizer)."""
     if any(n not in parameters for n in NAMES) or parameters.get("stabilizer.integral"):
         return None
     j, k_t, r, k_sg, gain, *times = (float(parameters[n]) for n in NAMES)
-    return Loop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
+    return LagLeadLoop(j, k_sg * gain * k_t * float(parameters.get("platform.ratio", 1.0)) / r, *times)
 
 
 class StabilizerFloated2dof(OneAxisTest):
@@ -124,12 +124,12 @@ class StabilizerFloated2dof(OneAxisTest):
         return MOTORS.get(self["motor"], MOTORS["ideal"])
 
     def crossovers(self) -> dict[str, float]:
-        """That of the closed form, where its loop is stable."""
-        loop = Loop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
+        """Return that of the closed form, where its loop is stable."""
+        loop = LagLeadLoop(self["J_x"], self["stiffness"] * self["K_G"], *(self[n] for n in TIMES))
         return {"stabilizer": loop.margin()[0] / (2.0 * math.pi)} if loop.stable() else {}
 
     def check(self) -> list[str]:
-        """Refusals of values; an unstable loop is let run, warned with its pole."""
+        """Return refusals of values; an unstable loop is let run, warned with its pole."""
         problems = self.not_positive("J_x", "stiffness", "K_G", "T1", "T2") + self.no_choice(motor=MOTORS)
         most = V_MAX * MOTORS["ideal"]["k_t"] / MOTORS["ideal"]["R"]
         if abs(self["load"]) >= most:
@@ -144,7 +144,7 @@ class StabilizerFloated2dof(OneAxisTest):
         return [] if falling else ["the network is not a lag and a lead: T1 > tau1 > tau2 > T2 does not hold"]
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        """Nothing is refused here; what is known of the loop before the run is said."""
+        """Say what is known of the loop before the run; nothing is refused here."""
         loop = loop_of(parameters)
         at = loop.limit() if loop is not None and loop.stable() else None
         if at is not None and at[1] < 1.0 and abs(self["blow"]) > 0.0:

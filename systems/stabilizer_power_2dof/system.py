@@ -74,7 +74,7 @@ class StabilizerPower2dof(LoopTest):
         ]
 
     def plan(self) -> LoopPlan:
-        """The phases; a recorded motion goes on beside them."""
+        """Return the phases; a recorded motion goes on beside them."""
         return LoopPlan(self.phases())
 
     def design(self, parts: PartValues) -> dict[str, Any]:
@@ -92,7 +92,7 @@ class StabilizerPower2dof(LoopTest):
         }
 
     def check(self) -> list[str]:
-        """Refusals before the run; an unstable K_m is refused by the stabilizer."""
+        """Return refusals before the run; an unstable K_m is refused by the stabilizer."""
         if self["K_m"] == 0.0:
             return ["K_m = 0: without the correction motor nothing takes the load off the gyro; K_m must be > 0"]
         lean = abs(self["load"]) / self["K_m"]

@@ -17,7 +17,7 @@ from gyrobench.arrays import Array
 
 
 @dataclass(frozen=True)
-class Axis:
+class StabilizedAxis:
     """J0 platform, J gyro about its output axis (kg.m2), H N.m.s, C N.m.s/rad, K N.m/rad, M N.m.  H stands for H c."""
 
     J0: float
@@ -29,26 +29,26 @@ class Axis:
 
     @property
     def n(self) -> float:
-        """Nutation without damping, rad/s: sqrt(H2/(J J0) + K/J)  [5-39]."""
+        """Return the nutation without damping, rad/s: sqrt(H2/(J J0) + K/J)  [5-39]."""
         return math.sqrt(self.H**2 / (self.J * self.J0) + self.K / self.J)
 
     @property
     def zeta(self) -> float:
-        """Damping of the nutation; 1: aperiodic, C = 2 sqrt(J/J0) H with K = 0  [5-35]."""
+        """Return the damping of the nutation; 1: aperiodic, C = 2 sqrt(J/J0) H with K = 0  [5-35]."""
         return self.C / (2.0 * self.J * self.n)
 
     @property
     def stiffness(self) -> float:
-        """Quasi-spring of the integrating gyro, H2/J, N.m/rad."""
+        """Return the quasi-spring of the integrating gyro, H2/J, N.m/rad."""
         return self.H**2 / self.J
 
     @property
     def inertia(self) -> float:
-        """Apparent inertia of the axis with a rate gyro, J0 + H2/K, kg.m2  [5-40]."""
+        """Return the apparent inertia of the axis with a rate gyro, J0 + H2/K, kg.m2  [5-40]."""
         return self.J0 + self.H**2 / self.K
 
     def transient(self, t: Array) -> Array:
-        """exp(-q t) cos(n1 t) and exp(-q t) sin(n1 t) / n1 as columns, at any damping (n1 may be imaginary)."""
+        """Return exp(-q t) cos(n1 t) and exp(-q t) sin(n1 t) / n1 as columns, at any damping (n1 may be imaginary)."""
         q = self.C / (2.0 * self.J)
         n1 = cmath.sqrt(complex(self.n**2 - q**2))
         root = n1 if abs(n1) > 1e-9 * self.n else 1e-9 * self.n
@@ -56,19 +56,19 @@ class Axis:
         return np.column_stack([(0.5 * (slow[0] + slow[1])).real, ((slow[1] - slow[0]) / (2j * root)).real])
 
 
-def integrating(p: Axis, t: Array) -> tuple[Array, Array]:
-    """a, b for C = K = 0  [5-29]: exact for held c."""
+def integrating(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
+    """Return a, b for C = K = 0  [5-29]: exact for held c."""
     n, lean = p.n, p.M / p.stiffness
     return lean * (1.0 - np.cos(n * t)), p.M * t / p.H - lean * math.sqrt(p.J0 / p.J) * np.sin(n * t)
 
 
-def line(p: Axis) -> tuple[float, float]:
-    """Offset and slope of the platform's limit line, rate-integrating: o (1 - 4 zeta2 J M / H2) and C M / H2."""
+def line(p: StabilizedAxis) -> tuple[float, float]:
+    """Return offset and slope of the platform's limit line, rate-integrating: o (1 - 4 zeta2 J M / H2) and C M / H2."""
     return p.J * p.M / p.H**2 * (1.0 - 4.0 * p.zeta**2), p.C * p.M / p.H**2
 
 
-def rate_integrating(p: Axis, t: Array) -> tuple[Array, Array]:
-    """a, b for K = 0, C > 0, at any damping: the exact solution behind 5-34."""
+def rate_integrating(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
+    """Return a, b for K = 0, C > 0, at any damping: the exact solution behind 5-34."""
     o, r = line(p)
     q = p.C / (2.0 * p.J)
     cosine, sine = p.transient(t).T
@@ -78,8 +78,8 @@ def rate_integrating(p: Axis, t: Array) -> tuple[Array, Array]:
     return a, (p.M * t - p.J0 * rate) / p.H
 
 
-def light(p: Axis, t: Array) -> tuple[Array, Array]:
-    """a, b by 5-34 for light damping (zeta < 0.3), with J0 for the printed J in the third term of b (EG9)."""
+def light(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
+    """Return a, b by 5-34 for light damping (zeta < 0.3), with J0 for the printed J in the third term of b (EG9)."""
     q = p.C / (2.0 * p.J)
     n1 = math.sqrt(p.n**2 - q**2)
     fall = np.exp(-q * t)
@@ -88,8 +88,8 @@ def light(p: Axis, t: Array) -> tuple[Array, Array]:
     return a, b - p.J0 * p.C * p.M / p.H**3 * (1.0 - fall * np.cos(n1 * t))
 
 
-def rate(p: Axis, t: Array) -> tuple[Array, Array]:
-    """a, b for K > 0: parabola, line and constant of 5-42 completed, and the transient that makes the start rest."""
+def rate(p: StabilizedAxis, t: Array) -> tuple[Array, Array]:
+    """Return a, b for K > 0: parabola, line, constant of 5-42 completed, and the transient of a start at rest."""
     total = p.K * p.J0 + p.H**2
     acceleration, slope = p.M * p.K / total, p.C * p.H**2 * p.M / total**2
     # behind the transient b = b1 t + b0, from J0 a' + H b = M t with a' = acceleration t + slope

@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.fit_result import ReductionError
-from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.loops.loop_summary import isolation, margins, told
-from gyrobench.result import LoopResult, Response, Specification
-from gyrobench.units import DPH
+from gyrobench.reduction.loops.platform_measures import level_drift
+from gyrobench.reduction.loops.toolkit import Account, Gate, LoopFindings, LoopTest, isolation, margins, told, trace
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
+from gyrobench.units import ARCMIN, DPH
 
 from . import closed
-from .closed import Axis
+from .closed import StabilizedAxis
 
-ARCMIN = math.pi / 10800.0
 SHOWN = 500  # points of a drawn curve
 EQUATIONS = {
     "integrating": "J_0 dot.double(alpha) + H cos beta dot(beta) = M, quad "
@@ -32,70 +29,76 @@ EQUATIONS = {
 }
 
 
-def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
-    """The result of a record.  Raises ReductionError where the load phase is not whole."""
-    run = record.run
-    kind = str(run.options.get("kind"))
-    if kind not in closed.FORMS:
-        raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
-    found = LoopFindings(record)
-    loads = found.of("torque", 1, "step")
-    if not loads:
-        raise ReductionError("the phase 'load' is not whole in this record: the run ended before (the float's stop?)")
-    gate = loads[0]
-    held = float(np.mean(np.cos(gate["gyro.b"])))
-    p = plant(run, held)
-    t = gate.t - gate.t[0]
-    free = not run.options.get("offload") and not run.options.get("viscous")
-    found.tables.append(_derived(p, kind, held))
-    if free:
-        _closed_forms(found, p, kind, str(run.options.get("form")), gate, t, run.step)
-    else:
-        found.step(gate, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
-        found.warnings.append("The closed forms know neither motor nor friction: the figures are of the run alone.")
-        end = coupling(p, t[-1], run.step) / 3**0.5 / ARCMIN
-        found.measure("a(T)", "platform angle at the end of the load", "arcmin",
-                      gate["platform.attitude"][-1] / ARCMIN, end)  # fmt: skip
-    late = math.degrees(p.M * run.step / p.H) / 3**0.5
-    found.measure("b_max", "largest angle of the float", "°", math.degrees(np.abs(gate["gyro.b"]).max()), late)
-    if free:  # a motor brings a slow pole in that is not in the fit beside the nutation
-        _drift(found, p, kind)
-        _command(found, p, kind)
-    for step in found.of("command", 1, "step"):
-        found.step(step, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
-    found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
-    found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
-                caption="Angle of the platform over that of the base.")  # fmt: skip
-    ends = next((c for c in found.coefficients if c.name == "a(T)"), None)
-    result = found.result(
-        title=f"Stabilizer with a gyro of one degree of freedom: {kind} gyro",
-        method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against the "
-        "closed form",
-        sources=[
-            "STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, eq. 5-27..5-43, corrected by EG9-EG13",
-        ],
-        equation=EQUATIONS[kind],
-        conventions=[
-            "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive for a "
-            "positive torque.",
-            f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for H cos(beta).",
-            "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
-        ],
-        specification=specification,
-    )
-    if ends is not None and not found.unstable:
+class Reduction(LoopTest):
+    """Load, drift, command, margins and isolation of an axis that its gyro stabilizes."""
+
+    def measure(self) -> Account:
+        run, found = self.run, self.found
+        self.kind = kind = str(run.options.get("kind"))
+        if kind not in closed.FORMS:
+            raise ReductionError(f"the record does not say the kind of gyro: one of {', '.join(closed.FORMS)}")
+        self.load = self._load()
+        held = float(np.mean(np.cos(self.load["gyro.b"])))
+        self.plant = p = plant(run, held)
+        t = self.load.t - self.load.t[0]
+        self.free = not run.options.get("offload") and not run.options.get("viscous")
+        found.tables.append(_derived(p, kind, held))
+        if self.free:
+            _closed_forms(found, p, kind, str(run.options.get("form")), self.load, t, run.step)
+        else:
+            found.step(self.load, "platform.attitude", scale=ARCMIN, unit="arcmin", y_name="platform angle")
+            text = "The closed forms know neither motor nor friction: the figures are of the run alone."
+            found.warn("stabilizer_sdf.no_closed", text)
+            end, last = coupling(p, t[-1], run.step) / 3**0.5, self.load["platform.attitude"][-1]
+            found.measure("a(T)", "platform angle at the end of the load", "arcmin", last, end, scale=ARCMIN)
+        late = math.degrees(p.M * run.step / p.H) / 3**0.5
+        largest = math.degrees(np.abs(self.load["gyro.b"]).max())
+        found.measure("b_max", "largest angle of the float", "°", largest, late)
+        if self.free:  # a motor brings a slow pole in that is not in the fit beside the nutation
+            _drift(found, p, kind)
+            _command(found, p, kind)
+        for step in found.of("command", 1, "step"):
+            found.step(step, "platform.omega[1]", scale=1e-6, unit="µrad/s", y_name="platform rate")
+        found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]")
+        found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]",
+                    caption="Angle of the platform over that of the base.")  # fmt: skip
+        return Account(
+            method="Load step on the axis in the co-simulation, platform and gyro coupled by their momentum, against "
+            "the closed form",
+            sources=["STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, eq. 5-27..5-43, corrected by EG9-EG13"],
+            title=f"Stabilizer with a gyro of one degree of freedom: {kind} gyro",
+            equation=EQUATIONS[kind],
+            conventions=[
+                "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive "
+                "for a positive torque.",
+                f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for "
+                "H cos(beta).",
+                "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
+            ],
+        )
+
+    def _load(self) -> Gate:
+        loads = self.found.of("torque", 1, "step")
+        if not loads:
+            raise ReductionError("the phase 'load' is not whole in this record: the run ended before")
+        return loads[0]
+
+    def summary(self) -> list[str]:
+        ends = next((c for c in self.found.coefficients if c.name == "a(T)"), None)
+        if ends is None:
+            return []
+        gate, p = self.load, self.plant
         beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
-        result.summary = [
-            *margins(found),
-            *isolation(found, "isolation", "platform.attitude"),
+        return [
+            *margins(self.found),
+            *isolation(self.found, "isolation", "platform.attitude"),
             *told(
-                found.coefficients,
-                f"After {t[-1]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
+                self.found.coefficients,
+                f"After {gate.t[-1] - gate.t[0]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
                 f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°; it was never beyond {{b_max}}.",
-                SAID[kind](p) if free else "",
+                SAID[self.kind](p) if self.free else "",
             ),
         ]
-    return result
 
 
 SAID = {
@@ -105,63 +108,57 @@ SAID = {
 }
 
 
-def plant(run: RunDocument, held: float = 1.0) -> Axis:
-    """The axis as the parts had it, with H times the cos(b) that the closed forms hold."""
+def plant(run: RunDocument, held: float = 1.0) -> StabilizedAxis:
+    """Return the axis as the parts had it, with H times the cos(b) that the closed forms hold."""
     q = run.parameters
     names = ("platform.J", "gyro.J", "gyro.H", "gyro.C", "gyro.K")
     missing = [n for n in names if n not in q]
     if missing:
         raise ReductionError([f"the record does not say {n}" for n in missing])
     j0, j, spin, c, k = (float(q[n]) for n in names)
-    return Axis(j0, j, spin * held, c, k, float(run.options["M"]))
+    return StabilizedAxis(j0, j, spin * held, c, k, float(run.options["M"]))
 
 
-def coupling(p: Axis, t: Array | float, step: float) -> Any:
-    """What the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
+def coupling(p: StabilizedAxis, t: Array | float, step: float) -> Any:
+    """Return what the held exchange may do to the platform's angle, rad: one step of torque late or early, M h t/J0."""
     return p.M * step * np.asarray(t) / p.J0
 
 
-def _closed_forms(found: LoopFindings, p: Axis, kind: str, form: str, gate: Gate, t: Array, step: float) -> None:
-    """Coefficients of the kind, the two curves, and how far they are apart."""
+def _closed_forms(
+    found: LoopFindings, p: StabilizedAxis, kind: str, form: str, gate: Gate, t: Array, step: float
+) -> None:
+    """Measure the coefficients of the kind, and show the two curves and how far they are apart."""
     a, b = gate["platform.attitude"] - gate["platform.attitude"][0], gate["gyro.b"] - gate["gyro.b"][0]
     wanted_a, wanted_b = closed.light(p, t) if form == "light" else closed.FORMS[kind](p, t)
     end = float(coupling(p, t[-1], step))
-    found.measure("a(T)", "platform angle at the end of the load", "arcmin", a[-1] / ARCMIN, end / 3**0.5 / ARCMIN,
-                  closed=wanted_a[-1] / ARCMIN)  # fmt: skip
+    found.measure("a(T)", "platform angle at the end of the load", "arcmin", a[-1], end / 3**0.5, scale=ARCMIN,
+                  closed=wanted_a[-1])  # fmt: skip
     found.measure("b(T)", "float angle at the end of the load", "°", math.degrees(b[-1]),
                   math.degrees(p.M * step / p.H) / 3**0.5, closed=math.degrees(wanted_b[-1]))  # fmt: skip
     {"integrating": _integrating, "rate-integrating": _rate_integrating, "rate": _rate}[kind](found, p, t, a, b, step)
     apart = float(np.abs(a - wanted_a).max()), float(np.abs(b - wanted_b).max())
-    found.tables.append(
-        {
-            "title": "Co-simulation against the closed form",
-            "caption": f"Over the whole load. The exchange once a step of {step:g} s may shift platform and float by "
-            "M h t/J0 and M h/H; both shrink with the step. The rest is cos(b) and, with form=light, that form.",
-            "columns": ["angle", "largest difference", "expected of the exchange", "largest value", "unit"],
-            "rows": [
-                ["platform", apart[0] / ARCMIN, end / ARCMIN, float(np.abs(a).max()) / ARCMIN, "arcmin"],
-                ["float", math.degrees(apart[1]), math.degrees(p.M * step / p.H), math.degrees(np.abs(b).max()), "°"],
-            ],
-        }
+    caption = (
+        f"Over the whole load. The exchange once a step of {step:g} s may shift platform and float by M h t/J0 and "
+        "M h/H; both shrink with the step. The rest is cos(b) and, with form=light, that form."
     )
+    columns = ["angle", "largest difference", "expected of the exchange", "largest value", "unit"]
+    rows = [
+        ["platform", apart[0] / ARCMIN, end / ARCMIN, float(np.abs(a).max()) / ARCMIN, "arcmin"],
+        ["float", math.degrees(apart[1]), math.degrees(p.M * step / p.H), math.degrees(np.abs(b).max()), "°"],
+    ]
+    found.tables.append(Table("load.closed", "Co-simulation against the closed form", caption, columns, rows))
     label = "closed form, light damping" if form == "light" else "closed form"
-    _figure(found, "load", "platform angle", "arcmin", t, a / ARCMIN, wanted_a / ARCMIN, label)
-    _figure(found, "load, float", "float angle", "°", t, np.degrees(b), np.degrees(wanted_b), label)
-
-
-def _figure(
-    found: LoopFindings, name: str, what: str, unit: str, t: Array, y: Array, wanted: Array, label: str
-) -> None:
-    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
-    curve = {"label": label, "x": t[pick].tolist(), "y": wanted[pick].tolist(), "phase": []}
-    caption = f"The {what} from the beginning of the load on: co-simulation, and the {label}."
-    found.responses.append(
-        Response(name, "step", caption, t[pick].tolist(), "time", "s", y[pick].tolist(), what, unit, curves=[curve])
-    )
+    caption = f"angle from the beginning of the load on: co-simulation, and the {label}."
+    float_angle, wanted_angle = np.degrees(b), np.degrees(wanted_b)
+    found.responses += [
+        trace("load", f"The platform {caption}", t, a / ARCMIN, "platform angle", "arcmin", {label: wanted_a / ARCMIN},
+              SHOWN),
+        trace("load, float", f"The float {caption}", t, float_angle, "float angle", "°", {label: wanted_angle}, SHOWN),
+    ]  # fmt: skip
 
 
 def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Coefficients and their standard uncertainties by ordinary least squares."""
+    """Return coefficients and their standard uncertainties by ordinary least squares."""
     size = np.abs(columns).max(axis=0)
     x, *_ = np.linalg.lstsq(columns / size, y, rcond=None)
     rest = y - columns / size @ x
@@ -170,8 +167,8 @@ def least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
     return x / size, u / size
 
 
-def _integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
+def _integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
+    """Fit a = A (1 - cos n t) + slope t and a sine for what the exchange adds; n by search about the closed form."""
     from scipy.optimize import minimize_scalar
 
     def columns(n: float) -> Array:
@@ -193,57 +190,54 @@ def _integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, ste
                   closed=math.degrees(p.M / p.H))  # fmt: skip
 
 
-def _rate_integrating(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = o + r t and the transient, b = line and transient."""
+def _rate_integrating(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
+    """Fit a = o + r t and the transient, b = line and transient."""
     columns = np.column_stack([np.ones(t.size), t, p.transient(t)])
     x, u = least_squares(columns, a)
     o, r = closed.line(p)
     slide = p.M * step / p.J0 / 3**0.5
-    found.measure("da/dt", "creep of the platform", "arcmin/s", x[1] / ARCMIN, math.hypot(u[1], slide) / ARCMIN,
-                  closed=r / ARCMIN)  # fmt: skip
-    found.measure("o", "offset of the platform's line", "arcmin", x[0] / ARCMIN,
-                  math.hypot(u[0], r * step / 3**0.5) / ARCMIN, closed=o / ARCMIN)  # fmt: skip
-    found.measure("H²/C", "damping that the axis feels", "N.m.s/rad", p.M / x[1],
-                  p.M / x[1] * math.hypot(u[1], slide) / abs(x[1]), closed=p.H**2 / p.C)  # fmt: skip
+    creep, late = math.hypot(u[1], slide), p.M * step / p.H / 3**0.5
+    found.measure("da/dt", "creep of the platform", "arcmin/s", x[1], creep, scale=ARCMIN, closed=r)
+    off = math.hypot(u[0], r * step / 3**0.5)
+    found.measure("o", "offset of the platform's line", "arcmin", x[0], off, scale=ARCMIN, closed=o)
+    damping = p.M / x[1]
+    found.measure("H²/C", "damping that the axis feels", "N.m.s/rad", damping, damping * creep / abs(x[1]),
+                  closed=p.H**2 / p.C)  # fmt: skip
     y, v = least_squares(columns, b)
-    late = p.M * step / p.H / 3**0.5
-    found.measure("b_o", "offset of the float's line, -J0 C M/H³", "arcmin", y[0] / ARCMIN,
-                  math.hypot(v[0], late) / ARCMIN, closed=-p.J0 * p.C * p.M / p.H**3 / ARCMIN)  # fmt: skip
+    found.measure("b_o", "offset of the float's line, -J0 C M/H³", "arcmin", y[0], math.hypot(v[0], late),
+                  scale=ARCMIN, closed=-p.J0 * p.C * p.M / p.H**3)  # fmt: skip
 
 
-def _rate(found: LoopFindings, p: Axis, t: Array, a: Array, b: Array, step: float) -> None:
-    """a = parabola and the transient."""
+def _rate(found: LoopFindings, p: StabilizedAxis, t: Array, a: Array, b: Array, step: float) -> None:
+    """Fit a = parabola and the transient."""
     x, u = least_squares(np.column_stack([0.5 * t**2, t, np.ones(t.size), p.transient(t)]), a)
     inertia = p.M / x[0]
     found.measure("J0 + H²/K", "apparent inertia of the axis", "kg.m2", inertia, inertia * u[0] / abs(x[0]),
                   closed=p.inertia)  # fmt: skip
     slide = p.M * step / p.J0 / 3**0.5
     total = p.K * p.J0 + p.H**2
-    found.measure("slope", "line beside the parabola, C H² M/(K J0 + H²)²", "arcmin/s", x[1] / ARCMIN,
-                  math.hypot(u[1], slide) / ARCMIN, closed=p.C * p.H**2 * p.M / total**2 / ARCMIN)  # fmt: skip
+    found.measure("slope", "line beside the parabola, C H² M/(K J0 + H²)²", "arcmin/s", x[1],
+                  math.hypot(u[1], slide), scale=ARCMIN, closed=p.C * p.H**2 * p.M / total**2)  # fmt: skip
 
 
-def _slope(p: Axis, t: Array, a: Array) -> tuple[float, float]:
-    """Rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
+def _slope(p: StabilizedAxis, t: Array, a: Array) -> tuple[float, float]:
+    """Return the rate of an angle beside the nutation, rad/s, and its standard uncertainty."""
     x, u = least_squares(np.column_stack([t - t[0], np.ones(t.size), p.transient(t - t[0])]), a)
     return float(x[0]), float(u[0])
 
 
-def _drift(found: LoopFindings, p: Axis, kind: str) -> None:
-    """What the axis does after the load: it follows the drift of its gyro.  With a rate gyro it keeps its rate."""
-    q = found.record.run.parameters
-    names = ("gyro.D_F", "gyro.D_S", "gyro.D_SS")
+def _drift(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
+    """Measure how the axis follows the drift of its gyro after the load; with a rate gyro it keeps its rate."""
+    own = level_drift(found.run.parameters)
     for gate in found.of("hold") if kind != "rate" else ():
         r, u = _slope(p, gate.t, gate["platform.attitude"])
-        closed_form = None
-        if all(n in q for n in names):  # x level, z up: (X, Y, Z) = (0, 0, -1)
-            fixed, along, squared = (float(q[n]) for n in names)
-            closed_form = (fixed - along + squared) / float(np.mean(np.cos(gate["gyro.b"]))) / DPH
-        found.measure("drift", "rate of the axis after the load", "°/h", r / DPH, u / DPH, closed=closed_form)
+        turned = None if own is None else own / float(np.mean(np.cos(gate["gyro.b"])))
+        found.measure("drift", "rate of the axis after the load", "°/h", r, u, scale=DPH, closed=turned)
 
 
-def _command(found: LoopFindings, p: Axis, kind: str) -> None:
-    """Change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c = cos(b).
+def _command(found: LoopFindings, p: StabilizedAxis, kind: str) -> None:
+    """Measure the change of the rate by a current i in the torquer, over k i: 1/c, and with a spring the less, c =
+    cos(b).
 
     Behind the transient, about the present b and a': J0 da' = -H c db, K db = H c da' - H a' sin(b) db - H k i, so
     da'/(k i) = H2 c / (H2 c2 + J0 (K + H a' sin b)).
@@ -262,7 +256,7 @@ def _command(found: LoopFindings, p: Axis, kind: str) -> None:
                       u_share, closed=wanted)  # fmt: skip
 
 
-def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
+def _derived(p: StabilizedAxis, kind: str, held: float) -> Table:
     rows: list[list[Any]] = [
         ["cos(b) held by the closed forms, mean over the load", held, "1"],
         ["nutation without damping, √(H²/(J J0) + K/J)", p.n, "rad/s"],
@@ -276,9 +270,4 @@ def _derived(p: Axis, kind: str, held: float) -> dict[str, Any]:
     else:
         rows.append(["apparent inertia J0 + H²/K", p.inertia, "kg.m2"])
     columns = ["of the closed form", "value", "unit"]
-    return {
-        "title": "Sizes of the axis",
-        "caption": "From the parameters of the run.",
-        "columns": columns,
-        "rows": rows,
-    }
+    return Table("sizes", "Sizes of the axis", "From the parameters of the run.", columns, rows)

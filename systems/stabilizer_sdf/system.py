@@ -11,7 +11,7 @@ from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
-from .closed import Axis
+from .closed import StabilizedAxis
 
 KINDS = ("integrating", "rate-integrating", "rate")
 LIGHT = 0.3  # damping up to which 5-34 may be taken
@@ -60,15 +60,15 @@ class StabilizerSdf(OneAxisTest):
     shown = ("platform.attitude", "platform.omega", "gyro.b", "exciter.torque", "exciter.motion_angle")
     channel_period = 1e-2
 
-    def axis(self) -> Axis:
-        """The plant of these options: C and K are those of the kind."""
+    def axis(self) -> StabilizedAxis:
+        """Return the plant of these options: C and K are those of the kind."""
         kind = self["kind"]
         c = 0.0 if kind == "integrating" else self["C"]
         k = self["K"] if kind == "rate" else 0.0
-        return Axis(self["J0"], self["J"], self["H"], c, k, self["M"])
+        return StabilizedAxis(self["J0"], self["J"], self["H"], c, k, self["M"])
 
     def phases(self) -> list[LoopPhase]:
-        """Torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
+        """Return torque, drift after it, a commanded rate; sines of the base with friction, test sines with a motor."""
         phases = [
             LoopPhase("load", "torque", "step", amplitude=self["M"], settle=0.1, dwell=self["time"]),
             LoopPhase("drift", settle=0.05 * self["time"], dwell=0.15 * self["time"]),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gyrobench.system.families.option_groups import VERTICAL_AXIS
 from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TABLE
 from gyrobench.system.part_values import PartValues
@@ -52,8 +53,7 @@ class TableCapture(System):
         "H": Option(0.04, "N.m.s", "spin angular momentum of the gyro", sets="gyro.H"),
         "C": Option(0.03, "N.m.s/rad", "float damping", sets="gyro.C"),
         "network": Option(2, int, "1: gyro of 0.4 ms, 2: of 1 ms", 1, 2, sets="table.network"),
-        "latitude": Option("45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2,
-                           sets="site.latitude"),
+        **VERTICAL_AXIS,
     }  # fmt: skip
     noises = (*SDF_NOISES, "table.rumble")
     done = "sequencer.done"
@@ -83,7 +83,7 @@ class TableCapture(System):
 
     @property
     def stop(self) -> float:  # type: ignore[override]
-        """The run ends here where the fine loop is never closed, s."""
+        """Return where the run ends if the fine loop is never closed, s."""
         way = abs(self.turn())
         return float(2.0 * math.sqrt(way / MOVE) + way / MOVE + PAUSE + 2.0 * self["limit"])
 

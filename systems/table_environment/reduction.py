@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.fit_result import Findings, Group, Quantity,
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification, Table
 from gyrobench.units import ARCSEC, DPH
 
 from . import budgets
@@ -134,11 +134,12 @@ def _budgets(result: DriftTestResult, run: RunDocument) -> None:
         result.budget.append(line)
     env = budgets.combine(lines, seed)
     result.tables.append(
-        {
-            "title": "Budget of the surroundings",
-            "caption": "Levels: those of the later tests (options u_...), not of this run. Last column: the level at "
+        Table(
+            "budget_of_the_surroundings",
+            "Budget of the surroundings",
+            "Levels: those of the later tests (options u_...), not of this run. Last column: the level at "
             "which the effect is 1e-9 ERU, a tenth of 1e-8 ERU.",
-            "columns": [
+            [
                 "cause",
                 "level",
                 "unit",
@@ -148,38 +149,40 @@ def _budgets(result: DriftTestResult, run: RunDocument) -> None:
                 "drift / ERU",
                 "level needed",
             ],
-            "rows": [*rows, *_totals(env, 5, DPH, 3)],
-        }
+            [*rows, *_totals(env, 5, DPH, 3)],
+        )
     )
     n, sense = float(options["turning"]), int(options["sense"])
     align_lines = budgets.parse(str(options["align"]), "rad")
     rates = [float(budgets.misalignment_rate(line.size, n, sense, ERU)) for line in align_lines]
     align = budgets.combine(align_lines, seed, lambda e: budgets.rotated_rate(e, n, sense, ERU))
     result.tables.append(
-        {
-            "title": "Budget of the alignment",
-            "caption": f"Rate on the input axis at {n:g} times Earth rate, (n ± 1) W sin φ with "
+        Table(
+            "budget_of_the_alignment",
+            "Budget of the alignment",
+            f"Rate on the input axis at {n:g} times Earth rate, (n ± 1) W sin φ with "
             f"{'n + 1, as the sense is not known' if sense == 0 else f'n {sense:+d}'}; Monte Carlo by rotations.",
-            "columns": ["misalignment", "angle / ″", "kind", "rate / (°/h)"],
-            "rows": [
+            ["misalignment", "angle / ″", "kind", "rate / (°/h)"],
+            [
                 *[[a.name, a.size / ARCSEC, a.kind, r / DPH] for a, r in zip(align_lines, rates, strict=True)],
                 *_totals(align, 3, DPH),
             ],
-        }
+        )
     )
     averaging = float(options["averaging"])
     mode_lines = budgets.parse(str(options["rate_mode"]), "rad")
     mode = budgets.combine(mode_lines, seed)
     result.tables.append(
-        {
-            "title": "Budget of the rate mode",
-            "caption": f"Errors of the angle; relative error of a rate averaged over {np.degrees(averaging):g}°.",
-            "columns": ["error", "angle / ″", "kind", "relative / %"],
-            "rows": [
+        Table(
+            "budget_of_the_rate_mode",
+            "Budget of the rate mode",
+            f"Errors of the angle; relative error of a rate averaged over {np.degrees(averaging):g}°.",
+            ["error", "angle / ″", "kind", "relative / %"],
+            [
                 *[[line.name, line.size / ARCSEC, line.kind, 100.0 * line.size / averaging] for line in mode_lines],
                 *[[name, value / ARCSEC, "", 100.0 * value / averaging] for name, value in _named(mode)],
             ],
-        }
+        )
     )
     result.summary += [
         *(f"{c.meaning[:1].upper()}{c.meaning[1:]}: {plus_minus(c)}." for c in _largest(result.coefficients)),

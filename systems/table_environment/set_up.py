@@ -26,6 +26,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, TORQUER_SCALE, TURNED, Source
 
 STATED = "relative, positive where the stated one is too large"
 
@@ -57,14 +58,13 @@ def effects(
 
     words = {n: n.replace("_", " ") for n in scales}
     return [
+        *(TURNED[n].effect(sizes, found.error(e)) for n, e in turned.items()),
+        TORQUER_SCALE.effect(sizes, found.error(-k * windows["mean"]), note=STATED),
+        CURRENT_OFFSET.effect(sizes, found.error(-k)),
         *(
-            Effect(f"gyro turned about its {n} axis", sizes["u_mount"], "rad", found.error(e))
-            for n, e in turned.items()
-        ),
-        Effect("torquer scale factor", sizes["u_scale_factor"], "1", found.error(-k * windows["mean"]), STATED),
-        Effect("offset of the current reading", sizes["u_current"], "A", found.error(-k)),
-        *(
-            Effect(f"scale of the {words[n]}", sizes["u_scales"], "1", scaled(j), "relative, what is recorded")
+            Source(f"scale_of_the:{words[n]}", f"scale of the {words[n]}", "1", "u_scales").effect(
+                sizes, scaled(j), note="relative, what is recorded"
+            )
             for j, n in enumerate(scales, 1)
         ),
     ]

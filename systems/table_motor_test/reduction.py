@@ -24,15 +24,8 @@ from typing import Any
 import numpy as np
 from scipy import integrate, linalg, optimize, special
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import LinearModels
-from gyrobench.reduction.estimation.uncertainty import NORMAL, withhold
-from gyrobench.reduction.loops.loop_measures import Gate
-from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.loops.loop_summary import told
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import LoopResult, Specification
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.toolkit import ARCSEC, Account, Array, Gate, LoopTest, ReductionError, Table, told
 
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
@@ -42,6 +35,12 @@ WOUND = "J w' = K_t i + M_h - D w - M_C \"sgn\"(w) + M_0 - c x, quad U = R i + K
 SQUARE_LAW = 'J w\' = K V abs(V) + M_h - D w - M_C "sgn"(w) + M_0 - c x, quad V = U - K_e w'
 QUANTUM = 2.0 * math.pi / 7.2e6
 NO_LIMIT = "the voltage does not come to its limit in the steps: take a larger torque"
+AXIS = (
+    ("D", "viscous drag", "N·m·s/rad", "body.axis_viscous"),
+    ("M_C", "Coulomb friction", "N·m", "body.axis_friction"),
+    ("M_0", "constant torque, at the angle 0", "N·m", ""),
+    ("c", "torque per angle, of cables", "N·m/rad", "body.axis_cable"),
+)
 EDGE = 0.9  # of the largest voltage: at its limit; of the change: the voltage has begun to move
 
 
@@ -64,120 +63,124 @@ class Solution:
         k = float(special.stdtrit(self.dof, 0.975)) / NORMAL
         return float(f(self.value)), k * math.sqrt(float(slopes @ self.covariance @ slopes))
 
+    def over(self, j: int, k: int) -> tuple[float, float]:
+        """Return value j over value k and its u."""
+        return self.of(lambda v: float(v[j] / v[k]))
 
-def from_record(record: Record, specification: Specification | None = None) -> LoopResult:
-    """The Result.  Raises ReductionError for a record in which the table did not turn as planned."""
-    record.run.linear = record.run.linear or LinearModels()  # there is no loop
-    found = LoopFindings(record)
-    runs = [g for g in found.gates if not g.label.startswith("step")]
-    steps = [g for g in found.gates if g.label.startswith("step")]
-    windows = [w for g in runs for w in cut(g)]
-    driven = [w for w in windows if w.motor]
-    if len({w.hung for w in windows}) < 3 or len(driven) < 4 or len({w.sense for w in windows}) < 2:
-        raise ReductionError(
-            "the table must turn under the motor and under the hung torque to either side; there are "
-            f"{len(windows)} windows of {2.0 * PIECE:g} s in which it turns faster than {SLOW:g} rad/s"
+
+class Reduction(LoopTest):
+    """Runs of a free table by the motor and by a known torque, coasting, steps of torque."""
+
+    linearized = False
+
+    def measure(self) -> Account:
+        """Measure what the runs show.  Raises ReductionError where the table did not turn as planned."""
+        found, o = self.found, self.run.options
+        runs, self.steps = ([g for g in found.gates if g.label.startswith("step") is s] for s in (False, True))
+        self.windows = windows = [w for g in runs for w in cut(g)]
+        driven = [w for w in windows if w.motor]
+        if len({w.hung for w in windows}) < 3 or len(driven) < 4 or len({w.sense for w in windows}) < 2:
+            raise ReductionError(
+                "the table must turn under the motor and under the hung torque to either side; there are "
+                f"{len(windows)} windows of {2.0 * PIECE:g} s in which it turns faster than {SLOW:g} rad/s"
+            )
+        means = np.array([float(np.mean(w.current)) for w in driven])
+        errors = np.array([float(np.std(w.current)) / math.sqrt(w.current.size) for w in driven])
+        self.wound = wound = bool(np.median(np.abs(means)) > SEEN * np.median(errors))
+        self.u = {n: float(o.get(f"u_{n}", 0.0)) for n in ("hung", "voltage", "current")}
+        quantum = float(self.run.parameters.get("reader.quantum", QUANTUM))
+        mechanics = solve(windows, quantum, _wound) if wound else solve(windows, quantum, _square_law, 0.0)
+        (self._winding if wound else self._amplifier)(mechanics)
+        one, of_M = 1 if wound else 2, self.u["hung"]  # 1/J
+        self._add("J", "inertia of table and load", "kg·m²", mechanics.of(lambda v: 1.0 / v[one]), of_M, "body.axis_J")
+        for k, (name, meaning, unit, truth) in enumerate(AXIS, one + 1):
+            self._add(name, meaning, unit, mechanics.over(k, one), of_M, truth)
+        self._tables(mechanics)
+        said = left_out.sentence(mechanics.left_out)
+        found.warn("motor.left_out", said, "error")
+        found.doubt("motor.left_out", said)
+        if silent := [f"u_{n}" for n, u in self.u.items() if not u and (wound or n != "current")]:
+            names = ", ".join(silent)
+            text = f"Not stated: {names}. Errors of these standards are not in u. Set {names}."
+            found.warn("motor.standards", text)
+        return Account(
+            method="Runs of a free table by the motor and by a known torque, coasting, steps of torque",
+            sources=["MOTOR-TEST, MOTOR-DC, MOTOR-SQUARELAW; Hu 1981, eq. 5-1 with ET1, 5-7"],
+            equation=WOUND if wound else SQUARE_LAW,
+            conventions=[
+                "Torques turn the table to larger angles. The known torque M_h is the standard of all torques and of "
+                "J.",
+                "U_0 and R are as the meters read them: a zero of the voltmeter is in U_0.",
+            ],
         )
-    means = np.array([float(np.mean(w.current)) for w in driven])
-    errors = np.array([float(np.std(w.current)) / math.sqrt(w.current.size) for w in driven])
-    wound = bool(np.median(np.abs(means)) > SEEN * np.median(errors))
-    o = record.run.options
-    u_M, u_U, u_I = (float(o.get(f"u_{n}", 0.0)) for n in ("hung", "voltage", "current"))
-    p = record.run.parameters
 
-    def add(name: str, meaning: str, unit: str, value: tuple[float, float], relative: float, truth: str,
-            scale: float = 1.0) -> None:  # fmt: skip
-        known = p.get(truth)
+    def summary(self) -> list[str]:
+        constants = (
+            ("Torque constant {K_t}, back EMF constant {K_e}.", "Winding: {R}, {L}.") if self.wound else
+            ("Torque over the square of the voltage {K}.", "The root shaper is off by {U_0} at null.")
+        )  # fmt: skip
+        axis = "The axis has an inertia of {J} and Coulomb friction of {M_C}."
+        return told(self.found.coefficients, *constants, axis)
+
+    def _add(self, name: str, meaning: str, unit: str, value: tuple[float, float], relative: float, truth: str,
+             scale: float = 1.0) -> None:  # fmt: skip
+        """Measure a constant; relative: u of the standards it rests on; truth: parameter of the part."""
+        known = self.run.parameters.get(truth)
         u = math.hypot(value[1], relative * value[0])
-        found.measure(name, meaning, unit, value[0] / scale, u / scale, limits=specification,
-                      truth=None if known is None else float(known) / scale)  # fmt: skip
+        true = None if known is None else float(known)
+        self.found.measure(name, meaning, unit, value[0], u, scale=scale, truth=true)
 
-    quantum = float(p.get("reader.quantum", QUANTUM))
-    if wound:
-        mechanics = solve(windows, quantum, _wound)
-        electric = _voltages(windows)
+    def _winding(self, mechanics: Solution) -> None:
+        """Measure the constants of a winding, its inductance in the steps of torque."""
+        u_M, u_U, u_I = self.u.values()
+        add, electric = self._add, _voltages(self.windows)
         R, K_e = float(electric.value[0]), float(electric.value[1])
-        add("K_t", "torque constant", "N·m/A", mechanics.of(lambda v: v[0] / v[1]), math.hypot(u_M, u_I),
-            "drive.motor_K_t")  # fmt: skip
+        torque = mechanics.over(0, 1)
+        add("K_t", "torque constant", "N·m/A", torque, math.hypot(u_M, u_I), "drive.motor_K_t")
         add("K_e", "back EMF constant", "V·s/rad", electric.of(lambda v: v[1]), u_U, "drive.motor_K_e")
-        add("R", "resistance of the winding", "Ω", electric.of(lambda v: v[0]), math.hypot(u_U, u_I), "drive.motor_R")
-        rises = [x for g in steps if (x := _inductance(g, R, K_e)) is not None]
+        ohmic, meaning = math.hypot(u_U, u_I), "inductance of the winding"
+        add("R", "resistance of the winding", "Ω", electric.of(lambda v: v[0]), ohmic, "drive.motor_R")
+        rises = [x for g in self.steps if (x := _inductance(g, R, K_e)) is not None]
         if len(rises) > 3:
-            add("L", "inductance of the winding", "mH", _mean(rises), math.hypot(u_U, u_I), "drive.motor_L", 1e-3)
+            add("L", meaning, "mH", _mean(rises), ohmic, "drive.motor_L", 1e-3)
         else:
-            found.measure("L", "inductance of the winding", "mH", None,
-                          no_value=NO_LIMIT)  # fmt: skip
-        first = 2
-    else:
-        mechanics = solve(windows, quantum, _square_law, 0.0)
-        add("K", "torque over the square of the voltage", "N·m/kV²", mechanics.of(lambda v: v[0] / v[2]),
-            math.hypot(u_M, 2.0 * u_U), "drive.motor_K", 1e-6)  # fmt: skip
+            self.found.measure("L", meaning, "mH", None, no_value=NO_LIMIT)
+
+    def _amplifier(self, mechanics: Solution) -> None:
+        """Measure the constants of a motor whose torque goes with the square of its voltage, behind a root shaper."""
+        u_M, u_U, _ = self.u.values()
+        add, shaper = self._add, _shaper(self.windows)
+        torque, u = mechanics.over(0, 2), math.hypot(u_M, 2.0 * u_U)
+        add("K", "torque over the square of the voltage", "N·m/kV²", torque, u, "drive.motor_K", 1e-6)
         add("K_e", "back EMF constant", "V·s/rad", mechanics.of(lambda v: v[1]), u_U, "drive.motor_K_e")
-        shaper = _shaper(windows)
-        add("K_s", "demanded torque over the square of the shaper's voltage", "N·m/kV²",
-            shaper.of(lambda v: v[0] ** -2), 2.0 * u_U, "drive.motor_K", 1e-6)  # fmt: skip
-        add("U_0", "voltage of the shaper at the demand 0: mistrim", "V", shaper.of(lambda v: v[1]), u_U,
-            "drive.motor_offset")  # fmt: skip
-        add(
-            "lag", "time constant of the amplifier", "ms", _mean([_lag(g) for g in steps]), 0.0, "drive.motor_lag", 1e-3
+        demand, meaning = shaper.of(lambda v: v[0] ** -2), "demanded torque over the square of the shaper's voltage"
+        add("K_s", meaning, "N·m/kV²", demand, 2.0 * u_U, "drive.motor_K", 1e-6)
+        meaning = "voltage of the shaper at the demand 0: mistrim"
+        add("U_0", meaning, "V", shaper.of(lambda v: v[1]), u_U, "drive.motor_offset")
+        lag, meaning = _mean([_lag(g) for g in self.steps]), "time constant of the amplifier"
+        add("lag", meaning, "ms", lag, 0.0, "drive.motor_lag", 1e-3)
+
+    def _tables(self, mechanics: Solution) -> None:
+        """Show how many windows there are of each kind, and what they leave; the torques sought in it."""
+        windows = self.windows
+        kinds = {"motor": [w.motor != 0.0 for w in windows], "hung torque": [w.hung != 0.0 for w in windows]}
+        kinds["coasting"] = [not a and not b for a, b in zip(*kinds.values(), strict=True)]
+        rows: list[list[Any]] = []
+        for name, of in kinds.items():
+            r = mechanics.residual[np.array(of)] / PIECE**2
+            rows.append([name, int(r.size), float(np.sqrt(np.mean(r**2))) if r.size else None])
+        caption = (
+            f"Windows of {2.0 * PIECE:g} s. From the residuals: random torque on the axis "
+            f"{mechanics.torque_density:.2g} N·m/√Hz, standard deviation of an angle "
+            f"{mechanics.angle_error / ARCSEC:.2g}″."
         )
-        first = 3
-    one = first - 1  # 1/J
-    add("J", "inertia of table and load", "kg·m²", mechanics.of(lambda v: 1.0 / v[one]), u_M, "body.axis_J")
-    add("D", "viscous drag", "N·m·s/rad", mechanics.of(lambda v: v[first] / v[one]), u_M, "body.axis_viscous")
-    add("M_C", "Coulomb friction", "N·m", mechanics.of(lambda v: v[first + 1] / v[one]), u_M, "body.axis_friction")
-    add("M_0", "constant torque, at the angle 0", "N·m", mechanics.of(lambda v: v[first + 2] / v[one]), u_M, "")
-    add("c", "torque per angle, of cables", "N·m/rad", mechanics.of(lambda v: v[first + 3] / v[one]), u_M,
-        "body.axis_cable")  # fmt: skip
-    add_table(found, mechanics, windows)
-    silent = [f"u_{n}" for n in ("hung", "voltage", "current")[: 2 + wound] if not float(o.get(f"u_{n}", 0.0))]
-    if silent:
-        names = ", ".join(silent)
-        found.warnings.append(f"Not stated: {names}. Errors of these standards are not in u. Set {names}.")
-    result = found.result(
-        title="Motor of a turntable",
-        method="Runs of a free table by the motor and by a known torque, coasting, steps of torque",
-        sources=["MOTOR-TEST, MOTOR-DC, MOTOR-SQUARELAW; Hu 1981, eq. 5-1 with ET1, 5-7"],
-        equation=WOUND if wound else SQUARE_LAW,
-        conventions=[
-            "Torques turn the table to larger angles. The known torque M_h is the standard of all torques and of J.",
-            "U_0 and R are as the meters read them: a zero of the voltmeter is in U_0.",
-        ],
-        specification=specification,
-    )  # fmt: skip
-    result.summary = told(
-        found.coefficients,
-        "Torque constant {K_t}, back EMF constant {K_e}." if wound else "Torque over the square of the voltage {K}.",
-        "Winding: {R}, {L}." if wound else "The root shaper is off by {U_0} at null.",
-        "The axis has an inertia of {J} and Coulomb friction of {M_C}.",
-    )
-    said = left_out.sentence(mechanics.left_out)
-    result.warnings[:0] = [said] if said else []
-    return withhold(result, [said] if said else [])
-
-
-def add_table(found: LoopFindings, mechanics: Solution, windows: Sequence[Window]) -> None:
-    """Add how many windows there are of each kind, and what they leave; the torques sought in it."""
-    kinds = {"motor": [w.motor != 0.0 for w in windows], "hung torque": [w.hung != 0.0 for w in windows]}
-    kinds["coasting"] = [not a and not b for a, b in zip(*kinds.values(), strict=True)]
-    rows: list[list[Any]] = []
-    for name, of in kinds.items():
-        r = mechanics.residual[np.array(of)] / PIECE**2
-        rows.append([name, int(r.size), float(np.sqrt(np.mean(r**2))) if r.size else None])
-    caption = (
-        f"Windows of {2.0 * PIECE:g} s. From the residuals: random torque on the axis {mechanics.torque_density:.2g} "
-        f"N·m/√Hz, standard deviation of an angle {mechanics.angle_error * 648000.0 / math.pi:.2g}″."
-    )
-    columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
-    found.tables.append({"title": "Windows", "caption": caption, "columns": columns, "rows": rows})
-    found.tables.append(
-        {
-            "title": "Torques left out",
-            "caption": "Each as if it were in the model, with the p of chance; the model has none of them.",
-            "columns": ["torque", "size", "u", "unit", "p"],
-            "rows": [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out],
-        }
-    )
+        columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
+        sought = [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out]
+        lacking = "Each as if it were in the model, with the p of chance; the model has none of them."
+        self.found.tables += [
+            Table("windows", "Windows", caption, columns, rows),
+            Table("motor.left_out", "Torques left out", lacking, ["torque", "size", "u", "unit", "p"], sought),
+        ]
 
 
 def _wound(w: Window, _: float, __: float) -> tuple[float, float, Array]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.loop_test import LoopTest
+from gyrobench.system.families.option_groups import VERTICAL_AXIS
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import element_names
@@ -72,8 +72,7 @@ class TableMotorTest(LoopTest):
         "u_hung": Option(0.0, "1", "relative standard uncertainty of the hung torque", 0.0),
         "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
         "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
-        "latitude": Option("45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2,
-                           sets="site.latitude"),
+        **VERTICAL_AXIS,
     }  # fmt: skip
     assumed = ("voltmeter.scale_error", "ammeter.scale_error")
     noises = ("body.axis_rumble", "voltmeter.noise_rms", "ammeter.noise_rms", "reader.encoder_reading")
@@ -86,7 +85,7 @@ class TableMotorTest(LoopTest):
     shown = ("reader.angle_read", "voltmeter.reading", "ammeter.reading", "exciter.torque")
 
     def phases(self) -> list[LoopPhase]:
-        """At two torques: up, coast, brake through zero by the hung torque and back, down; then steps of torque."""
+        """Return, at two torques: up, coast, brake through zero by the hung torque and back, down; then steps."""
         J, rate = self["J"], self["rate"]
         phases = []
 

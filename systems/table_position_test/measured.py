@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import Column, DataError
+from gyrobench.record.csv_reader import CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -36,15 +36,15 @@ TEMPLATE = """\
     "level_x [arcsec],level_y [arcsec]\n"
 )
 COLUMNS = (
-    Column("t_start", "s", "start of the reading"),
-    Column("t_end", "s", "end of the reading"),
-    Column("mount", "rad", "azimuth of polygon and level on the table"),
-    Column("position", "rad", "position commanded, cumulative"),
-    Column("deviation", "rad", "reading of the autocollimator"),
-    Column("tracking", "rad", "mean error of the counts"),
-    Column("second", "rad", "reading of the second head"),
-    Column("level_x", "rad", "reading of the level, x"),
-    Column("level_y", "rad", "reading of the level, y"),
+    CsvColumn("t_start", "s", "start of the reading"),
+    CsvColumn("t_end", "s", "end of the reading"),
+    CsvColumn("mount", "rad", "azimuth of polygon and level on the table"),
+    CsvColumn("position", "rad", "position commanded, cumulative"),
+    CsvColumn("deviation", "rad", "reading of the autocollimator"),
+    CsvColumn("tracking", "rad", "mean error of the counts"),
+    CsvColumn("second", "rad", "reading of the second head"),
+    CsvColumn("level_x", "rad", "reading of the level, x"),
+    CsvColumn("level_y", "rad", "reading of the level, y"),
 )
 NEEDED = {"positions": "12", "head": "180deg", "quantum": "0.18arcsec"}
 

@@ -29,7 +29,7 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import Coefficient, LoopResult, Series, Specification
+from gyrobench.result import Coefficient, LoopResult, Series, Specification, Table
 from gyrobench.units import ARCSEC
 
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
@@ -381,7 +381,7 @@ def _level_terms(level: Fit, terms: Sequence[str], p: Mapping[str, Any], add: An
             u["plate"][j] if "plate" in terms else 0.0, dof, None if plate is None else plate[j], none)  # fmt: skip
 
 
-def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> dict[str, Any]:
+def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> Table:
     seen = np.flatnonzero(np.isfinite(errors))
     known = None if true is None else true - np.mean(true[seen])
     last = math.sqrt(float(np.sum(fit.u[first:] ** 2)) / max(seen.size - 1, 1))
@@ -390,12 +390,13 @@ def _polygon(errors: Array, fit: Fit, first: int, true: Array | None) -> dict[st
          None if known is None else known[k] / ARCSEC]
         for i, k in enumerate(seen)
     ]  # fmt: skip
-    return {
-        "title": "Errors of the polygon",
-        "caption": "Errors of the faces, their mean left out",
-        "columns": ["face", "error / ″", "u / ″", "truth / ″"],
-        "rows": rows,
-    }
+    return Table(
+        "errors_of_the_polygon",
+        "Errors of the polygon",
+        "Errors of the faces, their mean left out",
+        ["face", "error / ″", "u / ″", "truth / ″"],
+        rows,
+    )
 
 
 def _series(r: Readings, m: int, error: Array, orders: Sequence[int], fit: Fit, shown: Array, curve: Array) -> Series:

@@ -17,7 +17,7 @@ from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
-from gyrobench.system.table_program import Program, read_program
+from gyrobench.system.table_program import MotionProgram, read_program
 from gyrobench.system.values import InvalidValueError
 
 from .measured import MEASURED
@@ -132,7 +132,7 @@ class TablePositionTest(System):
         text = f"mounts = {self['mounts']!r}: angles in deg with spaces between are expected, as in '0 30 180'"
         raise InvalidValueError(text)
 
-    def program(self) -> Program | None:
+    def program(self) -> MotionProgram | None:
         """Return the program of the file, if one is given."""
         return read_program(Path(self["program"])) if self["program"] else None
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gyrobench import units
-from gyrobench.record.csv_reader import Column, DataError
+from gyrobench.record.csv_reader import CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -32,14 +32,14 @@ TEMPLATE = """\
 phase,t_start [s],t_end [s],rate [ERU],angle_start [deg],angle_end [deg],error [arcsec],error_std [arcsec]
 """
 COLUMNS = (
-    Column("phase", "1", "number of the rate, from 1", whole=True),
-    Column("t_start", "s", "start of the window"),
-    Column("t_end", "s", "end of the window"),
-    Column("rate", "rad/s", "rate commanded"),
-    Column("angle_start", "rad", "reading at the start, cumulative"),
-    Column("angle_end", "rad", "reading at the end, cumulative"),
-    Column("error", "rad", "mean tracking error"),
-    Column("error_std", "rad", "standard deviation of the tracking error"),
+    CsvColumn("phase", "1", "number of the rate, from 1", whole=True),
+    CsvColumn("t_start", "s", "start of the window"),
+    CsvColumn("t_end", "s", "end of the window"),
+    CsvColumn("rate", "rad/s", "rate commanded"),
+    CsvColumn("angle_start", "rad", "reading at the start, cumulative"),
+    CsvColumn("angle_end", "rad", "reading at the end, cumulative"),
+    CsvColumn("error", "rad", "mean tracking error"),
+    CsvColumn("error_std", "rad", "standard deviation of the tracking error"),
 )
 
 

@@ -17,7 +17,7 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import plus_minus
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import BudgetLine, Coefficient, LoopResult, Response, Specification
+from gyrobench.result import BudgetLine, Coefficient, LoopResult, Response, Specification, Table
 from gyrobench.units import ARCSEC
 
 from .closed_form import SampledLoop
@@ -257,7 +257,7 @@ def _result(record: Record, readings: list[AtRate], quantum: float, limits: Spec
     )
 
 
-def _readouts(readings: list[AtRate], quantum: float, scale: Scale) -> dict[str, Any]:
+def _readouts(readings: list[AtRate], quantum: float, scale: Scale) -> Table:
     """Return the table of the rates by counts, gate and inverse rate, with the tracking and the true ripple."""
     rows: list[list[Any]] = []
     for r in readings:
@@ -283,15 +283,14 @@ def _readouts(readings: list[AtRate], quantum: float, scale: Scale) -> dict[str,
         "std of error / ″",
         "true rate ripple / ERU",
     ]
-    return {
-        "title": "Rates by the three readouts",
-        "caption": (
-            "Relative errors of the rate by counts over the whole phase, by the last gate and by the last interval of "
-            "the inverse rate; tracking error and standard deviation of the true rate"
-        ),
-        "columns": columns,
-        "rows": rows,
-    }
+    return Table(
+        "rates_by_the_three_readouts",
+        "Rates by the three readouts",
+        "Relative errors of the rate by counts over the whole phase, by the last gate and by the last interval of "
+        "the inverse rate; tracking error and standard deviation of the true rate",
+        columns,
+        rows,
+    )
 
 
 def _count_torque(run: RunDocument) -> float:

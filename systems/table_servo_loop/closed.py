@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+GCM = 9.80665e-5  # N.m
 LEAD = {1: (4.0, 4.0), 2: (5.0, 5.0), 3: (28.0, 28.0), 4: (6.5, 6.5, 6.5)}  # ratio pole / zero of the leads
 LAGGING = (1, 2)  # networks with a lag-lead (1 + s / w_l) / (1 + 5 s / w_l), w_l = w_c / 12
 NAMES = ("table.J", "table.viscous", "table.lag", "table.torque_max", "gyro.H", "gyro.J", "gyro.C", "gyro.K_sg")
@@ -38,16 +39,16 @@ class ServoLoop:
     c: float
     K_g: float
 
-    def network_gain(self, s: complex) -> complex:
-        """Return C(s)."""
-        value = 1.0 + 0.0j
+    def network_gain(self, s: Any) -> Any:
+        """Return C(s), of a number or of control.tf("s"), as of the following."""
+        value: Any = 1.0
         for r in LEAD[self.network]:
             value *= (1.0 + math.sqrt(r) * s / self.w_c) / (1.0 + s / (math.sqrt(r) * self.w_c))
         if self.network in LAGGING:
             value *= (1.0 + 12.0 * s / self.w_c) / (1.0 + 60.0 * s / self.w_c)
         return value
 
-    def plant(self, s: complex) -> complex:
+    def plant(self, s: Any) -> Any:
         """Return s [(J s + D)(J_g s + c) + H2]."""
         return s * ((self.J * s + self.viscous) * (self.J_g * s + self.c) + self.H**2)
 
@@ -55,9 +56,9 @@ class ServoLoop:
     def gain(self) -> float:
         """Return G, N.m/V."""
         s = 1j * self.w_c
-        return abs(self.plant(s) * (1.0 + self.lag * s) / (self.K_g * self.H * self.network_gain(s)))
+        return float(abs(self.plant(s) * (1.0 + self.lag * s) / (self.K_g * self.H * self.network_gain(s))))
 
-    def open_loop(self, s: complex) -> complex:
+    def open_loop(self, s: Any) -> Any:
         """Return L(s)."""
         return self.gain * self.K_g * self.H * self.network_gain(s) / (self.plant(s) * (1.0 + self.lag * s))
 
@@ -68,7 +69,7 @@ class ServoLoop:
 
     def compliance(self, s: complex) -> complex:
         """Return table angle per torque, rad/(N.m)."""
-        return (self.J_g * s + self.c) / self.plant(s) / (1.0 + self.open_loop(s))
+        return complex((self.J_g * s + self.c) / self.plant(s) / (1.0 + self.open_loop(s)))
 
     def at_rest(self, torque: float) -> float:
         """Return the static table angle under a torque."""
@@ -78,13 +79,7 @@ class ServoLoop:
         """Return L as a control.TransferFunction."""
         import control
 
-        s = control.tf("s")
-        value = control.tf([self.gain * self.K_g * self.H], [1.0])
-        for r in LEAD[self.network]:
-            value *= (1.0 + math.sqrt(r) * s / self.w_c) / (1.0 + s / (math.sqrt(r) * self.w_c))
-        if self.network in LAGGING:
-            value *= (1.0 + 12.0 * s / self.w_c) / (1.0 + 60.0 * s / self.w_c)
-        return value / (s * ((self.J * s + self.viscous) * (self.J_g * s + self.c) + self.H**2) * (1.0 + self.lag * s))
+        return self.open_loop(control.tf("s"))
 
     def limits(self) -> list[tuple[float, float]]:
         """Return (Hz, factor) of all gains that bring the loop to its limit, by rising frequency.

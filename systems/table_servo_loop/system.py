@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.system.families.loop_test import LoopTest, data_sheet, hold, torquer
+from gyrobench.system.families.option_groups import VERTICAL_AXIS
 from gyrobench.system.families.servo_test import gyro_on_table
 from gyrobench.system.families.table_test import SDF_NOISES
 from gyrobench.system.loop_plan import LoopPhase, sweep
@@ -14,9 +15,8 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import element_names
 from gyrobench.system.system import Option, Slot
 
-from .closed import loop_of
+from .closed import GCM, loop_of
 
-GCM = 9.80665e-5  # N.m
 ALONG = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # rows of the face: input axis along the table axis
 TAU = {1: 4e-4, 2: 1e-3}  # s, of the gyro for which a network is made; 3 and 4: undamped
 TESTS = (4.0, 6.0, 9.0, 13.0, 20.0, 30.0, 40.0, 50.0, 62.0, 80.0, 105.0, 140.0, 175.0, 220.0)  # Hz, at 50 Hz crossover
@@ -70,8 +70,7 @@ class TableServoLoop(LoopTest):
                            sets="rings.ring_follower"),
         "friction": Option("1400g.cm", "N.m", "friction of the slip rings", 0.0, sets="rings.ring_friction"),
         "turning": Option("0.1deg/s", "rad/s", "rate to either side, which shows the torque of the rings"),
-        "latitude": Option("45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2,
-                           sets="site.latitude"),
+        **VERTICAL_AXIS,
         "test": Option("0.4arcsec", "rad", "amplitude of test sines, as an angle; tenfold with an undamped gyro", 1e-9),
         **hold(60.0),
     }  # fmt: skip
@@ -88,7 +87,7 @@ class TableServoLoop(LoopTest):
 
     @property
     def loops(self) -> dict[str, str]:  # type: ignore[override]
-        """The loop for the linear model; none about the null of a motor without gain there."""
+        """Return the loop for the linear model; none about the null of a motor without gain there."""
         return {"stabilizer": "table.u"} if self["shaper"] else {}
 
     @property
@@ -104,7 +103,7 @@ class TableServoLoop(LoopTest):
         return float(self["load"] or (1.0 if self.damped else 500.0 * GCM))
 
     def phases(self) -> list[LoopPhase]:
-        """Rest, hung torques, turning both ways, test sines through the torquer, sines of torque."""
+        """Return rest, hung torques, turning both ways, test sines through the torquer, sines of torque."""
         share = self.wanted() / 50.0
         slow = 1.0 / share  # s: the slowest pole, about w_c / 12 (network 2), leaves exp(-12) in half of it
         frequencies = [f * share for f in TESTS]
@@ -128,7 +127,7 @@ class TableServoLoop(LoopTest):
         ]  # fmt: skip
 
     def injected(self, f: float) -> float:
-        """Rate whose angle is `test`, and grows below the crossover, where the loop leaves less of it."""
+        """Return the rate whose angle is `test`, and grows below the crossover, where the loop leaves less of it."""
         size = self["test"] * (1.0 if self.damped else 10.0)
         return float(size * 2.0 * math.pi * f * max(1.0, 0.4 * self.wanted() / f) ** 1.5)
 

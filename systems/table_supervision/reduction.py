@@ -20,7 +20,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, LoopResult, Specification
+from gyrobench.result import Coefficient, LoopResult, Specification, Table
 
 from .system import KINDS
 
@@ -112,12 +112,15 @@ def from_record(record: Record, specification: Specification | None = None) -> L
             "Closed: mean over the sampling instants; for pressure and temperature with their time constant.",
         ],
         coefficients=found,
-        tables=[{
-            "title": "Faults by kind",
-            "caption": "Each kind by itself, and two at once; times from the fault to the first detection.",
-            "columns": ["fault", "put in", "found", "named rightly", "shortest / s", "longest / s"],
-            "rows": rows,
-        }],
+        tables=[
+            Table(
+                "faults_by_kind",
+                "Faults by kind",
+                "Each kind by itself, and two at once; times from the fault to the first detection.",
+                ["fault", "put in", "found", "named rightly", "shortest / s", "longest / s"],
+                rows,
+            )
+        ],
         warnings=warnings,
         summary=summary,
         decision_rule=uncertainty.DECISION_RULE,
@@ -126,7 +129,7 @@ def from_record(record: Record, specification: Specification | None = None) -> L
         ranked_by="false alarms",
         responses=[],
         simulated=not run.measured,
-    )  # fmt: skip
+    )
     return run_metadata.finish(result, record)
 
 

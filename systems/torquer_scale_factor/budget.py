@@ -19,16 +19,30 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.effects import SINES, Effect
+from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.setups import Setup
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_LEVEL_POLE,
+    INPUT_TO_OUTPUT,
+    INPUT_TO_SPIN,
+    TIME_BASE,
+    Source,
+)
 
-AMMETER, ZERO = "ammeter", "zero of the ammeter"
+AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")
+ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Standard uncertainties of type B, SI, the options of the same names; u_current, u_time: relative."""
+@dataclass(frozen=True, kw_only=True)
+class TorquerSetup(Setup):
+    """u_current, u_time: relative; of a table of rates these two count alone.  truth: printed name -> value in the
+    printed unit.
+    """
 
+    earth_rate: float = frames.EARTH_RATE
     u_current: float = 0.0
     u_zero: float = 0.0
     u_angle1: float = 0.0
@@ -38,9 +52,7 @@ class Sizes:
     u_time: float = 0.0
 
 
-def effects(
-    found: Findings, currents: int, start: Array, end: Array, sizes: Sizes, earth_rate: float = frames.EARTH_RATE
-) -> Sequence[Effect]:
+def effects(found: Findings, currents: int, start: Array, end: Array, setup: TorquerSetup) -> Sequence[Effect]:
     """Return all sources of a fit to windows; start, end (n,): table angle, rad.
 
     currents: their number; the first columns of the fit are the current of each, then the constant of each.
@@ -61,12 +73,12 @@ def effects(
     K, constant = slice(0, currents), slice(currents, 2 * currents)
     along_o, along_s = mean(np.sin(end) - np.sin(start)), mean(np.cos(start) - np.cos(end))
     return [
-        Effect(AMMETER, sizes.u_current, "1", design(K, K), "relative"),
-        Effect(ZERO, sizes.u_zero, "A", design(K, constant)),
-        Effect("angle error, once a turn", sizes.u_angle1, "rad", read(1), "encoder", SINES),
-        Effect("angle error, twice a turn", sizes.u_angle2, "rad", read(2), "encoder", SINES),
-        Effect("table axis towards the pole", sizes.u_axis, "rad", found.error(-earth_rate)),
-        Effect("input axis towards output axis", sizes.u_mount, "rad", found.error(-earth_rate * along_o)),
-        Effect("input axis towards spin axis", sizes.u_mount, "rad", found.error(earth_rate * along_s)),
-        Effect("time base", sizes.u_time, "1", found.error(-found.y), "relative, seconds read too long"),
+        AMMETER.effect(setup, design(K, K)),
+        ZERO.effect(setup, design(K, constant)),
+        ANGLE_ONCE.effect(setup, read(1)),
+        ANGLE_TWICE.effect(setup, read(2)),
+        AXIS_LEVEL_POLE.effect(setup, found.error(-setup.earth_rate)),
+        INPUT_TO_OUTPUT.effect(setup, found.error(-setup.earth_rate * along_o)),
+        INPUT_TO_SPIN.effect(setup, found.error(setup.earth_rate * along_s)),
+        TIME_BASE.effect(setup, found.error(-found.y), note="relative, seconds read too long"),
     ]

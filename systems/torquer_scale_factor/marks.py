@@ -20,7 +20,7 @@ SHARED = 0.5  # of the range turned, least part that both senses must cover
 
 
 def rows(windows: Mapping[str, Array], plan: Sequence[PlanRow]) -> dict[str, Array]:
-    """current (A), rate_plus, rate_minus (rad/s, magnitudes), range_plus, range_minus (rad), by rising current.
+    """Return current (A), rate_plus, rate_minus (rad/s, magnitudes), range_plus, range_minus (rad), by rising current.
 
     plan: rows of run.json; the target of a servo phase is its current.  Raises ReductionError for flagged windows, a
     current with one sense only, and senses that do not share their angles.
@@ -57,7 +57,7 @@ def rows(windows: Mapping[str, Array], plan: Sequence[PlanRow]) -> dict[str, Arr
 
 
 def _pairs(plan: Sequence[PlanRow]) -> dict[float, dict[int, int]]:
-    """Magnitude of a current -> sense -> phase."""
+    """Return the magnitude of a current -> sense -> phase."""
     pairs: dict[float, dict[int, int]] = {}
     for row in plan:
         if row.mode == "servo" and row.target:
@@ -66,13 +66,13 @@ def _pairs(plan: Sequence[PlanRow]) -> dict[float, dict[int, int]]:
 
 
 def senses(plan: Sequence[PlanRow]) -> dict[int, int]:
-    """Phase -> number of its current, by rising current."""
+    """Return phase -> number of its current, by rising current."""
     pairs = _pairs(plan)
     return {phase: k for k, size in enumerate(sorted(pairs)) for phase in pairs[size].values()}
 
 
 def _curve(windows: Mapping[str, Array], mine: NDArray[np.bool_]) -> tuple[Array, Array, float]:
-    """Times and angles at the ends of the windows, mean current."""
+    """Return the times and angles at the ends of the windows, mean current."""
     t0, t1, a0, a1, i = (
         np.asarray(windows[c], dtype=float)[mine] for c in ("t_start", "t_end", "angle_start", "angle_end", "mean")
     )

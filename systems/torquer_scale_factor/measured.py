@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import Column
+from gyrobench.record.csv_reader import CsvColumn
 from gyrobench.record.run_document import ABOUT
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
@@ -19,11 +19,11 @@ TEMPLATE = """\
 current [mA],rate_plus [deg/h],rate_minus [deg/h],range_plus [deg],range_minus [deg]
 """
 COLUMNS = (
-    Column("current", "A", "magnitude of the torquer current"),
-    Column("rate_plus", "rad/s", "table rate with positive current, magnitude"),
-    Column("rate_minus", "rad/s", "table rate with negative current, magnitude"),
-    Column("range_plus", "rad", "angle range with positive current", required=False),
-    Column("range_minus", "rad", "angle range with negative current", required=False),
+    CsvColumn("current", "A", "magnitude of the torquer current"),
+    CsvColumn("rate_plus", "rad/s", "table rate with positive current, magnitude"),
+    CsvColumn("rate_minus", "rad/s", "table rate with negative current, magnitude"),
+    CsvColumn("range_plus", "rad", "angle range with positive current", required=False),
+    CsvColumn("range_minus", "rad", "angle range with negative current", required=False),
 )
 TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b")
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None, texts=TEXTS))

@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from gyrobench import frames, units
+from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.effects import Effect, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.mixture import equivalent_dof
+from gyrobench.reduction.estimation.noise_estimate import Estimate
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-from .budget import Sizes, effects
+from .budget import TorquerSetup, effects
 
 DEGREE = 4
 
@@ -39,12 +39,14 @@ class Precession:
 
     K: Array
     drift: Array
-    est: noise_mixture_fit.Estimate
+    est: Estimate
     fit: Findings | None = None
     effects: Sequence[Effect] = ()
 
     def weights(self, columns: Array, of: Array | slice) -> Array:
-        """(q, n) W of generalized least squares W values = c of ``values = columns c``, under their covariance."""
+        """Return (q, n) W of generalized least squares W values = c of ``values = columns c``, under their
+        covariance.
+        """
         C = self.est.covariance[of, of]
         size = np.sqrt(np.diag(C))
         A, B = columns / size[:, None], C / np.outer(size, size)
@@ -53,7 +55,7 @@ class Precession:
         return out
 
     def u(self, of_K: Array | None = None, of_drift: Array | None = None) -> tuple[float, float]:
-        """Standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
+        """Return the standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
         n, J = self.K.size, np.zeros(self.est.beta.size)
         J[:n], J[n : 2 * n] = 0.0 if of_K is None else of_K, 0.0 if of_drift is None else of_drift
         sd, half = (float(v[0]) for v in self.est.mixture.spread(J[None, :]))
@@ -62,12 +64,12 @@ class Precession:
 
 
 def precession(
-    windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array, sizes: Sizes | None = None,
-    corrections: str = "", earth_rate: float = frames.EARTH_RATE,
-) -> Precession:  # fmt: skip
-    """phases: number of a phase -> number of its current in ``currents`` (A).  sizes, corrections: errors of the set-up
-    (budget.py, gyrobench.reduction.estimation.effects).  Raises ReductionError.
+    windows: Mapping[str, Array], phases: Mapping[int, int], currents: Array, setup: TorquerSetup | None = None
+) -> Precession:
+    """Return the fit of the windows.  phases: number of a phase -> number of its current in ``currents`` (A).  setup:
+    with errors of the set-up and their corrections.  Raises ReductionError.
     """
+    setup = setup or TorquerSetup()
     phase = np.asarray(windows["phase"]).astype(int)
     mine = np.isin(phase, list(phases))
     t0, t1, a0, a1, i = (
@@ -85,14 +87,14 @@ def precession(
     found = fit(names, X, (a1 - a0) / (t1 - t0), t0, t1, [], "rate", "°/h", units.factor("deg/h"), noise="readings")
 
     def sources(f: Findings) -> Sequence[Effect]:
-        return effects(f, n, a0, a1, sizes or Sizes(), earth_rate)
+        return effects(f, n, a0, a1, setup)
 
-    found = with_set_up(found, sources, corrections)
+    found = with_set_up(found, sources, setup.corrections)
     return Precession(found.est.beta[:n], found.est.beta[n : 2 * n], found.est, found, sources(found))
 
 
 def _mean_legendre(j: int, start: Array, end: Array) -> Array:
-    """Mean of P_j between two arguments: its integral is (P_(j+1) - P_(j-1)) / (2 j + 1)."""
+    """Return the mean of P_j between two arguments: its integral is (P_(j+1) - P_(j-1)) / (2 j + 1)."""
 
     def integral(x: Array) -> Any:
         return (special.eval_legendre(j + 1, x) - special.eval_legendre(j - 1, x)) / (2.0 * j + 1.0)

@@ -17,291 +17,249 @@ two senses otherwise than as noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from scipy import special
 
 from gyrobench import units
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis import handling_candidates, handling_errors
+from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.diagnosis.handling_errors import examined
 from gyrobench.reduction.estimation import regression, uncertainty
-from gyrobench.reduction.estimation.effects import Effect, correction_table, simulated_table, standard_changes
-from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.fit_result import budget_lines, changes_by_source
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.simulated_errors import simulated_errors
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
+from gyrobench.reduction.estimation.effects import correction_table, simulated_table, standard_changes
+from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, changes_by_source
+from gyrobench.reduction.setup.sources import TIME_BASE
+from gyrobench.reduction.toolkit import (
+    Array,
+    Coefficient,
+    DriftTestResult,
+    Reason,
+    Record,
+    ReductionError,
+    Site,
+    Table,
+    told,
+)
+from gyrobench.result import BudgetLine, Series, Test
 
 from . import marks, row_checks
-from .budget import AMMETER, Sizes
-from .estimates import DPH, KU, UNIT, Estimates, Number, of_table, of_windows
+from .budget import AMMETER, TorquerSetup
+from .estimates import DPH, KU, UNIT, of_table, of_windows
 from .precession import Precession, precession
+from .row_checks import MA
 
-MA = 1e-3
 RANDOM = "random drift, angle readings and current, with the linearity error"
+COMPUTED = "Both senses have equal rates in every row: computed, not measured; the drift is then no finding."
+NO_RANGES = "No angle ranges given: all currents weigh alike in the least squares."
 
 
-@dataclass(frozen=True)
-class TorquerSetup:
-    """u_current, u_time: relative standard uncertainties of ammeter and time base, for a table of rates (those of a run
-    are in its Precession).  errors: of a simulated set-up.  limits: surface units.  truth: printed name -> value in the
-    printed unit.
+class Reduction:
+    """Scale factor, linearity and drift of a torquer from one row for each current (columns: row_checks.problems).
+
+    found: of the windows of a run, whose estimates then take the place of those from the rows.
     """
 
-    u_current: float = 0.0
-    u_time: float = 0.0
-    errors: Mapping[str, float] | None = None
-    specification: Specification | None = None
-    instrument: str = ""
-    simulated: bool = False
-    truth: Mapping[str, float] | None = None
-    site: Mapping[str, Any] = field(default_factory=dict)
+    def __init__(self, rows: Mapping[str, Array], setup: TorquerSetup, found: Precession | None = None) -> None:
+        self.rows, self.setup, self.fit = rows, setup, found
+        self.i, self.plus, self.minus = (np.asarray(rows[n], float) for n in ("current", "rate_plus", "rate_minus"))
+        self.marked, self.half = (self.plus + self.minus) / 2.0 / self.i, (self.plus - self.minus) / 2.0
+        self.theta = np.asarray(rows["range_plus"], float) if "range_plus" in rows else np.ones_like(self.i)
+        self.book = of_table(self.i, self.marked, self.half, self.theta)
+        self.e = self.book if found is None else of_windows(self.i, found)
+        self.K_n, self.full = self.marked if found is None else found.K, float(self.i.max())
+        self.sources = found.effects if found else ()
+        self.by_source = [standard_changes(self.e.reported, x) for x in self.sources] if self.e.reported else []
 
+    @classmethod
+    def reduce(
+        cls, rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: Precession | None = None
+    ) -> DriftTestResult:
+        """Return what rows say.  Raises ReductionError with everything that is wrong."""
+        if wrong := row_checks.problems(rows):
+            raise ReductionError(wrong)
+        return cls(rows, setup or TorquerSetup(), found).result()
 
-def problems(rows: Mapping[str, Array]) -> list[str]:
-    """What is wrong with the rows current (A), rate_plus, rate_minus (rad/s), range_plus, range_minus (rad,
-    optional).
-    """
-    need = ("current", "rate_plus", "rate_minus")
-    missing = [n for n in need if n not in rows]
-    if missing:
-        text = f"column {', '.join(missing)} is missing; each current needs current, rate_plus and rate_minus"
-        if {"rate_plus", "rate_minus"} & set(missing):
-            text += ": one sense alone cannot tell scale factor from drift"
-        return [text]
-    found = []
-    columns = [n for n in (*need, "range_plus", "range_minus") if n in rows]
-    data = {n: np.asarray(rows[n], dtype=float) for n in columns}
-    if len({v.size for v in data.values()}) > 1:
-        return ["columns of different length"]
-    for n, v in data.items():
-        for k in np.flatnonzero(~np.isfinite(v)):
-            found.append(f"row {k + 1}: {n} is no finite number" + (" (both senses are needed)" if "rate" in n else ""))
-    if found:
-        return found
-    i = data["current"]
-    for k in np.flatnonzero(i <= 0.0):
-        found.append(f"row {k + 1}: current {i[k] / MA:g} mA: give the magnitude, larger than zero")
-    for n in ("rate_plus", "rate_minus"):
-        for k in np.flatnonzero(data[n] <= 0.0):
-            found.append(
-                f"row {k + 1}: {n} = {data[n][k] / DPH:g} °/h: give magnitudes; a rate of the wrong sense is a drift "
-                "larger than the precession or crossed wires"
-            )
-    if ("range_plus" in data) != ("range_minus" in data):
-        found.append("range_plus and range_minus belong together: the angle range of each sense")
-    elif "range_plus" in data:
-        a, b = data["range_plus"], data["range_minus"]
-        for k in np.flatnonzero((np.abs(a - b) > 0.01 * np.maximum(np.abs(a), np.abs(b))) | (a <= 0.0) | (b <= 0.0)):
-            found.append(
-                f"row {k + 1}: ranges {math.degrees(a[k]):g}° and {math.degrees(b[k]):g}°: both senses need the same "
-                "angle range, or the drift does not cancel"
-            )
-    if i.size < 3:
-        found.append(f"{i.size} currents: at least 3 are needed for a linearity")
-    elif np.unique(i).size < i.size:
-        found.append("the same current twice: average repeated measurements first")
-    return found
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says: of a run (windows of the servo phases), or of a measured table of rates."""
+        run = record.run
+        if run.measured:
+            setup = TorquerSetup.of(run)
+            if setup.corrections.strip():
+                raise ReductionError(
+                    "corrections: a table of rates has no angles to correct; correct its currents and rates"
+                )
+            return cls.reduce(record.windows, setup)
+        rows, site = marks.rows(record.windows, run.plan), Site.of(run)
+        if wrong := row_checks.problems(rows):
+            raise ReductionError(wrong)
+        currents = np.asarray(rows["current"])
+        truth = truth_of(run.parameters, currents)
+        setup = TorquerSetup.of(run, earth_rate=site.earth_rate, truth=truth, site=site.shown())
+        return cls(rows, setup, precession(record.windows, marks.senses(run.plan), currents, setup)).result()
 
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says, a measured one examined for handling errors."""
+        return examined(record, cls.of_record, handling_candidates.table_of_rates)
 
-def reduce(
-    rows: Mapping[str, Array], setup: TorquerSetup | None = None, found: Precession | None = None
-) -> DriftTestResult:
-    """Scale factor, linearity and drift of a torquer from one row for each current; found: of the windows of a run,
-    whose estimates then take the place of those from the rows.  Raises ReductionError with everything that is wrong.
-    """
-    s = setup or TorquerSetup()
-    wrong = problems(rows)
-    if wrong:
-        raise ReductionError(wrong)
-    i, plus, minus = (np.asarray(rows[n], dtype=float) for n in ("current", "rate_plus", "rate_minus"))
-    theta = np.asarray(rows["range_plus"], dtype=float) if "range_plus" in rows else np.ones_like(i)
-    marked, half, n, full = (plus + minus) / 2.0 / i, (plus - minus) / 2.0, i.size, float(i.max())
-    K_n = marked if found is None else found.K
-    book = of_table(i, marked, half, theta)
-    e = book if found is None else of_windows(i, found)
-    mean, k, u_mean = e.mean[0], e.worst_at, e.mean[1]
-    sources = found.effects if found else ()
-    by_source = [standard_changes(e.reported, x) for x in sources] if e.reported else []
-    make = _Maker(s, np.vstack([np.zeros((1, 6)), *by_source]) if e.reported else None)
-    coefficients = [
-        make("K", "scale factor, mean of the K_n of all currents", UNIT, e.mean, 1.0 / KU, True),
-        make("K_LS", "scale factor, weighted least squares", UNIT, e.line, 1.0 / KU, True),
-        make("K_1", "scale factor at zero current of the cubic torquer", UNIT, e.K_1, 1.0 / KU, True),
-        make("K_3/K_1", f"relative change of the scale factor from 0 to {full / MA:g} mA, as i²", "%", e.cubic, 100.0),
-        make("linearity", f"largest departure (K_n − K)/K, at {i[k] / MA:g} mA", "%", e.worst, 100.0),
-        make("drift", "drift along the torqued axis, half the difference of the two senses", "°/h", e.drift, 1.0 / DPH),
-    ]
-    seen = e.p is not None and e.p < 0.05
-    warnings = []
-    if np.all(half == 0.0):
-        warnings.append(
-            "Both senses have equal rates in every row: computed, not measured; the drift is then no finding."
+    def coefficients(self) -> list[Coefficient]:
+        e, full = self.e, f"{self.full / MA:g} mA"
+        cubic = f"relative change of the scale factor from 0 to {full}, as i²"
+        worst = f"largest departure (K_n − K)/K, at {self.i[e.worst_at] / MA:g} mA"
+        rows = (
+            ("K", "scale factor, mean of the K_n of all currents", UNIT, 1.0 / KU),
+            ("K_LS", "scale factor, weighted least squares", UNIT, 1.0 / KU),
+            ("K_1", "scale factor at zero current of the cubic torquer", UNIT, 1.0 / KU),
+            ("K_3/K_1", cubic, "%", 100.0),
+            ("linearity", worst, "%", 100.0),
+            ("drift", "drift along the torqued axis, half the difference of the two senses", "°/h", 1.0 / DPH),
         )
-    if "range_plus" not in rows:
-        warnings.append("No angle ranges given: all currents weigh alike in the least squares.")
-    against, said = row_checks.contradictions(i, marked, half, theta) if found is None else ([], [])
-    warnings += said
-    gain = np.vstack([e.gain, np.zeros(n)])
-    covariance = gain @ e.cofactor @ gain.T
-    covariance[5, 5] = 1.0
-    result = DriftTestResult(
-        system="torquer_scale_factor",
-        title="Scale factor and linearity of a torquer",
-        method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
-        sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
-        equation='K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n',
-        conventions=[
-            "Positive current makes positive precession: K = ω/i (A3-5 of Hu 1981 prints a minus that its own table "
-            "does not have).",
-            "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
-            "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
-            if found is None
-            else "Noise, white, Gauss-Markov and of the angle readings, estimated from all windows together.",
-        ],
-        coefficients=coefficients,
-        series=[
-            Series(
-                label="scale factor of each current", x=(i / MA).tolist(), x_name="current", x_unit="mA",
-                y=(K_n / KU).tolist(), fit=(e.fitted / KU).tolist(), residual=((K_n - e.fitted) / KU).tolist(),
-                y_name="scale factor", y_unit=UNIT, t=np.arange(n, dtype=float).tolist(),
-                shown_fit_x=np.linspace(0.0, full / MA, 101).tolist(),
-                shown_fit_y=((e.beta[0] + e.beta[1] * np.linspace(0.0, 1.0, 101) ** 2) / KU).tolist(),
-            )
-        ],
-        correlation=regression.correlation(covariance).tolist(),
-        condition=regression.examine(np.column_stack([np.ones(n), (i / full) ** 2]) * theta[:, None],
-                                     ("K_1", "K_3")).condition,
-        rank=2,
-        dof=float(n - 2 if found is None else found.est.mixture.dof),
-        noise=_noise(e, found),
-        tests=[
-            Test("cubic term", e.F, e.p, "curvature of the torquer",
-                 "the scale factor depends on the current" if seen else "no curvature beyond the scatter")
-        ],
-        residual_std=e.scatter / KU,
-        residual_unit=UNIT,
-        budget=budget_lines(e.reported, sources, RANDOM) if e.reported else _budget(s, mean, u_mean),
-        type_b=changes_by_source(e.reported, sources, by_source) if e.reported else [],
-        tables=[*_set_up_tables(e.reported, sources, s.errors), _table(i, plus, minus, marked, half, book.mean[0]),
-                *_windows_table(i, found)],
-        warnings=warnings,
-        summary=[
-            f"Scale factor K = {mean / KU:.3f} °/h/mA from {n} currents, {i.min() / MA:g} to {full / MA:g} mA.",
-            f"Linearity: within {abs(e.worst[0]) * 100:.3f} %, worst at {i[k] / MA:g} mA.",
-            f"Drift along the axis {coefficients[-1].estimate:.3g} °/h.",
-        ],
-        decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
-        instrument=s.instrument,
-        simulated=s.simulated,
-        site=dict(s.site),
-    )  # fmt: skip
-    return uncertainty.withhold(result, against)
+        return [self._coefficient(j, *row) for j, row in enumerate(rows)]
 
-
-def _noise(e: Estimates, found: Precession | None) -> dict[str, Any]:
-    if found is None:
-        return {"model": "white, K_n weighted by their range", "scatter of the best K_n / (°/h/mA)": e.scatter / KU}
-    est = found.est
-    return {
-        "model": "white, Gauss-Markov and reading errors, estimated from the windows",
-        "white density / (°/h/√Hz)": est.density[0] / DPH,
-        "Gauss-Markov rms / (°/h)": est.sigma[0] / DPH,
-        "reading error, standard deviation / ″": est.sigma_reading[0] / units.factor("arcsec"),
-    }
-
-
-def _set_up_tables(
-    reported: Findings | None, sources: Sequence[Effect], errors: Mapping[str, float] | None
-) -> list[dict[str, Any]]:
-    if reported is None:
-        return []
-    return [*correction_table(reported), *simulated_table(reported, sources, errors)]
-
-
-def _windows_table(i: Array, found: Precession | None) -> list[dict[str, Any]]:
-    if found is None:
-        return []
-    n = i.size
-    rows: list[list[Any]] = [
-        [float(i[k] / MA), float(found.K[k] / KU), float(found.est.u[k] / KU), float(found.drift[k] / DPH),
-         float(found.est.u[n + k] / DPH)]
-        for k in range(n)
-    ]  # fmt: skip
-    head = ["current / mA", "K_n / (°/h/mA)", "u / (°/h/mA)", "drift / (°/h)", "u / (°/h)"]
-    caption = "Fit to all windows together; drift: at the middle of the angles of all currents"
-    return [{"title": "Scale factors from the windows", "caption": caption, "columns": head, "rows": rows}]
-
-
-class _Maker:
-    """Coefficients in surface units from an estimate with its type A uncertainty and degrees of freedom.
-
-    changes (m, 6): by the sources of type B of a run, SI, in the order in which the coefficients are made.
-    """
-
-    def __init__(self, setup: TorquerSetup, changes: Array | None) -> None:
-        self.setup, self.changes, self.made = setup, changes, 0
-
-    def __call__(
-        self, name: str, meaning: str, unit: str, number: Number, size: float, scale: bool = False
-    ) -> Coefficient:
+    def _coefficient(self, j: int, name: str, meaning: str, unit: str, size: float) -> Coefficient:
+        """Return a coefficient in its printed unit, from its estimate (SI) and ``size``, the unit's inverse."""
+        s, number = self.setup, self.e.numbers[j]
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
-        b = [abs(value) * self.setup.u_current, abs(value) * self.setup.u_time] if scale else []
-        if self.changes is not None:
-            b = (self.changes[:, self.made] * size).tolist()
-        self.made += 1
+        b = [abs(value) * s.u_current, abs(value) * s.u_time] if unit == UNIT else []
+        if self.e.reported:
+            b = (np.vstack([np.zeros((1, 6)), *self.by_source])[:, j] * size).tolist()
         u, U = uncertainty.combine_uncertainties(u_a, half_a, b)
-        limit = (self.setup.specification or {}).get(name)
-        t = value / u_a if u_a > 0.0 else None
-        truth = (self.setup.truth or {}).get(name)
+        t, truth = value / u_a if u_a > 0.0 else None, (s.truth or {}).get(name)
         return Coefficient(
             name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=U / u if u > 0.0 else uncertainty.NORMAL,
             interval=(value - U, value + U), t=t,
             p=float(2.0 * special.stdtr(min(dof, 1e9), -abs(t))) if t is not None else None, u_a=u_a,
             dof=float(dof) if math.isfinite(dof) else None,
-            truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None, limit=limit,
-            verdict=uncertainty.assess_conformity(value, U, limit),
+            truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None,
         )  # fmt: skip
 
+    def result(self) -> DriftTestResult:
+        """Return the result, without the checks of the rows."""
+        e, i, n, coefficients = self.e, self.i, self.i.size, self.coefficients()
+        gain = np.vstack([e.gain, np.zeros(n)])
+        covariance = gain @ e.cofactor @ gain.T
+        covariance[5, 5] = 1.0
+        curve = np.column_stack([np.ones(n), (i / self.full) ** 2]) * self.theta[:, None]
+        F, p = e.test
+        seen = p is not None and p < 0.05
+        text = "the scale factor depends on the current" if seen else "no curvature beyond the scatter"
+        noise = "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
+        return DriftTestResult(
+            method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
+            sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
+            equation="K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n",
+            conventions=[
+                "Positive current makes positive precession: K = ω/i (A3-5 of Hu 1981 prints a minus that its own "
+                "table does not have).",
+                "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
+                noise
+                if self.fit is None
+                else "Noise, white, Gauss-Markov and of the angle readings, estimated from all windows together.",
+            ],
+            coefficients=coefficients,
+            series=[self._series()],
+            correlation=regression.correlation(covariance).tolist(),
+            condition=regression.examine(curve, ("K_1", "K_3")).condition,
+            rank=2,
+            dof=float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
+            noise=self._noise(),
+            tests=[Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
+            residual_std=e.scatter / KU,
+            residual_unit=UNIT,
+            budget=self._budget(),
+            type_b=changes_by_source(e.reported, self.sources, self.by_source) if e.reported else [],
+            tables=self._tables(),
+            reasons=self._reasons(),
+            summary=told(
+                coefficients,
+                f"Scale factor K = {{K}} from {n} currents, {i.min() / MA:g} to {self.full / MA:g} mA.",
+                f"Largest departure from it, at {i[e.worst_at] / MA:g} mA: {{linearity}}.",
+                "Drift along the axis {drift}.",
+            ),
+            instrument=self.setup.instrument,
+            simulated=self.setup.truth is not None,
+            site=self.setup.shown,
+        )
 
-def _budget(s: TorquerSetup, mean: float, u_mean: float) -> list[BudgetLine]:
-    a, size = u_mean / KU, mean / KU
-    lines = [
-        BudgetLine("scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", "type A, with the linearity error in it")
-    ]
-    if s.u_current > 0.0:
-        lines.append(BudgetLine(AMMETER, s.u_current, "1", size, UNIT, size * s.u_current, UNIT, "K", "relative"))
-    if s.u_time > 0.0:
-        lines.append(BudgetLine("time base", s.u_time, "1", size, UNIT, size * s.u_time, UNIT, "K", "relative"))
-    return lines
+    def _series(self) -> Series:
+        dense, e = np.linspace(0.0, 1.0, 101), self.e
+        return Series(
+            label="scale factor of each current", x=(self.i / MA).tolist(), x_name="current", x_unit="mA",
+            y=(self.K_n / KU).tolist(), fit=(e.fitted / KU).tolist(), residual=((self.K_n - e.fitted) / KU).tolist(),
+            y_name="scale factor", y_unit=UNIT, t=np.arange(self.i.size, dtype=float).tolist(),
+            shown_fit_x=np.linspace(0.0, self.full / MA, 101).tolist(),
+            shown_fit_y=((e.beta[0] + e.beta[1] * dense**2) / KU).tolist(),
+        )  # fmt: skip
+
+    def _noise(self) -> dict[str, Any]:
+        if self.fit is None:
+            scatter = self.e.scatter / KU
+            return {"model": "white, K_n weighted by their range", "scatter of the best K_n / (°/h/mA)": scatter}
+        est = self.fit.est.noise
+        return {
+            "model": "white, Gauss-Markov and reading errors, estimated from the windows",
+            "white density / (°/h/√Hz)": est.density[0] / DPH,
+            "Gauss-Markov rms / (°/h)": est.sigma[0] / DPH,
+            "reading error, standard deviation / ″": est.sigma_reading[0] / units.factor("arcsec"),
+        }
+
+    def _budget(self) -> list[BudgetLine]:
+        if self.e.reported:
+            return budget_lines(self.e.reported, self.sources, RANDOM)
+        a, size = self.e.numbers[0][1] / KU, self.e.numbers[0][0] / KU
+        note = "type A, with the linearity error in it"
+        scatter = BudgetLine(TYPE_A, "scatter of the K_n", a, UNIT, 1.0, "1", a, UNIT, "K", note)
+        known = [(source, source.size(self.setup)) for source in (AMMETER, TIME_BASE)]
+        return [scatter, *(
+            BudgetLine(source.id, source.name, u, "1", size, UNIT, size * u, UNIT, "K", source.note)
+            for source, u in known if u > 0.0
+        )]  # fmt: skip
+
+    def _reasons(self) -> list[Reason]:
+        found = []
+        if np.all(self.half == 0.0):
+            found.append(Reason("rows.computed", COMPUTED))
+        if "range_plus" not in self.rows:
+            found.append(Reason("rows.no_ranges", NO_RANGES))
+        if self.fit is None:
+            against, said = row_checks.contradictions(self.i, self.marked, self.half, self.theta)
+            found += [Reason("torquer.asymmetry", text) for text in said]
+            found += [Reason("rows.contradict", text, ("pass", "fail"), severity="doubt") for text in against]
+        return found
+
+    def _tables(self) -> list[Table]:
+        i, mean, reported, fit = self.i, self.book.numbers[0][0], self.e.reported, self.fit
+        printed = round(mean / KU, 3)
+        off, off_printed = (self.marked - mean) / mean, (self.marked / KU - printed) / printed
+        columns = (i / MA, self.plus / DPH, self.minus / DPH, self.marked / KU, off * 100.0, off_printed * 100.0,
+                   self.half / DPH)  # fmt: skip
+        caption = f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA"
+        head = ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
+                "linearity, K rounded / %", "drift / (°/h)"]  # fmt: skip
+        rows = np.column_stack(columns).tolist()
+        found = [Table("torquer.rows", "Scale factor and linearity", caption, head, rows)]
+        if reported is not None:
+            shifts = simulated_table(reported, self.sources, self.setup.errors)
+            found = [*correction_table(reported), *shifts, *found]
+        if fit is not None:
+            u = fit.est.u[: 2 * i.size].reshape(2, -1)
+            head = ["current / mA", "K_n / (°/h/mA)", "u / (°/h/mA)", "drift / (°/h)", "u / (°/h)"]
+            caption = "Fit to all windows together; drift: at the middle of the angles of all currents"
+            rows = np.column_stack([i / MA, fit.K / KU, u[0] / KU, fit.drift / DPH, u[1] / DPH]).tolist()
+            found.append(Table("torquer.windows", "Scale factors from the windows", caption, head, rows))
+        return found
 
 
-def _table(i: Array, plus: Array, minus: Array, K_n: Array, half: Array, mean: float) -> dict[str, Any]:
-    printed = round(mean / KU, 3)
-    rows = [
-        [float(i[k] / MA), float(plus[k] / DPH), float(minus[k] / DPH), float(K_n[k] / KU),
-         float((K_n[k] - mean) / mean * 100.0), float((K_n[k] / KU - printed) / printed * 100.0), float(half[k] / DPH)]
-        for k in range(i.size)
-    ]  # fmt: skip
-    return {
-        "title": "Scale factor and linearity",
-        "caption": f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA",
-        "columns": ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
-                    "linearity, K rounded / %", "drift / (°/h)"],
-        "rows": rows,
-    }  # fmt: skip
+reduce = Reduction.reduce
 
 
 def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float] | None:
-    """What a simulated torquer k i (1 + k2 i + k3 i2) makes of the reported values; k2 is even and goes into the half
-    difference.  The drift has no one value: it changes with the range.
+    """Return what a simulated torquer k i (1 + k2 i + k3 i2) makes of the reported values.
+
+    k2 is even and goes into the half difference.  The drift has no one value: it changes with the range.
     """
     if "gyro.k" not in parameters:
         return None
@@ -314,33 +272,3 @@ def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float]
         "K": k / KU * (1.0 + cubic * float(np.mean((currents / currents.max()) ** 2))),
     }
     return truth | ({"K_LS": k / KU} if k3 == 0.0 else {})
-
-
-@handling_errors.examined(handling_candidates.table_of_rates)
-def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-    """:func:`reduce` of a record: of a run (windows of the servo phases), or of measured data (one row per current)."""
-    options, measured = record.run.options, record.run.measured
-    plan = record.run.plan
-    rows = record.windows if measured else marks.rows(record.windows, plan)
-    truth, found = None, None
-    corrections = str(options.get("corrections", ""))
-    if measured and corrections.strip():
-        raise ReductionError("corrections: a table of rates has no angles to correct; correct its currents and rates")
-    if not measured and not problems(rows):
-        sizes = Sizes(**run_metadata.sizes(options, [f.name for f in fields(Sizes)]))
-        site = run_metadata.Site.of(record.run)
-        found = precession(
-            record.windows, marks.senses(plan), np.asarray(rows["current"]), sizes, corrections, site.earth_rate
-        )
-        truth = truth_of(record.run.parameters, np.asarray(rows["current"]))
-    setup = TorquerSetup(
-        u_current=float(options.get("u_current", 0.0)),
-        u_time=float(options.get("u_time", 0.0)),
-        errors=simulated_errors(record.run),
-        specification=specification,
-        instrument=record.run.instrument,
-        simulated=truth is not None,
-        truth=truth,
-        site={} if measured else run_metadata.Site.of(record.run).shown(),
-    )
-    return run_metadata.finish(reduce(rows, setup, found), record)

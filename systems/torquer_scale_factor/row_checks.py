@@ -7,15 +7,66 @@ what comes out against what a torquer can be.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.uncertainty import p_text
+from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.units import DPH
 
 LEVEL = 1e-3  # probability that a clean table is contradicted by chance, of each kind
 LARGEST = 0.2  # departure of a K_n from the others, of a torquer
+MA = 1e-3  # A
 ASYMMETRY = 0.05  # (k+ - k-)/(k+ + k-), of a torquer
+
+
+def problems(rows: Mapping[str, Array]) -> list[str]:
+    """Return what is wrong with the rows current (A), rate_plus, rate_minus (rad/s), range_plus, range_minus (rad,
+    optional).
+    """
+    need = ("current", "rate_plus", "rate_minus")
+    missing = [n for n in need if n not in rows]
+    if missing:
+        text = f"column {', '.join(missing)} is missing; each current needs current, rate_plus and rate_minus"
+        if {"rate_plus", "rate_minus"} & set(missing):
+            text += ": one sense alone cannot tell scale factor from drift"
+        return [text]
+    found = []
+    columns = [n for n in (*need, "range_plus", "range_minus") if n in rows]
+    data = {n: np.asarray(rows[n], dtype=float) for n in columns}
+    if len({v.size for v in data.values()}) > 1:
+        return ["columns of different length"]
+    for n, v in data.items():
+        for k in np.flatnonzero(~np.isfinite(v)):
+            found.append(f"row {k + 1}: {n} is no finite number" + (" (both senses are needed)" if "rate" in n else ""))
+    if found:
+        return found
+    i = data["current"]
+    for k in np.flatnonzero(i <= 0.0):
+        found.append(f"row {k + 1}: current {i[k] / MA:g} mA: give the magnitude, larger than zero")
+    for n in ("rate_plus", "rate_minus"):
+        for k in np.flatnonzero(data[n] <= 0.0):
+            found.append(
+                f"row {k + 1}: {n} = {data[n][k] / DPH:g} °/h: give magnitudes; a rate of the wrong sense is a drift "
+                "larger than the precession or crossed wires"
+            )
+    if ("range_plus" in data) != ("range_minus" in data):
+        found.append("range_plus and range_minus belong together: the angle range of each sense")
+    elif "range_plus" in data:
+        a, b = data["range_plus"], data["range_minus"]
+        for k in np.flatnonzero((np.abs(a - b) > 0.01 * np.maximum(np.abs(a), np.abs(b))) | (a <= 0.0) | (b <= 0.0)):
+            found.append(
+                f"row {k + 1}: ranges {math.degrees(a[k]):g}° and {math.degrees(b[k]):g}°: both senses need the same "
+                "angle range, or the drift does not cancel"
+            )
+    if i.size < 3:
+        found.append(f"{i.size} currents: at least 3 are needed for a linearity")
+    elif np.unique(i).size < i.size:
+        found.append("the same current twice: average repeated measurements first")
+    return found
 
 
 def contradictions(i: Array, K_n: Array, half: Array, theta: Array) -> tuple[list[str], list[str]]:
@@ -46,7 +97,9 @@ def _far(K_n: Array) -> list[str]:
 
 
 def _departing(i: Array, K_n: Array, theta: Array) -> list[str]:
-    """Rows outside the noise of the others about the cubic torquer: t of the row left out, over the number of rows."""
+    """Return rows outside the noise of the others about the cubic torquer: t of the row left out, over the number of
+    rows.
+    """
     n = i.size
     X, w = np.column_stack([np.ones(n), (i / i.max()) ** 2]), theta / theta.max()
     if n < 5:

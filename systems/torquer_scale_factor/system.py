@@ -70,11 +70,11 @@ class TorquerScaleFactor(TableTest):
     channel_period = 1.0
 
     def currents(self) -> list[float]:
-        """Magnitudes, A; raises ValueError for what is no list of numbers."""
+        """Return the magnitudes, A; raises ValueError for what is no list of numbers."""
         return [float(x) * 1e-3 for x in self["currents"].replace(",", " ").split()]
 
     def plan(self) -> Plan:
-        """Capture without current; then each current in both senses, back over the same angles."""
+        """Return capture without current; then each current in both senses, back over the same angles."""
         try:
             currents = self.currents()
         except ValueError:

@@ -18,18 +18,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
-from gyrobench.arrays import Array
-from gyrobench.frames import G0, tumble_faces
-from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.frames import G0
 
 
 def formulas(
     one: Mapping[str, float], two: Mapping[str, float], y3: float, y4: float, latitude: float, gravity: float
 ) -> dict[str, float]:
-    """Nine coefficients from the amplitudes A0 A1 B1 A2 B2 of both mounts and the two dwells (unit of the data)."""
+    """Return nine coefficients from the amplitudes A0 A1 B1 A2 B2 of both mounts and the two dwells (unit of the
+    data).
+    """
     g, c, s2 = gravity / G0, math.cos(latitude), math.sin(2.0 * latitude)
     mean, second, dwell = one["A0"] + two["A0"], one["A2"] + two["A2"], y3 + y4
     return {
@@ -43,41 +40,3 @@ def formulas(
         "D_OS": (one["A1"] + two["A1"]) / (g * g * s2),
         "D_IS": (one["B2"] - two["B2"]) / (g * g * c * c),
     }
-
-
-def role(face: Array, latitude: float) -> str | None:
-    """``mount 1``, ``mount 2``, ``static 3`` or ``static 4`` if ``face`` is that attitude to 1e-6, else None."""
-    for name, ideal in tumble_faces(latitude).items():
-        if np.allclose(face, ideal, atol=1e-6):
-            return name
-    return None
-
-
-def reduce(
-    phase: Array, start: Array, end: Array, length: Array, y: Array, faces: Mapping[int, Array],
-    latitude: float, gravity: float,
-) -> tuple[dict[str, float], dict[str, Fit], str]:  # fmt: skip
-    """Coefficients by :func:`formulas`, the harmonic fits of the mounts, and why not ("" when all is well).
-
-    phase, start, end (rad), length (s), y (n,): one entry for each window.
-    """
-    roles = {p: role(faces[p], latitude) for p in faces}
-    if None in roles.values():
-        odd = ", ".join(str(p) for p, r in roles.items() if r is None)
-        return {}, {}, f"phase {odd} is not one of the four attitudes of Hu 1981: least squares only"
-    fits: dict[str, Fit] = {}
-    dwells: dict[str, float] = {}
-    for name in ("mount 1", "mount 2", "static 3", "static 4"):
-        mine = [p for p, r in roles.items() if r == name]
-        rows = np.isin(phase, mine)
-        if name.startswith("static"):
-            dwells[name] = float(np.average(y[rows], weights=length[rows]))
-            continue
-        for p in mine:
-            here = phase == p
-            if harmonic.whole_turns(start[here], end[here]) is None:
-                turned = math.degrees(float(np.sum(np.abs(end[here] - start[here]))))
-                return {}, {}, f"phase {p} covers {turned:.4g} deg, no whole turns without gap: least squares only"
-        fits[name] = harmonic.fit(-start[rows], -end[rows], y[rows])
-    one, two = (dict(zip(fits[m].names, fits[m].beta.tolist(), strict=True)) for m in ("mount 1", "mount 2"))
-    return formulas(one, two, dwells["static 3"], dwells["static 4"], latitude, gravity), fits, ""

@@ -15,13 +15,12 @@ from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.visit_protocol import GUARD, gyro_noise, gyro_unseen
 from gyrobench.frames import EARTH_RATE
 from gyrobench.record.record import Record
-from gyrobench.reduction.drift.window_regressors import Turning
+from gyrobench.reduction.drift.window_regressors import Turning, regressors
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
-from . import budget
-from .setup import TumbleSetup, setup_of
+from .reduction import Reduction, TumbleSetup
 
 TURN = 2.0 * math.pi
 TURNS = (1, 2, 4)
@@ -34,7 +33,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
 
     Faster turning costs no time and lifts the signal above slow drift; the rate is kept below 60 Earth rates.
     """
-    setup, p = setup_of(record.run), record.run.parameters
+    setup, p = Reduction.setup_of(record.run), record.run.parameters
     share = float(system["dwell"] * system["rate"] / (TURN * system["turns"]))
     own = (int(system["turns"]), share)
     each = [own, *((n, s) for n in TURNS for s in SHARES if (n, s) != own)]
@@ -83,4 +82,5 @@ def _windows(system: System, setup: TumbleSetup, turns: int, share: float, lengt
         t, angle = t + width * count, angle + step * count
     start, end, before, after = (np.concatenate(x) for x in (t0, t1, a0, a1))
     turned = Turning(before, after, start, end, np.array(faces))
-    return budget.design(setup, turned, drift.terms(9 if setup.terms == 10 else setup.terms)), start, end
+    names = drift.terms(9 if setup.terms == 10 else setup.terms)
+    return regressors(turned, setup.base, setup.gravity, names), start, end

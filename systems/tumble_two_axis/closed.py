@@ -24,7 +24,7 @@ TIES = (
 
 
 def columns(theta: Array, m: int, n: int) -> Array:
-    """1, cos f_j theta, sin f_j theta ... (k, 25)."""
+    """Return 1, cos f_j theta, sin f_j theta ... (k, 25)."""
     blocks = [np.ones_like(theta)]
     for f in frequencies(m, n):
         blocks += [np.cos(f * theta), np.sin(f * theta)]
@@ -32,13 +32,15 @@ def columns(theta: Array, m: int, n: int) -> Array:
 
 
 def amplitudes(theta: Array, y: Array, m: int, n: int) -> tuple[Array, Array]:
-    """A_0..A_12 and B_0..B_12 (B_0 = 0) of the means y of positions theta; equally spaced, one or more cycles."""
+    """Return A_0..A_12 and B_0..B_12 (B_0 = 0) of the means y of positions theta; equally spaced, one or more
+    cycles.
+    """
     v = np.linalg.lstsq(columns(theta, m, n), y, rcond=None)[0]
     return np.concatenate([v[:1], v[1::2]]), np.concatenate([[0.0], v[2::2]])
 
 
 def expected(D: dict[str, float], latitude: float, gravity: float) -> tuple[Array, Array]:
-    """The amplitudes that a gyro with coefficients D (per g0) has."""
+    """Return the amplitudes that a gyro with coefficients D (per g0) has."""
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
     x, y, z = D["D_I"] * g, D["D_O"] * g, D["D_S"] * g
     xx, zz, xy, yz, xz = (D[n] * g * g for n in ("D_II", "D_SS", "D_IO", "D_OS", "D_IS"))
@@ -56,7 +58,7 @@ def expected(D: dict[str, float], latitude: float, gravity: float) -> tuple[Arra
 
 
 def separate(A: Array, B: Array, latitude: float, gravity: float) -> dict[str, float]:
-    """Nine coefficients, per g0, from the amplitudes."""
+    """Return nine coefficients, per g0, from the amplitudes."""
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
     gg = g * g
     return {

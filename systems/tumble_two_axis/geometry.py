@@ -26,14 +26,14 @@ LIMIT = 1e3  # of the condition
 
 
 def base(latitude: float) -> Array:
-    """Table axes at angles 0 in ENU, rows: outer axis p, inner axis (0, -sin phi, cos phi), east."""
+    """Return table axes at angles 0 in ENU, rows: outer axis p, inner axis (0, -sin phi, cos phi), east."""
     p = frames.pole(latitude)
     inner = np.array([0.0, -p[2], p[1]])
     return np.array([p, inner, np.cross(p, inner)])
 
 
 def _turned(axis: int, angle: Array) -> Array:
-    """Passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
+    """Return passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
     j, m = (axis + 1) % 3, (axis + 2) % 3
     R = np.zeros((angle.size, 3, 3))
     R[:, axis, axis] = 1.0
@@ -44,7 +44,9 @@ def _turned(axis: int, angle: Array) -> Array:
 
 
 def _wobble(axis: int, angle: Array, size: float, phase: float) -> Array:
-    """Rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part table_two_axis."""
+    """Return rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part
+    table_two_axis.
+    """
     a = 2.0 * angle + phase
     return _turned((axis + 2) % 3, size * np.sin(a)) @ _turned((axis + 1) % 3, size * np.cos(a))
 
@@ -53,7 +55,7 @@ def attitude(
     latitude: float, outer: Array, inner: Array, squareness: float = 0.0,
     wobble: tuple[float, float] = (0.0, 0.0), phase: float = 0.0,
 ) -> Array:  # fmt: skip
-    """Gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]
+    """Return gyro axes I, O, S (rows) in ENU at table angles (k,): (k, 3, 3).  [SERVO2-A]
 
     wobble: of the outer and the inner axis, twice a turn, at this phase at angle 0.
     """
@@ -65,18 +67,18 @@ def attitude(
 
 
 def frequencies(m: int, n: int) -> list[int]:
-    """The twelve signed frequencies of the drift over theta.  [eq. 3-50, 3-51]"""
+    """Return the twelve signed frequencies of the drift over theta.  [eq. 3-50, 3-51]"""
     return [m - 2 * n, m - n, n, 2 * (m - n), m, 2 * n, 2 * m - n, m + n, 2 * m, m + 2 * n, 2 * m + n, 2 * (m + n)]
 
 
 def design(latitude: float, m: int, n: int, positions: int) -> Array:
-    """Nine regressors at equally spaced positions, gamma = 1."""
+    """Return nine regressors at equally spaced positions, gamma = 1."""
     theta = np.arange(positions) * 2.0 * math.pi / positions
     return drift.regressors(-attitude(latitude, m * theta, n * theta) @ frames.U, NAMES)
 
 
 def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[str]:
-    """Why the harmonic route cannot be had, as sentences."""
+    """Return why the harmonic route cannot be had, as sentences."""
     found = []
     f = frequencies(m, n)
     size = [abs(v) for v in f]
@@ -97,22 +99,18 @@ def harmonic_problems(latitude: float, m: int, n: int, positions: int) -> list[s
 
 
 def visit_problems(latitude: float, outer: Array, inner: Array) -> list[str]:
-    """Why positions at these angles (k,) cannot give nine coefficients, as sentences."""
+    """Return why positions at these angles (k,) cannot give nine coefficients, as sentences."""
     if found := frames.latitude_problems(latitude):
         return found
     X = drift.regressors(-attitude(latitude, outer, inner) @ frames.U, NAMES)
     if len(X) < len(NAMES):
         return [f"visits: {len(X)} positions for {len(NAMES)} coefficients: at least {len(NAMES)} different ones"]
     seen = regression.examine(X, NAMES)
-    if seen.rank < len(NAMES):
-        return [f"visits: rank {seen.rank} of {len(NAMES)}, not estimable: {'; '.join(seen.lost)}"]
-    if seen.condition > LIMIT:
-        return [f"visits: condition {seen.condition:.3g}, least determined is {seen.weakest}"]
-    return []
+    return [f"visits: {seen.weakness}"] if seen.condition > LIMIT else []
 
 
 def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
-    """Why these positions cannot give nine coefficients, as sentences."""
+    """Return why these positions cannot give nine coefficients, as sentences."""
     if found := frames.latitude_problems(latitude):
         return found
     if min(m, n) < 1:
@@ -127,10 +125,16 @@ def refusals(latitude: float, m: int, n: int, positions: int) -> list[str]:
         return found
     where = f"latitude {math.degrees(latitude):.4g}°, ratio {m}:{n}, {positions} positions"
     seen = regression.examine(design(latitude, m, n, max(positions, 9)), NAMES)
-    if seen.rank < len(NAMES):
-        found.append(f"{where}: rank {seen.rank} of {len(NAMES)}, not seen: {'; '.join(seen.lost)}")
-    elif seen.condition > LIMIT or polar:
-        found.append(f"{where}: condition {seen.condition:.3g}, hardly seen is {seen.weakest}")
+    if seen.condition > LIMIT or polar:
+        found.append(f"{where}: {seen.weakness}")
     if polar:
         found.append("only latitudes up to 85° north or south are possible")
     return found
+
+
+def cautions(latitude: float, m: int, n: int, positions: int) -> list[str]:
+    """Return what to expect of positions that are allowed but weak."""
+    if refusals(latitude, m, n, positions):
+        return []
+    seen = regression.examine(design(latitude, m, n, positions), NAMES)
+    return [f"{seen.weakness[:1].upper()}{seen.weakness[1:]}."] if seen.condition > 100.0 else []

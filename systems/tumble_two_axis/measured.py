@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -33,7 +33,7 @@ phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],
 """
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if not c.name.startswith("angle")),
-    *(Column(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
+    *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
 )
 NEEDED = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))

@@ -68,8 +68,9 @@ class TumbleTwoAxis(RebalanceTest):
         | FOLD
         | NUISANCES
         | CORRECTIONS
-        | type_b("square", "mount", "angle1", "angle2", "wobble", "scale_factor", "nonlinearity", "current", "pulse",
-                 "switching", axis="standard uncertainty of the outer axis against the pole")
+        | type_b("square", "mount", "angle1", "angle2", "wobble",
+                 axis="standard uncertainty of the outer axis against the pole")
+        | type_b("scale_factor", "nonlinearity", "current", "pulse", "switching")
         | TORQUER
     )  # fmt: skip
     measured_data = MEASURED
@@ -91,7 +92,7 @@ class TumbleTwoAxis(RebalanceTest):
         return {**super().field_axes(), "surroundings.inner": 1}
 
     def plan(self) -> Plan:
-        """The positions in order, every one with both angles; angles are counted on through the turns.
+        """Return the positions in order, every one with both angles; angles are counted on through the turns.
 
         Of visits, in their order; each axis takes the shorter way.
         """
@@ -143,11 +144,8 @@ class TumbleTwoAxis(RebalanceTest):
         return geometry.visit_problems(self["latitude"], angles[:, 0], angles[:, 1])
 
     def warnings(self) -> list[str]:
-        from .reduction import cautions
-
-        if self["visits"]:
-            return []
-        return cautions(self["latitude"], self["m"], self["n"], self["positions"])
+        values = (self["latitude"], self["m"], self["n"], self["positions"])
+        return [] if self["visits"] else geometry.cautions(*values)
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)

@@ -18,12 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
-from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.estimation.regression import Fit
 
 Amplitudes = Mapping[str, float]
 #: symbol of Hu 1981 -> coefficient of the bench and its sign
@@ -33,27 +28,24 @@ BOOK = {
 }  # fmt: skip
 
 
-def simple(
-    x1: Amplitudes, x2: Amplitudes, y1: Amplitudes, y2: Amplitudes, latitude: float, gravity: float
-) -> dict[str, float]:
-    """R, u, Q of Hu 1981, per g0, from amplitudes of k_x i_x (x1, x2) and k_y i_y (y1, y2) in mounts 1 and 2."""
+def simple(channel: str, one: Amplitudes, two: Amplitudes, latitude: float, gravity: float) -> dict[str, float]:
+    """Return R, u, Q of Hu 1981, per g0, of a channel from the amplitudes of its torquer rate in mounts 1 and 2.
+
+    The torquer rate of the y channel is k_x i_x, that of the x channel k_y i_y.
+    """
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
-    return {
-        "R_x": -(x1["A0"] + x2["A0"]) / 2.0,
-        "u_y": (x1["A0"] - x2["A0"]) / (2.0 * g * s),
-        "u_zx": (x1["B1"] - x2["B1"]) / (2.0 * g * c),
-        "Q_x": (x1["B1"] + x2["B1"]) / (g * g * s2),
-        "R_y": (y1["A0"] + y2["A0"]) / 2.0,
-        "u_x": (y1["A0"] - y2["A0"]) / (2.0 * g * s),
-        "u_zy": (y1["A1"] + y2["A1"]) / (2.0 * g * c),
-        "Q_y": (y2["A1"] - y1["A1"]) / (g * g * s2),
-    }
+    mean, half = (one["A0"] + two["A0"]) / 2.0, (one["A0"] - two["A0"]) / (2.0 * g * s)
+    if channel == "y":
+        along, cross = (one["B1"] - two["B1"]) / (2.0 * g * c), (one["B1"] + two["B1"]) / (g * g * s2)
+        return {"R_x": -mean, "u_y": half, "u_zx": along, "Q_x": cross}
+    along, cross = (one["A1"] + two["A1"]) / (2.0 * g * c), (two["A1"] - one["A1"]) / (g * g * s2)
+    return {"R_y": mean, "u_x": half, "u_zy": along, "Q_y": cross}
 
 
 def nine(
     channel: str, one: Amplitudes, two: Amplitudes, y3: float, y4: float, latitude: float, gravity: float
 ) -> dict[str, float]:
-    """Nine coefficients of a channel from the amplitudes of its drift in mounts 1 and 2 and the dwells."""
+    """Return nine coefficients of a channel from the amplitudes of its drift in mounts 1 and 2 and the dwells."""
     g, c, s, s2 = gravity / G0, math.cos(latitude), math.sin(latitude), math.sin(2.0 * latitude)
     mean, second, dwell = one["A0"] + two["A0"], one["A2"] + two["A2"], y3 + y4
     d = f"D{channel}_"
@@ -74,27 +66,3 @@ def nine(
         out[d + "yy"] = second / (g * g * c * c)
         out[d + "zz"] = (mean - second - dwell) / (2.0 * g * g * s * s) + 4.0 * second / (g * g * s2 * s2)
     return out
-
-
-def amplitudes(
-    phase: Array, start: Array, end: Array, y: Array, roles: Mapping[int, str], order: int = 2
-) -> tuple[dict[str, Fit], str]:
-    """Harmonics of ``y`` (n,) over theta for both mounts, and why not ("" when all is well).
-
-    phase, start, end (rad): one entry for each window.  roles: phase -> mount 1, mount 2 (others are left out).
-    """
-    fits = {}
-    for mount in ("mount 1", "mount 2"):
-        mine = [p for p, r in roles.items() if r == mount]
-        for p in mine:
-            here = phase == p
-            if harmonic.whole_turns(start[here], end[here]) is None:
-                turned = math.degrees(float(np.sum(np.abs(end[here] - start[here]))))
-                return {}, f"phase {p} covers {turned:.4g}°, no whole turns without gap; least squares only"
-        rows = np.isin(phase, mine)
-        fits[mount] = harmonic.fit(-start[rows], -end[rows], y[rows], order)
-    return fits, ""
-
-
-def named(fit: Fit) -> dict[str, float]:
-    return dict(zip(fit.names, fit.beta.tolist(), strict=True))

@@ -28,18 +28,16 @@ AXIS = {"x": 0, "y": 1}
 #: of the simple model, in the order of the R, u, u_z, Q of Hu 1981
 SIMPLE = {"x": ("Dx_0", "Dx_x", "Dx_z", "Dx_xz"), "y": ("Dy_0", "Dy_y", "Dy_z", "Dy_yz")}
 
-
-#: channel -> the square that cannot be told from the others at constant |g|, and the three that take it up
-FOLD = {channel: (square, drift.FOLDED[square]) for channel, square in (("x", "Dx_yy"), ("y", "Dy_xx"))}
+SQUARES = {"x": "Dx_yy", "y": "Dy_xx"}  # of each channel, what cannot be told from the others at constant |g|
 
 
 def terms(model: str, channel: str) -> tuple[str, ...]:
-    """Coefficient names of a channel (x, y) in a model (simple, nine)."""
+    """Return the coefficient names of a channel (x, y) in a model (simple, nine)."""
     return SIMPLE[channel] if model == "simple" else drift.terms_2dof(channel, 9)
 
 
 def faces(model: str, latitude: float) -> dict[str, Array]:
-    """Mounts by name, rows x, y, z in table axes at angle 0."""
+    """Return the mounts by name, rows x, y, z in table axes at angle 0."""
     x, y, z = np.eye(3)
     if model == "simple":
         return {"mount 1": np.array([y, -x, z]), "mount 2": np.array([y, x, -z])}
@@ -53,7 +51,7 @@ def faces(model: str, latitude: float) -> dict[str, Array]:
 
 
 def design(model: str, channel: str, latitude: float, points: int = 36) -> Array:
-    """Regressors of a channel in ``points`` attitudes a mount and both dwells, gamma = 1."""
+    """Return the regressors of a channel in ``points`` attitudes a mount and both dwells, gamma = 1."""
     base, rows = frames.polar_base(latitude), []
     for name, face in faces(model, latitude).items():
         turn = np.arange(points) * 2.0 * math.pi / points if name.startswith("mount") else [0.0]
@@ -62,26 +60,21 @@ def design(model: str, channel: str, latitude: float, points: int = 36) -> Array
 
 
 def refusals(latitude: float, model: str) -> list[str]:
-    """Why a test at ``latitude`` (rad) cannot give the coefficients of ``model``, as sentences; [TUM2B-SING]."""
+    """Return why a test at ``latitude`` (rad) cannot give the coefficients of ``model``, as sentences; [TUM2B-SING]."""
     if model not in MODELS:
         return [f"model = {model}: no such model; there are {' and '.join(MODELS)}"]
     if problems := frames.latitude_problems(latitude):
         return problems
     if 10.0 <= round(abs(math.degrees(latitude)), 9) <= 80.0:
         return []
-    lost, seen = [], []
-    for channel in "xy":
-        found = regression.examine(design(model, channel, latitude), terms(model, channel))
-        if found.rank < len(found.names):
-            text = f"rank {found.rank} of {len(found.names)}, the record does not see {'; '.join(found.lost)}"
-            lost.append(f"{channel} channel: {text}")
-        seen.append(f"{channel} channel: condition {found.condition:.3g}, hardly seen is {found.weakest}")
-    where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
-    return [where + "; ".join(lost or seen)]
+    seen = {c: regression.examine(design(model, c, latitude), terms(model, c)) for c in "xy"}
+    short = any(found.short for found in seen.values())
+    words = [f"{c} channel: {found.weakness}" for c, found in seen.items() if found.short or not short]
+    return [f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): {'; '.join(words)}"]
 
 
 def cautions(latitude: float) -> list[str]:
-    """What to expect outside 20 to 70 degrees."""
+    """Return what to expect outside 20 to 70 degrees."""
     size = abs(math.degrees(latitude))
     if 20.0 <= round(size, 9) <= 70.0:
         return []

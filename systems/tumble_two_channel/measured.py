@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, Column
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.families.tumble_test import attitudes
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
@@ -43,10 +43,10 @@ phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean_x [mA],mean_y
 """
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if c.name not in ("mean", "std")),
-    Column("mean_x", "A", "mean current of the torquer about x"),
-    Column("mean_y", "A", "mean current of the torquer about y"),
-    Column("std_x", "A", "standard deviation of the samples of mean_x", required=False),
-    Column("std_y", "A", "standard deviation of the samples of mean_y", required=False),
+    CsvColumn("mean_x", "A", "mean current of the torquer about x"),
+    CsvColumn("mean_y", "A", "mean current of the torquer about y"),
+    CsvColumn("std_x", "A", "standard deviation of the samples of mean_x", required=False),
+    CsvColumn("std_y", "A", "standard deviation of the samples of mean_y", required=False),
 )
 NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/mA"}
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, columns=COLUMNS))

@@ -46,10 +46,8 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         }
         | NUISANCES
         | CORRECTIONS
-        | type_b(
-            "axis", "mount", "remount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current",
-            "pulse", "switching",
-        )
+        | type_b("axis", "mount", "remount", "wobble", "angle1", "angle2")
+        | type_b("scale_factor", "nonlinearity", "current", "pulse", "switching")
         | {
             f"k_{a}": Option(0.0, "rad/s/A", f"scale factor of the torquer about {a}; 0: that of the gyro", 0.0)
             for a in "xy"

@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.frames import G0
-from gyrobench.system.families.loop_test import FLOWN, LoopTest
+from gyrobench.system.families.loop_test import FLOWN, LoopTest, by_phase
+from gyrobench.system.families.option_groups import MOVING
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot
+from gyrobench.units import DEG, G0
 
-DEG = math.pi / 180.0
 PHASES = ("erection", "rest", "acceleration", "turn", "loop", "roll")
 LAWS = ("switches", "linear")
 PITCH_RATE, ROLL_RATE = 36.0 * DEG, 60.0 * DEG  # of the loop and the roll
@@ -55,8 +54,7 @@ class VerticalGyroBench(LoopTest):
         "turn": Option("3deg/s", "rad/s", "rate of the turn"),
         "speed": Option(50.0, "m/s", "speed in the turn", 0.0, sets="motion.speed"),
         "time": Option(60.0, "s", "length of erection, rest, acceleration and turn, and of the wait before each"),
-        "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
-        "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
+        **MOVING,
     }
     noises = ("gyro.white", "gyro.white_y")
     step = 1e-2
@@ -65,39 +63,25 @@ class VerticalGyroBench(LoopTest):
         "gyro.e_x", "gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
     )  # fmt: skip
     shown = (
-        "motion.angle",
-        "gyro.pitch gyro.roll",
-        "gyro.e_x gyro.e_y",
-        "gyro.inner",
-        "gyro.ring_angle",
-        "erection.cut",
-    )
+        "motion.angle", "gyro.pitch gyro.roll", "gyro.e_x gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
+    )  # fmt: skip
     channel_period = 0.1
 
-    def flown(self) -> list[str]:
-        return [str(p) for p in self["phases"].replace(",", " ").split()]
-
     def phases(self) -> list[LoopPhase]:
-        """The phases asked for; before each manoeuvre the vehicle rests for as long (the erection needs no wait)."""
+        """Return the phases asked for; before each manoeuvre (not the erection) the vehicle rests for as long."""
         wait = self["time"]
         lengths = {"loop": 2.0 * math.pi / PITCH_RATE, "roll": 2.0 * math.pi / ROLL_RATE}
         return [
             LoopPhase(p, settle=0.0 if p in ("erection", "rest") else wait, dwell=lengths.get(p, wait))
-            for p in self.flown()
+            for p in self.asked()
         ]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        table: dict[str, list[float]] = {n: [0.0] * LIMIT for n in ("forward", "turn", "pitch", "roll")}
         rows = {
-            "acceleration": ("forward", self["acceleration"]),
-            "turn": ("turn", self["turn"]),
-            "loop": ("pitch", PITCH_RATE),
-            "roll": ("roll", ROLL_RATE),
-        }
-        for k, p in enumerate(self.flown()):
-            if p in rows and k < LIMIT:
-                name, value = rows[p]
-                table[name][k] = value
+            "acceleration": {"forward": self["acceleration"]}, "turn": {"turn": self["turn"]},
+            "loop": {"pitch": PITCH_RATE}, "roll": {"roll": ROLL_RATE},
+        }  # fmt: skip
+        table = by_phase(self.asked(), ("forward", "turn", "pitch", "roll"), rows)
         return {
             **{f"motion.{n}": x for n, x in table.items()},
             "gyro.tilt": [self["tilt"], 0.0],
@@ -106,13 +90,12 @@ class VerticalGyroBench(LoopTest):
         }
 
     def check(self) -> list[str]:
-        problems = [f"phases: '{p}' is none of {', '.join(PHASES)}" for p in self.flown() if p not in PHASES]
-        problems += self.no_choice(law=LAWS) + self.not_positive("rate", "gain", "time")
+        problems = self.not_offered(PHASES) + self.no_choice(law=LAWS) + self.not_positive("rate", "gain", "time")
         if self["tilt"] > 60.0 * DEG and self["fast_time"] == 0.0:
             problems.append(
                 f"tilt = {self['tilt'] / DEG:.3g}°: beyond 60° the switches are of no use; give a fast start, fast_time"
             )
-        if not self["ring"] and "loop" in self.flown():
+        if not self["ring"] and "loop" in self.asked():
             problems.append(
                 "ring = 0: without the follow-up ring the gimbals lock in the loop, at 90° of pitch; take ring=1, or "
                 "phases without loop"

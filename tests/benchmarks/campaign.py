@@ -1,6 +1,6 @@
 """Throughput of a campaign against a bare loop, in one go: runs a second, share of cores times one core, memory.
 
-    python tests/benchmarks/campaign.py [--runs 10000] [--workers 2] [--rounds 5]
+    python tests/benchmarks/campaign.py [--runs 10000] [--workers 2] [--rounds 5] [--write]
 
 A run is a tumble on a short plan, some 50 ms with its reduction.  Bare: processes that do nothing but Session.run and
 reduce, one alone and one for each worker at a time (what the machine gives several processes is no matter of the
@@ -20,6 +20,8 @@ import threading
 import time
 from pathlib import Path
 from typing import Any
+
+import quoted
 
 SYSTEM = "tumble_single_axis"
 VALUES = {"rate": 0.3, "windows": 24, "dwell": 5.0, "settle": 1.0}
@@ -86,7 +88,7 @@ class Memory:
 def campaign(runs: int, workers: int) -> tuple[float, float]:
     """Seconds of the whole, runs a second from the first row to the last."""
     import gyrobench as gb
-    from gyrobench.campaign.store import Campaign
+    from gyrobench.campaign.execution.store import Campaign
 
     rows = [{**VALUES, "latitude": 0.5 + 1e-4 * k, "seed": k} for k in range(runs)]
     asked = {"system": SYSTEM, "table": rows, "check_step": False, "keep": "none"}
@@ -109,6 +111,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=10000)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--write", action="store_true", help="write the share into docs/figures.toml")
     given = parser.parse_args()
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # as dask sets them for its workers
         os.environ[threads] = "1"
@@ -131,6 +134,10 @@ def main() -> None:
     print(f"campaign over {given.workers} bare processes  {statistics.median(shares):8.2f}   (rounds: {rounds})")
     print(f"campaign over {given.workers} x one process   {c / (given.workers * a):8.2f}")
     print(f"memory of all processes        {memory.largest / 1e6:8.0f} MB")
+    if given.write:
+        words = ("tests/benchmarks/campaign.py", f"--runs {given.runs}", f"--rounds {given.rounds}")
+        unit = f"runs a second of a campaign over those of {given.workers} bare processes"
+        quoted.record("campaign.efficiency", f"{statistics.median(shares):.2f}", unit, *words)
 
 
 if __name__ == "__main__":

@@ -15,13 +15,13 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "campaign"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import synthetic_campaign as synthetic
 from browser import OVERLAPS, Browser
 
-from gyrobench.campaign.site import write_site
-from gyrobench.campaign.store import Campaign
+from gyrobench.campaign.execution.store import Campaign
+from gyrobench.campaign.site.site_folder import write_site
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
-"""How often the 95 % intervals hold the truth: every test system, random gyros, latitudes and noise.
+"""How often the 95 % intervals contain the true value: every test system, random gyros, latitudes and noise.
 
-    python tests/benchmarks/coverage.py [SYSTEM ...] --runs 1000 [--noise population] [--seed 1] [--markdown]
+    python tests/benchmarks/coverage.py [SYSTEM ...] --runs 1000 [--noise population] [--seed 1] [--markdown] [--write]
 
 Each run draws true coefficients, a latitude and an instrument's noise, runs the whole dynamic co-simulation (FMUs, loop
 or servo, sampler) on a shortened plan and reduces the record; nothing is quasi-static.  What is counted is whether the
@@ -44,6 +44,7 @@ DPH, ARCSEC, G0 = math.pi / 648000.0, math.pi / 648000.0, 9.80665
 KU = 1e3 * DPH  # deg/h/mA
 Values = dict[str, Any]
 Rng = np.random.Generator
+SCRIPT = "tests/benchmarks/coverage.py"
 
 
 @dataclass(frozen=True)
@@ -343,6 +344,18 @@ def counts(frame: Any) -> dict[str, Count]:
     return found
 
 
+def write(case: str, found: dict[str, Count], runs: int, corner: str) -> None:
+    """Write the coverage of a case into docs/figures.toml, by coefficient where there are several."""
+    import quoted  # not where a campaign loads this file for its rows
+
+    shares = {name: f"{c.hits / c.runs:.3f}" for name, c in found.items()}
+    value = shares if len(shares) > 1 else next(iter(shares.values()))
+    key = f"coverage.{case.replace(', ', '_')}" + (f"_{corner}" if corner != "population" else "")
+    words = [SCRIPT, f'"{case}"' if "," in case else case, f"--runs {runs}"]
+    words += [f"--noise {corner}"] if corner != "population" else []
+    quoted.record(key, value, "share of 95 % intervals that contain the true value", *words)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("system", nargs="*", help=", ".join(CASES))
@@ -350,18 +363,25 @@ def main() -> int:
     parser.add_argument("--noise", default="population", choices=["population", *CORNERS])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, help="default: one for each core")
+    parser.add_argument("--write", action="store_true", help="write docs/figures.toml, of 300 runs or more")
     parser.add_argument("--markdown", action="store_true", help="one line of a table for each system")
     given = parser.parse_args()
     unknown = [n for n in given.system if not any(c == n or c.startswith(f"{n},") for c in CASES)]
     if unknown:
         parser.error(f"{', '.join(unknown)} unknown; there are {', '.join(CASES)}")
+    if given.write and given.runs < 300:
+        parser.error("--write needs 300 runs or more")
     bad = []
+    shares: list[float] = []
     for name, case in CASES.items():
         if given.system and not any(name == n or name.startswith(f"{n},") for n in given.system):
             continue
         began = time.monotonic()
         found = coverage(case, given.runs, given.seed, given.noise, workers=given.workers)
         took = time.monotonic() - began
+        shares += [c.hits / c.runs for c in found.values()]
+        if given.write:
+            write(name, found, given.runs, given.noise)
         if given.markdown:
             parts = ", ".join(f"{n} {c.hits / c.runs:.3f}" for n, c in found.items())
             print(f"| {name} | {given.noise} | {given.runs} | {parts} |", flush=True)
@@ -377,6 +397,12 @@ def main() -> int:
                 rms = float(np.sqrt(np.mean(np.square(c.z))))
                 note = "" if inside else "  OUTSIDE"
                 print(f"{n:<24}{c.hits / c.runs:>9.3f}   {low:.3f} .. {high:.3f}   {rms:9.2f}{note}", flush=True)
+    if given.write and not given.system and given.noise == "population":
+        import quoted
+
+        for which, share in (("lowest", min(shares)), ("highest", max(shares))):
+            unit = f"{which} share of 95 % intervals that contain the true value, all tests"
+            quoted.record(f"coverage.{which}", f"{share:.2f}", unit, SCRIPT)
     print("\nall between 0.93 and 0.97" if not bad else f"\noutside 0.93..0.97: {', '.join(bad)}", file=sys.stderr)
     return 1 if bad else 0
 

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS), str(TESTS / "systems")]
+sys.path[:0] = [str(TESTS / room) for room in ("support", "systems")]
 
 import counting  # noqa: E402
 from test_coverage import READ, ratios  # noqa: E402

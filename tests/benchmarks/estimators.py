@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg, stats
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import polar_drift
 from estimating import (
@@ -295,7 +295,6 @@ def cases(runs: int) -> Iterator[tuple[str, Callable[[np.random.Generator], Coun
 
 def live_days(days: int, seed: int) -> None:
     """Count how often 95 % of the live estimate hold the truth, at the end and at the stop: days of 1723 s."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
     from servoing import DAY50, polar_harmonics
 
     names, held = ("A0", "A1", "B1", "A2", "B2"), {"end": [], "stop": []}  # type: ignore[var-annotated]

@@ -20,7 +20,7 @@ from multiprocessing import Pool
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-sys.path.insert(0, str(TESTS))
+sys.path[:0] = [str(TESTS), str(TESTS / "support")]
 BUILT = TESTS.parent / "fmus"  # where the FMUs belong that the attacks are made from
 #: share of the inputs; the others read in some ms, these in some tenths of a second
 RARE = {"numbers": 0.01, "ssp": 0.05}

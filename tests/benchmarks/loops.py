@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS), str(TESTS / "systems"), str(TESTS / "reduction")]
+sys.path[:0] = [str(TESTS / room) for room in ("support", "systems", "reduction")]
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from exported import NOISY, at_step, differences, effects, left_over, names_of, numbers, record_in, same, scales
 from masters import PeerError, run_in

@@ -1,16 +1,19 @@
 """Time of one communication step of 1 ms of every native part: set inputs, step, get outputs.
 
-Run by hand: ``python tests/benchmarks/part_speed.py [part ...]``.  Parameters (noise on) and inputs are those of
-the parts' reference runs, repeated.  The processor time of the best of many short rounds counts: the machine may be
-shared.
+Run by hand: ``python tests/benchmarks/part_speed.py [--write] [part ...]``.  Parameters (noise on) and inputs are those
+of the parts' reference runs, repeated.  The processor time of the best of many short rounds counts: the machine may be
+shared.  --write: mean, median and counts of all parts into docs/figures.toml.
 """
 
 from __future__ import annotations
 
 import ctypes
+import statistics
 import sys
 import tempfile
 from pathlib import Path
+
+import quoted
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.packaging import build, compiler
@@ -74,7 +77,22 @@ def measure_at(h: float, reference: Reference, library: ctypes.CDLL, part: str, 
     return best
 
 
-def main(parts: list[str]) -> None:
+def write(times: list[float]) -> None:
+    """Write what the pages quote, of the times of all parts, s."""
+    found = {
+        "mean": (f"{1e6 * statistics.mean(times):.2f}", "µs a step of 1 ms, mean of the native parts"),
+        "median": (f"{1e6 * statistics.median(times):.2g}", "µs, median"),
+        "quick": (str(sum(t < 0.2e-6 for t in times)), "parts below 0.2 µs"),
+        "count": (str(len(times)), "parts measured"),
+    }
+    for name, (value, unit) in found.items():
+        quoted.record(f"speed.part_{name}", value, unit, "tests/benchmarks/part_speed.py")
+
+
+def main(words: list[str]) -> None:
+    parts = [w for w in words if w != "--write"]
+    if parts and parts != words:
+        sys.exit("--write is of all parts")
     with tempfile.TemporaryDirectory() as folder:
         library = driver(Path(folder))
         print(f"{'part':20} us a step of 1 ms")
@@ -85,6 +103,8 @@ def main(parts: list[str]) -> None:
                 times.append(seconds)
                 print(f"{part:20} {seconds * 1e6:.4f}", flush=True)
         print(f"{'mean':20} {sum(times) / len(times) * 1e6:.4f}   (budget 0.06, each part 0.2)")
+    if parts != words:
+        write(times)
 
 
 if __name__ == "__main__":

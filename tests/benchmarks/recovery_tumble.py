@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from tumbling import NAMES, errors, gyro, lag, latitude, load, quiet
 
 from gyrobench.engine.session import Session

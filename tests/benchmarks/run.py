@@ -1,9 +1,9 @@
 """All budgets in one table, each against a rival measured in the same run.
 
-    python tests/benchmarks/run.py [--quick]
+    python tests/benchmarks/run.py [--quick] [--write]
 
-Prints what, measured, budget, and the ratio to the rival.  Times are wall times of this machine now unless CPU time is
-said; read the ratios.
+Prints what, measured, budget, and the ratio to the rival; --write: into docs/figures.toml, too.  Times are wall times
+of this machine now unless CPU time is said; read the ratios.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import zipfile
 from pathlib import Path
 
 import peers
+import quoted
 
 HERE = Path(__file__).parent
 ROUNDS = 3
@@ -35,6 +36,19 @@ STEPS = {
 }
 OURS = "gyrobench, native engine on FMI calls"
 ROWS: list[tuple[str, str, str, str]] = []
+QUOTED: list[tuple[str, str | dict[str, str], str]] = []  # figures of docs/figures.toml: key, value, unit
+KEYS = {
+    "one hand-written C loop": "c_loop",
+    "gyrobench, native engine, linked form": "linked",
+    OURS: "fmi_calls",
+    "gyrobench, one FMU in FMPy": "one_fmu",
+    "toolbox container, sequential": "container",
+    "ecospy": "ecospy",
+    "gyrobench, reference engine": "reference",
+    "FMPy, loop of its API": "fmpy_loop",
+    "FMPy, simulate_ssp": "fmpy_ssp",
+    "libcosimpy": "libcosimpy",
+}
 
 
 def row(what: str, measured: str, budget: str = "", ratio: str = "") -> None:
@@ -95,6 +109,12 @@ def masters(quick: bool) -> None:
             us = statistics.median(g["us"] for g in got)
             budget = "0.07 us" if name == OURS else ""
             row(name, f"{us:.3f} us", budget, f"{us / base:.1f} x ours; plant at 1 s: {got[-1]['at_1s']:.7f}")
+            value = {
+                "µs a step": f"{us:.{3 if us >= 0.1 else 2}g}",
+                "ratio": f"{us / base:.{3 if us > 99 * base else 2}g}",
+            }
+            unit = "µs of four trivial FMUs, 1 ms step; ratio to gyrobench on FMI calls"
+            QUOTED.append((f"speed.{KEYS[name]}", value, unit))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -166,13 +186,18 @@ def tumble(quick: bool) -> None:
         steps = meta["steps"]
         w, f = statistics.median(whole), min(floor)  # processor time: others only make it longer
         row("one hand-written C loop, CPU time", f"{f:.2f} s", "", f"{1e9 * f / steps:.0f} ns a step")
+        unit = f"s of CPU of the tumble of {steps / 1e6:.1f} million steps; ratio to the C loop"
+        QUOTED.append(("speed.tumble_c_loop", {"s of CPU": f"{f:.2f}", "over the loop": "1"}, unit))
         forms = {"linked form": stepping["linked"], "FMI calls": stepping["native"], "one FMU, FMPy": one}
         for what, took in forms.items():
             r = min(took)
             budget = "2.0 x" if what == "linked form" else ""
             row(f"the six parts, {what}, CPU time", f"{r:.2f} s", budget, f"{r / f:.2f} x the C loop")
+            key = what.partition(",")[0].lower().replace(" ", "_").removesuffix("_form")
+            QUOTED.append((f"speed.tumble_{key}", {"s of CPU": f"{r:.2f}", "over the loop": f"{r / f:.2f}"}, unit))
         row("records of both forms", "bit-equal" if len(digests) == 1 else "DIFFERENT", "bit-equal")
         row("command to report, wall time", f"{w:.2f} s", "4 s")
+        QUOTED.append(("speed.tumble_report", f"{w:.1f}", "s from the command to the report, tumble_single_axis"))
         for slot, seconds in meta["timing"].items():
             row(f"  {slot}", f"{1e6 * seconds / steps:.3f} us", "0.06 us", "a step, in the run, timer included")
     finally:
@@ -204,6 +229,7 @@ def platform(quick: bool) -> None:
     other, _, few = cost("reference", 1.0)
     ratio = f"{other / few / (cpu / steps):.0f} x slower by FMPy's API"
     row(f"{60 if quick else 600} s of platform, wall time", f"{wall:.1f} s", "0.5 s" if quick else "5 s")
+    QUOTED.append(("speed.platform", f"{wall:.1f}", "s, 600 s of platform_three_axis at 0.1 ms, FMI calls"))
     row("  a step, CPU time", f"{1e6 * cpu / steps:.2f} us", "", ratio)
 
 
@@ -217,7 +243,11 @@ def builds() -> None:
             began = time.perf_counter()
             command = [sys.executable, "-m", "gyrobench", "build", "--all", "--out", cache]
             subprocess.run(command, capture_output=True, check=True, env=env)
-            row(what, f"{time.perf_counter() - began:.2f} s", budget)
+            took = time.perf_counter() - began
+            row(what, f"{took:.2f} s", budget)
+            if what.startswith("cold"):
+                QUOTED.append(("build.cold", f"{took:.1f}", "s, all native FMUs without a cache, two cores"))
+                QUOTED.append(("build.parts", str(len(list(Path(cache).glob("*.fmu")))), "parts built"))
         for command in (["list"], ["--help"]):
             times = []
             for _ in range(5):
@@ -225,6 +255,8 @@ def builds() -> None:
                 subprocess.run([sys.executable, "-m", "gyrobench", *command], capture_output=True, check=True)
                 times.append(time.perf_counter() - began)
             row(f"gyrobench {command[0]}", f"{statistics.median(times):.2f} s", "0.2 s")
+            if command == ["list"]:
+                QUOTED.append(("speed.list", f"{statistics.median(times):.2f}", "s, gyrobench list"))
     finally:
         shutil.rmtree(cache, ignore_errors=True)
 
@@ -232,7 +264,11 @@ def builds() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one round, a tenth of the steps")
-    quick = parser.parse_args().quick
+    parser.add_argument("--write", action="store_true", help="write the figures that the pages quote")
+    given = parser.parse_args()
+    quick = given.quick
+    if quick and given.write:
+        parser.error("--write needs a whole measurement, without --quick")
     packages = ("gyrobench", "fmpy", "fmu-manipulation-toolbox", "ecospy", "libcosimpy")
     found = {d.metadata["Name"].lower().replace("_", "-"): d.version for d in importlib.metadata.distributions()}
     print(", ".join(f"{p} {found.get(p, '-')}" for p in packages), f"on {os.cpu_count()} cores")
@@ -240,6 +276,8 @@ def main() -> None:
     tumble(quick)
     platform(quick)
     builds()
+    for key, value, unit in QUOTED if given.write else ():
+        quoted.record(key, value, unit, "tests/benchmarks/run.py")
 
 
 if __name__ == "__main__":

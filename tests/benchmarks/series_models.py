@@ -4,7 +4,7 @@ a record without lines shows one.
 python tests/benchmarks/series_models.py                # 1000 records of each: three hours of CPU
 python tests/benchmarks/series_models.py --only coefficients --samples 100000 1000000
 
-Each coefficient of three models by Burg and by Yule-Walker, 10^3 to 10^6 samples; correlation time of 20 samples
+Each coefficient of three models by Burg, 10^3 to 10^6 samples; correlation time of 20 samples
 alone, of 1/20 of the record, and of 20 samples under white noise of the same variance; false alarms at 5 %.
 """
 
@@ -27,7 +27,6 @@ MODELS = {
     "AR(2)": (1.2, -0.5),
     "AR(3) of Xia 2008": (-0.7466, -0.5044, -0.2538),
 }
-METHODS = ("burg", "yule-walker")
 
 
 def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
@@ -36,18 +35,15 @@ def record(phi: Any, n: int, rng: np.random.Generator) -> Any:
     return signal.lfilter([1.0], np.r_[1.0, -np.array(phi)], rng.normal(size=n + settle))[settle:]
 
 
-def coefficients(runs: int, lengths: Sequence[int], seed: int, methods: Sequence[str] = METHODS) -> None:
+def coefficients(runs: int, lengths: Sequence[int], seed: int) -> None:
     for n in lengths:
         for name, phi in MODELS.items():
             rng = np.random.default_rng(n + 4 * seed)
-            held = {method: np.zeros(len(phi)) for method in methods}
+            held = np.zeros(len(phi))
             for _ in range(runs):
-                x = record(phi, n, rng)
-                for method, count in held.items():
-                    fit = fit_ar(x, 1.0, len(phi), method)  # type: ignore[arg-type]
-                    count += (fit.low <= phi) & (phi <= fit.high)
-            each = [f"{m} " + " ".join(f"{v / runs:.3f}" for v in c) for m, c in held.items()]
-            print(f"{name}, {n} samples: {'; '.join(each)}", flush=True)
+                fit = fit_ar(record(phi, n, rng), len(phi))
+                held += (fit.low <= phi) & (phi <= fit.high)
+            print(f"{name}, {n} samples: {' '.join(f'{v / runs:.3f}' for v in held)}", flush=True)
 
 
 def times(runs: int, lengths: Sequence[int], seed: int) -> None:
@@ -110,9 +106,7 @@ if __name__ == "__main__":
     parser.add_argument("--only", choices=COUNTS, nargs="+", default=list(COUNTS))
     parser.add_argument("--samples", type=int, nargs="+", help="lengths of the records; default: those of each count")
     parser.add_argument("--seed", type=int, default=0, help="other records")
-    parser.add_argument("--methods", choices=METHODS, nargs="+", default=METHODS, help="of the coefficients")
     given = parser.parse_args()
     for name in given.only:
         count, lengths = COUNTS[name]
-        more = {"methods": given.methods} if name == "coefficients" else {}
-        count(given.records, given.samples or lengths, given.seed, **more)
+        count(given.records, given.samples or lengths, given.seed)

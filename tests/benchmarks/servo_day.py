@@ -1,6 +1,6 @@
 """The polar servo test as it is done: 24 h in each mount and the two dwells, as a full dynamic co-simulation.
 
-    python tests/benchmarks/servo_day.py [--step 1e-4] [--mounts "S N"] [--built] [--resume] [--out FOLDER]
+    python tests/benchmarks/servo_day.py [--step 1e-4] [--mounts "S N"] [--built] [--resume] [--out FOLDER] [--write]
 
 Noise, encoder errors (0.5 arcsec once and twice a turn, 0.2 arcsec fine) and quantum (0.18 arcsec) are on.  Prints wall
 time, CPU time (the machine may be shared), largest memory, and each coefficient against its truth.  With ``--resume``
@@ -17,6 +17,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import quoted
+
 from gyrobench.engine.session import RunError, run
 from gyrobench.record.record import Record
 from gyrobench.system.system import load_system
@@ -30,7 +32,9 @@ ENCODER = {
 SCALE = {f"table.scale_{name}": "0.5arcsec" for name in ("eccentricity", "tilt")}
 
 
-def timed(what: str, values: dict[str, str], step: float, out: Path, **how: object) -> Record | None:
+def timed(
+    what: str, values: dict[str, str], step: float, out: Path, write: bool = False, **how: object
+) -> Record | None:
     wall, cpu = time.perf_counter(), sum(os.times()[:4])
     try:
         record = run(NAME, values=values, step=step, seed=3, out=out, **how)  # type: ignore[arg-type]
@@ -41,6 +45,10 @@ def timed(what: str, values: dict[str, str], step: float, out: Path, **how: obje
     memory = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
     steps = f", {record.run.steps} steps" if record is not None else ""
     print(f"{what}: wall {wall:.0f} s, CPU {cpu:.0f} s{steps}, {memory:.0f} MB", flush=True)
+    if write:
+        unit = f"s of CPU, {NAME}, 24 h in two orientations at {step * 1e3:g} ms, linked form"
+        quoted.record("speed.servo_day", f"{cpu:.0f}", unit, "tests/benchmarks/servo_day.py")
+        quoted.record("speed.servo_day_memory", f"{memory:.0f}", "MB, the same", "tests/benchmarks/servo_day.py")
     return record
 
 
@@ -51,12 +59,15 @@ def main() -> None:
     ask.add_argument("--built", action="store_true", help="on table_servo_dynamic")
     ask.add_argument("--resume", action="store_true")
     ask.add_argument("--out", type=Path)
+    ask.add_argument("--write", action="store_true", help="write docs/figures.toml: of the default test")
     asked = ask.parse_args()
+    if asked.write and (asked.built or asked.mounts != "S N" or asked.step != 1e-4):
+        ask.error("--write is of the default test")
     out = asked.out or Path(tempfile.mkdtemp(prefix="gyrobench-day-"))
     route = "dwells" if len(asked.mounts.split()) == 2 else "combination"
     values = {"mounts": asked.mounts, "route": route, **(SCALE if asked.built else ENCODER)}
     parts = {"table": "table_servo_dynamic"} if asked.built else {}
-    whole = timed(f"{asked.mounts} at {asked.step:g} s", values, asked.step, out / "whole", parts=parts)
+    whole = timed(f"{asked.mounts} at {asked.step:g} s", values, asked.step, out / "whole", asked.write, parts=parts)
     assert whole is not None
     result = load_system(NAME).reduce(whole)
     for c in result.coefficients:

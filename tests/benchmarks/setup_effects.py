@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 import setup_plans
-from coverage import plan
+from estimation_coverage import plan
 
 from gyrobench import drift, frames
 from gyrobench.reduction.estimation import noise, nuisances, outliers, uncertainty
@@ -89,7 +89,7 @@ class Bench:
         length, middle = p.t1 - p.t0, (p.t0 + p.t1) / 2.0
         self.time = (middle - np.average(middle, weights=length)) / (p.t1[-1] - p.t0[0])
         _, hidden = nuisances.observable(p.X, p.names, p.candidates)
-        self.mounts_once = any(h.candidate.meaning == nuisances.MOUNTS for h in hidden)
+        self.mounts_once = any(h.candidate.kind == "mount" for h in hidden)
 
     def has(self, case: Case) -> bool:
         """False where the plan has no such error, or none that it shows."""
@@ -166,7 +166,7 @@ def tumble(order: tuple[int, ...], turn: int, dwell: int) -> setup_plans.Plan:
     found = [
         nuisances.Candidate("tilt", "misalignment", "arcsec", 1.0, tilt),
         nuisances.trend(t0, t1),
-        nuisances.scatter("mount", nuisances.MOUNTS, mount.tolist()),
+        nuisances.scatter("mount", mount.tolist()),
     ]
     return setup_plans.Plan(t0, t1, X, NAMES, truth, mount, found, tilt, np.zeros((0, t0.size)), turned[None])
 

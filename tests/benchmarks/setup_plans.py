@@ -69,7 +69,7 @@ def seen(system: str, channel: int = 0, speed: float = 1.0, **values: Any) -> Pl
 
     p = found.X.shape[1]
     every = [*found.candidates, *(h.candidate for h in found.hidden)]
-    groups = next((c.block.columns for c in every if c.meaning == nuisances.MOUNTS), np.ones((found.y.size, 1)))
+    groups = next((c.block.columns for c in every if c.kind == "mount"), np.ones((found.y.size, 1)))
     tilts = [c for c in found.candidates if c.unit == "″"]
     tilt = np.ravel(tilts[0].columns) * (ARCSEC / DPH / speed) if tilts else np.zeros(found.y.size)
     trend = nuisances.trend(found.t_start * speed, found.t_end * speed)

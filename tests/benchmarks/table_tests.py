@@ -18,8 +18,8 @@ import numpy as np
 
 import gyrobench as gb
 
-sys.path.append(str(Path(__file__).parents[1] / "systems"))
-import test_table_motor
+sys.path[:0] = [str(Path(__file__).parents[1] / room) for room in ("support", "systems")]
+import test_table_motor  # noqa: E402
 
 ARCSEC = math.pi / 648000
 

@@ -17,9 +17,9 @@ import pytest
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
-from gyrobench.campaign import campaign_execution
-from gyrobench.campaign.clusters import local_cluster
-from gyrobench.campaign.store import Campaign, CampaignError
+from gyrobench.campaign.execution import campaign_execution
+from gyrobench.campaign.execution.clusters import local_cluster
+from gyrobench.campaign.execution.store import Campaign, CampaignError
 from gyrobench.files import TEMPORARY
 from gyrobench.workflow.user_errors import exit_code
 

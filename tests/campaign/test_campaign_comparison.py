@@ -15,8 +15,8 @@ import synthetic_campaign as synthetic
 from scipy import stats
 
 from gyrobench.bench import UsageError
-from gyrobench.campaign.campaign_comparison import compare_campaigns
-from gyrobench.campaign.intervals import effective_runs
+from gyrobench.campaign.analysis.campaign_comparison import compare_campaigns
+from gyrobench.campaign.analysis.intervals import effective_runs
 
 AXES = [{"name": "latitude", "kind": "grid", "unit": "°"}, {"name": "seed", "kind": "seed", "unit": ""}]
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from gyrobench.bench import UsageError
-from gyrobench.campaign.axes import Axis, Distribution, draw, parse_axis
-from gyrobench.campaign.campaign_plan import Plan, make_plan
-from gyrobench.campaign.definition import from_mapping, read_definition
+from gyrobench.campaign.execution.axes import Axis, Distribution, draw, parse_axis
+from gyrobench.campaign.execution.campaign_plan import CampaignPlan, make_plan
+from gyrobench.campaign.execution.definition import from_mapping, read_definition
 
 BENCH = Path(__file__).with_name("bench")
 
@@ -22,7 +22,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(BENCH)
 
 
-def plan(**asked: Any) -> Plan:
+def plan(**asked: Any) -> CampaignPlan:
     return make_plan(from_mapping({"system": "weighing", **asked}))
 
 

@@ -15,10 +15,10 @@ from browser import OVERLAPS, Browser, needs_chromium
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
-from gyrobench.campaign.analysis import analyse
-from gyrobench.campaign.measures import numbers
-from gyrobench.campaign.site import write_site
-from gyrobench.campaign.store import Campaign
+from gyrobench.campaign.analysis.campaign_analysis import analyse
+from gyrobench.campaign.analysis.measures import numbers
+from gyrobench.campaign.execution.store import Campaign
+from gyrobench.campaign.site.site_folder import write_site
 
 RUNS = 300
 

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from gyrobench.campaign.axis_effects import crossed_seeds, levels, main_effects, responses
-from gyrobench.campaign.intervals import clopper_pearson, normal_factor, order_trim, tolerance_interval
-from gyrobench.campaign.lot_outliers import robust_outliers
-from gyrobench.campaign.lots import analyse_lot, control_limits
-from gyrobench.campaign.measures import Measures, normalized_error
-from gyrobench.campaign.sobol_indices import factorial_indices, first_order, sobol_indices, values_as_bins
+from gyrobench.campaign.analysis.axis_effects import crossed_seeds, levels, main_effects, responses
+from gyrobench.campaign.analysis.intervals import clopper_pearson, normal_factor, order_trim, tolerance_interval
+from gyrobench.campaign.analysis.lot_outliers import robust_outliers
+from gyrobench.campaign.analysis.lots import analyse_lot, control_limits
+from gyrobench.campaign.analysis.measures import CampaignMeasures, normalized_error
+from gyrobench.campaign.analysis.sobol_indices import factorial_indices, first_order, sobol_indices, values_as_bins
 
 
 # ------------------------------------------------------------------------------------------------ intervals
@@ -119,7 +119,7 @@ def test_main_effects_are_those_of_an_analysis_of_variance() -> None:
     y = 0.4 * a + 0.3 * (b == "x") + rng.normal(size=80)
     rows = table(**{"in.a": a, "in.b": b, "m.estimate": y})
     axes = [{"name": "a", "kind": "list", "unit": ""}, {"name": "b", "kind": "part", "unit": ""}]
-    found = main_effects(Measures.of(rows, {}, axes))
+    found = main_effects(CampaignMeasures.of(rows, {}, axes))
     fit = smf.ols("y ~ C(a) + C(b)", pd.DataFrame({"y": y, "a": a, "b": b})).fit()
     oracle = anova_lm(fit, typ=2)
     assert [e["p"] for e in found] == pytest.approx(oracle["PR(>F)"].iloc[:2].tolist(), rel=1e-8)
@@ -132,7 +132,7 @@ def test_noise_that_settings_share_by_their_seeds_hides_no_effect() -> None:
     y = np.tile(rng.normal(0.0, 10.0, 20), 2) + 0.5 * a + 0.1 * rng.normal(size=40)
     rows = table(**{"in.a": a, "m.estimate": y}).assign(seed=seeds)
     assert crossed_seeds(rows, ["in.a"]) is not None
-    effect = main_effects(Measures.of(rows, {}, [{"name": "a", "kind": "grid", "unit": ""}]))[0]
+    effect = main_effects(CampaignMeasures.of(rows, {}, [{"name": "a", "kind": "grid", "unit": ""}]))[0]
     paired = stats.ttest_rel(y[:20], y[20:]).pvalue  # two levels in blocks: the F test is the paired t test
     assert effect["p"] == pytest.approx(paired, rel=1e-9)
     assert crossed_seeds(rows.iloc[1:], ["in.a"]) is None
@@ -142,8 +142,8 @@ def test_axes_that_cannot_be_told_apart_claim_nothing() -> None:
     a = np.repeat([1.0, 2.0], 10)
     rows = table(**{"in.a": a, "in.b": 3.0 * a, "m.estimate": a + np.random.default_rng(1).normal(size=20)})
     axes = [{"name": n, "kind": "table", "unit": ""} for n in "ab"]
-    assert [e["p"] for e in main_effects(Measures.of(rows, {}, axes))] == [None, None]
-    assert "table" in sobol_indices(Measures.of(rows, {}, axes))["word"]
+    assert [e["p"] for e in main_effects(CampaignMeasures.of(rows, {}, axes))] == [None, None]
+    assert "table" in sobol_indices(CampaignMeasures.of(rows, {}, axes))["word"]
 
 
 def test_responses_are_free_of_what_the_other_axes_do() -> None:
@@ -153,7 +153,7 @@ def test_responses_are_free_of_what_the_other_axes_do() -> None:
     y = 0.2 * a + 5.0 * b + 0.1 * rng.normal(size=200)
     rows = table(**{"in.a": a, "in.b": b, "m.estimate": y})
     axes = [{"name": n, "kind": "table", "unit": ""} for n in "ab"]
-    r = responses(Measures.of(rows, {}, axes))[0]["measures"][0]["quantities"]["estimate"]
+    r = responses(CampaignMeasures.of(rows, {}, axes))[0]["measures"][0]["quantities"]["estimate"]
     assert r["mean"][1] - r["mean"][0] == pytest.approx(0.2, abs=0.05)
     assert y[a == 1.0].mean() - y[a == 0.0].mean() > 1.0
     # 95 % intervals of means of about 100 values with a dispersion of 0.1
@@ -215,10 +215,10 @@ def test_a_grid_with_a_hole_has_no_indices() -> None:
     a, b = (v.ravel() for v in np.meshgrid([0.0, 1.0], [0.0, 1.0, 2.0]))
     rows = table(**{"in.a": a, "in.b": b, "m.estimate": a + b, "m.u": np.full(6, 0.1)})
     axes = [{"name": n, "kind": "grid", "unit": ""} for n in "ab"]
-    whole = sobol_indices(Measures.of(rows, {}, axes))["rows"]
+    whole = sobol_indices(CampaignMeasures.of(rows, {}, axes))["rows"]
     assert [r["total"] for r in whole] == pytest.approx([r["first"] for r in whole], abs=0.05)  # additive
     assert all(r["lo"] < r["first"] < r["hi"] for r in whole)
-    assert "not complete" in sobol_indices(Measures.of(rows.iloc[1:], {}, axes))["word"]
+    assert "not complete" in sobol_indices(CampaignMeasures.of(rows.iloc[1:], {}, axes))["word"]
 
 
 def test_what_varies_no_more_than_its_noise_has_no_indices() -> None:
@@ -227,7 +227,7 @@ def test_what_varies_no_more_than_its_noise_has_no_indices() -> None:
     rows = table(**{"in.a": a, "in.b": b, "m.estimate": noise, "m.u": np.full(20, 0.1), "n.estimate": a + noise,
                     "n.u": np.full(20, 0.1)})  # fmt: skip
     axes = [{"name": n, "kind": "grid", "unit": ""} for n in "ab"]
-    found = sobol_indices(Measures.of(rows, {}, axes))
+    found = sobol_indices(CampaignMeasures.of(rows, {}, axes))
     assert {r["name"] for r in found["rows"]} == {"n"}
     assert found["word"].endswith("so no indices: m.")
 
@@ -253,13 +253,13 @@ def dated(instruments: int, step: float, seed: int = 0) -> pd.DataFrame:
 
 
 def test_an_instrument_that_drifts_between_dates_is_named() -> None:
-    changes = analyse_lot(Measures.of(dated(12, 0.6), {"m.estimate": "°/h"}, []))["changes"]
+    changes = analyse_lot(CampaignMeasures.of(dated(12, 0.6), {"m.estimate": "°/h"}, []))["changes"]
     assert [d["instrument"] for d in changes["drifts"] if d["beyond_chance"]] == ["g00"]
     drift = changes["drifts"][0]
     # equal weights at 0, 10.3, 20 days: u = 0.1 / sqrt(sum of squares from the mean), and no widening by its own drift
     t = np.array([0.0, 10.0 + 8.0 / 24.0, 20.0])
     assert drift["u"] == pytest.approx(0.1 / np.sqrt(((t - t.mean()) ** 2).sum()), rel=0.25)
     assert drift["slope"] == pytest.approx(0.06, abs=3 * drift["u"])
-    still = analyse_lot(Measures.of(dated(12, 0.0), {}, []))["changes"]
+    still = analyse_lot(CampaignMeasures.of(dated(12, 0.0), {}, []))["changes"]
     assert not any(d["beyond_chance"] for d in still["drifts"])
     assert still["pooled"][0]["p"] > 0.01

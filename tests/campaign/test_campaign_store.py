@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from gyrobench.campaign.store import Campaign, CampaignError, CampaignStore
+from gyrobench.campaign.execution.store import Campaign, CampaignError, CampaignStore
 from gyrobench.files import FolderInUseError
 
 DOCUMENT = {"name": "lot", "question": "", "system": "toy", "axes": [{"name": "T", "kind": "list", "unit": "K"}]}

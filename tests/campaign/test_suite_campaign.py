@@ -11,8 +11,8 @@ import pytest
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
-from gyrobench.campaign.campaign_plan import make_plan
-from gyrobench.campaign.definition import from_mapping
+from gyrobench.campaign.execution.campaign_plan import make_plan
+from gyrobench.campaign.execution.definition import from_mapping
 
 distributed = pytest.importorskip("distributed")
 TESTS = ("tumble_single_axis", "fixed_position")

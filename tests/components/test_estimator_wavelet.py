@@ -13,7 +13,6 @@ from scipy.signal import lfilter
 from gyrobench.component import ComponentError
 from gyrobench.component.blocks import wavelet_bank as block
 from gyrobench.packaging import load_part
-from gyrobench.reduction.series import wavelets as offline
 
 pywt = pytest.importorskip("pywt")
 SIGMA, C = 1.643e-3, 3.7232973
@@ -77,12 +76,6 @@ def test_filters_are_those_of_pywavelets(wavelet):
         found = np.array(getattr(one, name))
         assert found[: kept.size] == pytest.approx(kept, abs=1e-17) and not found[kept.size :].any(), name
     assert [block.low_pass(NUMBER[wavelet], m) for m in range(24)] == [*w.dec_lo, *[0.0] * (24 - w.dec_len)]
-
-
-def test_part_and_offline_reduction_have_the_same_wavelets_and_windows():
-    assert offline.WAVELETS == block.NAMES
-    for name in ("MEDIAN", "WINDOW", "COEFFICIENTS"):
-        assert getattr(offline, name) == getattr(block, name)
 
 
 @pytest.mark.parametrize(("wavelet", "J"), BANKS)

@@ -115,7 +115,7 @@ def test_refusals(values: dict[str, float], words: str) -> None:
 
 
 # ---------------------------------------------------------------------------------------- supervisor
-class Desk:
+class Console:
     """The supervisor with its inputs held, sampled at 100 Hz."""
 
     OUT = ("mode", "enable", "preset", "reason", "tripped")
@@ -140,27 +140,27 @@ class Desk:
 
 
 def test_a_request_is_followed_with_one_preset() -> None:
-    desk = Desk()
-    assert desk.after(3) == [0, 0, 0, 0, 0]
-    assert desk.after(1, m2=1) == [2, 1, 1, 0, 0]
-    assert desk.after(1) == [2, 1, 0, 0, 0]
-    assert desk.after(1, m2=0, m3=1) == [3, 1, 1, 0, 0]
-    assert desk.after(1, m3=0) == [0, 0, 0, 0, 0]
+    console = Console()
+    assert console.after(3) == [0, 0, 0, 0, 0]
+    assert console.after(1, m2=1) == [2, 1, 1, 0, 0]
+    assert console.after(1) == [2, 1, 0, 0, 0]
+    assert console.after(1, m2=0, m3=1) == [3, 1, 1, 0, 0]
+    assert console.after(1, m3=0) == [0, 0, 0, 0, 0]
 
 
 def test_two_requests_are_not_followed() -> None:
-    desk = Desk()
-    assert desk.after(1, m1=1, m5=1) == [0, 0, 0, 6, 0]
-    assert desk.after(1, m5=0) == [1, 1, 1, 0, 0]
-    assert desk.after(1, m2=1) == [1, 1, 0, 6, 0]  # the mode that is on stays
+    console = Console()
+    assert console.after(1, m1=1, m5=1) == [0, 0, 0, 6, 0]
+    assert console.after(1, m5=0) == [1, 1, 1, 0, 0]
+    assert console.after(1, m2=1) == [1, 1, 0, 6, 0]  # the mode that is on stays
 
 
 def test_a_change_at_speed_waits_for_the_stop_unless_it_is_bumpless() -> None:
-    desk = Desk()
-    desk.after(1, m2=1)
-    assert desk.after(1, rate=0.5, m2=0, m3=1) == [2, 1, 0, 5, 0]
-    assert desk.after(1, rate=1e-4) == [3, 1, 1, 0, 0]
-    other = Desk(bumpless=True)
+    console = Console()
+    console.after(1, m2=1)
+    assert console.after(1, rate=0.5, m2=0, m3=1) == [2, 1, 0, 5, 0]
+    assert console.after(1, rate=1e-4) == [3, 1, 1, 0, 0]
+    other = Console(bumpless=True)
     other.after(1, m2=1)
     assert other.after(1, rate=0.5, m2=0, m5=1) == [5, 1, 1, 0, 0]
 
@@ -171,43 +171,43 @@ def test_a_change_at_speed_waits_for_the_stop_unless_it_is_bumpless() -> None:
 )
 def test_interlocks_keep_the_motor_off_and_switch_it_off(fault: dict[str, float], reason: int) -> None:
     mended = {"pressure": 6e5, "rate": 0.0, "temperature": 293.15, "lost": 0.0}
-    desk = Desk()
-    assert desk.after(1, m2=1, **fault) == [0, 0, 0, reason, 0]
-    assert desk.after(1, **mended) == [2, 1, 1, 0, 0]
-    assert desk.after(1, **fault) == [2, 1, 0, 0, 0]  # one sample is not yet two
-    assert desk.after(1) == [0, 0, 0, reason, 1]
-    when = desk.part.get(["t_trip"])[0]
-    assert when == pytest.approx((desk.k - 1) * 0.01, abs=0.011)
-    assert desk.after(2, **mended) == [0, 0, 0, reason, 1]  # it stays off, whatever is requested
-    assert desk.after(1, clear=1) == [0, 0, 0, reason, 1]
-    assert desk.after(1, m2=0) == [0, 0, 0, 0, 0]
-    assert desk.after(1, m2=1, clear=0) == [2, 1, 1, 0, 0]
+    console = Console()
+    assert console.after(1, m2=1, **fault) == [0, 0, 0, reason, 0]
+    assert console.after(1, **mended) == [2, 1, 1, 0, 0]
+    assert console.after(1, **fault) == [2, 1, 0, 0, 0]  # one sample is not yet two
+    assert console.after(1) == [0, 0, 0, reason, 1]
+    when = console.part.get(["t_trip"])[0]
+    assert when == pytest.approx((console.k - 1) * 0.01, abs=0.011)
+    assert console.after(2, **mended) == [0, 0, 0, reason, 1]  # it stays off, whatever is requested
+    assert console.after(1, clear=1) == [0, 0, 0, reason, 1]
+    assert console.after(1, m2=0) == [0, 0, 0, 0, 0]
+    assert console.after(1, m2=1, clear=0) == [2, 1, 1, 0, 0]
 
 
 @pytest.mark.parametrize("mode", [2, 3, 4])
 def test_no_drift_run_with_tachometer_feedback(mode: int) -> None:
     """TABLE-TACHO: it is refused, and a motor that runs is switched off, after two samples in a row."""
-    desk = Desk()
-    assert desk.after(3, tacho=1.0, **{f"m{mode}": 1}) == [0, 0, 0, 7, 0]
-    assert desk.after(1, tacho=0.0)[:3] == [mode, 1, 1]
-    assert desk.after(1, tacho=1.0) == [mode, 1, 0, 0, 0]
-    assert desk.after(1) == [0, 0, 0, 7, 1]
+    console = Console()
+    assert console.after(3, tacho=1.0, **{f"m{mode}": 1}) == [0, 0, 0, 7, 0]
+    assert console.after(1, tacho=0.0)[:3] == [mode, 1, 1]
+    assert console.after(1, tacho=1.0) == [mode, 1, 0, 0, 0]
+    assert console.after(1) == [0, 0, 0, 7, 1]
 
 
 def test_servo_mode_has_tachometer_feedback_while_it_captures() -> None:
     """capture_max 0.045 s: allowed for four samples; the fifth and sixth in a row end it.  Mode 5 has it always."""
-    desk = Desk(capture_max=0.045)
-    desk.after(1)
-    assert desk.after(1, m1=1, tacho=1.0) == [1, 1, 1, 0, 0]
-    assert desk.after(5) == [1, 1, 0, 0, 0]
-    assert desk.after(1) == [0, 0, 0, 7, 1]
-    captured = Desk(capture_max=0.045)
+    console = Console(capture_max=0.045)
+    console.after(1)
+    assert console.after(1, m1=1, tacho=1.0) == [1, 1, 1, 0, 0]
+    assert console.after(5) == [1, 1, 0, 0, 0]
+    assert console.after(1) == [0, 0, 0, 7, 1]
+    captured = Console(capture_max=0.045)
     captured.after(4, m1=1, tacho=1.0)
     assert captured.after(50, tacho=0.0)[0] == 1
-    assert Desk().after(3000, m5=1, tacho=1.0)[0] == 5
+    assert Console().after(3000, m5=1, tacho=1.0)[0] == 5
 
 
 def test_servo_and_tacho_modes_do_not_need_the_encoder() -> None:
     for mode in (1, 5):
-        desk = Desk()
-        assert desk.after(5, lost=1.0, **{f"m{mode}": 1})[0] == mode
+        console = Console()
+        assert console.after(5, lost=1.0, **{f"m{mode}": 1})[0] == mode

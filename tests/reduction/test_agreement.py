@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import estimable_combinations
-from gyrobench.reduction.suite.consistency import MethodValue, combine_values, holm, normalized_error, outlier
+from gyrobench.reduction.suite.consistency import MethodValue, combine_values, normalized_error, outlier
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods, compare
-from gyrobench.result import Coefficient, DriftTestResult, SuiteResult
+from gyrobench.result import Coefficient, DriftTestResult, SuiteResult, TypeB
 
 NORMAL = 1.959963984540054
 
@@ -36,7 +37,8 @@ def result(values: dict[str, tuple[float, float]], dof: float | None = None, **m
 
 def suite(results: dict[str, DriftTestResult], **more: Any) -> SuiteResult:
     members = {n: Member(r) for n, r in results.items()}
-    return combine_methods(members, system="x", title="t", method="m", sources=(), **more)
+    limits = more.pop("limits", None)
+    return conclude(combine_methods(members, system="x", title="t", method="m", sources=(), **more), None, limits)
 
 
 # ------------------------------------------------------------------------------------------- by hand
@@ -85,11 +87,6 @@ def test_two_values_are_welch_s_t_test() -> None:
     values = [MethodValue(n, float(v.mean()), float(v.std(ddof=1) / math.sqrt(v.size)), dof=v.size - 1.0)
               for n, v in (("x", x), ("y", y))]  # fmt: skip
     assert combine_values(values).p == pytest.approx(float(stats.ttest_ind(x, y, equal_var=False).pvalue), rel=1e-9)
-
-
-def test_holm_by_hand() -> None:
-    """Sorted 0.01, 0.02, 0.03, 0.5 times 4, 3, 2, 1 = 0.04, 0.06, 0.06, 0.5."""
-    assert holm([0.5, 0.01, 0.03, 0.02]) == pytest.approx([0.5, 0.04, 0.06, 0.06])
 
 
 def test_the_one_that_is_off_is_named() -> None:
@@ -146,8 +143,9 @@ def test_a_shift_of_five_u_is_found_and_named() -> None:
     """Power: nine in ten at least, and never another method blamed."""
     rng, found, blamed = np.random.default_rng(3), 0, []
     for _ in range(100):
-        results = {m: result({k: (rng.standard_normal(), 1.0) for k in ("D_F", "D_I")}) for m in "abcd"}
-        results["b"].coefficients[1].estimate += 6.0
+        values = {m: {k: rng.standard_normal() for k in ("D_F", "D_I")} for m in "abcd"}
+        values["b"]["D_I"] += 6.0
+        results = {m: result({k: (x, 1.0) for k, x in v.items()}) for m, v in values.items()}
         c = next(c for c in compare(results, ()) if c.quantity.name == "D_I")
         found += c.disagree
         blamed += [c.words().split()[0]] if "deviates by" in c.words() and c.disagree else []
@@ -157,11 +155,10 @@ def test_a_shift_of_five_u_is_found_and_named() -> None:
 # ------------------------------------------------------------------------------------------ combinations
 def test_a_quantity_from_several_estimates() -> None:
     """b sees D_F + D_II in one attitude: from a it is the sum, with the sum's uncertainty and its correlation."""
-    a = result({"D_F": (1.0, 0.3), "D_II": (0.5, 0.4)})
-    a.correlation = [[1.0, -0.5], [-0.5, 1.0]]
-    a.type_b = [{"source": "mount", "changes": [[0.1, -0.1], [0.2, 0.2]]}, {"source": "k", "changes": [[0.3, 0.1]]}]
-    b = result({"ω_d": (1.6, 0.1)}, made_of={"ω_d": {"D_F": 1.0, "D_II": 1.0}})
-    b.type_b = [{"source": "k", "changes": [[0.2]]}]
+    of_a = [TypeB("mount", "mount", [[0.1, -0.1], [0.2, 0.2]]), TypeB("k", "k", [[0.3, 0.1]])]
+    a = result({"D_F": (1.0, 0.3), "D_II": (0.5, 0.4)}, correlation=[[1.0, -0.5], [-0.5, 1.0]], type_b=of_a)
+    of_b = [TypeB("k", "k", [[0.2]])]
+    b = result({"ω_d": (1.6, 0.1)}, made_of={"ω_d": {"D_F": 1.0, "D_II": 1.0}}, type_b=of_b)
     found = {c.quantity.name: c for c in compare({"a": a, "b": b}, ("k",))}
     assert set(found) == {"D_F", "D_II", "ω_d"} and len(found["D_F"].values) == 1
     v = found["ω_d"].values[0]
@@ -202,7 +199,7 @@ def test_what_the_rank_does_not_give_is_not_compared() -> None:
 def test_disagreement_enlarges_u_and_withholds_conformity() -> None:
     limits = {"D_F": (-5.0, 5.0), "D_I": (-5.0, 5.0)}
     values = {"a": 1.0, "b": 1.0, "c": 3.0}
-    r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, specification=limits)
+    r = suite({n: result({"D_F": (x, 0.2), "D_I": (x / 10.0, 0.2)}) for n, x in values.items()}, limits=limits)
     f, i = r.coefficients
     assert r.suite.disagreeing == ["D_F"] and r.suite.consistency == "inconsistent"
     assert "c deviates by +2 °/h; the others are consistent" in " ".join(r.summary)

@@ -19,10 +19,9 @@ def record(n: int, seed: int = 1) -> np.ndarray:
     return 3.0 + rng.normal(size=n) + 0.05 * np.cumsum(rng.normal(size=n))
 
 
-@pytest.mark.parametrize("grid", ["octave", "decade"])
-def test_deviations_equal_those_of_allantools(grid: str) -> None:
+def test_deviations_equal_those_of_allantools() -> None:
     x = record(3001)
-    found = dev.deviations(x, 0.5, dev.KINDS, grid)
+    found = dev.deviations(x, 0.5, dev.KINDS)
     for kind, peer in PEER.items():
         ours = found[kind]
         tau, value, _, count = peer(x, rate=2.0, data_type="freq", taus=ours.tau)
@@ -39,7 +38,6 @@ def test_wider_spaced_starts_give_the_same() -> None:
         long = found[kind].tau > 1024
         value = peer(x, rate=1.0, data_type="freq", taus=found[kind].tau[long])[1]
         assert long.sum() >= 3 and found[kind].deviation[long] == pytest.approx(value, rel=4e-3)
-    assert dev.deviations(x, 1.0, grid="decade")["allan"].tau[-1] == 20000
 
 
 def test_blocks_of_any_size_and_float32_give_the_same() -> None:
@@ -129,6 +127,6 @@ def test_degrees_of_freedom_of_white_angle_noise() -> None:
 def test_mistakes_are_refused() -> None:
     with pytest.raises(ValueError, match="kinds are of"):
         dev.DeviationAccumulator(1.0, ("total",))
-    with pytest.raises(ValueError, match="tau0 positive"):
+    with pytest.raises(ValueError, match="tau0 is positive"):
         dev.DeviationAccumulator(0.0)
     assert dev.deviations(np.zeros(1), 1.0)["allan"].tau.size == 0

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from finding import effect
 from scipy import optimize
 
 from gyrobench import units
 from gyrobench.reduction.estimation import noise, noise_mixture_fit, outliers
-from gyrobench.reduction.estimation.effects import Effect, Remount, standard_changes, with_set_up
+from gyrobench.reduction.estimation.effects import Effect, standard_changes, with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.setup.run_metadata import Remount
 
 DPH = units.factor("deg/h")
 N = 120
@@ -59,7 +61,7 @@ def test_of_one_noise_model_it_is_dense_generalized_least_squares(
 
     s = optimize.minimize_scalar(lambda x: dense(x)[0], bounds=(-3.0, 3.0), method="bounded", options={"xatol": 1e-10})
     _, C, gain = dense(s.x)
-    assert found.variance[0] == pytest.approx(math.exp(2.0 * s.x), rel=1e-6)
+    assert found.likeliest.variance[0] == pytest.approx(math.exp(2.0 * s.x), rel=1e-6)
     np.testing.assert_allclose(found.gain, gain, atol=1e-8)
     np.testing.assert_allclose(found.beta, gain @ y, rtol=1e-8)
     b2 = np.sum((gain @ E.T) ** 2, axis=1)
@@ -68,7 +70,7 @@ def test_of_one_noise_model_it_is_dense_generalized_least_squares(
     assert np.sqrt(found.u**2 + b2) == pytest.approx(np.sqrt(np.diag(C)), rel=0.03)
     whole = np.sqrt(found.half_width**2 + NORMAL**2 * b2)
     assert whole[0] == pytest.approx(NORMAL * math.sqrt(C[0, 0]), rel=1e-3)  # nearly all of it is known
-    assert np.var(found.whitened) == pytest.approx(1.0, abs=0.15)
+    assert np.var(found.likeliest.whitened) == pytest.approx(1.0, abs=0.15)
 
 
 def test_constants_of_two_mounts_are_counted_once() -> None:
@@ -77,7 +79,7 @@ def test_constants_of_two_mounts_are_counted_once() -> None:
     the statement it is, and type A is fifty times as large.
     """
     y = X @ [0.3, -0.2] + np.array([0.1, -0.1]) @ HALVES + 0.01 * np.random.default_rng(1).normal(size=N)
-    step = [Effect("constant", 0.1 * DPH, "rad/s", HALVES)]
+    step = [effect("constant", 0.1 * DPH, "rad/s", HALVES)]
     plain = line(y)
     found = with_set_up(plain, lambda _: step)
     b, u, half = combined(found, step)
@@ -85,13 +87,13 @@ def test_constants_of_two_mounts_are_counted_once() -> None:
     assert found.u[0] < 0.03 * plain.u[0]
     assert u[0] == pytest.approx(b[0], rel=0.01) and half[0] == pytest.approx(NORMAL * b[0], rel=0.02)
     assert found.u[1] / DPH == pytest.approx(0.01 / math.sqrt(60.0), rel=0.35)  # the cosine is not of the mounts
-    assert np.linalg.norm(found.est.residual - found.est.set_up) < 0.15 * np.linalg.norm(found.est.residual)
+    assert np.linalg.norm(found.est.residual - found.est.likeliest.set_up) < 0.15 * np.linalg.norm(found.est.residual)
     assert outliers.find(found) is None and not found.warnings()
 
 
 def test_what_is_stated_too_small_to_see_changes_nothing() -> None:
     y = X @ [0.3, -0.2] + 0.01 * np.random.default_rng(1).normal(size=N)
-    faint = [Effect("constant", 1e-9 * DPH, "rad/s", HALVES)]
+    faint = [effect("constant", 1e-9 * DPH, "rad/s", HALVES)]
     found, plain = with_set_up(line(y), lambda _: faint), line(y)
     np.testing.assert_array_equal(found.value, plain.value)
     np.testing.assert_array_equal(found.reported.half_width, plain.reported.half_width)
@@ -101,10 +103,10 @@ def test_what_is_stated_too_small_to_see_changes_nothing() -> None:
 def test_test_of_the_residuals_knows_what_is_stated() -> None:
     """Sine of an encoder that is stated: an F test of the sine finds it in a fit without the statement only."""
     y = X @ [0.3, -0.2] + 0.05 * np.sin(ANGLE) + 0.01 * np.random.default_rng(2).normal(size=N)
-    sine = [Effect("angle error", 0.05 * DPH, "rad", np.sin(ANGLE))]
+    sine = [effect("angle error", 0.05 * DPH, "rad", np.sin(ANGLE))]
     p = []
     for found in (line(y), with_set_up(line(y), lambda _: sine)):
-        found.f_test("sine", np.sin(ANGLE)[:, None], "what", "there", "not there")
+        found.f_test("sine", "sine", np.sin(ANGLE)[:, None], "what", "there", "not there")
         p.append(next(t.p for t in found.tests if t.name == "sine"))
     assert p[0] < 1e-6 and p[1] > 0.05
 
@@ -115,7 +117,7 @@ def test_intervals_hold_where_the_errors_are_of_the_stated_size() -> None:
     """
     rng = np.random.default_rng(5)
     encoder = np.array([np.sin(ANGLE), np.cos(ANGLE) * HALVES[0]])
-    stated = [Effect("encoder", 0.03 * DPH, "rad", encoder), Effect("constant", 0.03 * DPH, "rad/s", HALVES)]
+    stated = [effect("encoder", 0.03 * DPH, "rad", encoder), effect("constant", 0.03 * DPH, "rad/s", HALVES)]
     held = np.zeros(2)
     for _ in range(100):
         y = X @ [0.3, -0.2] + 0.03 * (rng.normal(size=2) @ encoder + rng.normal(size=2) @ HALVES)
@@ -130,7 +132,7 @@ def test_an_error_relative_to_the_reading_stays_outside() -> None:
     """
     y = X @ [0.3, -0.2] + 0.01 * np.random.default_rng(1).normal(size=N)
     plain = line(y)
-    found = with_set_up(plain, lambda _: [Effect("scale factor", 0.2, "1", -DPH * y)])
+    found = with_set_up(plain, lambda _: [effect("scale factor", 0.2, "1", -DPH * y)])
     np.testing.assert_array_equal(found.value, plain.value)
 
 
@@ -142,7 +144,7 @@ def test_errors_far_above_the_noise_leave_estimate_and_type_a_alone(size: float)
     """
     y = X @ [0.3, -0.2] + 1e-6 * np.random.default_rng(4).normal(size=N)
     plain = line(y)
-    stated = [Effect("constant", size * 1e-6 * DPH, "rad/s", np.ones(N))]
+    stated = [effect("constant", size * 1e-6 * DPH, "rad/s", np.ones(N))]
     found = with_set_up(plain, lambda _: stated)
     np.testing.assert_allclose(found.gain @ X, np.eye(2), atol=1e-6)
     np.testing.assert_allclose(found.value, plain.value, atol=0.1 * plain.u.min())

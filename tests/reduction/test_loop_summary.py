@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from gyrobench.reduction.loops.loop_summary import Sentence, base_torques, renew, told, with_u
+from gyrobench.reduction.estimation.sentences import Sentence, renewed, told, with_u
+from gyrobench.reduction.loops.loop_summary import base_torques
 from gyrobench.result import Coefficient, LoopResult
 
 F_C = Coefficient("f_c", "gain crossover frequency", "Hz", 10.1512, 0.02345, 1.96, (10.105, 10.197))
@@ -41,11 +42,11 @@ def test_sentences_follow_the_uncertainty_found_after_them() -> None:
     """The communication step's part comes into u when the sentences are there."""
     first = told([F_C], "Crossover {f_c}.")
     result = LoopResult(
-        system="s", title="", method="", sources=[], conventions=[], coefficients=[F_C], responses=[],
+        method="", sources=[], conventions=[], coefficients=[F_C], responses=[],
         summary=[*first, "Said."],
     )  # fmt: skip
-    result.coefficients = [replace(F_C, u=0.2)]
-    renew(result)
+    result = replace(result, coefficients=[replace(F_C, u=0.2)])
+    result = replace(result, summary=renewed(result))
     assert result.summary == ["Crossover 10.15 ± 0.39 Hz (95 %).", "Said."]
     assert json.loads(json.dumps(result.as_dict()["summary"])) == list(result.summary)
 

@@ -201,8 +201,8 @@ def test_gates_that_cannot_be() -> None:
 
 def test_cross_axis_table() -> None:
     table = cross_axis({(1, 1): 2.0, (1, 2): 0.1j, (2, 2): -4.0, (2, 1): 1.0}, ["pitch", "roll"], "1 Hz")
-    assert table["columns"] == ["excited axis", "pitch / %", "roll / %"]
-    assert table["rows"] == [["pitch", 100.0, 5.0], ["roll", 25.0, 100.0]]
+    assert table.columns == ["excited axis", "pitch / %", "roll / %"]
+    assert table.rows == [["pitch", 100.0, 5.0], ["roll", 25.0, 100.0]]
 
 
 def test_step_response_of_a_linear_model() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from finding import effect, judged
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -15,19 +16,15 @@ from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.fit_result import (
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    fit,
-    linear_result,
-    plus_minus,
-)
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.merge_channels import merge
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.sentences import plus_minus
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.result import Result
+from gyrobench.result import Reason, Result
 
 Array = NDArray[np.float64]
 DPH = units.factor("deg/h")
@@ -49,13 +46,6 @@ def line(n: int, sigma: float, seed: int = 1, noise: str = "white", channel: str
     return fit(wanted, X, y, t, t + 10.0, [group], "rate", "°/h", DPH, noise=noise)
 
 
-def result(found: Findings, **more: object) -> Result:
-    return linear_result(
-        found, system="line", title="A line", method="by hand", sources=["RED-OLS"], equation="y = a + b x",
-        conventions=["x counts to the right."], **more,  # type: ignore[arg-type]
-    )  # fmt: skip
-
-
 def test_white_line_by_hand() -> None:
     """y = (1, 2, 4) at x = (-1, 0, 1): a = 7/3, b = 3/2, residuals (1/6, -1/3, 1/6), s^2 = 1/6 with one degree of
     freedom, u(a)^2 = s^2/3 = 1/18, u(b)^2 = s^2/2 = 1/12; t quantile of one degree 12.7062.
@@ -64,7 +54,7 @@ def test_white_line_by_hand() -> None:
     X, y = np.column_stack([np.ones(3), x]), np.array([1.0, 2.0, 4.0])
     group = Group("points", np.arange(3), x, "position", "1")
     wanted = [Quantity("a", "constant", "V", 1.0), Quantity("b", "slope", "mV", 1e-3)]
-    r = result(fit(wanted, X, y, None, None, [group], "voltage", "V", 1.0, noise="white"))
+    r = judged(fit(wanted, X, y, None, None, [group], "voltage", "V", 1.0, noise="white"))
     a, b = r.coefficients
     assert (a.estimate, b.estimate) == pytest.approx((7 / 3, 1500.0))
     assert (a.u, b.u) == pytest.approx((math.sqrt(1 / 18), 1e3 * math.sqrt(1 / 12)))
@@ -78,7 +68,7 @@ def test_white_line_by_hand() -> None:
 
 @pytest.mark.parametrize("noise", ["white", "estimated"])
 def test_truth_and_closed(noise: str) -> None:
-    r = result(line(120, 0.01, noise=noise))
+    r = judged(line(120, 0.01, noise=noise))
     assert r.simulated and r.rank == 2 and r.dof == 118.0
     for c in r.coefficients:
         assert c.truth == pytest.approx(0.3 if c.name == "a" else -0.2)
@@ -86,7 +76,7 @@ def test_truth_and_closed(noise: str) -> None:
     a = r.coefficients[0]
     assert a.closed == pytest.approx(a.estimate, abs=0.005) and r.coefficients[1].closed is None
     assert a.u == pytest.approx(0.01 / math.sqrt(120), rel=0.6 if noise == "estimated" else 0.2)
-    assert [row[0] for row in r.tables[0]["rows"]] == ["a"]
+    assert [row[0] for row in r.tables[0].rows] == ["a"]
     assert r.series[0].shown_fit_y == pytest.approx([0.5, 0.4, 0.3, 0.2, 0.1], abs=0.01)
     assert ("whitened" in r.tests[1].name) == (noise == "estimated")
     assert r.allan["unit"] == "°/h" and r.psd["unit"] == "(°/h)²/Hz"
@@ -100,9 +90,9 @@ def test_effects_and_verdicts() -> None:
     one = found.error(0.1 * DPH)
     small = found.error(dX=found.X * [0.0, 0.01])
     assert found.gain @ small == pytest.approx([0.0, -0.01 * found.value[1]], abs=1e-12 * DPH)
-    effects = [Effect("offset", 0.5, "1", one), Effect("scale of x", 0.0, "1", small)]
+    effects = [effect("offset", 0.5, "1", one), effect("scale of x", 0.0, "1", small)]
     limits = {"a": (0.0, 1.0), "b": (-0.1, None)}
-    r = result(found, effects=effects, specification=limits, warnings=["Mind the step."])
+    r = judged(found, effects=effects, limits=limits, reasons=[Reason("step", "Mind the step.")])
     a, b = r.coefficients
     assert a.u == pytest.approx(math.hypot(0.05, a.u_a or 0.0)) and b.u == b.u_a
     assert a.interval[1] - a.interval[0] == pytest.approx(2 * 1.96 * 0.05, rel=1e-3)
@@ -115,7 +105,7 @@ def test_effects_and_verdicts() -> None:
 
 def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
     """U = 1.96 u: 5839 is 5800, and the estimate is rounded to hundreds; 0.0023 has four decimals."""
-    (c,) = [x for x in result(line(60, 0.001)).coefficients if x.name == "a"]
+    (c,) = [x for x in judged(line(60, 0.001)).coefficients if x.name == "a"]
     large = replace(c, estimate=263087.4, u=2979.0, k=1.96, unit="N·m/rad")
     assert plus_minus(large) == "263100 ± 5800 N·m/rad (95 %)"
     assert plus_minus(replace(large, estimate=-0.30012, u=0.00117, unit="°/h")) == "−0.3001 ± 0.0023 °/h (95 %)"
@@ -123,7 +113,8 @@ def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
 
 def test_merge_of_two_channels() -> None:
     x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
-    parts = {"x channel": result(x, warnings=["same"]), "y channel": result(y, warnings=["same", "other"])}
+    same = Reason("same", "same")
+    parts = {"x channel": judged(x, reasons=[same]), "y channel": judged(y, reasons=[same, Reason("other", "other")])}
     r = merge(parts)
     assert [c.name for c in r.coefficients] == ["a_x", "b_x", "a_y", "b_y"]
     matrix = np.array(r.correlation)
@@ -145,13 +136,13 @@ def test_an_error_that_channels_share_is_one() -> None:
     x, y = line(60, 0.01, 1, channel="_x"), line(40, 0.02, 2, channel="_y")
 
     def effects(found: Findings, size: float, own: str) -> list[Effect]:
-        return [Effect("axis", 1.0, "1", size * found.error(DPH)), Effect(own, 0.1, "1", found.error(DPH))]
+        return [effect("axis", 1.0, "1", size * found.error(DPH)), effect(own, 0.1, "1", found.error(DPH))]
 
-    parts = {"x channel": result(x, effects=effects(x, 0.3, "meter x")),
-             "y channel": result(y, effects=effects(y, -0.4, "meter y"))}  # fmt: skip
+    parts = {"x channel": judged(x, effects=effects(x, 0.3, "meter x")),
+             "y channel": judged(y, effects=effects(y, -0.4, "meter y"))}  # fmt: skip
     r = merge(parts)
-    assert [b["source"] for b in r.type_b] == ["axis", "meter x", "meter y"]
-    (axis,) = r.type_b[0]["changes"]
+    assert [b.source for b in r.type_b] == ["axis", "meter x", "meter y"]
+    (axis,) = r.type_b[0].changes
     assert axis == pytest.approx([0.3, 0.0, -0.4, 0.0], abs=1e-12)
     covariance = r.covariance()
     assert covariance[0, 2] == pytest.approx(-0.12, rel=1e-9) and covariance[1, 3] == pytest.approx(0.0, abs=1e-15)
@@ -174,7 +165,7 @@ def test_derived_quantities() -> None:
     assert c.u == pytest.approx([math.sqrt((ub / a) ** 2 + (b / a**2 * ua) ** 2)], rel=1e-8)
     assert c.reported.half_width / c.u == pytest.approx(found.reported.half_width[:1] / ua)
     assert c.gain @ c.error(0.02) == pytest.approx([-b / a**2 * 0.02], rel=1e-8)
-    r = result(c)
+    r = judged(c)
     assert r.rank == 2 and len(r.coefficients) == 1 and r.coefficients[0].dof == 19.0
 
 
@@ -184,11 +175,11 @@ def test_extra_columns_are_tested() -> None:
     x = found.X[:, 1:]
     bent = fit(found.quantities, found.X, found.y + 0.05 * DPH * x[:, 0] ** 2, found.t_start, found.t_end, [],
                "rate", "°/h", DPH, noise="white")  # fmt: skip
-    size = bent.f_test("curvature", x**2, "curvature", "the line is bent", "no more than noise")
+    size = bent.f_test("test", "curvature", x**2, "curvature", "the line is bent", "no more than noise")
     assert size is not None and size[0] == pytest.approx([0.05 * DPH], abs=4 * float(size[1][0]))
     assert bent.tests[-1].p is not None and bent.tests[-1].p < 1e-6 and "bent" in bent.tests[-1].finding
-    assert any("curvature" in w for w in result(bent).warnings)
-    assert found.f_test("curvature", x**2, "curvature", "bent", "no more than noise") and len(found.tests) == 4
+    assert any("curvature" in w for w in judged(bent).warnings)
+    assert found.f_test("test", "curvature", x**2, "curvature", "bent", "no more than noise") and len(found.tests) == 4
 
 
 def test_extra_columns_under_all_noise_models() -> None:
@@ -203,7 +194,7 @@ def test_extra_columns_under_all_noise_models() -> None:
     X, extra = np.column_stack([np.ones(n), x]), np.column_stack([x**2, x**3])
     found = fit(["a", "b"], X, y, t, t + 10.0, [], "rate", "", 1.0)
     p_of, f_of = [], []
-    for tau, share, reading, _ in found.est.models:
+    for tau, share, reading, _ in found.est.noise.models:
         assert reading == 0.0
         C = noise_model.process_covariance(t, t + 10.0, tau)
         R = np.eye(n) * (1.0 - share) + share * C / C[0, 0]
@@ -213,14 +204,14 @@ def test_extra_columns_under_all_noise_models() -> None:
             rss.append(v @ np.linalg.solve(R, v))
         f_of.append((rss[0] - rss[1]) / 2.0 / (rss[1] / (n - 4)))
         p_of.append(stats.f.sf(f_of[-1], 2, n - 4))
-    found.f_test("square and cube", extra, "", "", "")
+    found.f_test("test", "square and cube", extra, "", "", "")
     test = found.tests[-1]
-    assert test.statistic == pytest.approx(f_of[0]) and test.p == pytest.approx(found.est.models[:, 3] @ p_of)
+    assert test.statistic == pytest.approx(f_of[0]) and test.p == pytest.approx(found.est.noise.models[:, 3] @ p_of)
     assert test.p is not None and test.p > 2.0 * p_of[0] and p_of[0] < 0.05
-    found.f_test("with a copy", np.column_stack([extra, x + 2.0, np.ones(n)]), "", "", "")
+    found.f_test("test", "with a copy", np.column_stack([extra, x + 2.0, np.ones(n)]), "", "", "")
     assert found.tests[-1].statistic == pytest.approx(test.statistic)
     before = len(found.tests)
-    assert found.f_test("held", x[:, None] - 3.0, "", "", "") is None and len(found.tests) == before
+    assert found.f_test("test", "held", x[:, None] - 3.0, "", "", "") is None and len(found.tests) == before
 
 
 def test_verdicts_hold_for_slow_drift_too() -> None:
@@ -245,14 +236,14 @@ def test_verdicts_hold_for_slow_drift_too() -> None:
     assert np.quantile(np.abs(draws), 0.95) == pytest.approx(half * widening[0], rel=0.02)
     middle, estimate = half * (1.0 + widening[0]) / 2.0 / DPH, found.value[0] / DPH
     for limit, verdict in ((middle, "inconclusive"), (1.01 * half * widening[0] / DPH, "pass")):
-        r = result(found, specification={"a": (estimate - limit, estimate + limit)})
+        r = judged(found, limits={"a": (estimate - limit, estimate + limit)})
         assert r.verdict == verdict
         assert any("slow drift" in w for w in r.warnings) == (verdict == "inconclusive")
 
 
 def test_ideal_data_claim_nothing() -> None:
     for noise in ("white", "estimated"):
-        r = result(line(60, 0.0, noise=noise))
+        r = judged(line(60, 0.0, noise=noise))
         assert r.noise["model"] == "none (ideal data)" and r.tests == [] and r.allan == {}
         assert all(c.z is None for c in r.coefficients)
         assert [c.estimate for c in r.coefficients] == pytest.approx([0.3, -0.2], abs=1e-12)
@@ -288,7 +279,7 @@ def test_turns() -> None:
     found, turns = turning(0.0, 0.0)
     named = {t.name: t for t in found.tests}
     assert (named["harmonics 2 and higher"].p or 0.0) > 0.01 and (named["turn to turn"].p or 0.0) > 0.01
-    rows = turns.table()[0]["rows"]
+    rows = turns.table()[0].rows
     assert [r[:2] for r in rows] == [["mount 1", 1], ["mount 1", 2]]
     assert rows[0][2:] == pytest.approx([0.3, 0.1, 0.0], abs=0.002)
     assert list(turns.repeatability())[3:] == [f"scatter of {n} / (°/h)" for n in ("A0", "A1", "B1")]

@@ -6,8 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from finding import judged
 from scipy import stats
-from test_outliers import record, result
+from test_outliers import record
 
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.mixture import Mixture
@@ -35,14 +36,14 @@ def test_one_candidate_is_a_t_distribution() -> None:
 def test_residuals_alone_are_those_of_the_whole_result() -> None:
     """A row that is off is in the whole result, with Allan deviation and spectrum; all else is the same in both."""
     found = record({40: 60.0})
-    whole = result(found)
+    whole = judged(found)
     with asked.residuals_alone():
-        alone = result(found)
+        alone = judged(found)
     assert whole.allan and whole.psd and not alone.allan and not alone.psd
     assert any("outside the noise" in w for w in whole.warnings)
     for name in ("coefficients", "tests", "acf", "noise", "dof", "rank", "residual_std", "residual_unit", "withheld"):
         assert getattr(alone, name) == getattr(whole, name), name
-    left_out = {"allan", "psd", "tables", "warnings"}
+    left_out = {"allan", "psd", "tables", "reasons"}
     differ = {f.name for f in dataclasses.fields(whole) if getattr(alone, f.name) != getattr(whole, f.name)}
     assert differ == left_out
-    assert result(found).allan == whole.allan  # afterwards all is asked for again
+    assert judged(found).allan == whole.allan  # afterwards all is asked for again

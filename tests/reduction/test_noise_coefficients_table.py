@@ -40,10 +40,10 @@ def test_residuals_and_the_rate_itself(gap: bool) -> None:
     result, record = long_test(LEAST + 100, gap)
     (left,) = noise_coefficients_table(result, record, residual=True)
     (whole,) = noise_coefficients_table(result, record)
-    assert RESIDUAL in left["caption"] and RESIDUAL not in whole["caption"]
-    assert f"from {LEAST + 94 if gap else LEAST + 100} means of 60 s" in left["caption"]
+    assert RESIDUAL in left.caption and RESIDUAL not in whole.caption
+    assert f"from {LEAST + 94 if gap else LEAST + 100} means of 60 s" in left.caption
     for table in (left, whole):
-        rows = {row[0].partition(",")[0]: row for row in table["rows"]}
+        rows = {row[0].partition(",")[0]: row for row in table.rows}
         assert list(rows) == [n for n in "NBKRQ" if n != "R" or table is whole]
         assert rows["N"][1] == pytest.approx(0.01, rel=0.1) and rows["N"][2] < 0.01 < rows["N"][3]
         for name in "BK":  # the fit may have taken some
@@ -63,14 +63,14 @@ def test_drift_that_is_none_of_the_five_is_told() -> None:
     """Gauss-Markov drift of a correlation time of 8 windows; white noise alone has no such words."""
     rng = np.random.default_rng(1)
     result, record = long_test(2000)
-    assert "five terms do not" not in noise_coefficients_table(result, record, residual=True)[0]["caption"]
+    assert "five terms do not" not in noise_coefficients_table(result, record, residual=True)[0].caption
     a = math.exp(-1.0 / 8.0)
     for s in result.series:
         x = rng.normal(size=len(s.t))
         for k in range(1, x.size):
             x[k] = a * x[k - 1] + math.sqrt(1.0 - a * a) * x[k]
         s.y = x[np.argsort(np.argsort(s.t))].tolist()
-    caption = noise_coefficients_table(result, record)[0]["caption"]
+    caption = noise_coefficients_table(result, record)[0].caption
     assert caption.startswith("The five terms do not describe the record (p < 0.001)")
     assert caption.count("do not describe") == 1
 
@@ -79,8 +79,8 @@ def test_just_determined_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     just, none = Estimate(1e-7, 3e-8, 1.7e-7, True), Estimate(0.0, 0.0, 1e-7, False)
     monkeypatch.setattr(table_module, "fit", lambda *_: NoiseCoefficients(none, none, just, none, none))
     (table,) = noise_coefficients_table(*long_test())
-    assert [row[5] for row in table["rows"]] == ["not determined"] * 2 + ["just determined"] + ["not determined"] * 2
-    assert "K: just determined, below 4 u: of such" in table["caption"]
+    assert [row[5] for row in table.rows] == ["not determined"] * 2 + ["just determined"] + ["not determined"] * 2
+    assert "K: just determined, below 4 u: of such" in table.caption
 
 
 def test_a_missing_window_is_a_gap() -> None:

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from finding import judged
 
 from gyrobench import units
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisance_states, nuisances
-from gyrobench.reduction.estimation.effects import Remount, remounts
+from gyrobench.reduction.estimation.effects import remounts
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.fit_result import linear_result
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.setup.run_metadata import Remount
 
 _spec = importlib.util.spec_from_file_location(
     "setup_effects", Path(__file__).parents[1] / "benchmarks" / "setup_effects.py"
@@ -91,12 +92,12 @@ def test_what_the_plan_does_not_show_is_named() -> None:
     """A column that is the cosine itself; mounts that are the two halves of what a and b already hold."""
     x = np.cos(2.0 * np.pi * np.arange(60) / 12.0)
     same = nuisances.Candidate("same", "an effect like b", "°/h", DPH, 3.0 * x)
-    once = nuisances.scatter("σ", "scatter", [0] * 30 + [1] * 30)
+    once = nuisances.scatter("mount", [0] * 30 + [1] * 30)
     found = line(noisy(), [same, once])
-    rows = {r[0]: r for r in found.nuisance_tables()[0]["rows"]}
+    rows = {r[0]: r for r in found.nuisance_tables()[0].rows}
     assert rows["same"][6] == "not observable: aliased with b"
-    assert rows["σ"][6] == "not observable: all but 1 of its contrasts aliased with a; repeat"
-    assert rows["σ"][2] is None
+    assert rows["σ_mount"][6] == "not observable: all but 1 of its contrasts aliased with a; repeat"
+    assert rows["σ_mount"][2] is None
 
 
 def test_scatter_between_mounts_is_a_result() -> None:
@@ -106,7 +107,7 @@ def test_scatter_between_mounts_is_a_result() -> None:
     rng = np.random.default_rng(7)
     group = np.repeat(np.arange(10), 6)
     drawn = 0.05 * rng.normal(size=10)
-    found = line(noisy() + DPH * drawn[group], [nuisances.scatter("σ_mount", nuisances.MOUNTS, group.tolist())])
+    found = line(noisy() + DPH * drawn[group], [nuisances.scatter("mount", group.tolist())])
     sigma = found.quantities[2]
     assert sigma.name == "σ_mount"
     value, half = found.value[2] / DPH, found.reported.half_width[2] / DPH
@@ -119,13 +120,13 @@ def test_turn_ons_are_told_from_mounts() -> None:
     each mount is one turn-on there is one scatter, and the other is said to be the same."""
     group, turn = np.repeat(np.arange(10), 6), np.repeat(np.arange(20), 3)
     drawn = 0.03 * np.random.default_rng(5).normal(size=20)
-    mounts = nuisances.scatter("σ_mount", nuisances.MOUNTS, group.tolist())
+    mounts = nuisances.scatter("mount", group.tolist())
     found = line(noisy() + DPH * drawn[turn], [mounts, *nuisances.common({**windows(), "turn_on": 1.0 + turn})])
     assert [q.name for q in found.quantities] == ["a", "b", "σ_turn_on"]
     value, half = found.value[2] / DPH, found.reported.half_width[2] / DPH
     assert abs(value - np.std(drawn, ddof=1)) < half < 0.03
     same = line(noisy() + DPH * drawn[group], [mounts, *nuisances.common({**windows(), "turn_on": 1.0 + group})])
-    rows = {r[0]: r for r in same.nuisance_tables()[0]["rows"]}
+    rows = {r[0]: r for r in same.nuisance_tables()[0].rows}
     assert rows["σ_turn_on"][6] == "not observable: its groups are those of σ_mount"
     assert [q.name for q in same.quantities] == ["a", "b", "σ_mount"]
 
@@ -147,13 +148,10 @@ def test_mounts_taken_once_are_in_u_or_withhold(stated: float) -> None:
     """Mounts of 36 and 24 windows: a constant of each of 0.02 deg/h moves the constant by 0.6 and 0.4 of it, 0.721
     together, and the cosine, of three and two periods in each, not.  Unstated, the constant has no verdict.
     """
-    once = nuisances.scatter("σ", nuisances.MOUNTS, [0] * 36 + [1] * 24)
+    once = nuisances.scatter("mount", [0] * 36 + [1] * 24)
     found = line(noisy(), [once])
     limits = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
-    result = linear_result(
-        found, system="line", title="", method="", sources=[], equation="", conventions=[], specification=limits,
-        effects=remounts(found, Remount(stated, stated > 0.0)),
-    )  # fmt: skip
+    result = judged(found, remounts(found, Remount(stated, stated > 0.0)), limits)
     a, b = result.coefficients
     part = math.sqrt(a.u**2 - float(found.u[0] / DPH) ** 2)
     assert part == pytest.approx(stated / DPH * math.sqrt(0.52), rel=0.01, abs=1e-9)
@@ -202,7 +200,7 @@ def test_mounts_that_scatter_by_as_much_as_a_window() -> None:
     group, attitude = np.repeat(np.arange(12), 10), np.tile(np.repeat(np.arange(6), 10), 2)
     X = np.array([[1.0 if a == k else 0.0 for k in range(6)] for a in attitude])
     t = 70.0 * group + 60.0 * np.arange(120.0)
-    blocks = [nuisances.scatter("σ", nuisances.MOUNTS, group.tolist()).block]
+    blocks = [nuisances.scatter("mount", group.tolist()).block]
     held = np.zeros(6)
     for _ in range(100):
         y = rng.normal(size=12)[group] + rng.normal(size=120)
@@ -222,9 +220,7 @@ def test_no_verdict_rests_on_noise_being_white() -> None:
     for _ in range(30):
         y = records.record(bench.Case(slow=0.5), rng)
         found = fit(records.names, p.X, y, p.t0, p.t1, [], "rate", "", 1.0, candidates=p.candidates)
-        result = linear_result(
-            found, system="tumble", title="", method="", sources=[], equation="", conventions=[], specification=limits
-        )
+        result = judged(found, limits=limits)
         own = result.coefficients[: len(records.names)]
         verdicts += [c.verdict for c in own]
         stated += [abs(c.estimate - v) > c.k * c.u for c, v in zip(own, p.truth, strict=True)]

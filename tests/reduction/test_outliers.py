@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from finding import judged
 
 from gyrobench import units
 from gyrobench.reduction.estimation import nuisances, outliers
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.fit_result import linear_result
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.setup.setups import Setup
 
 DPH = units.factor("deg/h")
 N = 88
@@ -33,13 +32,6 @@ def record(shift: dict[int, float], seed: int = 1, slow: float = 0.0, noise: str
     return fit(wanted, X, DPH * (X @ [0.3, -0.2] + 0.01 * e), t, t + 100.0, [], "rate", "°/h", DPH, noise=noise)
 
 
-def result(found: Findings, **more: Any) -> Any:
-    return linear_result(
-        found, system="line", title="A line", method="by hand", sources=["RED-OLS"], equation="y = a + b x",
-        conventions=[], **more,
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize("noise", ["estimated", "white"])
 def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
     """60 sigma in row 41 of 88: it moves the mean by 60/88 sigma = 0.0068 deg/h; without it u is that of the rest."""
@@ -50,21 +42,23 @@ def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
     assert odd.distance[0] == pytest.approx(0.6, abs=0.03)
     assert odd.without.value == pytest.approx(clean.value, abs=0.4 * float(clean.u.max()))
     assert spoilt.u[0] > 5.0 * odd.without.u[0]
-    r = result(spoilt)
+    r = judged(spoilt)
     assert r.coefficients[0].estimate == pytest.approx(0.3 + 0.6 / N, abs=0.004)  # the plain fit stays
     (text,) = [w for w in r.warnings if "outside the noise" in w]
     assert text.startswith("Row 41 (+0.") and "without it" in text and "u = " in text
-    (table,) = [t for t in r.tables if t["title"] == "Estimates without outliers"]
-    assert table["rows"][0][4] < 0.2 * table["rows"][0][2]
+    (table,) = [t for t in r.tables if t.title == "Estimates without outliers"]
+    assert table.rows[0][4] < 0.2 * table.rows[0][2]
 
 
 def test_a_mount_of_outliers() -> None:
     """Eleven mounts of eight windows, all of the last one 60 sigma off, either way: they are named, and the fit to the
     others is that of ten mounts.
     """
-    mounts = nuisances.scatter("σ", nuisances.MOUNTS, np.repeat(np.arange(11), 8).tolist())
+    mounts = nuisances.scatter("mount", np.repeat(np.arange(11), 8).tolist())
     plain = record({80 + k: 60.0 * (-1.0) ** k for k in range(8)})
-    spoilt = fit(plain.linear, plain.X, plain.y, plain.t_start, plain.t_end, [], "", "", DPH, candidates=[mounts])
+    spoilt = fit(
+        plain.data.quantities, plain.X, plain.y, plain.t_start, plain.t_end, [], "", "", DPH, candidates=[mounts]
+    )
     odd = outliers.find(spoilt)
     assert odd is not None and odd.rows.tolist() == list(range(80, 88))
     assert np.all(np.abs(odd.without.value / DPH - [0.3, -0.2]) < 0.01)
@@ -106,14 +100,14 @@ def test_robust_fit_beside_the_plain_one() -> None:
     assert light >= 2
     assert np.all(np.abs(beta - clean.value) < 0.5 * clean.u)
     assert np.sqrt(np.diag(covariance)) == pytest.approx(clean.u, rel=0.2)
-    tables = {t["title"]: t for t in result(spoilt, robust=True).tables}
-    assert [row[0] for row in tables["Robust fit"]["rows"]] == ["a", "b"]
-    assert "Robust fit" not in {t["title"] for t in result(spoilt).tables}
+    tables = {t.title: t for t in judged(spoilt, setup=Setup(robust=True)).tables}
+    assert [row[0] for row in tables["Robust fit"].rows] == ["a", "b"]
+    assert "Robust fit" not in {t.title for t in judged(spoilt).tables}
 
 
 def test_derived_quantities_have_both() -> None:
     found = record({40: 60.0}).derive([Quantity.of("c", "ratio", "1")], lambda b: b[1] / b[0])
     odd = outliers.find(found)
     assert odd is not None and abs(odd.without.value[0] + 2.0 / 3.0) < 4.0 * odd.without.u[0]
-    (row,) = outliers.robust(found)[0]["rows"]
+    (row,) = outliers.robust(found)[0].rows
     assert row[0] == "c" and abs(row[3] + 2.0 / 3.0) < 4.0 * row[4]

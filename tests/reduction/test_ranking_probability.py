@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from gyrobench.reduction.suite.ranking import LEVEL, Candidate, adjusted, difference, rank
+from gyrobench.reduction.suite.ranking import LEVEL, RankedValue, adjusted, difference, rank
 
 
 def of(values, seeds=None):
@@ -16,7 +16,7 @@ def of(values, seeds=None):
     seeds = range(1, len(values) + 1) if seeds is None else seeds
     u = np.std(values, ddof=1) / math.sqrt(len(values))
     k = float(stats.t.ppf(0.975, len(values) - 1))
-    return Candidate(float(np.mean(values)), float(u), k, dict(zip(seeds, values, strict=True)))
+    return RankedValue(float(np.mean(values)), float(u), k, dict(zip(seeds, values, strict=True)))
 
 
 def test_pairs_of_equal_seed_are_those_of_the_paired_t_test():
@@ -34,10 +34,10 @@ def test_pairs_of_equal_seed_are_those_of_the_paired_t_test():
 
 def test_single_runs_are_compared_by_their_uncertainties():
     """d = 0.5, u = hypot(0.3, 0.4) = 0.5: one standard deviation, p = 0.3173 two-sided."""
-    assert difference(Candidate(1.0, 0.3), Candidate(1.5, 0.4)).p == pytest.approx(0.31731, abs=1e-5)
-    assert difference(Candidate(1.0, None), Candidate(1.5, 0.4)).p is None
-    assert difference(Candidate(1.0, 0.0), Candidate(1.5, 0.0)).p == 0.0
-    assert difference(Candidate(1.0, 0.0), Candidate(1.0, 0.0)).p == 1.0
+    assert difference(RankedValue(1.0, 0.3), RankedValue(1.5, 0.4)).p == pytest.approx(0.31731, abs=1e-5)
+    assert difference(RankedValue(1.0, None), RankedValue(1.5, 0.4)).p is None
+    assert difference(RankedValue(1.0, 0.0), RankedValue(1.5, 0.0)).p == 0.0
+    assert difference(RankedValue(1.0, 0.0), RankedValue(1.0, 0.0)).p == 1.0
 
 
 def test_equal_numbers_that_differ_by_rounding_are_a_tie():
@@ -52,7 +52,7 @@ def test_adjustment_is_holms():
 
 def test_ranks_and_probability_by_hand():
     """Two pairs at 4.47 and 4.46 u, one at 0.009 u: Holm takes 3, 2 and 1 times their p."""
-    places = rank([Candidate(3.0, 0.316), Candidate(1.0, 0.316), Candidate(1.004, 0.316)])
+    places = rank([RankedValue(3.0, 0.316), RankedValue(1.0, 0.316), RankedValue(1.004, 0.316)])
     assert [(p.index, p.place) for p in places] == [(1, 1), (2, 1), (0, 3)]
     z = 2.0 / math.hypot(0.316, 0.316)
     assert places[2].probability == pytest.approx(1.0 - 0.5 * 3.0 * 2.0 * stats.norm.sf(z), abs=1e-12)

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from coverage import plan as tumble_plan
+from estimation_coverage import plan as tumble_plan
 from scipy import stats
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import harmonic, window_regressors
-from gyrobench.reduction.estimation import residual_series, uncertainty
+from gyrobench.reduction.estimation import residual_series, uncertainty, verdict
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.setup.window_checks import window_problems
 
@@ -210,14 +210,14 @@ def test_combination() -> None:
     (math.nan, (-1.0, 1.0), "void"),
 ])  # fmt: skip
 def test_verdicts(estimate: float, limit: tuple[float | None, float | None] | None, expected: str) -> None:
-    assert uncertainty.assess_conformity(estimate, 0.1, limit) == expected
+    assert verdict.assess_conformity((estimate - 0.1, estimate + 0.1), limit) == expected
 
 
 def test_overall() -> None:
-    assert uncertainty.worst_verdict(["pass", "no specification given"]) == "pass"
-    assert uncertainty.worst_verdict(["pass", "inconclusive", "fail"]) == "fail"
-    assert uncertainty.worst_verdict(["pass", "inconclusive"]) == "inconclusive"
-    assert uncertainty.worst_verdict([]) == "no specification given"
+    assert verdict.worst_verdict(["pass", "no specification given"]) == "pass"
+    assert verdict.worst_verdict(["pass", "inconclusive", "fail"]) == "fail"
+    assert verdict.worst_verdict(["pass", "inconclusive"]) == "inconclusive"
+    assert verdict.worst_verdict([]) == "no specification given"
 
 
 def test_window_problems_are_none_for_good_windows() -> None:

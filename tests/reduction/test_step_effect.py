@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
-from gyrobench.reduction.estimation.step_effect import apply_step, step_effects, step_text
+from gyrobench.reduction.estimation.sentences import told
+from gyrobench.reduction.estimation.step_effect import step_effects, step_text, with_step
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_summary import renew, told
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.result import Coefficient, DriftTestResult, LoopResult
 from gyrobench.system.system import load_system
 
@@ -49,17 +51,16 @@ def test_isolation_is_extrapolated_as_an_amplitude() -> None:
 
 
 def loop_result(*coefficients: Coefficient) -> LoopResult:
-    return LoopResult(
-        system="s", title="t", method="", sources=[], conventions=[], coefficients=list(coefficients), responses=[],
-        verdict=coefficients[0].verdict,
-    )  # fmt: skip
+    return LoopResult(method="", sources=[], conventions=[], coefficients=list(coefficients), responses=[])
 
 
 def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     """u = 0.3, effect 0.4 sqrt 3: u becomes 0.5; the pass of 10 below 10.8 (U = 0.588) ends inconclusive (U = 0.98)."""
-    r = loop_result(coefficient(10.0, 0.3, limit=(None, 10.8), verdict="pass", truth=9.0, z=1.0 / 0.3))
+    found, limits = loop_result(coefficient(10.0, 0.3, truth=9.0, z=1.0 / 0.3)), {"m": (None, 10.8)}
+    assert conclude(found, None, limits).verdict == "pass"
     change = 0.4 * math.sqrt(3.0)
-    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": change}]})
+    check = {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": change}]}
+    r = conclude(found, None, limits, check)
     c = r["m"]
     assert c.u == pytest.approx(0.5) and c.k * c.u == pytest.approx(NORMAL * 0.5)
     assert c.interval == pytest.approx((10.0 - 0.98, 10.0 + 0.98), abs=1e-4)
@@ -73,9 +74,9 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
 def test_sentences_that_are_renewed_need_no_note() -> None:
     """u = 0.3 and a part of 0.4: the sentence has U = 0.98 as the table, and nothing is said of a missing effect."""
     r = loop_result(coefficient(10.0, 0.3))
-    r.summary = told(r.coefficients, "It is {m}.")
-    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": 0.4 * math.sqrt(3.0)}]})
-    renew(r)
+    r = replace(r, summary=told(r.coefficients, "It is {m}."))
+    check = {"step": 1e-3, "other": 2e-3, "rows": [{"name": "m", "unit": "1", "change": 0.4 * math.sqrt(3.0)}]}
+    r = conclude(r, None, None, check)
     assert r.summary == ["It is 10.00 ± 0.98 (95 %)."]
 
 
@@ -83,14 +84,12 @@ def test_the_warning_says_what_to_do() -> None:
     """Above u it speaks; an effect of a thousandth of the estimate is in u without a word."""
     rows = [{"name": "isolation", "unit": "dB", "change": 3.2}, {"name": "S", "unit": "N·m/rad", "change": 5.0}]
     r = loop_result(coefficient(-72.56, 0.01, "isolation", "dB"), coefficient(16000.0, 0.1, "S", "N·m/rad"))
-    r.summary = ["It isolates by 72.56 ± 0.02 dB."]
-    apply_step(r, {"step": 1e-4, "rows": rows})
+    r = with_step(r, {"step": 1e-4, "rows": rows})
     (text,) = r.warnings
     assert text.startswith(
         "The communication step of 0.1 ms moves isolation by 3.2 dB (u without it 0.01 dB): more than"
     )
     assert text.endswith("run with --step 25us.") and "S by" not in text
-    assert "without the effect of the communication step" in r.summary[-1]
     assert r["S"].u == pytest.approx(math.hypot(0.1, 5.0 / math.sqrt(3.0)))
     assert [step_text(x) for x in (5e-4, 2.5e-5, 1.0, 1e-2)] == ["0.5 ms", "25 us", "1 s", "10 ms"]
 
@@ -99,12 +98,12 @@ def test_the_covariance_of_a_drift_test_gets_the_signed_product() -> None:
     """Effects that only follow from one another: cov = C + s s^T, against numpy."""
     c = [coefficient(1.0, 0.2, "a"), coefficient(2.0, 0.3, "b")]
     r = DriftTestResult(
-        system="s", title="t", method="", sources=[], conventions=[], coefficients=c, series=[], condition=1.0, rank=2,
+        method="", sources=[], conventions=[], coefficients=c, series=[], condition=1.0, rank=2,
         correlation=[[1.0, 0.5], [0.5, 1.0]], dof=1.0, noise={}, residual_std=0.0, residual_unit="1",
     )  # fmt: skip
     before = r.covariance()
     rows = [{"name": n, "unit": "1", "change": x} for n, x in (("a", 0.6), ("b", -0.9))]
-    apply_step(r, {"step": 1e-3, "rows": rows})
+    r = with_step(r, {"step": 1e-3, "rows": rows})
     s = np.array([0.6, -0.9]) / math.sqrt(3.0)
     np.testing.assert_allclose(r.covariance(), before + np.outer(s, s), rtol=1e-12)
 
@@ -142,6 +141,6 @@ def test_an_effect_of_either_sign_has_its_share_of_the_variance(sign: float) -> 
     """|c| u(x): the figure of the budget shows no bar for a contribution below 0, although it is in u."""
     r = loop_result(coefficient(10.0, 0.3))
     rows = [{"name": "m", "unit": "1", "change": sign * 0.4 * math.sqrt(3.0)}]
-    apply_step(r, {"step": 1e-3, "other": 2e-3, "rows": rows})
+    r = with_step(r, {"step": 1e-3, "other": 2e-3, "rows": rows})
     assert [b.contribution for b in r.budget] == pytest.approx([0.3, 0.4])
     assert r.budget[1].sensitivity == pytest.approx(sign * 400.0)

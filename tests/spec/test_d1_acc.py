@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from multipoint import KS, estimates, module, polynomial, reading, reduced, windows
 
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -162,8 +158,8 @@ def test_uncertainties_are_those_of_the_method(n: int) -> None:
         "k5": math.sqrt(8) / gamma**2,
     }  # fmt: skip
     data = windows(k, {"a": 0.0}, gamma, n)
-    visits = MODEL.visits(data, MODEL.Setup(gravity=gamma * 9.80665, scale=9806.65, mounts={1: "a"}))
-    model = MODEL.Model(["a"], False)
+    visits = MODEL.visits(data, MODEL.MultipointSetup(gravity=gamma * 9.80665, scale=9806.65, mounts={1: "a"}))
+    model = MODEL.Polynomial(["a"], False)
     at, one = {"a": 0.0}, np.array([0.0, 1.0, 0.0, 0.0, 0.0])  # k1 = 1
     X = np.column_stack([model.columns(visits, at, gamma), model.slopes(visits, at, gamma, one)])
     for name, v in zip(model.terms, np.diag(np.linalg.inv(X.T @ X)), strict=False):

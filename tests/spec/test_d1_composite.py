@@ -42,7 +42,7 @@ def test_composite_correlation_time() -> None:
     trend = composite.composite((slower - slower[100]) * DPH, t, t + 60.0)
     assert trend.time is None or trend.time > 1000.0
     table = composite.tables({"a": c, "b": trend, "c": "9 windows: at least 10 are needed"}, DPH, "°/h")
-    assert len(table) == 2 and table[0]["rows"][2][-1].startswith("9 windows") and "60 s" in table[0]["caption"]
+    assert len(table) == 2 and table[0].rows[2][-1].startswith("9 windows") and "60 s" in table[0].caption
 
 
 def test_composite_refusals() -> None:

@@ -207,7 +207,7 @@ def test_polar_geometry(seed: int) -> None:
         truth = rate(p, mount, th, phi, g)
         np.testing.assert_allclose(m * W - constant + wide, truth, rtol=1e-12)
         axes = np.repeat(on_servo_table(f"polar {mount}", phi)[None], th.size, axis=0)
-        seen = servo_regression.Held(th, th, th, th + 1.0, axes).seen(np.array([0.0, 0.0, -g]))[:, 0, :]
+        seen = servo_regression.HeldWindows(th, th, th, th + 1.0, axes).seen(np.array([0.0, 0.0, -g]))[:, 0, :]
         np.testing.assert_allclose(seen.T, polar_gamma(mount, th, phi, g), atol=1e-12)
         if mount == "S":  # E39: U_x for U_z, K_xz for K_zx in the constant, cos for cos2
             bad = R + Ux * g * s + Kxz * (g * s) ** 2 - 0.5 * Kxz * g * g * c

@@ -9,7 +9,7 @@ import pytest
 from estimating import AR3, SIGMA2, companion
 from scipy import linalg, signal, stats
 
-from gyrobench.reduction.series import stationarity, wavelets
+from gyrobench.reduction.series import stationarity
 
 SIGMA, T = 1.643e-3, 1e-3
 
@@ -43,32 +43,6 @@ def test_the_drift_filter_by_either_sign(
     assert abs(at) == pytest.approx(gain, rel=0.01)
     left = abs(at - 1.0) ** 2 * 0.01**2 / 2.0 + passed * SIGMA**2
     assert 10.0 * math.log10(left / SIGMA**2) == pytest.approx(error, abs=0.1)
-
-
-@pytest.mark.parametrize(("J", "decibels"), [(4, -11.9), (5, -15.1), (6, -18.4), (7, -20.3), (8, -6.1)])
-def test_offline_wavelet_by_level(J: int, decibels: float) -> None:
-    """BENCH-DYN-SINE: db4, the best level is the one of the rule and one more; beyond it the sine goes."""
-    t = np.arange(60_000) * T
-    sine = 0.01 * np.sin(2.0 * math.pi * t)
-    noise = SIGMA * np.random.default_rng(12).normal(size=t.size)
-    left = (wavelets.denoise(sine + noise, "db4", J).x - sine)[3000:-3000]
-    assert 20.0 * math.log10(float(np.std(left)) / SIGMA) == pytest.approx(decibels, abs=0.8)
-
-
-def test_deep_levels_take_the_signal() -> None:
-    """EST-WAVELET: at 1 kHz nine levels halve 1 Hz, eleven leave nothing; eleven levels of db4 are 14.3 s late, at 5 s
-    a reading 19.9 h.
-    """
-    t = np.arange(60_000) * T
-    sine, inside = np.sin(2.0 * math.pi * t), slice(15_000, -15_000)
-    noise = SIGMA / 0.01 * np.random.default_rng(13).normal(size=t.size)
-    kept = {}
-    for J in (9, 11):
-        found = wavelets.denoise(sine + noise, "db4", J).x[inside]
-        kept[J] = float(found @ sine[inside] / (sine[inside] @ sine[inside]))
-    assert 0.3 < kept[9] < 0.7 and abs(kept[11]) < 0.05
-    late = (8 - 1) * (2**11 - 1)
-    assert late == 14_329 and late * 5.0 / 3600.0 == pytest.approx(19.9, abs=0.01)
 
 
 def test_power_and_size_of_the_runs() -> None:

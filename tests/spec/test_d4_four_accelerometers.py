@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-
-sys.path.append(str(Path(__file__).parents[1] / "systems"))
 from accelerometers_four import ALPHA, ARCSEC, TRUE, N
+from numpy.typing import NDArray
 
 from systems.accelerometer_four import chain, geometry
 

@@ -69,6 +69,15 @@ def test_up_and_down_runs() -> None:
     assert u[198] == pytest.approx(-2.3141, abs=2e-4) and u[200] == pytest.approx(-2.527, abs=1e-3)
 
 
+def test_a_line_nearly_vanishes_from_the_difference() -> None:
+    """EX10: d differences; 2 sin(pi f T) = 0.00723 for 2.3e-4 Hz at 5 s, phase + (pi/2 - pi f T)."""
+    turn = np.pi * 2.3e-4 * 5.0
+    t = 2.0 * turn * np.arange(20_000)
+    assert 2.0 * np.sin(turn) == pytest.approx(0.0072257, rel=1e-4)
+    assert np.diff(np.sin(t)) == pytest.approx(2.0 * np.sin(turn) * np.sin(t[1:] + np.pi / 2.0 - turn), abs=1e-12)
+    assert np.diff(np.arange(5.0) ** 2, n=2) == pytest.approx([2.0, 2.0, 2.0])
+
+
 def test_phase_of_a_line() -> None:
     """EX11: atan2(b, a) returns a phase of 2.5 rad, the printed arctan(b/a) does not."""
     t = 2 * np.pi * 2.3e-4 * 5 * np.arange(1, 20_001)

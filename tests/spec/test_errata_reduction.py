@@ -30,6 +30,20 @@ def test_rates_from_angles() -> None:
     assert abs(forward - rate(6.0)) == pytest.approx(0.004, abs=1e-12) and abs(forward - rate(4.0)) > 0.1
 
 
+def test_the_shortest_interval_is_not_the_best() -> None:
+    """ER4: errors of the rate of sin t with noise: least near sqrt2 s/dT = dT^2/24, not at the shortest interval."""
+    t, s = np.arange(0.0, 2000.0, 0.05), 1e-3
+    theta = np.sin(t) + s * generator().normal(size=t.size)
+    rms = []
+    for n in (1, 8, 40):
+        rate = (theta[n:] - theta[:-n]) / (n * 0.05)
+        rms.append(float(np.sqrt(np.mean((rate - np.cos(t[:-n] + n * 0.025)) ** 2))))
+    assert rms[1] < rms[0] / 3 and rms[1] < rms[2] / 3
+    assert rms[0] == pytest.approx(np.sqrt(2) * s / 0.05, rel=0.03)
+    # the mean of cos over dT is sin(dT/2)/(dT/2) of it
+    assert rms[2] == pytest.approx((1 - np.sin(1.0)) / np.sqrt(2), rel=0.03)
+
+
 def test_moving_mean_as_a_filter() -> None:
     """ER3: beyond f dT = 1 the mean over dT turns the sign of a sine and lets 22 % of it pass."""
     t, f = np.linspace(0.0, 50.0, 5001), 1.43

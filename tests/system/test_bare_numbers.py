@@ -19,7 +19,7 @@ from gyrobench.system.system import System, load_system
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import assemble
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 ROOT = Path(__file__).parents[2]
 
@@ -83,12 +83,12 @@ def test_array_is_questioned_by_its_elements() -> None:
         Option([1.0, 2.0], "kg").parse("gyro.mass", "[1, 3000]")
 
 
-def test_foreign_part_is_asked_in_si(small: System, make: Make) -> None:
+def test_foreign_part_is_asked_in_si(small: System, foreign: Foreign) -> None:
     """Its own unit is deg/h/mA; a bare number is SI as everywhere."""
-    foreign: Any = {"gyro": make("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}
+    vendor: Any = {"gyro": foreign("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}
     with pytest.raises(InvalidValueError, match=r"gyro.k = 20: without a unit this is 20 rad/s/A"):
-        resolved(small, {"gyro.k": "20"}, *foreign)
-    resolved(small, {"gyro.k": "20deg/h/mA"}, *foreign)
+        resolved(small, {"gyro.k": "20"}, *vendor)
+    resolved(small, {"gyro.k": "20deg/h/mA"}, *vendor)
 
 
 def test_options() -> None:

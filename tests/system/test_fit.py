@@ -12,7 +12,7 @@ from fmpy import read_model_description
 from gyrobench.system.binding import SocketMismatchError, fit, load_mapping
 from gyrobench.system.sockets import SOCKETS, element_names, socket
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 DPH = math.pi / 180 / 3600
 
@@ -23,8 +23,8 @@ def test_element_names() -> None:
     assert element_names("C", (2, 2)) == ["C[1,1]", "C[1,2]", "C[2,1]", "C[2,2]"]
 
 
-def test_vendor_gyro_fits_through_its_mapping(make: Make) -> None:
-    description = read_model_description(str(make("vendor_gyro")))
+def test_vendor_gyro_fits_through_its_mapping(foreign: Foreign) -> None:
+    description = read_model_description(str(foreign("vendor_gyro")))
     binding = fit(socket("SdfGyro"), description, load_mapping(FOREIGN / "vendor_gyro.toml"), "gyro")
     # connector = gain * variable: deg/h declared by BaseUnit, load in g with the other sign, mA declared, mV mapped
     assert binding.inputs["omega[2]"].variable == "W_OA"
@@ -38,8 +38,8 @@ def test_vendor_gyro_fits_through_its_mapping(make: Make) -> None:
     assert binding.absent == [*inputs, "drift", "b", "M_react", "h_I", "M_I", "saturated"]
 
 
-def test_misfit_names_everything(make: Make) -> None:
-    description = read_model_description(str(make("vendor_gyro")))
+def test_misfit_names_everything(foreign: Foreign) -> None:
+    description = read_model_description(str(foreign("vendor_gyro")))
     with pytest.raises(SocketMismatchError) as caught:
         fit(socket("SdfGyro"), description, {"omega": {"names": ["W_IA", "W_OA", "BIAS"]}, "i": {"name": "I_TORQ"},
                                              "pickoff": "V_PICKOFF"}, "gyro")  # fmt: skip
@@ -55,8 +55,8 @@ def test_misfit_names_everything(make: Make) -> None:
     assert len(caught.value.problems) == 7  # omega[3], f[1..3], i, u, pickoff
 
 
-def test_wrong_unit_and_wrong_type(make: Make) -> None:
-    vendor = read_model_description(str(make("vendor_gyro")))
+def test_wrong_unit_and_wrong_type(foreign: Foreign) -> None:
+    vendor = read_model_description(str(foreign("vendor_gyro")))
     mapping = load_mapping(FOREIGN / "vendor_gyro.toml")
     with pytest.raises(SocketMismatchError, match=r"i: wrong unit: I_TORQUE is in V, the socket needs A") as caught:
         fit(socket("SdfGyro"), vendor, {**mapping, "i": {"name": "I_TORQUE", "unit": "V"}})
@@ -65,13 +65,13 @@ def test_wrong_unit_and_wrong_type(make: Make) -> None:
         fit(socket("SdfGyro"), vendor, {**mapping, "f": {**mapping["f"], "unit": "furlong"}})
     with pytest.raises(SocketMismatchError, match=r"factor 0.0 in the mapping"):
         fit(socket("SdfGyro"), vendor, {**mapping, "u": {"name": "V_PICKOFF", "unit": "mV", "factor": 0}})
-    lag = read_model_description(str(make("lag")))
+    lag = read_model_description(str(foreign("lag")))
     with pytest.raises(SocketMismatchError, match=r"i: wrong type: count is Integer, must be Real"):
         fit(socket("Rebalance"), lag, {"i": "count", "i_read": "y"})
 
 
-def test_unit_not_declared_is_taken_as_si_with_a_warning(make: Make) -> None:
-    lag = read_model_description(str(make("lag")))
+def test_unit_not_declared_is_taken_as_si_with_a_warning(foreign: Foreign) -> None:
+    lag = read_model_description(str(foreign("lag")))
     binding = fit(socket("Rebalance"), lag, {"i": "y", "i_read": "y", "saturated": "odd"})
     assert any("u declares no unit; taken as V" in w for w in binding.warnings)
     assert binding.outputs["saturated"].kind == "Boolean"
@@ -89,9 +89,9 @@ def test_every_socket_has_a_meaning_for_each_connector() -> None:
         assert all(c.meaning and c.causality in ("input", "output") for c in s.connectors)
 
 
-def test_quantity_is_compared_where_both_sides_declare_one(make: Make) -> None:
+def test_quantity_is_compared_where_both_sides_declare_one(foreign: Foreign) -> None:
     """The vendor's FMU declares none and fits; a quantity the bench does not know says nothing."""
-    description = read_model_description(str(make("vendor_gyro")))
+    description = read_model_description(str(foreign("vendor_gyro")))
     mapping = load_mapping(FOREIGN / "vendor_gyro.toml")
     angle = socket("SdfGyro").standing_for({"u": "angle"})
     u = next(v for v in description.modelVariables if v.name == "V_PICKOFF")

@@ -23,7 +23,7 @@ from gyrobench.system.execution_order import AlgebraicLoopError
 from gyrobench.system.sockets import SOCKETS, socket
 from gyrobench.system.system import Slot, System
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 GAUGE = Socket(
     "Gauge",
@@ -53,13 +53,13 @@ class Chain(System):
     channel_period = 0.01
 
 
-def chain(make: Make, tmp_path: Path, text: dict[str, str], **more: Any) -> list[Record]:
+def chain(foreign: Foreign, tmp_path: Path, text: dict[str, str], **more: Any) -> list[Record]:
     """Run in both engines and in a child process; the mapping files of a and b."""
     files = {}
     for slot, lines in text.items():
         files[slot] = tmp_path / f"{slot}.toml"
         files[slot].write_text(lines)
-    parts = {n: make("lag") for n in "ab"}
+    parts = {n: foreign("lag") for n in "ab"}
     both = [run(Chain(), parts, files, engine=e, **more) for e in ("native", "reference")]
     both.append(run(Chain(), parts, files, child=True, **more))
     assert both[0].same_data(both[1])
@@ -67,7 +67,7 @@ def chain(make: Make, tmp_path: Path, text: dict[str, str], **more: Any) -> list
     return both
 
 
-def test_offsets_and_constants_against_a_loop_by_hand(make: Make, tmp_path: Path) -> None:
+def test_offsets_and_constants_against_a_loop_by_hand(foreign: Foreign, tmp_path: Path) -> None:
     # a gives degC: y[K] = v + 273.15; b works in degF above 100 K: u[K] = 5/9 v + 100; a is held by constant inputs
     text = {
         "a": 'y = {name = "y", unit = "degC"}\nu = {name = "u", unit = "K"}\n'
@@ -75,7 +75,7 @@ def test_offsets_and_constants_against_a_loop_by_hand(make: Make, tmp_path: Path
         "b": 'u = {name = "u", factor = 0.5, offset = "100K"}\ny = {name = "y"}\nhold = {name = "hold"}\n'
         "[valid]\nconstant = 1",
     }
-    found = chain(make, tmp_path, text, values={"a.y0": 20.0})[0]
+    found = chain(foreign, tmp_path, text, values={"a.y0": 20.0})[0]
     e = -math.expm1(-0.01 / 0.1)
     a, b = 20.0, 0.0
     rows = [[a + 273.15, b]]
@@ -86,16 +86,18 @@ def test_offsets_and_constants_against_a_loop_by_hand(make: Make, tmp_path: Path
     np.testing.assert_allclose(np.column_stack([found.channels["a.y"], found.channels["b.y"]]), rows, rtol=1e-13)
     assert set(found.channels["a.valid"].tolist()) == {0.0}
     # 1 holds b at its start value from the first step on
-    still = chain(make, tmp_path, {**text, "a": text["a"].replace("valid = {constant = 0}", "valid = {constant = 1}")})
+    still = chain(
+        foreign, tmp_path, {**text, "a": text["a"].replace("valid = {constant = 0}", "valid = {constant = 1}")}
+    )
     assert set(still[0].channels["b.y"].tolist()) == {0.0}
     # an input held at a constant of the mapping file
-    held = chain(make, tmp_path, {**text, "a": text["a"].replace("constant = 0}\nv", "constant = 1}\nv")})[0]
+    held = chain(foreign, tmp_path, {**text, "a": text["a"].replace("constant = 0}\nv", "constant = 1}\nv")})[0]
     assert set(held.channels["a.y"].tolist()) == {273.15}
 
 
-def test_delay_is_one_step_whatever_the_order(make: Make, tmp_path: Path) -> None:
+def test_delay_is_one_step_whatever_the_order(foreign: Foreign, tmp_path: Path) -> None:
     one = '[u]\nname = "u"\n%s[hold]\nconstant = 0\n[valid]\nconstant = 0\n'
-    found = chain(make, tmp_path, {"a": one % "", "b": one % "delay = 1\n"}, values={"a.y0": 20.0})[0]
+    found = chain(foreign, tmp_path, {"a": one % "", "b": one % "delay = 1\n"}, values={"a.y0": 20.0})[0]
     assert "a.y -> b.u: one step delay (stated in the mapping file)" in found.run.cuts
     assert found.run.delays["a.y -> b.u"] == 0.01
     e = -math.expm1(-0.01 / 0.1)
@@ -108,7 +110,7 @@ def test_delay_is_one_step_whatever_the_order(make: Make, tmp_path: Path) -> Non
     np.testing.assert_allclose(np.column_stack([found.channels["a.y"], found.channels["b.y"]]), rows, rtol=1e-13)
     # without the wire back, a comes first in the order, and b sees its value before the step all the same
     alone = (one % "").replace('"u"', '"u"\nconstant = 0')
-    found = chain(make, tmp_path, {"a": alone, "b": one % "delay = 1\n"}, values={"a.y0": 20.0})[0]
+    found = chain(foreign, tmp_path, {"a": alone, "b": one % "delay = 1\n"}, values={"a.y0": 20.0})[0]
     assert found.run.order == ["a", "b"]
     a, b = 20.0, 0.0
     rows = [[a, b]]
@@ -118,31 +120,31 @@ def test_delay_is_one_step_whatever_the_order(make: Make, tmp_path: Path) -> Non
     np.testing.assert_allclose(np.column_stack([found.channels["a.y"], found.channels["b.y"]]), rows, rtol=1e-13)
 
 
-def test_a_pythonfmu_gyro(small: System, make: Make) -> None:
+def test_a_pythonfmu_gyro(small: System, foreign: Foreign) -> None:
     """It declares no dependencies; with that in the mapping file it runs, and the gyro in C gives the same windows."""
     maps = {"gyro": FOREIGN / "python_gyro.toml"}
     values = {"dwell": 0.2, "turns": 0.01, "table.index_rate": 50.0, "rebalance.meter": 0.0}
-    found = run(small, {"gyro": make("python_gyro")}, maps, values)
-    old = run(small, {"gyro": make("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}, values)
+    found = run(small, {"gyro": foreign("python_gyro")}, maps, values)
+    old = run(small, {"gyro": foreign("vendor_gyro")}, {"gyro": FOREIGN / "vendor_gyro.toml"}, values)
     assert "rebalance.i -> gyro.i: one step delay (no output of gyro depends on it at once)" in found.run.cuts
     assert found.run.cuts == old.run.cuts
     np.testing.assert_allclose(found.windows["mean"], old.windows["mean"], rtol=1e-9, atol=1e-15)
 
 
-def test_an_algebraic_loop_says_which_lines_open_it(small: System, make: Make, tmp_path: Path) -> None:
+def test_an_algebraic_loop_says_which_lines_open_it(small: System, foreign: Foreign, tmp_path: Path) -> None:
     with pytest.raises(AlgebraicLoopError) as caught:
-        run(small, {"gyro": make("python_gyro")}, {"gyro": _without(tmp_path, "python_gyro.toml", "feedthrough")})
+        run(small, {"gyro": foreign("python_gyro")}, {"gyro": _without(tmp_path, "python_gyro.toml", "feedthrough")})
     assert "gyro: pickoff declares no dependencies" in str(caught.value)
     assert "    [u]\n    feedthrough = false" in str(caught.value)
     # a gyro that does follow the current within the step: a delay is an error that is stated
     text = '[u]\nname = "u"\ndelay = 1\n'
     (tmp_path / "loose.toml").write_text(text)
-    with Session(small, {"gyro": make("loose")}, {"gyro": tmp_path / "loose.toml"}) as session:
+    with Session(small, {"gyro": foreign("loose")}, {"gyro": tmp_path / "loose.toml"}) as session:
         cuts = [str(c) for c in session.assembly.order.cuts]
     assert cuts[-1] == "gyro.u -> rebalance.u: one step delay (stated in the mapping file)"
     pytest.importorskip("fmu_manipulation_toolbox")
     with pytest.raises(ExportError, match=r"cannot .* the delay of gyro\.u -> rebalance\.u"):
-        export_container(small, tmp_path / "x.fmu", {"gyro": make("loose")}, {"gyro": tmp_path / "loose.toml"})
+        export_container(small, tmp_path / "x.fmu", {"gyro": foreign("loose")}, {"gyro": tmp_path / "loose.toml"})
 
 
 def _without(folder: Path, name: str, word: str) -> Path:
@@ -166,8 +168,8 @@ def _without(folder: Path, name: str, word: str) -> Path:
         ({"name": "u", "offest": 1.0}, "u: mapping entry must be a table with name or names, unit, factor, offset"),
     ],
 )
-def test_mapping_entries_that_are_wrong(make: Make, entry: dict[str, Any], words: str) -> None:
-    description = read_model_description(str(make("lag")))
+def test_mapping_entries_that_are_wrong(foreign: Foreign, entry: dict[str, Any], words: str) -> None:
+    description = read_model_description(str(foreign("lag")))
     rest = {"hold": {"constant": 0}, "valid": {"constant": 1}}
     with pytest.raises(SocketMismatchError) as caught:
         fit(GAUGE, description, {"u": entry, **rest})
@@ -175,9 +177,9 @@ def test_mapping_entries_that_are_wrong(make: Make, entry: dict[str, Any], words
     assert words in caught.value.problems[0]
 
 
-def test_proposals(make: Make) -> None:
+def test_proposals(foreign: Foreign) -> None:
     """The vendor's mapping by names and units alone; what is left is said: units that are not declared, signs."""
-    description = read_model_description(str(make("vendor_gyro")))
+    description = read_model_description(str(foreign("vendor_gyro")))
     with pytest.raises(SocketMismatchError) as caught:
         fit(socket("SdfGyro"), description, {}, "gyro")
     proposed = tomllib.loads("\n".join(caught.value.proposal))
@@ -193,9 +195,9 @@ def test_proposals(make: Make) -> None:
     assert list(tomllib.loads("\n".join(caught.value.proposal))) == ["i"]
 
 
-def test_fit_command(make: Make, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+def test_fit_command(foreign: Foreign, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
     file = tmp_path / "gyro.toml"
-    arguments = ("fit", make("python_gyro"), "--slot", "tumble_single_axis.gyro")
+    arguments = ("fit", foreign("python_gyro"), "--slot", "tumble_single_axis.gyro")
     code, _, err = command(*arguments, "--out", file)
     assert (code, err) == (0, "")
     written = file.read_text()
@@ -206,11 +208,11 @@ def test_fit_command(make: Make, tmp_path: Path, command: Callable[..., tuple[in
     }
     assert "# pickoff: no dependencies are declared" in written
     assert command(*arguments, "--out", file)[0] == 2  # not over what is there
-    code, text, err = command("fit", make("lag"), "--slot", "Rebalance")
+    code, text, err = command("fit", foreign("lag"), "--slot", "Rebalance")
     assert code == 0
     assert "# [i]  # torquer current, A: name the FMU's output, or state the value" in text
     assert "to be completed by hand:\n  - i: missing" in err
-    code, _, err = command("fit", make("lag"), "--slot", "tumble_single_axis.gyroscope")
+    code, _, err = command("fit", foreign("lag"), "--slot", "tumble_single_axis.gyroscope")
     assert code == 2
     assert "no slot 'gyroscope'; did you mean gyro" in err
 
@@ -221,7 +223,7 @@ def test_optional_connectors_are_marked() -> None:
     assert latency.optional
 
 
-def test_offsets_and_constants_survive_an_archive(make: Make, tmp_path: Path) -> None:
+def test_offsets_and_constants_survive_an_archive(foreign: Foreign, tmp_path: Path) -> None:
     text = {
         "a": 'y = {name = "y", unit = "degC"}\nu = {name = "u", unit = "K"}\n'
         "hold = {constant = 0}\nvalid = {constant = 1}",
@@ -232,7 +234,7 @@ def test_offsets_and_constants_survive_an_archive(make: Make, tmp_path: Path) ->
     for slot, lines in text.items():
         maps[slot] = tmp_path / f"{slot}.toml"
         maps[slot].write_text(lines)
-    parts = {n: make("lag") for n in "ab"}
+    parts = {n: foreign("lag") for n in "ab"}
     for held in (True, False):
         maps["a"].write_text(text["a"].replace("valid = {constant = 1}", f"valid = {{constant = {int(held)}}}"))
         export_ssp(Chain(), tmp_path / "chain.ssp", parts, maps, {"a.y0": 20.0})

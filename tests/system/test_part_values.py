@@ -19,7 +19,7 @@ from gyrobench.system.system import System, load_system
 from gyrobench.system.values import nest
 from gyrobench.system.wiring import assemble
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 VENDOR = FOREIGN / "vendor_gyro.toml"
 DPH_MA = np.pi / 180 / 3600 / 1e-3  # deg/h/mA
@@ -67,16 +67,16 @@ def test_what_the_system_sets_unless_the_user_does(small: System) -> None:
     assert parts.given("gyro.mount", np.eye(3)) == [[0.5, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
-def test_foreign_part_through_its_mapping(small: System, make: Make) -> None:
-    slot = {"gyro": make("vendor_gyro")}
+def test_foreign_part_through_its_mapping(small: System, foreign: Foreign) -> None:
+    slot = {"gyro": foreign("vendor_gyro")}
     parts = seen(small, slot, {"gyro": VENDOR})
     assert parts["gyro.k"] == pytest.approx(20 * DPH_MA, rel=1e-14)  # 20 deg/h/mA, its start value
     assert parts.notes == []
     assert seen(small.with_values({"gyro.k": 0.1}), slot, {"gyro": VENDOR})["gyro.k"] == 0.1
 
 
-def test_what_a_foreign_part_lacks(small: System, make: Make) -> None:
-    parts = seen(small, {"gyro": make("vendor_gyro")}, {"gyro": VENDOR})
+def test_what_a_foreign_part_lacks(small: System, foreign: Foreign) -> None:
+    parts = seen(small, {"gyro": foreign("vendor_gyro")}, {"gyro": VENDOR})
     assert parts["gyro.H"] == load_part("floated_gyro")._by_name["H"].start
     (note,) = parts.notes
     assert note.startswith("gyro has no parameter 'H': the design takes 0.2 (SI), the value of floated_gyro; ")
@@ -91,29 +91,29 @@ def test_what_a_foreign_part_lacks(small: System, make: Make) -> None:
         parts["table2.x"]
 
 
-def test_notes_of_a_design_reach_the_run(make: Make) -> None:
+def test_notes_of_a_design_reach_the_run(foreign: Foreign) -> None:
     class Design(type(load_system("tumble_single_axis"))):  # type: ignore[misc]
         def parameters(self, parts: PartValues) -> dict[str, Any]:
             return {**super().parameters(parts), "rebalance.K_p": parts["gyro.H"]}
 
     system = Design()
-    parts = seen(system, {"gyro": make("vendor_gyro")}, {"gyro": VENDOR})
+    parts = seen(system, {"gyro": foreign("vendor_gyro")}, {"gyro": VENDOR})
     assert parts.__dict__["everything"]["rebalance.K_p"] == 0.2
     assert any("gyro has no parameter 'H'" in n for n in parts.__dict__["said"])
 
 
-def test_value_that_the_mapping_file_states(small: System, make: Make, tmp_path: Path) -> None:
+def test_value_that_the_mapping_file_states(small: System, foreign: Foreign, tmp_path: Path) -> None:
     file = tmp_path / "gyro.toml"
     text = VENDOR.read_text()
     file.write_text(text + 'H = { value = 0.15 }\nK_sg = { value = 9.5, unit = "V/rad" }\nmass = { value = [1, 2] }\n')
-    parts = seen(small, {"gyro": make("vendor_gyro")}, {"gyro": file})
+    parts = seen(small, {"gyro": foreign("vendor_gyro")}, {"gyro": file})
     assert (parts["gyro.H"], parts["gyro.K_sg"], parts["gyro.mass"]) == (0.15, 9.5, [1, 2])
     assert parts.notes == []
     assert parts.__dict__["everything"]["gyro.H"] == 0.15  # run.json says it too
     file.write_text(text + 'H = { value = "much" }\nK_sg = { value = 1, unit = "degF" }\n')
     assert load_mapping(file)
     with pytest.raises(SocketMismatchError) as caught:
-        seen(small, {"gyro": make("vendor_gyro")}, {"gyro": file})
+        seen(small, {"gyro": foreign("vendor_gyro")}, {"gyro": file})
     assert "parameters.H: value much: must be a number or a list of numbers" in str(caught.value)
     assert "parameters.K_sg: unit 'degF' has no factor to SI" in str(caught.value)
 

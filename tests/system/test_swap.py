@@ -8,14 +8,14 @@ from pathlib import Path
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 
-Make = Callable[[str], Path]
+Foreign = Callable[[str], Path]
 MAP = Path(__file__).parents[1] / "foreign" / "vendor_gyro.toml"
 SHORT = {"rate": "200 ERU", "dwell": 20.0, "settle": 5.0, "windows": 12}
 QUIET = {"rebalance.meter": 0.0, "rebalance.resolution": 0.0}
 TERMS = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS")
 
 
-def test_vendor_gyro_gives_the_same_coefficients(make: Make) -> None:
+def test_vendor_gyro_gives_the_same_coefficients(foreign: Foreign) -> None:
     system = load_system("tumble_single_axis")
     noise = {f"gyro.{n}": 0.0 for n in ("turn_on", "markov", "white", "pickoff")}
     with Session(system) as session:
@@ -27,7 +27,7 @@ def test_vendor_gyro_gives_the_same_coefficients(make: Make) -> None:
         "gyro.T_FLOAT": p["gyro.J"] / p["gyro.C"],  # s, declared in ms
         "gyro.SENS": p["gyro.K_sg"] * 1e3,  # mV/rad
     }
-    with Session(system, {"gyro": make("vendor_gyro")}, {"gyro": MAP}) as session:
+    with Session(system, {"gyro": foreign("vendor_gyro")}, {"gyro": MAP}) as session:
         theirs = session.run({**SHORT, **QUIET, **same, **body})
     a, b = system.reduce(ours), system.reduce(theirs)
     assert [c.name for c in a.coefficients] == list(TERMS)

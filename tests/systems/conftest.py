@@ -1,10 +1,8 @@
-"""The tumble system, prepared once, the foreign FMUs, and the commands called as a user calls them."""
+"""The tumble system, prepared once, and a reduction without its slowest part."""
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 from tumbling import NAME
@@ -30,22 +28,3 @@ def no_arma(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name in ("fit_arma", "arima310"):
         monkeypatch.setattr(drift_model, name, refused)
-
-
-@pytest.fixture(scope="session")
-def foreign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Builds a foreign FMU of tests/foreign once."""
-    file = Path(__file__).parents[1] / "foreign" / "make.py"
-    spec = importlib.util.spec_from_file_location("foreign_make", file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    folder = tmp_path_factory.mktemp("foreign")
-    done: dict[str, Path] = {}
-
-    def make_once(name: str) -> Path:
-        if name not in done:
-            done[name] = module.make(name, folder)
-        return done[name]
-
-    return make_once

@@ -16,9 +16,10 @@ from accelerometers_four import ALPHA, ARCSEC, TRUE, N, head, voltages, windows
 
 from gyrobench.engine.session import Session
 from gyrobench.frames import G0
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import load_system
 from systems.accelerometer_four import chain, geometry
-from systems.accelerometer_four.reduction import FourSetup, ReductionError, from_record, reduce
+from systems.accelerometer_four.reduction import FourSetup, Reduction, reduce
 
 Command = Callable[..., tuple[int, str, str]]
 NAME = "accelerometer_four"
@@ -41,10 +42,8 @@ def test_exact_without_noise() -> None:
     D = head(rng, 11 * ARCSEC, D1)
     found = reduce(windows(voltages(rng, D, 0.0)), setup())
     assert np.array([c.estimate for c in found.coefficients[:20]]).reshape(4, 5) == pytest.approx(TRUE, abs=1e-7)
-    table = next(t for t in found.tables if t["title"].startswith("Angle errors"))
-    back = sum(
-        a * ARCSEC * (np.cos(k * ALPHA) if kind == "cos" else np.sin(k * ALPHA)) for k, kind, a, _ in table["rows"]
-    )
+    table = next(t for t in found.tables if t.title.startswith("Angle errors"))
+    back = sum(a * ARCSEC * (np.cos(k * ALPHA) if kind == "cos" else np.sin(k * ALPHA)) for k, kind, a, _ in table.rows)
     assert back == pytest.approx(D, abs=2e-9)
 
 
@@ -120,7 +119,7 @@ def test_misalignment_and_zero_stand_in_the_output_axis() -> None:
     values = {f"accelerometer_{i}.white": 0.0 for i in (1, 2, 3, 4)} | {"accelerometer_2.eta": 1e-3, "dwell": 1.0}
     with Session(load_system(NAME)) as session:
         record = session.run({**values, "settle": 0.5}, seed=1)
-    found = from_record(record)
+    found = Reduction.from_record(record)
     assert found["K_O,2"].estimate == pytest.approx(-7.3e-6 + 1.32453 * 1e-3, abs=1e-8)
     for c in found.coefficients[:20]:
         assert c.estimate == pytest.approx(c.truth, abs=1e-7), c.name
@@ -132,7 +131,7 @@ def test_co_simulation_with_noise() -> None:
     with Session(load_system(NAME)) as session:
         for seed in (3, 4, 5):
             record = session.run({"head_seed": seed, "dwell": 1.0, "settle": 0.2}, seed=seed)
-            z += [float(c.z or 0.0) for c in from_record(record).coefficients[:20]]
+            z += [float(c.z or 0.0) for c in Reduction.from_record(record).coefficients[:20]]
     assert abs(float(np.mean(z))) < 0.45 and 0.7 < float(np.std(z)) < 1.35
 
 

@@ -35,9 +35,9 @@ def reduction() -> Any:
 
 
 def by_phase(r: Any, column: str) -> dict[str, Any]:
-    table = next(t for t in r.result.tables if t["title"] == "Attitude error by phase")
-    k = table["columns"].index(column)
-    return {row[0]: row[k] for row in table["rows"]}
+    table = next(t for t in r.result.tables if t.kind == "phases")
+    k = table.columns.index(column)
+    return {row[0]: row[k] for row in table.rows}
 
 
 def test_error_and_its_frame() -> None:

@@ -166,8 +166,8 @@ def test_date_and_site_give_the_sensor_its_field() -> None:
     assert p["sensor.inclination"] / DEG == pytest.approx(71.73, abs=0.05)
     assert p["sensor.field"] == pytest.approx(16.647e-6, rel=2e-3)
     assert found["error at rest"].estimate == pytest.approx(5.0 / 60.0, rel=1e-3)
-    (table,) = [t for t in found.tables if t["title"] == "Magnetic field of the site"]
-    assert "2025 on 2026-07-02" in table["caption"] and 0.3 < table["rows"][0][2] < 0.5
+    (table,) = [t for t in found.tables if t.kind == "site.field"]
+    assert "2025 on 2026-07-02" in table.caption and 0.3 < table.rows[0][2] < 0.5
 
 
 def test_without_the_package_a_date_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,8 +73,8 @@ def test_tumble(session: Session, plain: Result, error: dict[str, Any], source: 
     record = session.run({**TUMBLED, **error}, seed=1)
     wrong, right = corrected(record), corrected(record, f"{source} = {size}(1) arcsec")
     check(plain, wrong, right, 0.05 if "angle" in source else 0.02, 2e-5)  # an encoder moves the windows too
-    (table,) = [t for t in right.tables if t["title"] == "Corrections"]
-    assert table["rows"][0][:2] == [source, pytest.approx(size * ARCSEC)]
+    (table,) = [t for t in right.tables if t.title == "Corrections"]
+    assert table.rows[0][:2] == [source, pytest.approx(size * ARCSEC)]
 
 
 def test_the_correction_brings_its_own_uncertainty(session: Session) -> None:

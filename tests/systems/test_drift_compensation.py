@@ -45,7 +45,7 @@ def closed_form() -> Any:
 def test_figures_of_the_method() -> None:
     """After 6 h: 114 arcsec, 2.45 with u = M (1.75 after 3 h), 0.24 with T_c = 300 s; 0.00194 deg/h."""
     c = closed_form()
-    m = c.Model(0.01 * DPH, 3600.0, 1.0, 0.2 * ARCSEC)
+    m = c.CompensatedDrift(0.01 * DPH, 3600.0, 1.0, 0.2 * ARCSEC)
     rate, both = (c.expected(m, m, H, 2160, T_c) for T_c in (0.0, 300.0))
     assert rate.free[-1] / ARCSEC == pytest.approx(114.0, abs=0.5)
     assert rate.angle[-1] / ARCSEC == pytest.approx(2.45, abs=0.1)
@@ -81,7 +81,7 @@ def test_consistent_with_and_without_the_angle(with_angle: Any, rate_only: Any) 
 def test_prediction_without_the_torquer_is_out_by_hundreds() -> None:
     """ER40: the filter of (6-31), printed without u, in a loop of its own: NEES about 980 instead of 3."""
     c = closed_form()
-    Phi, Q, B = c.Model(0.01, 3600.0, 1.0, 0.2).sampled(H)  # deg/h is arcsec/s: arcsec
+    Phi, Q, B = c.CompensatedDrift(0.01, 3600.0, 1.0, 0.2).sampled(H)  # deg/h is arcsec/s: arcsec
     rng, n = np.random.default_rng(15), 200
     L = np.linalg.cholesky(Q + 1e-18 * np.eye(3))
     found = []

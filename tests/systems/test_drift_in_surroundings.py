@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -12,6 +11,7 @@ import pytest
 import servoing_two_axes
 from servoing import DAY50, QUIET, polar_at_2_ms
 from tumbling import DPH, NAMES, SHORT, load, quiet
+from undiagnosed import reduce_undiagnosed
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
@@ -41,11 +41,8 @@ def ramp(prepared: Session) -> Record:
 
 
 def reduced(record: Record, **columns: Any) -> DriftTestResult:
-    reduction = importlib.import_module(".reduction", type(load()).__module__)
     windows = {n: v for n, v in record.windows.items() if n in columns or n != "temperature"} | columns
-    result = reduction.from_record.__wrapped__(Record(windows, {}, record.run))
-    assert isinstance(result, DriftTestResult)
-    return result
+    return reduce_undiagnosed(Record(windows, {}, record.run))
 
 
 def test_the_record_has_the_mean_temperature_of_each_window(ramp: Record) -> None:

@@ -365,7 +365,7 @@ def test_days_of_turn_on(session: Session, tmp_path: Path) -> None:
     assert by["R_y"].interval[1] - by["R_y"].estimate == pytest.approx(half)
     p = {t.name: t.p for t in result.tests}
     assert p["day to day, R_y"] < 1e-6 and p["day to day, u_x"] > 1e-3
-    assert len(next(t for t in result.tables if t["title"] == "Estimates by day")["rows"]) == 8
+    assert len(next(t for t in result.tables if t.title == "Estimates by day").rows) == 8
 
     day = {p.phase: 1 + [f.name for f in folders].index(p.day) for p in combined.run.plan}
     (tmp_path / "lab.csv").write_text(laboratory(combined, day=day), encoding="utf-8")

@@ -65,8 +65,8 @@ def test_an_error_is_predicted_and_taken_out(
     """ω_0 in deg/h, s_E and s_N in deg/h per arcsec; the rest of their squares."""
     plain, wrong = reduced(session, {}), reduced(session, error)
     right = reduced(session, error, f"{source} = 120(1) arcsec")
-    (said,) = [t for t in wrong.tables if t["title"] == PREDICTED]
-    shift = {row[0]: row[-3] for row in said["rows"]}
+    (said,) = [t for t in wrong.tables if t.id == PREDICTED]
+    shift = {row[0]: row[-3] for row in said.rows}
     for name, x in by_hand.items():
         assert wrong[name].estimate - plain[name].estimate == pytest.approx(x, rel=0.03), name
     for name in ("ω_0", "s_E", "s_N"):

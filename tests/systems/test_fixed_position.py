@@ -20,6 +20,7 @@ from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.estimation import noise
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
@@ -105,10 +106,10 @@ def test_closed_formula_by_hand() -> None:
     """Input axis up at 45.75 deg: 15.041069 sin phi = 10.7739 deg/h; 0.6 mA of 17.2 deg/h/mA take 10.32 of it."""
     C, phi = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]), math.radians(45.75)
     t = np.arange(10.0)
-    setup = R.Setup(latitude=phi, gravity=9.8, k=17.2 * DPH / 1e-3, attitude=C)
+    setup = R.FixedPositionSetup(latitude=phi, gravity=9.8, k=17.2 * DPH / 1e-3, attitude=C)
     result = R.reduce({"t_start": t, "t_end": t + 1.0, "mean": np.full(10, 6e-4)}, setup)
     assert result.coefficients[0].estimate == pytest.approx(15.041069 * math.sin(phi) - 10.32, abs=1e-6)
-    assert result.tables[-1]["rows"][0][1] == pytest.approx(10.7740, abs=1e-4)
+    assert result.tables[-1].rows[0][1] == pytest.approx(10.7740, abs=1e-4)
 
 
 def test_dynamic_against_quasi_static(session: Session) -> None:
@@ -128,7 +129,7 @@ def test_intervals_cover(correlated: float) -> None:
     t0 = 10.0 + window * np.arange(n)
     C = 0.0178**2 / window * np.eye(n) + correlated**2 * noise.process_covariance(t0, t0 + window, 300.0)
     L, k = np.linalg.cholesky(C), 17.2 * DPH / 1e-3
-    setup = R.Setup(latitude=0.7, gravity=9.8, k=k, attitude=parse("E U", 0.7))
+    setup = R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=k, attitude=parse("E U", 0.7))
     hits = 0
     for _ in range(100):
         mean = (L @ rng.normal(size=n)) * DPH / k
@@ -191,12 +192,12 @@ def test_refusals(session: Session) -> None:
     with pytest.raises(ValueError, match="flagged windows"):
         load().with_values({"attitude": "U E"}).reduce(record)
     t = np.arange(6.0)
-    setup = R.Setup(latitude=0.7, gravity=9.8, k=math.nan, attitude=2.0 * np.eye(3))
-    with pytest.raises(R.ReductionError) as error:
+    setup = R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=math.nan, attitude=2.0 * np.eye(3))
+    with pytest.raises(ReductionError) as error:
         R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, setup)
     assert "scale factor" in str(error.value) and "attitude: rows are not orthonormal" in str(error.value)
-    with pytest.raises(R.ReductionError, match="6 readings"):
-        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, R.Setup(latitude=0.7, gravity=9.8, k=1.0))
+    with pytest.raises(ReductionError, match="6 readings"):
+        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=1.0))
 
 
 def test_trend_is_seen(session: Session) -> None:
@@ -283,9 +284,9 @@ def test_long_record_gives_noise_coefficients(session: Session) -> None:
     """600 windows of 1 s: flicker and angle noise of the gyro lie in their intervals; 30 windows: no table."""
     values = {**SHORT, **QUIET, "gyro.white": 0.003 * DPH, "gyro.flicker": 0.05 * DPH, "gyro.quantization": 1e-6}
     short = reduced(session, {**values, "readings": 30})
-    assert "Noise coefficients" not in [t["title"] for t in short.tables]
+    assert "Noise coefficients" not in [t.title for t in short.tables]
     long = reduced(session, {**values, "readings": 600, "dwell": 600.0, "nuisances": "none"}, seed=3)
-    (table,) = (t for t in long.tables if t["title"] == "Noise coefficients")
-    rows = {row[0][0]: row for row in table["rows"]}
+    (table,) = (t for t in long.tables if t.title == "Noise coefficients")
+    rows = {row[0][0]: row for row in table.rows}
     for name, true in (("B", 0.05), ("Q", math.degrees(1e-6) * 3600.0)):
         assert rows[name][2] < true < rows[name][3] and rows[name][1] == pytest.approx(true, rel=0.3)

@@ -56,7 +56,7 @@ def test_full_roll_and_full_loop(bench: Session, flight: str, law: str) -> None:
     c = measures(result)
     assert c["platform error"] < 2e-4
     assert "was kept within" in result.summary[0]
-    rows = table(result, "Gimbal lock")["rows"]
+    rows = table(result, "flight.lock").rows
     if flight == "roll":
         assert c["ring 4 travel"] == pytest.approx(360.0, rel=1e-3) and not rows
     else:  # within 5 deg of the vertical twice, 10 deg at 72 deg/s each
@@ -113,7 +113,7 @@ def test_wobble_at_the_vertical_active_or_locked(bench: Session) -> None:
     locked = measures(result)
     assert locked["ring 4 travel"] == 0.0 and locked["platform error"] < 2e-4
     assert locked["g2 max"] == pytest.approx(2.0 * 3.0 / (2.0 * np.pi * 0.3), rel=2e-3)
-    (row,) = table(result, "Gimbal lock")["rows"]
+    (row,) = table(result, "flight.lock").rows
     assert row[:2] == ["fourth gimbal locked", "wobble"] and row[4] == pytest.approx(-90.0, abs=0.01)
 
 
@@ -122,7 +122,7 @@ def test_launch_locked_then_released(bench: Session, release: float) -> None:
     """Released when the pitch has left the vertical at 18 deg/s; then roll 90, yaw 50: error < 0.001 deg (factor 2)."""
     result = fly(bench, "launch", "secant", locked=True, release=release * DEG)
     assert measures(result)["platform error"] < 2e-3
-    (row,) = table(result, "Gimbal lock")["rows"]
+    (row,) = table(result, "flight.lock").rows
     what, leg, begin, end, at, left, *_ = row
     assert (what, leg) == ("fourth gimbal locked", "pitch over")
     assert end - begin == pytest.approx((90.0 - release) / 18.0, abs=6e-3)
@@ -134,7 +134,7 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
     """With noise: margins within 1 dB and 3 degrees up to twice the crossover; error and ring angles over time."""
     values = {"hold": 5.0}
     result = bench.system.with_values(values).reduce(bench.run(values, seed=5))
-    rows = table(result, "Linear models and measured loop")["rows"]
+    rows = table(result, "margins.agreement").rows
     assert len(rows) == 6 and all(r[3] < 0.02 and r[4] < 0.6 for r in rows)
     c = measures(result)
     for axis in ("pitch", "roll", "azimuth"):
@@ -165,7 +165,7 @@ def test_three_gimbals_in_the_launch() -> None:
         }
         result = s.system.reduce(s.run(values))
     assert measures(result)["platform error"] == pytest.approx(4.0, rel=0.05)
-    assert table(result, "Gimbal lock")["rows"]
+    assert table(result, "flight.lock").rows
 
 
 # ------------------------------------------------------------------------------------ bad input

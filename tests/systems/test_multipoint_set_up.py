@@ -89,8 +89,8 @@ def test_an_error_is_predicted_and_taken_out(
     assert largest > 0.0 and max(abs(x) for x in left.values()) < 0.01 * largest, (off, left)
     assert {b.source for b in right.budget} & {source}
     # the report of the run with the error says beforehand what it does: sum of the shifts, last but two
-    (said,) = [t for t in wrong.tables if t["title"] == PREDICTED]
-    shift = {row[0]: row[-3] for row in said["rows"]}
+    (said,) = [t for t in wrong.tables if t.id == PREDICTED]
+    shift = {row[0]: row[-3] for row in said.rows}
     for n, x in by_hand.items():
         assert shift[n] == pytest.approx(x, rel=0.2), n
 

@@ -18,6 +18,7 @@ from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import Record
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
@@ -107,7 +108,7 @@ def test_with_noise(session: Session) -> None:
     z = [r.coefficients[0].z for r in results]
     assert 0.2 < float(np.sqrt(np.mean(np.square(z)))) < 2.0, z
     for r in results:
-        rows = {row[0]: row[1] for t in r.tables if t["title"] == "From angle to drift" for row in t["rows"]}
+        rows = {row[0]: row[1] for t in r.tables if t.title == "From angle to drift" for row in t.rows}
         assert rows["gain of the pickoff G"] == pytest.approx(10.0, rel=0.01)  # K_sg H/C
         assert rows["case angle at saturation"] == pytest.approx(0.01 / ARCSEC, rel=1e-9)  # u_max C/(K_sg H)
         assert "Range of the pickoff used" in r.summary[1] and "2063″ to saturation" in r.summary[1]
@@ -119,7 +120,7 @@ def test_budget_by_hand(session: Session) -> None:
     values = {**SHORT, **QUIET, "attitude": "U E", "latitude": phi, "u_latitude": eps, "u_angle": ARCSEC}
     result = reduced(session, values)
     lines = {b.source: b.contribution for b in result.budget}
-    span = next(r[1] for r in result.tables[-1]["rows"] if r[0] == "time between them")
+    span = next(r[1] for r in result.tables[-1].rows if r[0] == "time between them")
     assert lines["latitude"] == pytest.approx(W * math.cos(phi) / DPH * eps, rel=1e-3)
     assert lines["angle between first and last reading"] == pytest.approx(1.0 / span, rel=1e-2)  # 1 arcsec/s = 1 deg/h
 
@@ -179,7 +180,7 @@ def readings(**changes: Any) -> dict[str, np.ndarray]:
 
 
 def test_refused_records() -> None:
-    setup = R.Setup(latitude=0.0, gravity=9.8)
+    setup = R.OpenLoopSetup(latitude=0.0, gravity=9.8)
     assert R.reduce(readings(), setup).coefficients[0].estimate == pytest.approx(-2e-7 / DPH, abs=1e-6)
     for w, said in (
         (readings(mean=-readings()["mean"]), "must be positive"),
@@ -187,7 +188,7 @@ def test_refused_records() -> None:
         ({k: v[:8] for k, v in readings().items()}, "8 readings: at least 9"),
         (readings(mean=np.full(11, np.inf)), "non-finite"),
     ):
-        with pytest.raises(R.ReductionError, match=said):
+        with pytest.raises(ReductionError, match=said):
             R.reduce(w, setup)
 
 

@@ -56,11 +56,11 @@ def test_an_error_is_predicted_and_taken_out(
 ) -> None:
     plain, wrong = reduced(session, {}), reduced(session, error)
     right = reduced(session, error, f"{source} = 60(1) arcsec")
-    (said,) = [t for t in wrong.tables if t["title"] == PREDICTED]
+    (said,) = [t for t in wrong.tables if t.id == PREDICTED]
     a, b, c = (r["ω_d"] for r in (plain, wrong, right))
     assert b.estimate - a.estimate == pytest.approx(by_hand, rel=0.01)
     assert abs(c.estimate - a.estimate) < 0.01 * abs(by_hand)
-    assert said["rows"][0][-3] == pytest.approx(by_hand, rel=0.01)
+    assert said.rows[0][-3] == pytest.approx(by_hand, rel=0.01)
     assert math.sqrt(c.u**2 - c.u_a**2) == pytest.approx(abs(by_hand) / 60.0, rel=0.02)
 
 

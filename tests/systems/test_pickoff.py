@@ -15,6 +15,7 @@ from pickoffs import ARCMIN, DPH, NAME, R, load, made
 
 from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
+from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 Command = Callable[..., tuple[int, str, str]]
@@ -83,7 +84,7 @@ def test_a_bent_pickoff_is_seen() -> None:
     assert 0.02 < abs(c.estimate) < 0.05
     assert any("not straight" in t.finding for t in r.tests)
     limits = {"linearity": (-0.01, 0.01), "S": (11.9, 12.1)}
-    r = R.reduce(data, R.PickoffSetup(1.0, 2.0 * DPH, specification=limits))
+    r = conclude(R.reduce(data, R.PickoffSetup(1.0, 2.0 * DPH)), None, limits)
     assert named(r)["linearity"].verdict == "fail" and r.verdict == "fail"
 
 

@@ -51,8 +51,8 @@ def test_an_error_is_predicted_and_taken_out(
     """By hand to 0.1 % (S relative, drift in deg/h), in the report of the run, and out of the estimates again."""
     plain, wrong = reduced(stepping, {}), reduced(stepping, error)
     right = reduced(stepping, error, f"{source} = 60(1) arcsec")
-    (said,) = [t for t in wrong.tables if t["title"] == PREDICTED]
-    shift = {row[0]: row[-3] for row in said["rows"]}
+    (said,) = [t for t in wrong.tables if t.id == PREDICTED]
+    shift = {row[0]: row[-3] for row in said.rows}
     for name, x in by_hand.items():
         size = plain["S"].estimate if name == "S" else 1.0
         off, left = ((r[name].estimate - plain[name].estimate) / size for r in (wrong, right))

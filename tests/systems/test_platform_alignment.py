@@ -172,8 +172,8 @@ def test_result_of_an_alignment(aligned: Any) -> None:
     assert total == pytest.approx(psi.u, rel=0.12)
     largest = {b.source for b in result.budget[:2]}
     assert largest == {"constant drift along x", "accelerometer noise"}
-    (table,) = (t for t in result.tables if t["title"].startswith("Time to be ready"))
-    times = [row[1] for row in table["rows"] if row[1] is not None]
+    (table,) = (t for t in result.tables if t.kind == "ready_times")
+    times = [row[1] for row in table.rows if row[1] is not None]
     assert times == sorted(times) and len(set(times)) >= 2
     assert [r.name for r in result.responses] == ["heading error", "tilt", "ready time"]
     assert result.verdict == "no specification given" and not result.warnings

@@ -13,7 +13,7 @@ from gyrobench.system.system import System, load_system
 
 OFF = {"gyro.white": 0.0, "gyro.markov": 0.0, "gyro.pickoff": 0.0, "reading_noise": 0.0, "base": 0.0}
 STILL = {f"gyro.D_{n}": 0.0 for n in ("F", "I", "O", "S", "II", "SS", "IO", "IS", "OS")}
-TITLE = "Error budget of the ride"
+BUDGET = "budget.sources"
 
 
 Ridden = tuple[Any, dict[str, float], float]
@@ -34,8 +34,8 @@ def each(runs: int, **values: Any) -> list[Ridden]:
     with Session(system) as session:
         for seed in range(1, runs + 1):
             result = system.reduce(session.run({**OFF, **STILL, **values}, seed=seed))
-            table = next((t for t in result.tables if t["title"].startswith(TITLE)), {"rows": []})
-            found.append((result, {row[0]: row[3] for row in table["rows"]}, result["platform error"].estimate))
+            rows = [row for t in result.tables if t.kind == BUDGET for row in t.rows]
+            found.append((result, {row[0]: row[3] for row in rows}, result["platform error"].estimate))
     return found
 
 
@@ -73,8 +73,8 @@ def test_base_by_each_way() -> None:
     assert rows["together"] == pytest.approx(measured, rel=1e-3)
     ratio = rows["base about x, by viscous friction"] / rows["base about x, by the back EMF of the motor"]
     assert ratio == pytest.approx(0.05 / 0.49996, rel=1e-4)
-    table = next(t for t in result.tables if t["title"].startswith(TITLE))
-    assert sum(row[4] for row in table["rows"] if row[4] is not None) == pytest.approx(100.0)
+    table = next(t for t in result.tables if t.kind == BUDGET)
+    assert sum(row[4] for row in table.rows if row[4] is not None) == pytest.approx(100.0)
     assert any("the largest part is base about x, by the back EMF of the motor" in s for s in result.summary)
 
 

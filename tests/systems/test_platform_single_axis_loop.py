@@ -21,9 +21,9 @@ def reduced(parts=None, **values):
     return record, result, {c.name: c for c in result.coefficients}
 
 
-def rows(result, title):
-    table = next(t for t in result.tables if t["title"].startswith(title))
-    return [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
+def rows(result, kind):
+    table = next(t for t in result.tables if t.kind == kind)
+    return [dict(zip(table.columns, row, strict=True)) for row in table.rows]
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +34,10 @@ def quiet():
 def test_margins_of_the_sweep_are_those_of_the_linear_parts(quiet):
     """Within 1 dB and 3 degrees up to twice the crossover; without noise far closer, as the delays are in the model."""
     _, result, found = quiet
-    (row,) = rows(result, "Linear models and")
+    (row,) = rows(result, "margins.agreement")
     assert row["gain / dB"] < 0.01 and row["phase / °"] < 0.1
     assert found["f_c"].estimate == pytest.approx(10.0, rel=0.03)  # the gain is set for it; delays shift it
-    margins = rows(result, "Stability margins")
+    margins = rows(result, "margins")
     assert margins[0]["phase margin / °"] == pytest.approx(margins[1]["phase margin / °"], abs=0.3)
     assert 55.0 < found["PM"].estimate < 70.0
 
@@ -104,7 +104,7 @@ def test_servo_with_a_current_loop_swaps_and_isolates_better(quiet):
     _, result, found = reduced({"stabilizer": "servo_three_loop"}, **QUIET)
     _, _, plain = quiet
     assert found["platform error"].estimate < 0.3 * plain["platform error"].estimate
-    assert rows(result, "Linear models and")[0]["gain / dB"] < 0.05
+    assert rows(result, "margins.agreement")[0]["gain / dB"] < 0.05
     assert not any("carried over" in s for s in result.summary)  # by other ways than those of a plain motor
 
 

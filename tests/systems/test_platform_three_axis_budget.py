@@ -35,8 +35,7 @@ def each(runs: int, *phases: LoopPhase, wires: str = "", **values: Any) -> list[
         system.wires = wires
     with Session(system) as session:
         results = [system.reduce(session.run({**IDEAL, **values}, seed=seed)) for seed in range(1, runs + 1)]
-    tables = [next((t for t in r.tables if t["title"].startswith("Error budget")), {"rows": []}) for r in results]
-    return [(r, {(x[0], x[1]): x[2:] for x in t["rows"]}) for r, t in zip(results, tables, strict=True)]
+    return [(r, {(x[0], x[1]): x[2:] for t in r.tables if t.kind == "budget.sources" for x in t.rows}) for r in results]
 
 
 def swing(axis: int, f: float, size: float = 0.08) -> LoopPhase:
@@ -119,7 +118,7 @@ def test_budget_of_a_recorded_ride(tmp_path: Path) -> None:
     np.savetxt(file, columns, delimiter=",", header="time [s],pitch [deg],roll [deg],heading [deg]", comments="")
     system = load_system("platform_three_axis")
     result = system.reduce(run(system, values={**IDEAL, **DRY, "profile": str(file), "hold": "25s"}, seed=1))
-    rows = next(t for t in result.tables if t["title"].startswith("Error budget"))["rows"]
+    rows = next(t for t in result.tables if t.kind == "budget.sources").rows
     angle = {r[1]: r[2] for r in rows if r[0] == "ride"}
     assert angle["together"] == pytest.approx(angle["measured"], rel=0.02)
     assert rows[0][1] == "dry friction" and any("carried over by dry friction (" in s for s in result.summary)

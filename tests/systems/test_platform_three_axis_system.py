@@ -150,7 +150,7 @@ def test_margins_of_the_sweep_are_those_of_the_linear_parts():
     """Within 1 dB and 3 degrees up to twice the crossover, on each axis; the delays are in the model."""
     with only(NAME, "loop") as session:
         _, result, found = reduced(session, sweeps=True, swing=0.0)
-    rows = next(t for t in result.tables if t["title"].startswith("Linear models"))["rows"]
+    rows = next(t for t in result.tables if t.kind == "margins.agreement").rows
     assert len(rows) == 6  # three axes, with and without the step
     for model, _, count, db, degrees, _loop in rows:
         assert count >= 4

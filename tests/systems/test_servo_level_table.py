@@ -53,7 +53,7 @@ def check(plain: Result, found: Result, expected: dict[str, float], predicted: n
 
 def told(result: Result, source: str) -> np.ndarray[Any, Any]:
     """Rows: independent errors of one source; columns: what each changes the coefficients by."""
-    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"]) / FAINT
+    return np.array(next(b for b in result.type_b if b.source == source).changes) / FAINT
 
 
 @pytest.mark.parametrize(

@@ -148,8 +148,8 @@ def test_warnings_of_loads_and_of_a_low_crossover(drawn):
 def test_linear_model_of_the_run(drawn):
     """The discrete model, from the parts alone, has the phase margin and the limits of the closed form."""
     run, values = drawn
-    table = next(t for t in run.result.tables if t["title"].startswith("Stability margins"))
-    model = next(r for r in table["rows"] if r[0].startswith("linear, with step"))
+    table = next(t for t in run.result.tables if t.kind == "margins")
+    model = next(r for r in table.rows if r[0].startswith("linear, with step"))
     servo = closed.loop_of(run.record.run.parameters)
     assert model[1] == pytest.approx(values["crossover"], rel=1e-3)
     assert model[2] == pytest.approx(servo.phase_margin(), abs=0.1)

@@ -34,8 +34,8 @@ def live() -> Any:
 
 
 def of(result: Any, title: str) -> list[dict[str, Any]]:
-    table = next(t for t in result.tables if t["title"].startswith(f"Live estimate: {title}"))
-    return [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
+    table = next(t for t in result.tables if t.title.startswith(f"Live estimate: {title}"))
+    return [dict(zip(table.columns, row, strict=True)) for row in table.rows]
 
 
 def test_end_values_are_generalized_least_squares_over_the_record(live: Any) -> None:
@@ -100,7 +100,7 @@ def test_hours_saved_are_those_of_the_record(live: Any) -> None:
         assert row["saved / h"] == pytest.approx((t[-1] - t[np.argmax(ready)]) / 3600.0)
         assert row["consistent"] == "yes" and 0.6 < row["mean NIS"] < 1.5
         total += row["saved / h"]
-    caption = next(t["caption"] for t in result.tables if t["title"].startswith("Live estimate: time"))
+    caption = next(t.caption for t in result.tables if t.title.startswith("Live estimate: time"))
     assert caption.startswith("Standard deviation wanted of mean and harmonics: 0.002 °/h.")
     assert any(f"would have saved {total:.1f} h of" in s for s in result.summary)
 
@@ -128,9 +128,9 @@ def test_stopped_too_early_to_be_estimable(live: Any) -> None:
     record, _ = live
     windows = {**record.windows, "live_may_stop": np.ones(record.windows["phase"].size)}
     result = load_system(NAME).reduce(type(record)(windows, {}, record.run))
-    table = next(t for t in result.tables if "had the test been left" in t["title"])
-    assert table["caption"].startswith("Not estimable")
-    assert table["rows"][0][0].startswith("phase 2 (polar S) has 1 windows: at least 8 are needed; phase 4")
+    table = next(t for t in result.tables if "had the test been left" in t.title)
+    assert table.caption.startswith("Not estimable")
+    assert table.rows[0][0].startswith("phase 2 (polar S) has 1 windows: at least 8 are needed; phase 4")
 
 
 def test_what_is_not_reached_is_said(live: Any) -> None:
@@ -151,7 +151,7 @@ def test_without_the_slot_nothing_is_said(live: Any) -> None:
     record, result = live
     windows = {n: x for n, x in record.windows.items() if not n.startswith("live_")}
     plain = load_system(NAME).reduce(type(record)(windows, {}, record.run))
-    assert not [t for t in plain.tables if t["title"].startswith("Live")]
+    assert not [t for t in plain.tables if t.title.startswith("Live")]
     assert not [s for s in plain.summary if "live" in s]
     assert [c.estimate for c in plain.coefficients] == [c.estimate for c in result.coefficients]
 

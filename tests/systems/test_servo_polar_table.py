@@ -105,7 +105,7 @@ def test_wobble(wobbling: tuple[Session, dict[str, float]], phase: float, row: i
     session, plain = wobbling
     wobble = {"wobble.amplitude": size, "wobble.phase": phase, "u_wobble": size * FAINT}
     found, result = estimates(session, session.system, **HEAVY, **wobble)
-    expected = np.array(next(b for b in result.type_b if b["source"].startswith("wobble"))["changes"])[row] / FAINT
+    expected = np.array(next(b for b in result.type_b if b.source.startswith("wobble")).changes)[row] / FAINT
     shift = np.array([found[n] - plain[n] for n in found])
     assert np.max(np.abs(expected)) > 2e-4
     assert np.max(np.abs(shift - expected)) < 0.05 * np.max(np.abs(expected)), (shift, expected)

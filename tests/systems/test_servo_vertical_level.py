@@ -75,7 +75,7 @@ def test_three_term_route_says_what_it_holds(bench: Session) -> None:
     for c in result.coefficients:
         assert c.truth == pytest.approx(truth[c.name], rel=1e-9)
         assert c.estimate == pytest.approx(c.truth, abs=1e-5) and c.closed == pytest.approx(c.truth, abs=1e-5)
-    book = next(t for t in result.tables if t["title"] == "Notation of Hu 1981")["rows"]
+    book = next(t for t in result.tables if t.title == "Notation of Hu 1981").rows
     assert [row[0] for row in book] == ["R + γ² K_zx", "U_z", "U_x + γ K_zx + γ K_xz"]
     assert book[0][1] == pytest.approx(0.3 + 0.05 * g * g, abs=1e-5)
     assert any("tell only combinations" in w for w in result.warnings)
@@ -95,8 +95,8 @@ def test_all_eighteen_attitudes(bench: Session) -> None:
     result = load_system(NAME).reduce(record)
     for c in result.coefficients:
         assert c.estimate == pytest.approx(c.truth, abs=1e-4), c.name
-    table = next(t for t in result.tables if t["title"] == "Drift in each attitude")
-    assert len(table["rows"]) == 18
+    table = next(t for t in result.tables if t.title == "Drift in each attitude")
+    assert len(table.rows) == 18
 
 
 def test_noise_and_composite(bench: Session) -> None:
@@ -105,8 +105,8 @@ def test_noise_and_composite(bench: Session) -> None:
     result = load_system(NAME).reduce(bench.run(values, seed=5))
     for c in result.coefficients:
         assert c.z is not None and abs(c.z) < 4.0 and c.u > 1e-4, c.name
-    table = next(t for t in result.tables if t["title"] == "Systematic and random drift rate")
-    assert len(table["rows"]) == 12 and all(row[1] == 10 and row[2] == 30.0 for row in table["rows"])
+    table = next(t for t in result.tables if t.title == "Systematic and random drift rate")
+    assert len(table.rows) == 12 and all(row[1] == 10 and row[2] == 30.0 for row in table.rows)
 
 
 @pytest.mark.parametrize(

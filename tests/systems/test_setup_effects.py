@@ -14,7 +14,7 @@ from undiagnosed import reduce_undiagnosed
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
-from gyrobench.reduction.estimation.effects import REMOUNT
+from gyrobench.reduction.setup.sources import REMOUNT
 from gyrobench.result import DriftTestResult, Specification
 
 ARCSEC = math.pi / 648000.0
@@ -48,7 +48,7 @@ def worst(result: DriftTestResult, like: DriftTestResult) -> float:
 
 def candidates(result: DriftTestResult) -> dict[str, str]:
     """Name -> in the model, of the (first) table."""
-    return {r[0]: r[6] for t in result.tables if t["title"].startswith("Nuisance model") for r in t["rows"]}
+    return {r[0]: r[6] for t in result.tables if t.title.startswith("Nuisance model") for r in t.rows}
 
 
 def passes_when_remounts_are_stated(record: Record, *at_rest: str) -> None:
@@ -64,7 +64,7 @@ def passes_when_remounts_are_stated(record: Record, *at_rest: str) -> None:
     assert {c.name for c in bare.coefficients if c.verdict == "pass"} == set(at_rest)
     assert all(f" {c.name}" in words for c in bare.coefficients if c.verdict != "pass")
     stated = reduced(record, wide, measured=True, **said, u_remount=1e-3 * DPH)
-    assert stated.verdict == "pass" and any(b.source == REMOUNT for b in stated.budget)
+    assert stated.verdict == "pass" and any(b.id == REMOUNT.id for b in stated.budget)
 
 
 def ramped(record: Record, rate: float) -> Record:

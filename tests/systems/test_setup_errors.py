@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from tumbling import NAME, SHORT, load
 
 from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PartInfo, RunDocument, SetupError
-from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
-from gyrobench.result import Coefficient, LoopResult
+from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
+from gyrobench.reduction.estimation.verdict import conclude
+from gyrobench.result import Coefficient, LoopResult, Reason
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.setup_errors import setup_errors
@@ -141,24 +143,23 @@ def result_of(*z: float | None) -> LoopResult:
     ]
     return LoopResult(
         system="", title="", method="", sources=[], conventions=[], coefficients=coefficients, responses=[],
-        warnings=["another"],
     )  # fmt: skip
 
 
 @pytest.mark.parametrize(("z", "named"), [((5.1, -2.0), ["c0"]), ((0.0, -6.0, 7.0, None), ["c2", "c1"])])
 def test_an_estimate_far_from_its_truth_is_said_first(z: tuple[float | None, ...], named: list[str]) -> None:
-    result = result_of(*z)
-    check_truth(result, [])
-    assert result.warnings[1:] == ["another"]
-    places = [result.warnings[0].index(f"{n} (z = ") for n in named]
-    assert places == sorted(places) and result.warnings[0].count("(z = ") == len(named)
-    assert "No value was set" in result.warnings[0]
+    another = replace(result_of(*z), reasons=[Reason("another", "another")])
+    (missed,) = missed_truth(another, [])
+    assert missed.severity == "error" and missed.blocks == ("pass", "fail")
+    places = [missed.text.index(f"{n} (z = ") for n in named]
+    assert places == sorted(places) and missed.text.count("(z = ") == len(named)
+    assert "No value was set" in missed.text
+    result = conclude(replace(another, reasons=[*another.reasons, missed]))
+    assert result.warnings == [missed.text, "another"]
 
 
 def test_an_estimate_near_its_truth_is_not() -> None:
-    result = result_of(4.99, -5.0, None)
-    check_truth(result, ["gyro.k = 1"])
-    assert result.warnings == ["another"]
+    assert missed_truth(result_of(4.99, -5.0, None), ["gyro.k = 1"]) == []
 
 
 def test_what_was_set_may_explain_it() -> None:
@@ -178,6 +179,4 @@ def test_what_was_set_may_explain_it() -> None:
 def test_default_tumble_is_within_its_uncertainty() -> None:
     with Session(load()) as session:
         result = session.system.reduce(session.run(SHORT, 3))
-    warnings = list(result.warnings)
-    check_truth(result, [])
-    assert result.warnings == warnings
+    assert missed_truth(result, []) == [] and not any(r.id == "truth.missed" for r in result.reasons)

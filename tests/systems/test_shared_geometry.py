@@ -30,9 +30,9 @@ def agrees(system: str, values: dict, source: str, sign: float) -> None:
         plain = session.run({**values, "u_mount": TURN}, seed=1)
         moved = session.run({**values, "u_mount": TURN, "gyro.mount": turned(2)}, seed=1)
     a, b = (reduced(r, nuisances="none") for r in (plain, moved))
-    entries = [e for e in a.type_b if e["source"] == source]
+    entries = [e for e in a.type_b if e.source == source]
     assert len(entries) == 1
-    (row,) = np.array(entries[0]["changes"])
+    (row,) = np.array(entries[0].changes)
     shift = b.array("estimate") - a.array("estimate")
     weight = 1.0 / a.array("u_a")
     half = len(row) // 2
@@ -42,7 +42,7 @@ def agrees(system: str, values: dict, source: str, sign: float) -> None:
         assert abs(one @ other) > 0.98 * np.linalg.norm(one) * np.linalg.norm(other)
     assert len(row) == 18 and np.any(row[:half]) and np.any(row[half:])
     covariance = a.covariance()
-    together = sum(np.array(e["changes"]).T @ np.array(e["changes"]) for e in a.type_b)
+    together = sum(np.array(e.changes).T @ np.array(e.changes) for e in a.type_b)
     np.testing.assert_allclose(covariance[:half, half:], together[:half, half:], rtol=1e-6)
 
 

@@ -72,7 +72,7 @@ def angle(record: Any) -> tuple[Any, Any]:
 # ------------------------------------------------------------------------------------ closed forms
 def test_numbers_of_the_method() -> None:
     """Crossover 100 rad/s, margin 52.3 degrees, slope -24 dB/dec, lower limit 0.044; python-control agrees."""
-    p = closed.Loop(**DEFAULT)
+    p = closed.LagLeadLoop(**DEFAULT)
     s = control.tf("s")
     loop = p.K * (1 + p.tau1 * s) * (1 + p.tau2 * s) / (1 + p.T1 * s) / (1 + p.T2 * s) / (p.J * s**2)
     gm, pm, w_gm, w_pm = control.margin(loop)
@@ -87,14 +87,14 @@ def test_limit_and_routh_are_those_of_the_roots() -> None:
     """Random networks, with a net lead or not: stable() and the share of the gain at the limit, by the roots."""
     rng, kinds = np.random.default_rng(5), set()
     for _ in range(300):
-        p = closed.Loop(*10.0 ** rng.uniform([-1, 2, -2, -2, -3, -3], [1, 5, 1, 1, 0, 0]))
+        p = closed.LagLeadLoop(*10.0 ** rng.uniform([-1, 2, -2, -2, -3, -3], [1, 5, 1, 1, 0, 0]))
         roots = np.roots(polynomial(p))
         assert p.stable() == bool(np.max(roots.real) < 0.0), p
         at = p.limit()
         kinds.add((p.stable(), at is not None))
         if at is not None:
             values = {**p.__dict__, "K": at[1] * p.K}
-            there = np.roots(polynomial(closed.Loop(**values)))
+            there = np.roots(polynomial(closed.LagLeadLoop(**values)))
             near = there[np.argmin(np.abs(there - 1j * at[0]))]
             assert near == pytest.approx(1j * at[0], rel=1e-6)
     assert len(kinds) == 4
@@ -115,11 +115,11 @@ def test_5_25_prints_the_loop_gain(steps: Session) -> None:
     f = np.array([0.01, 0.5, 2.0, 16.0, 60.0])
     s = 2j * np.pi * f
     found = margins.excitation_response(model, "torque", 1, "platform.attitude", f)
-    np.testing.assert_allclose(found, closed.Loop(**DEFAULT).compliance(s), rtol=1e-6)
+    np.testing.assert_allclose(found, closed.LagLeadLoop(**DEFAULT).compliance(s), rtol=1e-6)
     assert np.min(np.abs(8250.0 / (0.5 * s**2) / found)) > 1e3
     loop = linear.loops["stabilizer"].continuous
     np.testing.assert_allclose(
-        margins.model_response(loop, f)[:, 0, 0], closed.Loop(**DEFAULT).gain(s), rtol=1e-6
+        margins.model_response(loop, f)[:, 0, 0], closed.LagLeadLoop(**DEFAULT).gain(s), rtol=1e-6
     )  # with G, it is L
 
 
@@ -130,7 +130,7 @@ def test_stability_by_the_gain(steps: Session, share: float, grows: bool, caplog
     maxima of |theta| about its rest.  The step shifts the damping: by 0.03 1/s at 4 %, of 0.2."""
     with caplog.at_level(logging.WARNING, "gyrobench"):
         record = steps.run({**IDEAL, "stiffness": share * 8250.0, "load": 0.2})
-    p = closed.Loop(**{**DEFAULT, "K": share * 16500.0})
+    p = closed.LagLeadLoop(**{**DEFAULT, "K": share * 16500.0})
     assert p.stable() is not grows
     t, a = angle(record)
     swing = a - 0.2 / p.K
@@ -183,20 +183,20 @@ def test_a_motor_at_its_limit_makes_the_loop_unstable(caplog: pytest.LogCaptureF
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, with the gyro's noise."""
     result = load().reduce(whole)
-    table = next(t for t in result.tables if t["title"].startswith("Linear models and"))
-    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
+    table = next(t for t in result.tables if t.kind == "margins.agreement")
+    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table.rows
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(31.5, abs=0.1) and count >= 14
     assert db < 0.02 and degrees < 0.15
     assert db_c < 0.2 and degrees_c < 1.0
-    note = next(t for t in result.tables if t["title"].startswith("Stability margins"))["caption"]
+    note = next(t for t in result.tables if t.kind == "margins").caption
     assert "stabilizer.v → platform.v: 0.0001 s" in note
 
 
 def test_the_step_costs_margin_in_the_first_order(steps: Session) -> None:
     """Half the step, half the loss: gain and phase of the linear model with step against the closed form."""
     f = np.array([2.0, 16.0])
-    exact = closed.Loop(**DEFAULT).gain(2j * np.pi * f)
+    exact = closed.LagLeadLoop(**DEFAULT).gain(2j * np.pi * f)
     lost = []
     for h in (2e-4, 1e-4, 5e-5):
         model = steps.prepare(IDEAL, step=h)[2].linear.loops["stabilizer"].discrete
@@ -236,7 +236,7 @@ def test_isolation_is_friction_and_with_a_real_motor_its_back_emf() -> None:
         for values, drag in (({}, 0.02), ({"motor": "real"}, 0.12)):
             result = s.system.reduce(s.run({**STILL, **values}))
             r = next(r for r in result.responses if r.name == "isolation")
-            wanted = np.abs(closed.Loop(**DEFAULT).isolation(2j * np.pi * np.array(r.x), drag))
+            wanted = np.abs(closed.LagLeadLoop(**DEFAULT).isolation(2j * np.pi * np.array(r.x), drag))
             np.testing.assert_allclose(r.y, wanted, rtol=0.03)
             linear = next(c for c in r.curves if c["label"].startswith("linear, with step"))
             there = np.interp(np.log(r.x), np.log(linear["x"]), linear["y"])
@@ -288,7 +288,7 @@ def test_a_poor_network_is_told_and_fails_acceptance(steps: Session, caplog: pyt
     said = " ".join(caplog.messages)
     assert "T1 > tau1 > tau2 > T2 does not hold" in said
     assert "is unstable: pole +" in said
-    weak = closed.Loop(**{**DEFAULT, "tau2": 0.015})
+    weak = closed.LagLeadLoop(**{**DEFAULT, "tau2": 0.015})
     assert 20.0 < weak.margin()[1] < 45.0
     sines = [LoopPhase(f"{f} Hz", "test", "sine", 1, 5e-4, f, settle=2.0, dwell=1.0) for f in (5.0, 8.0, 12.0, 18.0)]
     with session(*sines) as s:

@@ -168,14 +168,14 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, the delay of the step included.  The
     continuous model differs by the delay: half a step of holding and nothing else, 360 f h/2 = 0.048 deg at 2.66 Hz."""
     result = load().reduce(whole)
-    table = next(t for t in result.tables if t["title"].startswith("Linear models and"))
-    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table["rows"]
+    table = next(t for t in result.tables if t.kind == "margins.agreement")
+    (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table.rows
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
     assert far == pytest.approx(2.659, abs=0.01) and count >= 5
     assert db < 1e-3 and degrees < 5e-3
     assert db_c < 1e-3 and degrees_c == pytest.approx(360.0 * 2.0 * 0.5e-4, abs=5e-3)
-    rows = next(t for t in result.tables if t["title"].startswith("Stability margins"))
-    assert "delays of delayed connections: gyro.u_y → stabilizer.u: 0.0001 s" in rows["caption"]
+    rows = next(t for t in result.tables if t.kind == "margins")
+    assert "delays of delayed connections: gyro.u_y → stabilizer.u: 0.0001 s" in rows.caption
 
 
 def test_measures_of_the_whole_run(whole: Any) -> None:
@@ -215,7 +215,7 @@ def covered(runs: int) -> dict[str, int]:
     inside = dict.fromkeys(truth, 0)
     with session(step, hold) as s:
         for seed in range(runs):
-            found = {c.name: c for c in R.from_record(s.run({}, seed=seed + 1)).coefficients}
+            found = {c.name: c for c in R.Reduction.from_record(s.run({}, seed=seed + 1)).coefficients}
             for name, value in truth.items():
                 low, high = found[name].interval
                 inside[name] += low <= value <= high

@@ -23,7 +23,7 @@ assert sys.modules[closed.__name__] is closed
 
 
 def axis(c=0.0, k=0.0, **more):
-    return closed.Axis(**{**SATELLITE, "C": c, "K": k, **more})
+    return closed.StabilizedAxis(**{**SATELLITE, "C": c, "K": k, **more})
 
 
 def by_matrix(p, t):
@@ -212,8 +212,8 @@ def test_motor_takes_the_load_off_the_float(session):
     assert b[-1] == pytest.approx(10.0 / 2000.0, rel=0.02)
     result = session.system.reduce(record)
     assert any(r.kind == "loop" for r in result.responses)
-    agree = next(t for t in result.tables if t["title"].startswith("Linear models and"))
-    assert agree["rows"][0][3] < 0.1 and agree["rows"][0][4] < 1.0
+    agree = next(t for t in result.tables if t.kind == "margins.agreement")
+    assert agree.rows[0][3] < 0.1 and agree.rows[0][4] < 1.0
 
 
 def test_friction_turns_with_the_base(session):

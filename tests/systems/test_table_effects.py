@@ -37,7 +37,7 @@ def reduced(system: System, record: Record, corrections: str = "") -> Result:
 
 def told(result: Result, source: str, row: int) -> Array:
     """What the budget says all coefficients change by; a source of several channels stands there for each."""
-    changes = [b["changes"][row] for b in result.type_b if b["source"].startswith(source)]
+    changes = [b.changes[row] for b in result.type_b if b.source.startswith(source)]
     return np.array(np.sum(changes, axis=0)) / FAINT
 
 

@@ -126,7 +126,7 @@ def test_a_torque_that_the_model_lacks_is_named() -> None:
     assert isinstance(result, LoopResult)
     said = [w for w in result.warnings if "torque once a turn, 0.008" in w]
     assert len(said) == 1 and "Balance the table" in said[0]
-    rows = next(t["rows"] for t in result.tables if t["title"] == "Torques left out")
+    rows = next(t.rows for t in result.tables if t.kind == "motor.left_out")
     assert rows[0][0] == "torque once a turn" and rows[0][1] == pytest.approx(8.56e-3, abs=4.0 * rows[0][2])
     judged = load_system(NAME).reduce(run.record, {"K_t": (2.0, 4.0)})
     assert judged["K_t"].verdict == "inconclusive"

@@ -60,8 +60,8 @@ def test_lock_table(m: float) -> None:
     rates = np.abs([c[f"platform.theta_dot[{k}]"][late] for k in (1, 2, 3)])
     known = {0.0: 1.0, 60.0: 2.0, 80.0: 5.76, 89.0: 57.3, 89.9: 573.0}[m]
     assert rates.max() / rate == pytest.approx(known, rel=2e-3)
-    assert table(result, "Legs of the flight")["rows"][0][4] == pytest.approx(1.0 / math.cos(m * DEG), rel=2e-3)
-    assert bool(table(result, "Gimbal lock")["rows"]) == (m > 85.0)
+    assert table(result, "flight.legs").rows[0][4] == pytest.approx(1.0 / math.cos(m * DEG), rel=2e-3)
+    assert bool(table(result, "flight.lock").rows) == (m > 85.0)
     assert measures(result)["platform error"] < 1e-6
 
 
@@ -71,7 +71,7 @@ def test_roll_to_exactly_90_then_50_of_yaw(quick: Session) -> None:
     c = measures(result)
     assert c["platform error"] == pytest.approx(50.0, rel=1e-3)
     assert c["error at the end"] < 0.01  # dragged along on the way back, too
-    (row,) = table(result, "Gimbal lock")["rows"]
+    (row,) = table(result, "flight.lock").rows
     what, leg, begin, end, angle, _, before, worst = row
     assert (what, leg) == ("lock", "roll 90°")
     assert begin == pytest.approx(85.0 / 36.0, abs=4e-3)
@@ -90,12 +90,12 @@ def test_without_allow_lock_the_platform_ends_the_run(quick: Session) -> None:
 
 def test_short_of_lock_and_with_the_other_mount_it_is_kept(quick: Session) -> None:
     near = quick.system.reduce(quick.run({**EXACT, "roll": 80 * DEG}))
-    assert measures(near)["platform error"] < 1e-6 and not table(near, "Gimbal lock")["rows"]
-    legs = table(near, "Legs of the flight")["rows"]
+    assert measures(near)["platform error"] < 1e-6 and not table(near, "flight.lock").rows
+    legs = table(near, "flight.legs").rows
     # outer gimbal 10 tan m; the azimuth gimbal -10 (cos m + sin m tan m) = -10 / cos m, largest where the yaw begins
     assert legs[1][3] == pytest.approx(10.0 / math.cos(80 * DEG), rel=2e-3)
     other = quick.system.reduce(quick.run({**EXACT, "mount": 0}))
-    assert measures(other)["platform error"] < 1e-6 and not table(other, "Gimbal lock")["rows"]
+    assert measures(other)["platform error"] < 1e-6 and not table(other, "flight.lock").rows
 
 
 # ------------------------------------------------------------------------------------ azimuth
@@ -182,7 +182,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; by hand the crossover is 6.346 Hz, the margin 85.44
     less the delay, 360 f h / 2 = 0.57 deg at most."""
     result = load_system(NAME).reduce(whole)
-    rows = table(result, "Linear models and measured loop")["rows"]
+    rows = table(result, "margins.agreement").rows
     assert len(rows) == 6
     for label, _, count, db, degrees in (r[:5] for r in rows):
         assert count >= 5 and db < 0.01 and degrees < (0.05 if "delays" in label else 0.6), label
@@ -199,8 +199,8 @@ def test_drift_command_and_monitor_of_the_whole_run(whole: Any) -> None:
     found = {c.name: c for c in result.coefficients}
     for name in ("drift x", "drift y", "drift z", "monitor", "rate gain"):
         assert abs(found[name].z) < 4.0, name
-    coupling = next(t for t in result.tables if t["title"].startswith("Cross-axis coupling"))
-    for k, row in enumerate(coupling["rows"], 1):  # gyros out of true by 3' about each axis: up to 0.09 % each way
+    coupling = next(t for t in result.tables if t.kind == "cross_axis")
+    for k, row in enumerate(coupling.rows, 1):  # gyros out of true by 3' about each axis: up to 0.09 % each way
         assert row[k] == pytest.approx(100.0) and all(0.0 <= x < 0.3 for j, x in enumerate(row[1:], 1) if j != k)
     assert found["platform error"].estimate < 1e-3
     assert "its gimbals did not lock" in result.summary[0]

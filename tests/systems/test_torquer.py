@@ -132,7 +132,7 @@ def test_random_torquers(servo: Session, seed: int) -> None:
     y, z = -g * math.sin(phi), -g * math.cos(phi)
     static = values["gyro.D_F"] / DPH + 0.1 * y - 0.7 * z + 0.04 * z * z - 0.02 * y * z
     # +-0.25 deg of the start, gravity to 0.3 %
-    assert r.tables[0]["rows"][0][-1] == pytest.approx(static, abs=0.012)
+    assert r.tables[0].rows[0][-1] == pytest.approx(static, abs=0.012)
 
 
 def test_cubic_and_even_torquer(servo: Session) -> None:
@@ -143,7 +143,7 @@ def test_cubic_and_even_torquer(servo: Session) -> None:
     assert c["K_3/K_1"].estimate == pytest.approx(-0.05, rel=2e-4) and c["K_3/K_1"].truth == pytest.approx(-0.05)
     assert c["K_1"].estimate == pytest.approx(17.2, rel=1e-7)
     assert c["K"].estimate == pytest.approx(c["K"].truth, rel=1e-7)
-    rows = r.tables[0]["rows"]
+    rows = r.tables[0].rows
     for row in rows:
         assert row[3] == pytest.approx(17.2 * (1.0 - 0.05 * (row[0] * 1e-3) ** 2), rel=1e-6)
     even = rows[-1][-1] - rows[-2][-1]  # 17.2 x 0.01/A x (100 mA x 0.1 A - 70 mA x 0.07 A) = 0.172 x (10 - 4.9)
@@ -160,7 +160,7 @@ def test_drift_that_changes_over_the_range(servo: Session) -> None:
     values["gyro.D_O"] = 20.0 * DPH
     r = reduced(servo, values)
     size = math.radians(10.0)
-    for row in r.tables[0]["rows"]:
+    for row in r.tables[0].rows:
         expected = -((20.0 * size) ** 2) / 12.0 / (17.2 * row[0]) ** 2
         assert row[3] / 17.2 - 1.0 == pytest.approx(expected, rel=0.1), row[0]
 

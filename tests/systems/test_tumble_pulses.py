@@ -38,9 +38,9 @@ def reduced(record: Record, **options: Any) -> DriftTestResult:
 
 def predicted(result: DriftTestResult) -> dict[str, float]:
     """Coefficient -> sum of the predicted shifts, in its unit."""
-    (table,) = [t for t in result.tables if t["title"].startswith("Predicted shifts")]
-    column = table["columns"].index("sum")
-    return {row[0]: row[column] for row in table["rows"]}
+    (table,) = [t for t in result.tables if t.title.startswith("Predicted shifts")]
+    column = table.columns.index("sum")
+    return {row[0]: row[column] for row in table.rows}
 
 
 def test_windows_are_differences_of_the_counts(clean: Record) -> None:
@@ -95,7 +95,7 @@ def test_resolution_and_stated_uncertainties_are_lines_of_the_budget(clean: Reco
     # 2 k I f_s dT = 2 x 51.6 deg/h x 1e3 Hz x 1e-8 s
     assert lines["switching time of the pulses"].contribution == pytest.approx(1.032e-3, rel=1e-3)
     assert 0.0 < lines["resolution of the counts"].contribution < 1e-4
-    assert "Predicted shifts by simulated errors" not in [t["title"] for t in result.tables]
+    assert "Predicted shifts by simulated errors" not in [t.title for t in result.tables]
 
 
 def test_refuses_a_loop_too_fast_for_the_saw(session: Session) -> None:
@@ -109,8 +109,8 @@ def shifts(name: str, parts: dict[str, str], values: dict[str, Any], errors: dic
     system = load_system(name)
     with Session(name, parts) as session:
         before, after = (system.reduce(session.run({**values, **e}, seed=4)) for e in ({}, errors))
-    tables = [t for t in after.tables if t["title"].startswith("Predicted shifts")]
-    said = {row[0]: row[t["columns"].index("sum")] for t in tables for row in t["rows"]}
+    tables = [t for t in after.tables if t.title.startswith("Predicted shifts")]
+    said = {row[0]: row[t.columns.index("sum")] for t in tables for row in t.rows}
     names = [c.name for c in before.coefficients if c.name in said and c.truth is not None]
     moved = [after[n].estimate - before[n].estimate for n in names]
     return np.array(moved), np.array([said[n] for n in names]), np.array([before[n].u for n in names])

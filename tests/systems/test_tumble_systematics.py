@@ -90,8 +90,8 @@ def test_tilt_that_the_data_show_is_estimated(session: Session) -> None:
             names = [c.name for c in result.coefficients]
             assert ("ε_IO" in names) == seen and len(names) == 9 + seen
             assert all(c.truth is None or abs(c.estimate - c.truth) < 4.0 * c.u for c in result.coefficients)
-            table = next(t for t in result.tables if t["title"] == "Nuisance model")
-            assert [row[0] for row in table["rows"]] == ["ε_IO", "trend", "k_±", "δk", "σ_mount"]
+            table = next(t for t in result.tables if t.title == "Nuisance model")
+            assert [row[0] for row in table.rows] == ["ε_IO", "trend", "k_±", "δk", "σ_mount"]
             if seen:
                 tilt = result.coefficients[-1]
                 assert tilt.interval[0] < math.degrees(eps) * 3600.0 < tilt.interval[1]

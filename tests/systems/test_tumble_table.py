@@ -44,7 +44,7 @@ def shifts(found: Result, plain: Result, what: str) -> Array:
 
 def told(result: Result, source: str, row: int) -> Array:
     """What the budget says the coefficients change by."""
-    return np.array(next(b for b in result.type_b if b["source"] == source)["changes"])[row] / FAINT
+    return np.array(next(b for b in result.type_b if b.source == source).changes)[row] / FAINT
 
 
 def check(shift: Array, expected: dict[str, float], part: float) -> None:

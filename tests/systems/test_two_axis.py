@@ -144,7 +144,7 @@ REFUSED: list[tuple[list[str], list[str]]] = [
     (["m=1", "n=1"], ["ratio 1:1", "rank 8 of 9", "not seen"]),
     (["m=6", "n=2"], ["common divisor 2", "3:1 is the same path"]),
     (["latitude=90deg"], ["rank 5 of 9", "85°"]),
-    (["latitude=86deg"], ["condition", "hardly seen is", "85°"]),
+    (["latitude=86deg"], ["condition", "least determined", "85°"]),
     (["positions=8"], ["8 positions for 9 coefficients"]),
     (["positions=60", "cycles=2"], ["120 phases"]),
     (["harmonic=true", "m=2"], ["harmonic route", "2:1 has not twelve different frequencies", "5:1 and 1:5"]),

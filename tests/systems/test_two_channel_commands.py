@@ -22,7 +22,7 @@ RUNS: list[tuple[list[str], list[str]]] = [
     (["latitude=0deg"], ["latitude 0°", "10° to 80°", "x channel: rank 5 of 9", "y channel: rank 5 of 9"]),
     (["latitude=90deg"], ["latitude 90°", "x channel: rank 4 of 9"]),
     (["latitude=0deg", "model=simple"], ["x channel: rank 2 of 4", "Dx_z"]),
-    (["latitude=-9deg"], ["latitude -9°", "condition", "hardly seen is"]),
+    (["latitude=-9deg"], ["latitude -9°", "condition", "least determined"]),
     (["latitude=81deg", "model=simple"], ["latitude 81°", "condition"]),
     (["model=eight"], ["model = eight", "simple and nine"]),
     (["rate=0"], ["rate = 0: the table does not turn"]),

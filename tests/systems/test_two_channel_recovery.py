@@ -168,7 +168,7 @@ def test_encoder_harmonic_shifts_as_the_budget_predicts(ran: Callable[..., Recor
     wrong = {f"table.encoder_amplitude[{order}]": error, f"table.encoder_phase[{order}]": row * np.pi / 2.0}
     plain, off = (load().reduce(stating(ran({**values, **v}), **{f"u_angle{order}": error})) for v in ({}, wrong))
     source = f"angle error, {('once', 'twice')[order - 1]} a turn"
-    told = np.sum([b["changes"][row] for b in plain.type_b if source in b["source"]], axis=0)  # one for each channel
+    told = np.sum([b.changes[row] for b in plain.type_b if source in b.source], axis=0)  # one for each channel
     shift = np.array([b.estimate - a.estimate for a, b in zip(plain.coefficients, off.coefficients, strict=True)])
     assert 0.1 * error < np.max(np.abs(told)) < 10.0 * error
     assert np.max(np.abs(shift - told)) < 0.1 * np.max(np.abs(told)), (shift, told)

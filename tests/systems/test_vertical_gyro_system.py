@@ -78,8 +78,8 @@ def test_acceleration(session):
     assert found(session, **given, cut_off=0)[0]["lean"].estimate == pytest.approx(4.0, abs=0.02)
     cut, result = found(session, **given)
     assert abs(cut["lean"].estimate) < 1e-6
-    table = next(t for t in result.tables if t["title"] == "Tilt by phase")
-    assert table["rows"][0][-1] == 1.0
+    table = next(t for t in result.tables if t.kind == "phases")
+    assert table.rows[0][-1] == 1.0
 
 
 def test_whole_flight(session):

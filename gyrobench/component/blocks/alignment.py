@@ -27,7 +27,7 @@ UG = 9.80665e-6  # m/s2
 
 
 class SensorErrors(Block):
-    """What an alignment is told of its gyros, accelerometers and place."""
+    """Errors of gyros, accelerometers and place that an alignment assumes."""
 
     bias = Parameter(0.01 * DEG_H, "rad/s", "rms of the constant drift of a gyro (0.01 deg/h)", min=0.0)
     markov = Parameter(0.002 * DEG_H, "rad/s", "rms of its Gauss-Markov drift (0.002 deg/h)", min=0.0)

@@ -126,7 +126,7 @@ class AttitudeEstimator(Component):
 
 
 class SensorNoise(Block):
-    """What a Kalman filter is told of gyros, accelerometers and heading."""
+    """Noise of gyros, accelerometers and heading that a Kalman filter assumes."""
 
     gyro = Parameter(0.05 / 60.0 * pi / 180.0, "rad/s/sqrt(Hz)", "white noise density of the rate", above=0.0)
     bias = Parameter(5.0 / 3600.0 * pi / 180.0, "rad/s", "rms of the gyro biases (5 deg/h)", min=0.0)

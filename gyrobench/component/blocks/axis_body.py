@@ -6,6 +6,7 @@ from gyrobench.component.blocks.table import AxisTable
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Noise, Parameter, State
 from gyrobench.component.math import Number, Vector, cos, exp, fabs, sign, sin, vector
+from gyrobench.component.set_up import unbalanced
 
 GONE = 50.0  # exp(-50) = 2e-22 changes no last digit of what it is added to
 SMALL = 1e-3  # rad: below it the series of cos and sin are exact to the last digit
@@ -220,6 +221,8 @@ class BodyTable(AxisTable):
     A part calls `turn` in its flow and `settle` in its sampled method, with the torque of its motor and its loads; the
     torque of the unbalance is added here, that of the next step at its middle.
     """
+
+    simulates = (unbalanced("axis_unbalance"),)
 
     axis = AxisBody()
     angle0 = Parameter(0.0, "rad", "angle at the start")

@@ -11,6 +11,7 @@ from gyrobench.component.composition import sampled
 from gyrobench.component.declarations import Input, Output, Parameter
 from gyrobench.component.math import Number
 from gyrobench.component.rotation import IDENTITY
+from gyrobench.component.set_up import SCALE, SCALE_PHASE, harmonic
 
 
 class BuiltTable(BodyTable):
@@ -22,6 +23,8 @@ class BuiltTable(BodyTable):
         sample()   takes a sample; `follow` is that of the count loop: command count less encoder count
         load()     further torque on the table, N.m
     """
+
+    simulates = (harmonic(SCALE, SCALE_PHASE, ("angle.once", "angle.twice")),)
 
     step = Parameter(1e-4, "s", "largest internal step", above=0.0)
     period = Parameter(5e-3, "s", "sampling period of command and controller", min=1e-3, max=1e-2)

@@ -154,7 +154,7 @@ class DcMotor(Block):
         self.M_mean = self.torque(i_mean, x - 0.5 * self.h * rate)
 
 
-class Tachometer(Block):
+class TachometerReading(Block):
     """Tachometer of a table axis: reading = rate (1 + scale_error) (1 + ripple sin(cycles x + phase)).
 
     Not modelled: noise and lag of the tachometer.

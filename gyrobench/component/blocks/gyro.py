@@ -8,6 +8,7 @@ from gyrobench.component.composition import Block, sampled
 from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
 from gyrobench.component.math import Number, Vector, clip, exp, pi, sqrt, vector
 from gyrobench.component.rotation import Rotation
+from gyrobench.component.set_up import GYRO_MOUNT, turned
 
 DEG_H = pi / 180.0 / 3600.0  # 1 deg/h in rad/s
 PER_G = -1.0 / 9.80665  # (X, Y, Z) = PER_G f, s2/m
@@ -167,6 +168,7 @@ class SdfGyro(Component):
     k2 = Parameter(0.0, "1/A", "torquer nonlinearity, relative, even in the rate")
     k3 = Parameter(0.0, "1/A2", "torquer nonlinearity, relative, odd in the rate")
     k_T = Parameter(0.0, "1/K", "torquer scale factor per kelvin of mean temperature, relative")
+    simulates = (turned("mount", GYRO_MOUNT),)
     mount = Rotation("rows: gyro axes I, O, S in case axes")
 
     D_F = Parameter(-0.3 * DEG_H, "rad/s", "acceleration-insensitive drift rate (-0.3 deg/h)")

@@ -175,7 +175,7 @@ def whitening(S: Vector) -> Vector:
     return vector(G)
 
 
-class LinearModel(KalmanEstimator):
+class MatrixModel(KalmanEstimator):
     """A linear model of n states and m readings, its arrays of fixed size: what lies beyond n and m is 0.
 
         x+ = A x + w,   cov w = W        reading i = (C x)_i + v_i

@@ -1,4 +1,4 @@
-"""Where a stand is: specific force and Earth rate of a body at rest, noise of the ground."""
+"""Place of a stand: specific force and Earth rate of a body at rest, noise of the ground."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ ALONG_Z = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 
 
 class RateErrors(Block):
-    """What a gyro in its rebalance loop, or a rate gyro, indicates besides the rate about its input axis.
+    """Errors of the rate that a gyro in its rebalance loop, or a rate gyro, indicates.
 
         indicated = w_I - omega_d + delta
         omega_d   = D_F + D_I X + D_O Y + D_S Z + D_II X2 + ... + D_IS X Z,      (X, Y, Z) = -f/g0 along I, O, S

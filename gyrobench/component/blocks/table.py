@@ -7,6 +7,7 @@ from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter
 from gyrobench.component.math import Number, Vector, cos, fabs, index, maximum, minimum, sign, sin, sqrt, vector
 from gyrobench.component.rotation import IDENTITY, Rotation
+from gyrobench.component.set_up import each
 
 FIVE = [0.0, 0.0, 0.0, 0.0, 0.0]
 
@@ -117,6 +118,14 @@ class AxisTable(Component):
     input `face` (rows: the gyro axes in table axes).
     """
 
+    simulates = (
+        each(
+            "tilt",
+            ("table.axis.pole.east", "table.axis.vertical.east", "table.axis.servo.y", "axis.square"),
+            ("table.axis.pole.normal", "table.axis.vertical.north", "table.axis.level.pole", "table.axis.servo.z"),
+        ),
+    )
+
     base = Rotation("rows: table axes in ENU at angle 0; the third is the axis")
     tilt = Parameter([0.0, 0.0], "rad", "axis tilt about the first and second table axis", min=-0.1, max=0.1)
 
@@ -173,6 +182,8 @@ class TwoAxisTable(Component):
     omega is the exact derivative of the attitude and alpha that of omega, wobble included.  The parts declare the input
     `face` (rows: the gyro axes in plate axes).
     """
+
+    simulates = (each("squareness", ("table.square",)),)
 
     base = Rotation("rows: outer axis X, inner axis Y at x = 0, and Z in ENU at angles 0")
     squareness = Parameter(0.0, "rad", "inner axis turned about Z out of the right angle", min=-0.1, max=0.1)

@@ -1,4 +1,4 @@
-"""Wavelets of parts and reductions: filters, thresholds, noise of the details from a running median."""
+"""Wavelets of parts: filters, thresholds, noise of the details from a running median."""
 
 from __future__ import annotations
 

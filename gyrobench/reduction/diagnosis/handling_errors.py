@@ -1,7 +1,6 @@
 """Diagnosis of handling errors: which mistake in taking or labelling a measured record makes its residuals ordinary.
 
-    @handling_errors.examined(candidates)          # candidates: record -> the mistakes that make sense in this test
-    def from_record(record, specification=None): ...
+    result = examined(record, reduce, candidates)      # candidates: record -> the mistakes that make sense in this test
 
 A measured record is examined where its residuals are not ordinary: a test of the fit contradicts model or noise, they
 are correlated (a mistake may hide in what is taken for slow noise) or too few to say.  It is then reduced again
@@ -31,11 +30,10 @@ rate, which some of them leave, are pointed out (plausibility.py).  Two mistakes
 
 from __future__ import annotations
 
-import functools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from scipy import special
@@ -43,13 +41,18 @@ from scipy import special
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis import plausibility
-from gyrobench.reduction.estimation import asked, uncertainty
-from gyrobench.reduction.estimation.effects import UNSTATED
-from gyrobench.reduction.setup.run_metadata import NO_TYPE_B, Site
+from gyrobench.reduction.estimation import asked
+from gyrobench.reduction.estimation.findings import RAW, WHITENED
+from gyrobench.reduction.estimation.fit_result import REMOUNT_UNSTATED
+from gyrobench.reduction.estimation.nuisances import BOTH, NUISANCES, InTheModel
+from gyrobench.reduction.setup.run_metadata import Site
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import DriftTestResult, Specification
+from gyrobench.result import DriftTestResult, Reason, Table
 
-Reduce = Callable[..., DriftTestResult]
+Reduce = Callable[[Record], DriftTestResult]
+DIAGNOSIS = "handling.diagnosis"  # id of the table
+HANDLING = "handling.error"
+STATEMENTS = (REMOUNT_UNSTATED,)  # doubts that say nothing against the record
 FACTOR = 3.0  # least ratio of the residual scatters
 LEVEL = 1e-3  # of the F test, all mistakes together
 SLOW = 10.0  # the same where they are correlated
@@ -85,39 +88,37 @@ class _Tried:
         return [self.words, self.scatter, "ordinary" if self.ordinary else "not ordinary", self.p]
 
 
-def examined(candidates: Callable[[Record], Iterable[Candidate]]) -> Callable[[Reduce], Reduce]:
-    """Return a decorator for the from_record of a test, which adds the diagnosis to its result."""
+def examined(
+    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]] | None
+) -> DriftTestResult:
+    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary.
 
-    def decorate(reduce: Reduce) -> Reduce:
-        @functools.wraps(reduce)
-        def from_record(record: Record, specification: Specification | None = None) -> DriftTestResult:
-            if not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
-                return reduce(record, specification)
-            try:
-                result = reduce(record, specification)
-            except GyrobenchError as error:
-                if named := _cures(reduce, candidates(record)):
-                    hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
-                    raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
-                raise
-            if "latitude" in record.run.options:
-                result.warnings += plausibility.earth_rate_warnings(result, Site.of(record.run))
-            reference, plain = result, record
-            if _hides(result, record):
-                plain = with_options(record, PLAIN)
-                reference = _undone(reduce, plain) or result
-            if _suspicious(reference):
-                _diagnose(result, reference, reduce, list(candidates(plain)))
-            return result
-
-        return from_record
-
-    return decorate
+    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  Raises ReductionError.
+    """
+    if candidates is None or not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
+        return reduce(record)
+    try:
+        result = reduce(record)
+    except GyrobenchError as error:
+        if named := _cures(reduce, candidates(record)):
+            hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
+            raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
+        raise
+    if "latitude" in record.run.options:
+        near = plausibility.earth_rate_warnings(result, Site.of(record.run))
+        result = replace(result, reasons=[*result.reasons, *near])
+    reference, plain = result, record
+    if _hides(result, record):
+        plain = with_options(record, PLAIN)
+        reference = _undone(reduce, plain) or result
+    if not _suspicious(reference):
+        return result
+    return _diagnosed(result, reference, reduce, list(candidates(plain)))
 
 
 def _hides(result: DriftTestResult, record: Record) -> bool:
     """True where small errors of the set-up are among the unknowns."""
-    nuisances = any(t["title"].startswith("Nuisance model") for t in result.tables)
+    nuisances = any(t.kind == NUISANCES for t in result.tables)
     return nuisances or record.run.options.get("tilt") in (True, "yes")
 
 
@@ -128,17 +129,17 @@ def with_options(record: Record, options: Mapping[str, Any]) -> Record:
 
 
 def _contradicted(result: DriftTestResult) -> bool:
-    return any(reason != NO_TYPE_B and not reason.endswith(UNSTATED) for reason in result.withheld)
+    return any(r.severity == "doubt" and r.id not in STATEMENTS for r in result.reasons)
 
 
 def _suspicious(result: DriftTestResult) -> bool:
-    if result.residual_std <= 0.0 or str(result.noise.get("model", "")).startswith("none"):
+    if result.residual_std <= 0.0 or result.ideal:
         return False
     return _contradicted(result) or _correlated(result) or result.dof < FEW
 
 
 def _correlated(result: DriftTestResult) -> bool:
-    return any(t.name.startswith("Ljung-Box") and t.p is not None and t.p < 1e-3 for t in result.tests)
+    return any(t.id.partition(":")[0] in (RAW, WHITENED) and t.p is not None and t.p < 1e-3 for t in result.tests)
 
 
 def _undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
@@ -175,8 +176,10 @@ def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
     return " or ".join(words) if len(words) <= 3 else ""
 
 
-def _diagnose(result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[Candidate]) -> None:
-    """Add to ``result`` what undoing each mistake does to the residuals, and name those that explain them.
+def _diagnosed(
+    result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[Candidate]
+) -> DriftTestResult:
+    """Return the result with what undoing each mistake does to the residuals, and those that explain them named.
 
     reference: the record as labelled, without unknowns for errors of the set-up.
     """
@@ -197,31 +200,34 @@ def _diagnose(result: DriftTestResult, reference: DriftTestResult, reduce: Reduc
     named = [t for t in named if float(special.fdtrc(t.nu, t.nu, (t.scatter / named[0].scatter) ** 2)) > LEVEL]
     explained = reference is not result and not _contradicted(result)  # by small errors of the set-up
     if not named and (explained or not (better or _contradicted(reference))):
-        return
+        return result
     if not named and not _contradicted(reference) and not _correlated(reference):  # few data, no sign of a mistake
-        return
+        return result
     unit = reference.residual_unit
-    result.tables.insert(0, {
-        "title": "Diagnosis of handling errors",
-        "caption": f"The record reduced again with each of {len(candidates)} mistakes undone; scatter in the scale of "
-        f"the record as labelled; p: F test against it, times {len(candidates)}",
-        "columns": ["with", f"residual scatter / ({unit})", "residuals", "p"],
-        "rows": [["as labelled", reference.residual_std, "not ordinary", None], *(t.row for t in tried[:SHOWN])],
-    })  # fmt: skip
+    table = Table(
+        DIAGNOSIS, "Diagnosis of handling errors",
+        f"The record reduced again with each of {len(candidates)} mistakes undone; scatter in the scale of the record "
+        f"as labelled; p: F test against it, times {len(candidates)}",
+        ["with", f"residual scatter / ({unit})", "residuals", "p"],
+        [["as labelled", reference.residual_std, "not ordinary", None], *(t.row for t in tried[:SHOWN])],
+    )  # fmt: skip
+    result = replace(result, tables=[table, *result.tables])
     if not named:
-        if better:
-            reason = (
-                f"The residuals hold more than noise: with {better[0].words} their scatter is {better[0].scatter:.3g} "
-                f"{unit}, as labelled {reference.residual_std:.3g} {unit}; no mistake that was tried explains them."
-            )
-            uncertainty.withhold(result, [reason])
-        return
-    result.summary[:] = [text for text in result.summary if not text.startswith("In the model: ")]
+        text = (
+            f"The residuals hold more than noise: with {better[0].words} their scatter is {better[0].scatter:.3g} "
+            f"{unit}, as labelled {reference.residual_std:.3g} {unit}; no mistake that was tried explains them."
+        ) if better else ""  # fmt: skip
+        reasons = [Reason("handling.unexplained", text, BOTH, severity="doubt")] if better else []
+        return replace(result, reasons=[*reasons, *result.reasons])
     scatters = f"residual scatter {reference.residual_std:.3g} {unit} as labelled, {named[0].scatter:.3g} {unit} with "
     names = [t.words for t in named[:4]] + ([f"{len(named) - 4} more"] if len(named) > 4 else [])
     several = " The record cannot tell which of these." if len(named) > 1 else ""
     hidden = " As reduced, it is taken for an error of the set-up." if explained else ""
     error = ", or ".join(names)
-    uncertainty.withhold(result, [f"A handling error explains the residuals: {error}."])
     wrong = "The coefficients are wrong until the record is corrected."
-    result.warnings.insert(0, f"Handling error: {scatters}{error}.{several}{hidden} {wrong}")
+    reasons = [
+        Reason(HANDLING, f"Handling error: {scatters}{error}.{several}{hidden} {wrong}", severity="error"),
+        Reason(HANDLING, f"A handling error explains the residuals: {error}.", BOTH, severity="doubt"),
+    ]
+    summary = [text for text in result.summary if not isinstance(text, InTheModel)]
+    return replace(result, reasons=[*reasons, *result.reasons], summary=summary)

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import math
 
-from gyrobench import units
 from gyrobench.reduction.setup.run_metadata import Site
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Reason
+from gyrobench.units import DPH
 
 NEAR = 0.03  # relative distance
 RATES = ("°/h", "°/h/g", "°/h/g²")
 LEAST = 3.0  # deg/h: smaller multiples (near the pole, at the equator) are the size of drifts
 
 
-def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[str]:
+def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[Reason]:
     """Return which coefficients (deg/h, deg/h/g ...) are close to a component of the Earth rate or to twice of it."""
-    whole = site.earth_rate / units.factor("deg/h")
+    whole = site.earth_rate / DPH
     rates = {
         "vertical component of the Earth rate": whole * abs(math.sin(site.latitude)),
         "horizontal component of the Earth rate": whole * abs(math.cos(site.latitude)),
@@ -41,4 +41,5 @@ def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[str]:
             found.append(f"{c.name} = {c.estimate:.4g} {c.unit} is close to {words}".replace("-", "−"))
     if not found:
         return []
-    return [f"{'; '.join(found)}. Check the sign of the latitude, the attitudes and the sense of rotation."]
+    text = f"{'; '.join(found)}. Check the sign of the latitude, the attitudes and the sense of rotation."
+    return [Reason("plausibility.earth_rate", text)]

@@ -18,6 +18,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 LEAST = 10  # windows
 
@@ -73,8 +74,8 @@ def composite(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> Com
     return Composite(n, dT, mean, sigma, rho, float(below[0]) * dT if below.size else None)
 
 
-def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -> list[dict[str, Any]]:
-    """What was found in each series (a sentence where there is nothing), and the correlations, for Result.tables."""
+def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -> list[Table]:
+    """Return the tables of drift rates (a sentence for a series that has none) and of their correlations."""
     rows: list[list[Any]] = []
     for label, c in statistics.items():
         if isinstance(c, str):
@@ -87,7 +88,7 @@ def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -
         ", ".join(f"{t:g} s" for t in dTs) or "no length"
     )
     head = ["series", "windows", "ΔT / s", f"mean / ({unit})", f"σ / ({unit})", "correlation time (1/e) / s"]
-    out = [{"title": "Systematic and random drift rate", "caption": caption, "columns": head, "rows": rows}]
+    out = [Table("systematic_and_random_drift_rate", "Systematic and random drift rate", caption, head, rows)]
     complete = {n: c for n, c in statistics.items() if not isinstance(c, str)}
     if complete:
         lags = _shown(max(c.correlation.size for c in complete.values()))
@@ -104,7 +105,9 @@ def tables(statistics: Mapping[str, Composite | str], scale: float, unit: str) -
             head = ["series, at lag / ΔT =", *(str(q) for q in across)]
         caption = "Autocovariance divided by its value at lag 0, for lags up to a quarter of the windows"
         out.append(
-            {"title": "Autocorrelation of the random drift rate", "caption": caption, "columns": head, "rows": body}
+            Table(
+                "autocorrelation_of_the_random_drift", "Autocorrelation of the random drift rate", caption, head, body
+            )
         )
     return out
 

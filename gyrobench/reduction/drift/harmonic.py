@@ -19,9 +19,7 @@ from gyrobench.reduction.estimation.regression import Fit, RegressionError, leas
 
 
 def columns(start: Array, end: Array, orders: Sequence[int]) -> tuple[Array, tuple[str, ...]]:
-    """Window means of cos n theta, sin n theta between ``start`` and ``end`` (rad), with names A1, B1, ...; 0 gives
-    A0.
-    """
+    """Return window means of cos n theta, sin n theta from ``start`` to ``end`` (rad), with names A0, A1, B1, ..."""
     middle, width = (start + end) / 2.0, end - start
     out, names = [], []
     for n in orders:
@@ -35,7 +33,7 @@ def columns(start: Array, end: Array, orders: Sequence[int]) -> tuple[Array, tup
 
 
 def fit(start: Array, end: Array, y: Array, order: int = 2) -> Fit:
-    """A_0, A_1, B_1 ... up to ``order`` with their covariance for white noise.
+    """Return A_0, A_1, B_1 ... up to ``order`` with their covariance for white noise.
 
     Raises RegressionError for fewer than 2 order + 2 windows, for windows that do not cover the circle (condition
     above 1e8), and where averaging leaves less than a tenth of a harmonic.

@@ -15,7 +15,8 @@ sign: of the reading x the mean current is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,24 +24,26 @@ from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import Effect
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup.sources import Source
 
-SOURCES = (
-    "asymmetry of the pulse currents",
-    "mean of the pulse currents",
-    "switching time of the pulses",
-    "switching time, proportional to the current",
-    "switching time, by the square of the current",
-    "resolution of the counts",
+ASYMMETRY = Source(
+    "pulse.asymmetry", "asymmetry of the pulse currents", "A", "u_pulse", "positive less negative current"
 )
+MEAN = Source("pulse.mean", "mean of the pulse currents", "A", note="part of the torquer scale factor")
+LATE = Source("pulse.late", "switching time of the pulses", "s", "u_switching", "edges too late")
+GROWING = Source("pulse.growing", "switching time, proportional to the current", "s", "u_switching", "at full current")
+CURVED = Source("pulse.curved", "switching time, by the square of the current", "s", "u_switching", "at full current")
+RESOLUTION = Source("pulse.resolution", "resolution of the counts", "1")
+SOURCES = (ASYMMETRY, MEAN, LATE, GROWING, CURVED, RESOLUTION)
 
 
-def sources(loop: str = "") -> tuple[str, ...]:
-    """Return the names of the sources; loop: "x", "y" where there are several loops."""
-    return tuple(f"{name}, {loop} loop" if loop else name for name in SOURCES)
+def of_loop(source: Source, loop: str = "") -> Source:
+    """Return a source of one of several loops, "x" or "y"; of the only one: ""."""
+    return replace(source, id=f"{source.id}.{loop}", name=f"{source.name}, {loop} loop") if loop else source
 
 
 @dataclass(frozen=True)
-class Windows:
+class CurrentWindows:
     """Readings (n,): mean and standard deviation of the current of each step (A), length of the window (s)."""
 
     mean: Array
@@ -76,37 +79,27 @@ class Pulses:
             return PulsesOnDemand(current, f_q, 0.0, plus, minus, (0.0, late[0], 0.0), clocks=1.0)
         return cls(current, f_q, float(p[f"{slot}.f_s"]), plus, minus, (late[0], late[1], late[2]))
 
-    def effects(
-        self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float, loop: str = ""
-    ) -> list[Effect]:
+    def effects(self, fit: Findings, k: float, read: CurrentWindows, sizes: Any, loop: str = "") -> list[Effect]:
         """Return the sources with their sensitivities.
 
-        k: torquer scale factor, rad/s/A.  u_pulse (A), u_switching (s): standard uncertainties, see the options.  loop:
-        name of the loop where there are several.
+        k: torquer scale factor, rad/s/A.  sizes: with u_pulse (A), u_switching (s), see the options.  loop: name of the
+        loop where there are several.
         """
-        asymmetric, average, late, growing, curved, resolution = sources(loop)
         d = read.mean / self.current
         one = np.ones_like(d)
         edge = k * (2.0 * self.current + self.d_plus + self.d_minus) * self.f_s
         square = d**2 + (read.std / self.current) ** 2  # the noise of d is rectified
-        asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
-        counts = self._counts(fit, k, read)
+        note = "two clocks, independent from window to window"
         return [
-            Effect(asymmetric, u_pulse, "A", 0.5 * k * one, "positive less negative current",
-                   simulated=(asymmetry,)),
-            Effect(average, 0.0, "A", k * d, "part of the torquer scale factor",
-                   simulated=(mean,)),
-            Effect(late, u_switching, "s", edge * one, "edges too late",
-                   simulated=(self.late[0],)),
-            Effect(growing, u_switching, "s", edge * d, "at full current",
-                   simulated=(self.late[1],)),
-            Effect(curved, u_switching, "s", edge * square, "at full current",
-                   simulated=(self.late[2],)),
-            Effect(resolution, 12.0**-0.5, "1", None, "two clocks, independent from window to window",
-                   values=counts),
-        ]  # fmt: skip
+            of_loop(ASYMMETRY, loop).effect(sizes, 0.5 * k * one, simulated=(self.d_plus - self.d_minus,)),
+            of_loop(MEAN, loop).effect(0.0, k * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
+            of_loop(LATE, loop).effect(sizes, edge * one, simulated=(self.late[0],)),
+            of_loop(GROWING, loop).effect(sizes, edge * d, simulated=(self.late[1],)),
+            of_loop(CURVED, loop).effect(sizes, edge * square, simulated=(self.late[2],)),
+            of_loop(RESOLUTION, loop).effect(12.0**-0.5, values=self._counts(fit, k, read), note=note),
+        ]
 
-    def _counts(self, fit: Findings, k: float, read: Windows) -> Array:
+    def _counts(self, fit: Findings, k: float, read: CurrentWindows) -> Array:
         """Return what the resolution, in every window anew, makes of each value."""
         each = self.clocks * k * self.current / self.f_q / read.length
         return np.asarray(np.sqrt(np.sum((fit.gain * each) ** 2, axis=1)))
@@ -115,21 +108,15 @@ class Pulses:
 class PulsesOnDemand(Pulses):
     """Rebalance by pulses on demand: one clock long each, late[1] by how much longer (s)."""
 
-    def effects(
-        self, fit: Findings, k: float, read: Windows, u_pulse: float, u_switching: float, loop: str = ""
-    ) -> list[Effect]:
+    def effects(self, fit: Findings, k: float, read: CurrentWindows, sizes: Any, loop: str = "") -> list[Effect]:
         """Return the sources with their sensitivities, as those of pulse widths; a window has pulses of one sign."""
-        asymmetric, average, _, growing, _, resolution = sources(loop)
         d = read.mean / self.current
         longer = 1.0 + self.f_q * self.late[1]
-        asymmetry, mean = self.d_plus - self.d_minus, (self.d_plus + self.d_minus) / 2.0
+        asymmetric, late = 0.5 * k * longer * np.abs(d), k * self.current * self.f_q * d
+        values, note = self._counts(fit, k, read), "a pulse at either end, independent from window to window"
         return [
-            Effect(asymmetric, u_pulse, "A", 0.5 * k * longer * np.abs(d), "positive less negative current",
-                   simulated=(asymmetry,)),
-            Effect(average, 0.0, "A", k * longer * d, "part of the torquer scale factor",
-                   simulated=(mean,)),
-            Effect(growing, u_switching, "s", k * self.current * self.f_q * d, "length of a pulse",
-                   simulated=(self.late[1],)),
-            Effect(resolution, 6.0**-0.5, "1", None, "a pulse at either end, independent from window to window",
-                   values=self._counts(fit, k, read)),
-        ]  # fmt: skip
+            of_loop(ASYMMETRY, loop).effect(sizes, asymmetric, simulated=(self.d_plus - self.d_minus,)),
+            of_loop(MEAN, loop).effect(0.0, k * longer * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
+            of_loop(GROWING, loop).effect(sizes, late, note="length of a pulse", simulated=(self.late[1],)),
+            of_loop(RESOLUTION, loop).effect(6.0**-0.5, values=values, note=note),
+        ]

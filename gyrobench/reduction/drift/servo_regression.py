@@ -27,12 +27,24 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
 from gyrobench.reduction.drift import window_regressors
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.effects import PHASES, SINES, Effect, one_by_one
+from gyrobench.reduction.estimation.effects import Effect, one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup import window_checks
 from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    ATTITUDE_SERVO,
+    AXIS_SERVO,
+    INPUT_TO_OUTPUT,
+    INPUT_TO_SPIN,
+    TIME_BASE,
+    UNBALANCE,
+    WOBBLE,
+)
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 REQUIRED = ("phase", "t_start", "t_end", "angle_start", "angle_end")
 SMALL = 1e-5  # rad, step of the geometric perturbations
@@ -49,7 +61,7 @@ BOOK: dict[str, tuple[str, int]] = {
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldWindows:
     """Windows of a held table: angles (n,) rad, times (n,) s, and the gyro axes x, y, z (rows, in ENU) at angle 0 of
     each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.
     """
@@ -72,8 +84,8 @@ class Held:
         """Angles (n, 12) at which the windows are averaged."""
         return window_regressors.held_nodes(self.angle_start, self.angle_end, self.t_start, self.t_end)
 
-    def turned(self, **axes_or_body: Array) -> Held:
-        """The same windows on other axes or of another gyro."""
+    def turned(self, **axes_or_body: Array) -> HeldWindows:
+        """Return the same windows on other axes or of another gyro."""
         other = replace(self, **axes_or_body)
         other.__dict__["nodes"] = self.nodes  # which a new one would find again from the same angles
         return other
@@ -90,14 +102,14 @@ class Held:
 
 def held_windows(
     windows: Mapping[str, Array], labels: Mapping[int, str], known: Collection[str], latitude: float
-) -> tuple[Held, NDArray[np.int_], NDArray[np.bool_]]:
+) -> tuple[HeldWindows, NDArray[np.int_], NDArray[np.bool_]]:
     """Return the windows of the phases in ``labels`` (phase -> attitude), their phase numbers, and their rows.
 
     Raises ReductionError for an attitude that is not one of ``known``, and for windows that cannot be read.
     """
     there = "; ".join(known)
     wrong = [f"phase {p}: attitude '{n}' unknown; there are {there}" for p, n in labels.items() if n not in known]
-    if wrong := wrong or window_problems(windows, {p: {"label": n} for p, n in labels.items()}):
+    if wrong := wrong or window_problems(windows, labels):
         raise ReductionError(wrong)
     every = np.asarray(windows["phase"]).astype(int)
     rows = np.isin(every, list(labels))
@@ -106,10 +118,10 @@ def held_windows(
     axes = np.array([of_phase[p] for p in phase.tolist()])
     columns = (np.asarray(windows[c], dtype=float)[rows] for c in ("angle_start", "angle_end", "t_start", "t_end"))
     start, end, t0, t1 = columns
-    return Held(start, end, t0, t1, axes), phase, rows
+    return HeldWindows(start, end, t0, t1, axes), phase, rows
 
 
-def drift_rate(held: Held, site: Site) -> Array:
+def drift_rate(held: HeldWindows, site: Site) -> Array:
     """Return the data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
@@ -117,32 +129,30 @@ def drift_rate(held: Held, site: Site) -> Array:
     return out
 
 
-def design(held: Held, site: Site, names: tuple[str, ...]) -> Array:
+def design(held: HeldWindows, site: Site, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names``."""
     return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
 
 def window_problems(
-    windows: Mapping[str, Array], phases: Mapping[int, Mapping[str, Any]], required: Sequence[str] = REQUIRED
+    windows: Mapping[str, Array], labels: Mapping[int, str], required: Sequence[str] = REQUIRED
 ) -> list[str]:
-    """Return what is wrong with the rows of the held phases, as sentences."""
+    """Return what is wrong with the rows of the phases in ``labels`` (phase -> attitude), as sentences."""
     for c in [c for c in windows if c.startswith("flagged")]:  # what happened while the table was moved does not matter
-        windows = {**windows, c: np.where(np.isin(windows["phase"], list(phases)), windows[c], 0)}
+        windows = {**windows, c: np.where(np.isin(windows["phase"], list(labels)), windows[c], 0)}
     problems = window_checks.window_problems(windows, required)
     if problems:
         return problems
     present = set(np.asarray(windows["phase"]).astype(int).tolist())
-    missing = [f"phase {p} ({row['label']}) has no windows" for p, row in phases.items() if p not in present]
-    return missing or ([] if phases else ["the record holds no phase in which the gyro holds the table"])
+    missing = [f"phase {p} ({label}) has no windows" for p, label in labels.items() if p not in present]
+    return missing or ([] if labels else ["the record holds no phase in which the gyro holds the table"])
 
 
-def tracking_problems(
-    windows: Mapping[str, Array], rows: NDArray[np.bool_], parameters: Mapping[str, Any], limit: float
-) -> list[str]:
-    """Where the table did not follow the gyro to ``limit`` (rad): from the pickoff voltage (columns mean and std) and
-    the gain of the gyro, as far as both are known.
+def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gain: float, limit: float) -> list[str]:
+    """Return where the table did not follow the gyro to ``limit`` (rad), as a sentence.
+
+    From the pickoff voltage (columns mean and std) and the gain of the gyro, as far as both are known.
     """
-    gain = parameters.get("gyro.K_sg", 0.0) * parameters.get("gyro.H", 0.0) / (parameters.get("gyro.C") or 1.0)
     if not gain or "mean" not in windows or not limit > 0.0:
         return []
     size = (np.abs(windows["mean"]) + np.nan_to_num(windows["std"])) / gain
@@ -158,18 +168,19 @@ def tracking_problems(
 
 
 def effects(
-    held: Held, site: Site, fit: Findings, columns: Callable[[Held], Array], phase: NDArray[np.int_],
-    sizes: Mapping[str, float],
+    held: HeldWindows, site: Site, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
+    sizes: Any,
 ) -> list[Effect]:  # fmt: skip
-    """Type B: axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.
+    """Return the effects of type B of the set-up of a held table.
 
-    sizes: u_axis, u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The
-    axis is set up anew in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
+    Axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.  sizes: u_axis,
+    u_mount, u_wobble, u_angle1, u_angle2 (rad), u_unbalance (rad at 1 g), u_time (relative).  The axis is set up anew
+    in each phase: the phases are independent errors; so are sine and cosine of the angle errors.
     columns: what is fitted.
     """
     y, X = drift_rate(held, site), columns(held)
 
-    def moved(other: Held) -> Array:
+    def moved(other: HeldWindows) -> Array:
         return fit.error(drift_rate(other, site) - y, columns(other) - X) / SMALL
 
     def axis(k: int) -> Array:
@@ -205,32 +216,35 @@ def effects(
 
     each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [
-        Effect("table axis about y", sizes["u_axis"], "rad", axis(1), each, phases),
-        Effect("table axis about z", sizes["u_axis"], "rad", axis(2), each, phases),
-        Effect("attitude about the table axis", sizes["u_axis"], "rad", axis(0), each, phases),
-        Effect("wobble of the table axis, twice a turn", sizes["u_wobble"], "rad", wobble(), "", PHASES),
-        Effect("input axis towards output axis", sizes["u_mount"], "rad", mount(2)),
-        Effect("input axis towards spin axis", sizes["u_mount"], "rad", -mount(1)),
-        Effect("angle error, once a turn", sizes["u_angle1"], "rad", order(1), "encoder", SINES),
-        Effect("angle error, twice a turn", sizes["u_angle2"], "rad", order(2), "encoder", SINES),
-        Effect(
-            "unbalance over stiffness", sizes["u_unbalance"], "rad", unbalance(), "angle at 1 g across the axis",
-            ("mass along z", "mass along y"),
-        ),
-        Effect("time base", sizes["u_time"], "1", fit.error(-held.rate), "relative"),
-    ]  # fmt: skip
+        AXIS_SERVO.of(axis="y").effect(sizes, axis(1), note=each, parts=phases),
+        AXIS_SERVO.of(axis="z").effect(sizes, axis(2), note=each, parts=phases),
+        ATTITUDE_SERVO.effect(sizes, axis(0), note=each, parts=phases),
+        WOBBLE.effect(sizes, wobble()),
+        INPUT_TO_OUTPUT.effect(sizes, mount(2)),
+        INPUT_TO_SPIN.effect(sizes, -mount(1)),
+        ANGLE_ONCE.effect(sizes, order(1)),
+        ANGLE_TWICE.effect(sizes, order(2)),
+        UNBALANCE.effect(sizes, unbalance()),
+        TIME_BASE.effect(sizes, fit.error(-held.rate)),
+    ]
 
 
-def _mounted(held: Held, k: int) -> Held:
-    """The windows with the gyro turned by SMALL about its axis k on the table."""
+def _mounted(held: HeldWindows, k: int) -> HeldWindows:
+    """Return the windows with the gyro turned by SMALL about its axis k on the table."""
     return held.turned(body=frames.rotation(np.eye(3)[k], SMALL))
 
 
 def candidates(
-    held: Held, site: Site, columns: Callable[[Held], Array], phase: NDArray[np.int_], windows: Mapping[str, Array]
+    held: HeldWindows,
+    site: Site,
+    columns: Callable[[HeldWindows], Array],
+    phase: NDArray[np.int_],
+    windows: Mapping[str, Array],
 ) -> list[Candidate]:
-    """Set-up effects that a held table may have: misalignment of the input axis, trend, temperature, constants that
-    differ from phase to phase, each of which is set up by itself.
+    """Return the set-up effects that a held table may have.
+
+    Misalignment of the input axis, trend, temperature, constants that differ from phase to phase, each of which is set
+    up by itself.
 
     columns: what is fitted.  windows: the rows of ``held``, with the thermometers of a measured record.
     """
@@ -247,24 +261,28 @@ def candidates(
         Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2), PART),
         Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1), PART),
         *nuisances.common({**windows, "t_start": held.t_start, "t_end": held.t_end}),
-        nuisances.scatter("σ_mount", nuisances.MOUNTS, phase.tolist()),
+        nuisances.scatter("mount", phase.tolist()),
     ]
 
 
-def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """The estimates in the names and torque sign of Hu 1981.  combined: our name -> a combination in those names."""
+def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
+    """Return the table of the estimates in the notation and torque sign of Hu 1981.
+
+    combined: our name -> a combination in that notation.
+    """
     rows: list[list[Any]] = []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
             symbol, sign = BOOK[q.name]
             words = (combined or {}).get(q.name, symbol)
             rows.append([words, sign * value / q.scale, u / q.scale, q.unit, q.title, "+" if sign > 0 else "−"])
-    return {
-        "title": "Notation of Hu 1981",
-        "caption": "Torque sign, ω_M = −ω_d; last column: sign against this report",
-        "columns": ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
-        "rows": rows,
-    }
+    return Table(
+        "notation_of_hu_1981",
+        "Notation of Hu 1981",
+        "Torque sign, ω_M = −ω_d; last column: sign against this report",
+        ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
+        rows,
+    )
 
 
 CONVENTIONS = (
@@ -274,18 +292,3 @@ CONVENTIONS = (
     "Gyro axes x = input, y = output, z = spin axis (I, O, S), right-handed; the input axis lies along the table axis; "
     "table angle right-handed about it; local frame east, north, up. Torquer idle while the gyro holds the table.",
 )
-
-
-def equation(names: Sequence[str]) -> str:
-    """Typst math of the measurement equation with the terms ``names``."""
-    axis = {"I": "X", "O": "Y", "S": "Z"}
-    parts = []
-    for n in names:
-        index = n[2:]
-        if n == "D_F":
-            parts.append("D_F")
-        elif len(index) == 2 and index[0] == index[1]:
-            parts.append(f'D_"{index}" {axis[index[0]]}^2')
-        else:
-            parts.append((f"D_{index} " if len(index) == 1 else f'D_"{index}" ') + " ".join(axis[a] for a in index))
-    return 'dot(theta) + omega_"E,x" = omega_d, quad omega_d = ' + " + ".join(parts)

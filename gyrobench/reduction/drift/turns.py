@@ -1,4 +1,4 @@
-"""What turning shows beside the model: harmonics the model does not hold, and turns that differ from one another.
+"""Evidence of a turning table beside the model: harmonics the model does not hold, turns that differ from one another.
 
     turns = Turns(found, [("mount 1", phase == 2), ("mount 2", phase == 4)], theta_start, theta_end)
     turns.test()                                # adds its F tests to found.tests
@@ -21,8 +21,9 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.result import Table
 
-AGREE = "turn to turn"
+AGREE, HIGH = "turns.agree", "turns.harmonics"  # ids of the tests
 
 
 @dataclass
@@ -48,10 +49,10 @@ class Turns:
             self.turn[mine] = np.floor(way / (2.0 * math.pi)).astype(int)
 
     def test(self) -> None:
-        """F tests of the harmonics the model does not hold and, where a phase has several, of turn against turn."""
+        """Test (F) the harmonics that the model does not hold and, where a phase has several, turn against turn."""
         self._harmonic_test()
         self.found.f_test(
-            AGREE, self._turn_columns(), "change of the drift between successive turns",
+            AGREE, "turn to turn", self._turn_columns(), "change of the drift between successive turns",
             "the turns differ by more than the noise", "the turns agree within the noise",
         )  # fmt: skip
 
@@ -65,10 +66,10 @@ class Turns:
                 block, _ = harmonic.columns(self.start, self.end, orders)
                 columns.append(np.where(mine[:, None], block, 0.0))
                 labels += [(label, n) for n in orders]
-        extra = np.concatenate(columns, axis=1) if columns else np.empty((self.turn.size, 0))
+        extra = self._side_by_side(columns)
         name = f"harmonics {self.held + 1} and higher"
         size = self.found.f_test(
-            name, extra, "model errors periodic in the table angle",
+            HIGH, name, extra, "model errors periodic in the table angle",
             "something turns with the table that the model does not hold", "no more than noise",
         )  # fmt: skip
         if size is not None:
@@ -79,8 +80,9 @@ class Turns:
             ]
 
     def harmonics(self, fits: Mapping[str, Fit]) -> list[dict[str, Any]]:
-        """Amplitudes with u in the unit of the data: of ``fits`` (label -> harmonic.fit of the data), then those of
-        the residuals that the model does not hold.
+        """Return amplitudes with u in the unit of the data: of ``fits``, then of the residuals the model does not hold.
+
+        fits: label -> harmonic.fit of the data.
         """
         out, unit, scale = [], self.found.y_unit, self.found.y_scale
         for label, f in fits.items():
@@ -105,6 +107,9 @@ class Turns:
                 mine = phase & (self.turn == k)
                 if mine.sum() >= len(names):
                     columns.append(np.where(mine[:, None], block, 0.0))
+        return self._side_by_side(columns)
+
+    def _side_by_side(self, columns: Sequence[Array]) -> Array:
         return np.concatenate(columns, axis=1) if columns else np.empty((self.turn.size, 0))
 
     def _rows(self) -> list[list[Any]]:
@@ -121,8 +126,8 @@ class Turns:
         return ["A0", *(f"{c}{n}" for n in range(1, self.held + 1) for c in "AB")]
 
     def repeatability(self) -> dict[str, Any]:
-        """F test of the turns and the scatter of their harmonics; empty where no test was made."""
-        test = next((t for t in self.found.tests if t.name == AGREE), None)
+        """Return the F test of the turns and the scatter of their harmonics; empty where no test was made."""
+        test = next((t for t in self.found.tests if t.id == AGREE), None)
         if test is None:
             return {}
         rows = self._rows()
@@ -137,10 +142,10 @@ class Turns:
             scatter[f"scatter of {name} / ({self.found.y_unit})"] = size
         return {"F": test.statistic, "p": test.p, "finding": test.finding, **scatter}
 
-    def table(self, over: str = "θ") -> list[dict[str, Any]]:
-        """Harmonics of each turn; empty for single turns."""
+    def table(self, over: str = "θ") -> list[Table]:
+        """Return the table of the harmonics of each turn; empty for single turns."""
         if not self.turn.any():
             return []
         caption = f"Amplitudes in {self.found.y_unit} over {over}"
         head = ["series", "turn", *self._names()]
-        return [{"title": "Harmonics of each turn", "caption": caption, "columns": head, "rows": self._rows()}]
+        return [Table("harmonics_of_each_turn", "Harmonics of each turn", caption, head, self._rows())]

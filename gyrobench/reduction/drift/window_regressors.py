@@ -1,5 +1,4 @@
-"""What a gyro on a turning table sees, averaged over each window: regressors of the drift model, rates along its
-axes.
+"""Window means of what a gyro on a turning table senses: regressors of the drift model, rates along its axes.
 
 During a window a driven table turns evenly from angle_start to angle_end, one that its gyro holds along a curve through
 the readings.  Averages are Gauss-Legendre sums over the time, exact to rounding for windows up to a radian; no harmonic
@@ -93,19 +92,19 @@ def average(values: Array) -> Array:
     return out
 
 
-def _in_face(local: Array, turning: Turning, base: Array) -> Array:
-    """Return a local vector (3,) in face axes at every node: (n, 12, 3)."""
-    x, y, z = base @ local
+def _in_face(vector: Array, turning: Turning) -> Array:
+    """Return a vector in table axes at angle 0, (3,) or (n, 12, 3) of each node, in face axes at every node."""
+    x, y, z = np.moveaxis(vector, -1, 0)
     a = turning.nodes()
     c, s = np.cos(a), np.sin(a)
-    table = np.stack([c * x + s * y, -s * x + c * y, np.full_like(a, z)], axis=-1)
+    table = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, a.shape)], axis=-1)
     out: Array = np.einsum("nij,nkj->nki", turning.face, table)
     return out
 
 
 def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names`` at local gravity ``gravity`` (m/s2)."""
-    xyz = _in_face(np.array([0.0, 0.0, -gravity / G0]), turning, base)
+    xyz = _in_face(base @ np.array([0.0, 0.0, -gravity / G0]), turning)
     return average(drift.regressors(xyz, names))
 
 
@@ -113,7 +112,7 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     """Return the window means (n,) of the inertial rate along a gyro axis (0 input, 1 output, 2 spin), rad/s: Earth and
     table.
     """
-    earth = average(_in_face(earth_rate * pole(latitude), turning, base)[:, :, axis])
+    earth = average(_in_face(base @ (earth_rate * pole(latitude)), turning)[:, :, axis])
     table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
     out: Array = earth + turning.face[:, axis, 2] * table
     return out
@@ -130,21 +129,15 @@ def wobbles(
     besides.
     """
     theta = turning.nodes()
-    c, s = np.cos(theta), np.sin(theta)
     turn = ((turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start))[:, None]
-
-    def seen(v: Array) -> Array:  # along the gyro axes, of (n, 12, 3) in table axes at angle 0
-        x, y, z = (v[..., k] for k in range(3))
-        return np.asarray(np.einsum("nij,nkj->nki", turning.face, np.stack([c * x + s * y, c * y - s * x, z], axis=-1)))
-
-    up = np.broadcast_to(base @ np.array([0.0, 0.0, -site.g]), (*theta.shape, 3))
+    up = base @ np.array([0.0, 0.0, -site.g])
     earth = base @ (site.earth_rate * pole(site.latitude))
-    still = drift.regressors(seen(up), names)
+    still = drift.regressors(_in_face(up, turning), names)
     found = []
     for a in (2.0 * theta, 2.0 * theta + np.pi / 2.0):
         q = np.stack([np.cos(a), np.sin(a), np.zeros_like(a)], axis=-1)
         going = 2.0 * turn[..., None] * np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=-1)
-        rate = average(seen(going - np.cross(q, earth)))
-        dX = average(still - drift.regressors(seen(up - size * np.cross(q, up)), names)) / size
+        rate = average(_in_face(going - np.cross(q, earth), turning))
+        dX = average(still - drift.regressors(_in_face(up - size * np.cross(q, up), turning), names)) / size
         found.append((rate, dX))
     return found

@@ -1,7 +1,7 @@
-"""Sources of type B: what an error of the set-up does to the data, and measured errors, which are taken out of them.
+"""Effects of the sources of error on a test, and measured errors, which are taken out of its data.
 
-    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", found.error(-k * current))]
-    found = with_set_up(found, lambda f: [Effect(...)], "torquer scale factor = 1.2e-4 (2e-5)")
+    effects = [TORQUER_SCALE.effect(setup, fit.error(-k * current))]
+    fit = with_set_up(fit, lambda f: [...], "torquer scale factor = 1.2e-4(2e-5)")
 
 A correction is linear in the error, as the budget is; what the data are wrong by is taken from them and the fit made
 again, noise model included, so a known error neither biases the coefficients nor widens their intervals.  An error of
@@ -15,55 +15,65 @@ import difflib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import nuisances
+from gyrobench.component.set_up import Errors
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
+from gyrobench.reduction.setup.run_metadata import Remount
+from gyrobench.reduction.setup.sources import RELATIVE, REMOUNT, Source
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 FORM = "'SOURCE = VALUE(U) UNIT; ...', such as 'angle error, once a turn (sine) = 12(2) arcsec'"
 _ONE = re.compile(r"\s*(?P<source>.+?)\s*=\s*(?P<value>[-+\d.eE]+)\s*\(\s*(?P<u>[\d.eE+-]+)\s*\)\s*(?P<unit>\S*)\s*")
-REMOUNT = "drift from mount to mount"
 UNSTATED = (
     "each mount is taken once, so drift from mount to mount is in the estimates and not in u. State u_remount, repeat "
     "the mounts, or declare type_b = none."
 )
 TOUCHED = 0.1  # of what the mounts differ by: least change of a coefficient that rests on them alike
-#: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
-#: of the data, which a covariance would take for a sight of it
-RELATIVE = "1"
-SINES = ("sine", "cosine")  # of an error that is harmonic in an angle
-PHASES = ("phase 0°", "phase 90°")  # of a wobble
-PREDICTED = "Predicted shifts by simulated errors"  # title of the table
+PREDICTED = "budget.predicted"  # id of the table of shifts by simulated errors
+CORRECTIONS = "budget.corrections"
 APART = 2  # parts of a source up to which each has a line of its own
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One source of type B: its standard uncertainty, and what the data are wrong by for one unit of it.
+    """What one source does to the data of a test: its standard uncertainty, and the error of the data for one unit.
 
     error: (n,), as :meth:`Findings.error` gives it, with the sign of a set-up that is off by one unit while the
     reduction knows nothing of it, or of a reading or a stated value (scale factor, latitude) that is too large by one;
     (m, n) for m errors of this size that have nothing to do with one another, which ``parts`` names.  values: (q,)
     change of the reported values, of a source that is not in the data.  simulated: the error of each part that a
-    simulated set-up has.  needed: why nothing passes without its size; "" where it may be left out.
+    simulated set-up has, where no part of the bench declares it.  needed: why nothing passes without its size; "" where
+    it may be left out.
     """
 
-    source: str
+    kind: Source
     size: float
-    unit: str
     error: Array | None
     note: str = ""
     parts: tuple[str, ...] = ()
     values: Array | None = None
     simulated: tuple[float, ...] = ()
     needed: str = ""
+
+    @property
+    def id(self) -> str:
+        return self.kind.id
+
+    @property
+    def source(self) -> str:
+        """Name of the source."""
+        return self.kind.name
+
+    @property
+    def unit(self) -> str:
+        return self.kind.unit
 
     def changes(self, fit: Findings) -> Array:
         """Return the change (m, q) of the reported values for one unit of each part, SI."""
@@ -75,11 +85,26 @@ class Effect:
     @property
     def names(self) -> list[str]:
         """Names of the parts, as a correction uses them; none for parts that have no name."""
+        return self._each(self.source, " ({})")
+
+    @property
+    def ids(self) -> list[str]:
+        """Return the ids of the parts, as :attr:`names`."""
+        return self._each(self.id, ".{}")
+
+    def _each(self, whole: str, part: str) -> list[str]:
         if self.error is None:
             return []
-        if np.ndim(self.error) == 1:
-            return [self.source]
-        return [f"{self.source} ({part})" for part in self.parts]
+        return [whole] if np.ndim(self.error) == 1 else [whole + part.format(p) for p in self.parts]
+
+    def errors(self, simulated: Errors) -> list[float]:
+        """Return the error of each part that is simulated, SI: by the effect itself, or by a part of the bench."""
+        if self.simulated:
+            return list(self.simulated)
+        given = simulated.get(self.id, 0.0)
+        if self.error is None or self.error.ndim == 1:
+            return [given if isinstance(given, float) else 0.0]
+        return [given.get(p, 0.0) if isinstance(given, dict) else given for p in self.parts]
 
 
 @dataclass(frozen=True)
@@ -121,18 +146,19 @@ def _corrections(effects: Sequence[Effect], text: str, elsewhere: Sequence[str])
     if not text.strip():
         return []
     unit = {n: e.unit for e in effects for n in e.names}
+    by_id = {i: n for e in effects for i, n in zip(e.ids, e.names, strict=True)}
     stated = [one for one in text.split(";") if one.strip()]
-    taken = [_read(one, unit) for one in stated if one.rpartition("=")[0].strip() not in elsewhere]
+    taken = [_read(one, unit, by_id) for one in stated if one.rpartition("=")[0].strip() not in elsewhere]
     if len({c.source for c in taken}) < len(taken):
         raise ReductionError(f"corrections: a source stands twice in '{text}'")
     return taken
 
 
-def _read(text: str, unit: dict[str, str]) -> Correction:
+def _read(text: str, unit: Mapping[str, str], by_id: Mapping[str, str]) -> Correction:
     match = _ONE.fullmatch(text)
     if match is None:
         raise ReductionError(f"corrections: '{text.strip()}' is not of the form {FORM}")
-    source = match["source"]
+    source = by_id.get(match["source"], match["source"])
     if source not in unit:
         near = difflib.get_close_matches(source, unit, 1, 0.4)
         meant = f"; meant is perhaps '{near[0]}'" if near else ""
@@ -146,20 +172,13 @@ def _read(text: str, unit: dict[str, str]) -> Correction:
     return Correction(source, given[0], given[1], unit[source])
 
 
-class Remount(NamedTuple):
-    """Standard uncertainty (rad/s) of the drift from mount to mount; stated: given, declared absent, or simulated."""
-
-    size: float = 0.0
-    stated: bool = True
-
-
 def remounts(found: Findings, remount: Remount) -> list[Effect]:
     """Return the drift from mount to mount as a source where the plan does not show it: each mount is taken once, and
     what a constant of its own does to the data is what some coefficients do.  Where it is weighed there is none.
     """
-    each = [h.candidate.block.columns.T for h in found.hidden if h.candidate.meaning == nuisances.MOUNTS]
+    each = [h.candidate.block.columns.T for h in found.hidden if h.candidate.kind == "mount"]
     needed = "" if remount.stated else UNSTATED
-    return [Effect(REMOUNT, remount.size, "rad/s", e, "of each mount by itself", needed=needed) for e in each]
+    return [REMOUNT.effect(remount.size, e, needed=needed) for e in each]
 
 
 def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:
@@ -197,36 +216,28 @@ def budget_rows(fit: Findings, effect: Effect) -> Iterator[tuple[str, float, Arr
         yield name, size, change, "; ".join(filter(None, [effect.note, "corrected" if name in own else ""]))
 
 
-def correction_table(fit: Findings) -> list[dict[str, Any]]:
+def correction_table(fit: Findings) -> list[Table]:
     """Return the table of the corrections; none without."""
     if not fit.corrections:
         return []
-    return [
-        {
-            "title": "Corrections",
-            "caption": "Measured errors of the set-up, whose effect was taken out of the data before the fit; the "
-            "closed formulas use the data as they are.",
-            "columns": ["source", "value", "u", "unit"],
-            "rows": [[c.source, c.value, c.u, c.unit] for c in fit.corrections],
-        }
-    ]
+    caption = (
+        "Measured errors of the set-up, whose effect was taken out of the data before the fit; the closed formulas use "
+        "the data as they are."
+    )
+    rows = [[c.source, c.value, c.u, c.unit] for c in fit.corrections]
+    return [Table(CORRECTIONS, "Corrections", caption, ["source", "value", "u", "unit"], rows)]
 
 
-def simulated_table(
-    fit: Findings, effects: Sequence[Effect], errors: Mapping[str, float] | None = None
-) -> list[dict[str, Any]]:
+def simulated_table(fit: Findings, effects: Sequence[Effect], simulated: Errors | None = None) -> list[Table]:
     """Return the table of the shifts by simulated errors of the set-up; none where the effects have no such error.
 
     A shift is sensitivity times error, less what a correction has taken out; it is known before anything is measured.
-    errors: source -> error, SI, beside those that the effects have.
     """
-    given = errors or {}
     taken = {c.source: c.value for c in fit.corrections}
     known: list[tuple[str, float, str, Array]] = []
     for e in effects:
-        own = dict(zip(e.names, e.simulated, strict=False))
-        for name, change in zip(e.names, e.changes(fit), strict=False):
-            if value := own.get(name, 0.0) or given.get(name, 0.0):
+        for name, value, change in zip(e.names, e.errors(simulated or {}), e.changes(fit), strict=False):
+            if value:
                 known.append((name, value, e.unit, (value - taken.get(name, 0.0)) * change))
     if not known:
         return []
@@ -235,12 +246,9 @@ def simulated_table(
         each = [float(shift[j]) / q.scale for *_, shift in known]
         rows.append([q.title, *each, sum(each), float(fit.u[j]) / q.scale, q.unit])
     said = [f"({n}) {name}, {units.format_quantity(x, unit)}" for n, (name, x, unit, _) in enumerate(known, 1)]
-    return [
-        {
-            "title": PREDICTED,
-            "caption": "Change of each estimate against a set-up without these errors, sensitivity of the budget times "
-            f"error: {'; '.join(said)}.",
-            "columns": ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"],
-            "rows": rows,
-        }
-    ]
+    caption = (
+        "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
+        f"{'; '.join(said)}."
+    )
+    columns = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
+    return [Table(PREDICTED, "Predicted shifts by simulated errors", caption, columns, rows)]

@@ -10,7 +10,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +21,18 @@ from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuis
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.mixture import equivalent_dof
+from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
-from gyrobench.result import Series, Test
+from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.result import Reason, Series, Table, Test
 
-RAW = "Ljung-Box, residuals"
+if TYPE_CHECKING:
+    from gyrobench.reduction.estimation.linear_fit import Regression
+
+RAW, WHITENED = "ljung_box.raw", "ljung_box.whitened"  # ids of tests of the residuals
+RUNS, NORMAL_RESIDUALS = "runs", "shapiro_wilk"
 CONTRADICTED = 0.01  # probability that the tests of a clean record speak against its model or noise
 
 
@@ -44,7 +50,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What is reported, in SI, in the order of the quantities; see correlated.Estimate."""
+    """What is reported, in SI, in the order of the quantities; see Estimate."""
 
     value: Array
     covariance: Array
@@ -57,29 +63,21 @@ class Estimates:
 
 @dataclass
 class Findings:
-    """A fit and what its residuals say; made by :func:`fit`.  Data in SI, what is shown in the unit of the data."""
+    """A fit and what its residuals say; made by :meth:`Regression.fit`.
 
+    Data in SI, what is shown in the unit of the data.
+    """
+
+    data: Regression
     quantities: tuple[Quantity, ...]
-    X: Array
-    y: Array
-    t_start: Array
-    t_end: Array
-    est: noise_mixture_fit.Estimate  # of the linear unknowns
+    est: Estimate  # of the linear unknowns
     reported: Estimates
-    groups: list[Group]
-    y_name: str
-    y_unit: str
-    y_scale: float
-    white: bool  # assumed, not estimated
-    weights: Array | None = None
-    known_tests: list[Test] | None = None  # of the same fit, reported otherwise
     candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
     hidden: Sequence[Hidden] = ()
-    linear: tuple[Quantity, ...] = ()  # those of the columns of X
-    mode: str = "estimated"  # noise, as of fit()
+    known_tests: list[Test] | None = None  # of the same fit, reported otherwise
     function: Callable[[Array], ArrayLike] | None = None  # of derive()
     corrections: tuple[Any, ...] = ()  # what was taken out of the data, see gyrobench.reduction.estimation.effects
-    known: Array | None = None  # (m, n): errors of known size in the data, as of fit()
+    known: Array | None = None  # (m, n): errors of known size in the data
 
     def __post_init__(self) -> None:
         dof = self.dof
@@ -87,6 +85,41 @@ class Findings:
         self.residual_std = math.sqrt(float(np.sum(self.est.residual**2)) / dof) / self.y_scale
         self.stretches = series.stretches(self.t_start, self.t_end, residual)
         self.ideal = self.residual_std * self.y_scale <= 1e-12 * float(np.max(np.abs(self.y)))
+
+    @property
+    def X(self) -> Array:
+        """(n, p): the design matrix."""
+        return self.data.X
+
+    @property
+    def y(self) -> Array:
+        """(n,): the data."""
+        return self.data.y
+
+    @property
+    def t_start(self) -> Array:
+        return np.asarray(self.data.t_start)
+
+    @property
+    def t_end(self) -> Array:
+        return np.asarray(self.data.t_end)
+
+    @property
+    def y_unit(self) -> str:
+        return self.data.y_unit
+
+    @property
+    def y_scale(self) -> float:
+        return self.data.y_scale
+
+    @property
+    def weights(self) -> Array | None:
+        return self.data.weights
+
+    @property
+    def white(self) -> bool:
+        """True where the noise is assumed, not estimated."""
+        return self.data.noise == "white"
 
     @functools.cached_property
     def tests(self) -> list[Test]:
@@ -108,7 +141,7 @@ class Findings:
         return int(self.y.size) - int(self.X.shape[1]) - flat
 
     @property
-    def joined(self) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+    def joined(self) -> list[tuple[Candidate, Evidence]]:
         """Effects of the nuisance model that are reported."""
         return nuisances.reported(self.candidates, self.est)
 
@@ -155,6 +188,12 @@ class Findings:
             self, quantities=(*quantities, *after), reported=reported, known_tests=self.made_tests, function=function
         )
 
+    def reported_alike(self, other: Findings) -> Findings:
+        """Return another fit of the same unknowns, reported as this one."""
+        if self.function is None:
+            return other
+        return other.derive(self.quantities[: len(self.quantities) - len(self.joined)], self.function)
+
     def linearized(self, function: Callable[[Array], ArrayLike], beta: Array) -> tuple[Array, Array]:
         """Return ``function`` of the linear unknowns beta (p,) and its derivatives (q, p)."""
         size = np.sqrt(np.sum(self.y**2) / np.sum(self.X**2, axis=0))  # of an unknown that makes all the data
@@ -178,16 +217,15 @@ class Findings:
         ratio = np.maximum(half / np.maximum(self.est.mixture.spread(J)[1], 1e-300), 1.0)
         return probability, np.concatenate([ratio, np.ones(max(self.value.size - ratio.size, 0))])
 
-    def nuisance_tables(self) -> list[dict[str, Any]]:
+    def nuisance_tables(self) -> list[Table]:
         """Return the table of the nuisance model (none without candidates)."""
         names = [q.title for q in self.quantities]
-        found = None if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
-        return [found] if found else []
+        return [] if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
 
     def nuisance_sentences(self) -> list[str]:
         return nuisances.sentences(self.candidates, self.est)
 
-    def implausible_nuisances(self) -> list[str]:
+    def implausible_nuisances(self) -> list[Reason]:
         return nuisances.implausible(self.candidates, self.est)
 
     # ------------------------------------------------------------------------------------------ plots
@@ -195,21 +233,23 @@ class Findings:
         """Data against what each group is drawn against, with fit, residual and the dense curve."""
         out = []
         fitted, middle = self.y - self.est.residual, (self.t_start + self.t_end) / 2.0
-        for g in self.groups:
+        for g in self.data.groups:
             rows = np.asarray(g.rows)
             rows = np.flatnonzero(rows) if rows.dtype == bool else rows
             x = np.asarray(g.x, dtype=float)
             turn = np.argsort(x, kind="stable")
             x, rows = x[turn], rows[turn]
+            dense, curve = [], []
+            if g.dense is not None:
+                dense = np.asarray(g.dense[0], dtype=float).tolist()
+                shown = np.asarray(g.dense[1], dtype=float) @ self.est.beta[: self.X.shape[1]]
+                curve = (shown / self.y_scale).tolist()
             s = Series(
                 label=g.label, x=x.tolist(), x_name=g.x_name, x_unit=g.x_unit, y=(self.y[rows] / self.y_scale).tolist(),
                 fit=(fitted[rows] / self.y_scale).tolist(), residual=(self.est.residual[rows] / self.y_scale).tolist(),
-                y_name=self.y_name, y_unit=self.y_unit, t=middle[rows].tolist(),
+                y_name=self.data.y_name, y_unit=self.y_unit, t=middle[rows].tolist(),
+                shown_fit_x=dense, shown_fit_y=curve,
             )  # fmt: skip
-            if g.dense is not None:
-                s.shown_fit_x = np.asarray(g.dense[0], dtype=float).tolist()
-                curve = np.asarray(g.dense[1], dtype=float) @ self.est.beta[: self.X.shape[1]]
-                s.shown_fit_y = (curve / self.y_scale).tolist()
             out.append(s)
         return out
 
@@ -233,13 +273,13 @@ class Findings:
     # ------------------------------------------------------------------------------------------ noise
     def noise(self) -> dict[str, Any]:
         """Return the noise model of the estimation; units in the keys."""
-        e, unit, scale = self.est, self.y_unit, self.y_scale
+        e, unit, scale = self.est.noise, self.y_unit, self.y_scale
         if self.white:
             parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
             return {**parameters, f"standard deviation / ({unit})": self.residual_std}
         share = e.best[1]
         model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
-        model += " with reading errors" if e.reading > 0.0 else ""
+        model += " with reading errors" if e.best[2] > 0.0 else ""
         parameters = {
             "model": "none (ideal data)" if self.ideal else model,
             "weight of white noise alone": e.white,
@@ -251,7 +291,7 @@ class Findings:
         if e.sigma_reading[2] > 0.0:
             parameters[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
             parameters[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
-        if e.white < 0.5 and (share > 0.0 or e.reading == 0.0) and not self.ideal:
+        if e.white < 0.5 and (share > 0.0 or e.best[2] == 0.0) and not self.ideal:
             parameters["correlation time / s"] = e.tau[0]
             parameters["correlation time, 90 % range / s"] = list(e.tau[1:])
         return parameters
@@ -263,10 +303,10 @@ class Findings:
             return text + ", rounding only."
         if self.white:
             return text + ", treated as white noise."
-        if self.est.best[1] == 0.0:
-            reading_errors = " and reading errors" if self.est.reading > 0.0 else ""
+        if self.est.noise.best[1] == 0.0:
+            reading_errors = " and reading errors" if self.est.noise.best[2] > 0.0 else ""
             return text + f", compatible with white noise{reading_errors}."
-        return text + f"; correlation time about {self.est.tau[0]:.3g} s, included in the coverage intervals."
+        return text + f"; correlation time about {self.est.noise.tau[0]:.3g} s, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests
     def _residual_tests(self) -> list[Test]:
@@ -283,36 +323,41 @@ class Findings:
             if self.white
             else "the residuals are autocorrelated; ordinary least squares would understate the uncertainties"
         )
-        tests = [Test(RAW, q, p, f"autocorrelation up to lag {lags}", text)]
+        tests = [Test(RAW, "Ljung-Box, residuals", q, p, f"autocorrelation up to lag {lags}", text)]
         whitened = ", residuals" if self.white else ", whitened residuals"
-        null = series.fitted_noise(e.fitted)
+        null = series.fitted_noise(e.likeliest.fitted)
         if not self.white:
-            q, p = series.ljung_box_of_fit(self._parts(e.whitened), lags, null)
+            q, p = series.ljung_box_of_fit(self._parts(e.likeliest.whitened), lags, null)
             text = "autocorrelation remains" if p < 0.05 else "the noise model explains the autocorrelation"
-            tests.append(Test("Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
-        z, p = series.runs_test(e.whitened, null)
+            tests.append(Test(WHITENED, "Ljung-Box" + whitened, q, p, "autocorrelation outside the noise model", text))
+        z, p = series.runs_test(e.likeliest.whitened, null)
         text = "neighbours have the same sign too often" if p < 0.05 else "compatible with random signs"
-        tests.append(Test("runs" + whitened, z, p, "trends and steps", text))
-        w, p = series.normality(e.whitened)
+        tests.append(Test(RUNS, "runs" + whitened, z, p, "trends and steps", text))
+        w, p = series.normality(e.likeliest.whitened)
         text = (
             "the residuals are not normal; check for outliers" if p < 0.05 else "compatible with a normal distribution"
         )
-        tests.append(Test("Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
+        tests.append(Test(NORMAL_RESIDUALS, "Shapiro-Wilk" + whitened, w, p, "outliers and skewness", text))
         return tests
 
     def broken(self) -> list[Test]:
         """Return the tests that contradict the fit: p below CONTRADICTED over their number, so that a clean record has
         none with a probability of 1 - CONTRADICTED.  That of autocorrelation that the noise model includes is not one.
         """
-        tests = [t for t in self.tests if t.p is not None and (self.white or t.name != RAW)]
+        tests = [t for t in self.tests if t.p is not None and (self.white or t.id != RAW)]
         return [t for t in tests if t.p is not None and t.p * len(tests) < CONTRADICTED]
 
-    def warnings(self) -> list[str]:
-        """Return a sentence for each of :meth:`broken`."""
-        return [f"{t.name}: {p_text(t.p or 0.0)}, {t.finding}. The stated u may be too small." for t in self.broken()]
+    def warnings(self) -> list[Reason]:
+        """Return what :meth:`broken` tests, and the fit itself, say against its u."""
+        broken = [(t.id, f"{t.name}: {p_text(t.p or 0.0)}, {t.finding}. The stated u may be too small.")
+                  for t in self.broken()]  # fmt: skip
+        return [
+            *([Reason("noise.unbounded", text)] if (text := self.est.noise.unbounded) else []),
+            *(Reason(*b) for b in broken),
+        ]
 
     def f_test(
-        self, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
+        self, id: str, name: str, extra: Array, what: str, bad: str, good: str, minimum: int = 5
     ) -> tuple[Array, Array] | None:
         """Adds an F test of ``extra`` columns (n, k): do they explain more than noise?  ``bad`` is said when they do.
 
@@ -338,8 +383,8 @@ class Findings:
         inverse = np.linalg.inv(M)
         rss1 = yy - np.einsum("gp,gpq,gq->g", xy, inverse, xy)
         f = ((rss0 - rss1) / k) / (np.maximum(rss1, 1e-300) / dof)
-        probability = float(self.est.models[:, 3] @ special.fdtrc(k, dof, f))
-        self.tests.append(Test(name, float(f[0]), probability, what, bad if probability < 0.05 else good))
+        probability = float(self.est.noise.models[:, 3] @ special.fdtrc(k, dof, f))
+        self.tests.append(Test(id, name, float(f[0]), probability, what, bad if probability < 0.05 else good))
         back = turned[there].T / s[there] / size[:, None]
         covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
         return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -348,11 +393,11 @@ class Findings:
         """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
         if not self.white:
             e = self.est
-            tau, share, reading, weight = e.models.T
+            tau, share, reading, weight = e.noise.models.T
             grid, n = noise_model.NoiseGrid(tau, share, weight, reading), self.y.size
-            every = np.column_stack([columns[:, :-1], e.known, columns[:, -1]])
+            every = np.column_stack([columns[:, :-1], e.likeliest.known, columns[:, -1]])
             moments = noise_mixture_fit.moments(self.t_start, self.t_end, every, grid)
-            found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.variance)
+            found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.likeliest.variance)
             return found.square, found.own, found.data
         Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]
         square = (Z.T @ Z)[None]

@@ -1,11 +1,7 @@
-"""From a linear fit to a result: what every test method needs beside its design matrix, its formulas and its tables.
+"""From a linear fit to what a test has found: estimates with their budget, tables, figures, reasons against them.
 
-    fitted = fit(quantities, X, y, t_start, t_end, groups, "drift rate", "°/h", units.factor("deg/h"))
-    effects = [Effect("torquer scale factor", setup.u_scale_factor, "1", fitted.error(-k * current))]
-    result = linear_result(fitted, system="...", title="...", ..., effects=effects, specification=limits)
-
-Two channels measured at once: one result each, then merge_channels.  Everything inside is SI; what a
-Result holds is in the printed unit of each quantity.  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
+Everything inside is SI; what a result holds is in the printed unit of each quantity.  There is no limit and no verdict
+here (gyrobench.reduction.estimation.verdict).  [RED-OLS, RED-GLS; uncertainties of type B by the chain rule]
 """
 
 from __future__ import annotations
@@ -14,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
-from dataclasses import replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,21 +25,46 @@ from gyrobench.reduction.estimation.effects import (
     simulated_table,
     standard_changes,
 )
-from gyrobench.reduction.estimation.findings import Findings, Group
-from gyrobench.reduction.estimation.linear_fit import fit
-from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Specification
-
-__all__ = ["Findings", "Group", "Quantity", "ReductionError", "fit", "linear_result", "observed_fits", "plus_minus"]
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.verdict import DECISION_RULE, SLOW_RULE
+from gyrobench.reduction.setup.setups import Setup
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Table, TypeB
 
 CONDITION = 100.0  # above this a warning names the weakest direction
+TYPE_A = "type_a"  # id of the line of a budget
+CLOSED = "closed_form"  # id of the table
+REMOUNT_UNSTATED = "mount.unstated"
+CONTRADICTED = "residuals.contradict"
 _observers: ContextVar[tuple[list[tuple[Findings, Array]], ...]] = ContextVar("observers", default=())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Account:
+    """What a test says of itself, beside its figures.
+
+    equation: Typst math.  conventions, summary: sentences.  no_closed: why there are no values of the source's
+    formulas, if there should be.  tables: the method's own; one of closed formulas is put before them where quantities
+    have any.  random: the type A line of the budget.
+    """
+
+    method: str
+    sources: Sequence[str]
+    equation: str
+    conventions: Sequence[str]
+    no_closed: str = ""
+    closed_caption: str = "From the same data"
+    tables: Sequence[Table] = ()
+    harmonics: Sequence[dict[str, Any]] = ()
+    repeatability: Mapping[str, Any] = field(default_factory=dict)
+    reasons: Sequence[Reason] = ()
+    title: str = ""  # where it is not that of the system
+    random: str = "random drift and reading noise"
 
 
 @contextlib.contextmanager
 def observed_fits() -> Iterator[list[tuple[Findings, Array]]]:
-    """Collect the fits that linear_result() reports while the block runs, each with what one standard uncertainty of
+    """Collect the fits that are reported while the block runs, each with what one standard uncertainty of
     every source of type B changes (parts, q), SI: a prediction of u needs the design matrix and not the numbers alone.
     """
     seen: list[tuple[Findings, Array]] = []
@@ -54,53 +75,26 @@ def observed_fits() -> Iterator[list[tuple[Findings, Array]]]:
         _observers.reset(token)
 
 
-def linear_result(
-    fit: Findings, *, system: str, title: str, method: str, sources: Sequence[str], equation: str,
-    conventions: Sequence[str], effects: Sequence[Effect] = (), specification: Specification | None = None,
-    site: Mapping[str, Any] | None = None, instrument: str = "", simulated: bool | None = None,
-    no_closed: str = "", closed_caption: str = "From the same data", tables: Sequence[dict[str, Any]] = (),
-    harmonics: Sequence[dict[str, Any]] = (), repeatability: Mapping[str, Any] | None = None,
-    warnings: Sequence[str] = (), summary: Sequence[str] = (), random: str = "random drift and reading noise",
-    robust: bool = False, errors: Mapping[str, float] | None = None,
-) -> DriftTestResult:  # fmt: skip
-    """Return the result of a fit: coefficients with type A and B, verdicts, budget, plots, tests, tables.
-
-    equation: Typst math.  conventions, warnings, summary: sentences.  specification: name -> limits in the printed
-    unit.  no_closed: why there are no values of the source's formulas, if there should be.  tables: the method's own,
-    {"title", "caption", "columns", "rows"}; a table of closed formulas is put before them where quantities have any.
-    simulated: whether truth is known (None: by the quantities).  random: the type A line of the budget.
-    robust: a table with a robust fit beside this one.  errors: those of a simulated set-up by their source, SI, see
-    gyrobench.reduction.setup.simulated_errors.
-    """
+def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup: Setup) -> DriftTestResult:
+    """Return what a fit has found: coefficients with type A and B, budget, plots, tests, tables, reasons."""
     by_source = [standard_changes(fit, e) for e in effects]
     rows = np.vstack([np.zeros((1, fit.value.size)), *by_source])
     for seen in _observers.get():
         seen.append((fit, rows[1:]))
-    coefficients = [_coefficient(fit, j, rows[:, j].tolist(), specification or {}) for j in range(rows.shape[1])]
-    slow_warnings = _judge_slow_drift(fit, coefficients, rows)
-    design = fit.est.design
+    coefficients = [coefficient(fit, j, rows[:, j].tolist()) for j in range(rows.shape[1])]
     odd = outliers.find(fit)
-    beside = [*outliers.tables(fit, odd), *(outliers.robust(fit) if robust and asked.whole() else [])]
-    fit_warnings = [*outliers.warnings(fit, odd), *fit.est.warnings, *fit.warnings()]
-    if no_closed:
-        fit_warnings.append(f"No closed-form estimates: {no_closed}.")
-    if design.condition > CONDITION:
-        fit_warnings.append(
-            f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
-            f"is {design.weakest}; errors of the model are amplified in it."
-        )
-    result = DriftTestResult(
-        system=system,
-        title=title,
-        method=method,
-        sources=list(sources),
-        equation=equation,
-        conventions=list(conventions),
+    robust = outliers.robust(fit) if setup.robust and asked.whole() else []
+    return DriftTestResult(
+        title=account.title,
+        method=account.method,
+        sources=list(account.sources),
+        equation=account.equation,
+        conventions=list(account.conventions),
         coefficients=coefficients,
         series=fit.series(),
         correlation=regression.correlation(fit.reported.covariance).tolist(),
-        condition=design.condition,
-        rank=design.rank,
+        condition=fit.est.design.condition,
+        rank=fit.est.design.rank,
         dof=float(fit.dof),
         noise=fit.noise(),
         tests=list(fit.tests),
@@ -109,59 +103,49 @@ def linear_result(
         acf=fit.acf(),
         allan=fit.allan(),
         psd=fit.psd(),
-        harmonics=list(harmonics),
-        budget=budget_lines(fit, effects, random),
+        harmonics=list(account.harmonics),
+        budget=budget_lines(fit, effects, account.random),
         type_b=changes_by_source(fit, effects, by_source),
-        repeatability=dict(repeatability or {}),
+        repeatability=dict(account.repeatability),
         tables=[
             *correction_table(fit),
-            *simulated_table(fit, effects, errors),
-            *_closed_table(fit, closed_caption),
-            *tables,
+            *simulated_table(fit, effects, setup.errors),
+            *_closed_table(fit, account.closed_caption),
+            *account.tables,
             *fit.nuisance_tables(),
-            *beside,
+            *outliers.tables(fit, odd),
+            *robust,
         ],
-        warnings=[*slow_warnings, *fit_warnings, *warnings],
-        summary=[*summary, *fit.nuisance_sentences()],
-        decision_rule=f"{uncertainty.DECISION_RULE} {uncertainty.SLOW_RULE}",
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
-        site=dict(site or {}),
-        instrument=instrument,
-        simulated=any(q.truth is not None for q in fit.quantities) if simulated is None else simulated,
+        reasons=[
+            *_contradictions(fit),
+            *_unstated(fit, effects),
+            *_slow_drift(fit, coefficients, rows),
+            *outliers.warnings(fit, odd),
+            *fit.warnings(),
+            *(
+                [Reason("closed_form.none", f"No closed-form estimates: {account.no_closed}.")]
+                * bool(account.no_closed)
+            ),
+            *_ill_conditioned(fit),
+            *account.reasons,
+        ],
+        ideal=fit.ideal,
+        decision_rule=f"{DECISION_RULE} {SLOW_RULE}",
+        site=setup.shown,
+        instrument=setup.instrument,
+        simulated=setup.truth is not None or any(q.truth is not None for q in fit.quantities),
     )
-    for e in effects:
-        if e.needed and not e.size:
-            touched = np.sqrt(np.sum(e.changes(fit) ** 2, axis=0)) > TOUCHED
-            names = [q.title for q, t in zip(fit.quantities, touched, strict=True) if t]
-            uncertainty.withhold(result, [f"Of {', '.join(names)}: {e.needed}"], ["pass"], names)
-    return uncertainty.withhold(result, _contradictions(fit))
 
 
-def _contradictions(fit: Findings) -> list[str]:
-    """Return why the coverage intervals do not hold what they state, as a sentence; nothing where they may."""
-    broken = "; ".join(f"{t.name} {uncertainty.p_text(t.p or 0.0)}, {t.finding}" for t in fit.broken())
-    against = [f"The residuals contradict the model or its noise ({broken})."] if broken else []
-    return against + fit.implausible_nuisances()
-
-
-def plus_minus(c: Coefficient) -> str:
-    """ "−0.3001 ± 0.0023 °/h (95 %)": expanded uncertainty with two digits."""
-    U = c.k * c.u
-    if not U > 0.0 or not math.isfinite(U):
-        return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
-    digits = 1 - math.floor(math.log10(U))
-    shown = max(0, digits)
-    return f"{round(c.estimate, digits):.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
-
-
-def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: Specification) -> Coefficient:
+def coefficient(fit: Findings, j: int, contributions: Sequence[float] = ()) -> Coefficient:
+    """Return the estimate of quantity j; contributions: what one standard uncertainty of each source changes, SI."""
     q, r = fit.quantities[j], fit.reported
     u, U = uncertainty.combine_uncertainties(float(r.u[j]), float(r.half_width[j]), contributions)
-    limit = limits.get(q.title, limits.get(q.name))
     estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
     truth = None if q.truth is None else q.truth / q.scale
     u_a, dof = float(r.u[j]) / q.scale, float(r.dof[j])
-    c = Coefficient(
+    compared = truth is not None and u_s > 0.0 and not fit.ideal  # u of ideal data is rounding
+    return Coefficient(
         name=q.title,
         meaning=q.meaning,
         unit=q.unit,
@@ -175,64 +159,91 @@ def _coefficient(fit: Findings, j: int, contributions: Sequence[float], limits: 
         dof=dof if math.isfinite(dof) else None,
         closed=None if q.closed is None else q.closed / q.scale,
         truth=truth,
-        z=(estimate - truth) / u_s if truth is not None and u_s > 0.0 else None,
-        limit=limit,
-        verdict=uncertainty.assess_conformity(estimate, U_s, limit),
+        z=(estimate - truth) / u_s if compared and truth is not None else None,
         combination=dict(q.combination or {q.name: 1.0}),
+        stands_for=q.name if q.shown else "",
     )
-    return replace(c, z=None) if fit.ideal else c  # u is rounding: nothing to compare with
 
 
-def _judge_slow_drift(fit: Findings, coefficients: list[Coefficient], contributions: Array) -> list[str]:
-    """Make verdicts inconclusive that slow drift, which the record does not exclude, would take back; say so."""
-    if all(c.verdict not in ("pass", "fail") for c in coefficients):
-        return []
+def _contradictions(fit: Findings) -> list[Reason]:
+    """Return why the coverage intervals do not hold what they state; nothing where they may."""
+    broken = "; ".join(f"{t.name} {p_text(t.p or 0.0)}, {t.finding}" for t in fit.broken())
+    text = f"The residuals contradict the model or its noise ({broken})."
+    against = [Reason(CONTRADICTED, text, ("pass", "fail"), severity="doubt")] if broken else []
+    return against + fit.implausible_nuisances()
+
+
+def _unstated(fit: Findings, effects: Sequence[Effect]) -> list[Reason]:
+    """Return what nothing passes without: the size of a source that this plan cannot show."""
+    found = []
+    for e in effects:
+        if e.needed and not e.size:
+            touched = np.sqrt(np.sum(e.changes(fit) ** 2, axis=0)) > TOUCHED
+            names = tuple(q.title for q, t in zip(fit.quantities, touched, strict=True) if t)
+            text = f"Of {', '.join(names)}: {e.needed}"
+            found.append(Reason(REMOUNT_UNSTATED, text, ("pass",), names, severity="doubt"))
+    return found
+
+
+def _slow_drift(fit: Findings, coefficients: Sequence[Coefficient], contributions: Array) -> list[Reason]:
+    """Return that the noise may be slow drift, not excluded by the record: verdicts must hold for it."""
     probability, widening = fit.if_slow()
-    turned = []
+    intervals = {}
     for j, c in enumerate(coefficients):
         half = float(fit.reported.half_width[j] * widening[j])
         _, U = uncertainty.combine_uncertainties(0.0, half, contributions[:, j].tolist())
         U /= fit.quantities[j].scale
-        if c.verdict in ("pass", "fail") and uncertainty.assess_conformity(c.estimate, U, c.limit) != c.verdict:
-            coefficients[j] = replace(c, verdict="inconclusive")
-            turned.append(f"{c.name} (U = {U:.2g} {c.unit})")
-    if not turned:
+        if widening[j] > 1.0:
+            intervals[c.name] = (c.estimate - U, c.estimate + U)
+    if not intervals:
         return []
-    return [
-        f"Inconclusive: {', '.join(turned)}. The noise may be slow drift, which this record does not tell from white "
-        f"noise (probability {probability:.2g}), and then U is as given here. A longer record tells."
-    ]
+    text = (
+        "The noise may be slow drift, which this record does not tell from white noise (probability "
+        f"{probability:.2g}); U would then be larger. Record longer to decide."
+    )
+    return [Reason("noise.slow", text, ("pass", "fail"), severity="condition", intervals=intervals)]
+
+
+def _ill_conditioned(fit: Findings) -> list[Reason]:
+    design = fit.est.design
+    if design.condition <= CONDITION:
+        return []
+    text = (
+        f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
+        f"is {design.weakest}; errors of the model are amplified in it."
+    )
+    return [Reason("design.ill_conditioned", text)]
 
 
 def budget_lines(fit: Findings, effects: Sequence[Effect], random: str) -> list[BudgetLine]:
     """Return the lines of the budget of each value: ``random``, of type A, then every source that has a size."""
     lines = []
     note = "Type A, from the residuals" + ("" if fit.white else " under the estimated noise model")
-    sources = [(e.unit, *row) for e in effects for row in budget_rows(fit, e)]
+    sources = [(e.id, e.unit, *row) for e in effects for row in budget_rows(fit, e)]
     for j, q in enumerate(fit.quantities):
         u_a = float(fit.u[j]) / q.scale
-        lines.append(BudgetLine(random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
-        for unit, source, size, changes, said in sources:
+        lines.append(BudgetLine(TYPE_A, random, u_a, q.unit, 1.0, "1", u_a, q.unit, q.title, note))
+        for id, unit, source, size, changes, said in sources:
             change = float(changes[j]) / q.scale
             if size > 0.0 and abs(change) * size > 1e-9 * u_a:
                 per = q.unit if unit == "1" else f"{q.unit}/{unit}"
-                lines.append(BudgetLine(source, size, unit, change, per, abs(change) * size, q.unit, q.title, said))
+                line = (size, unit, change, per, abs(change) * size, q.unit, q.title, said)
+                lines.append(BudgetLine(id, source, *line))
     return lines
 
 
-def changes_by_source(fit: Findings, effects: Sequence[Effect], changes: Sequence[Array]) -> list[dict[str, Any]]:
+def changes_by_source(fit: Findings, effects: Sequence[Effect], changes: Sequence[Array]) -> list[TypeB]:
     """Return what one standard uncertainty of each source does to all estimates: its independent parts in rows."""
     scale = np.array([q.scale for q in fit.quantities])
     pairs = zip(effects, changes, strict=True)
-    return [{"source": e.source, "changes": (c / scale).tolist()} for e, c in pairs if np.any(c)]
+    return [TypeB(e.id, e.source, (c / scale).tolist()) for e, c in pairs if np.any(c)]
 
 
-def _closed_table(fit: Findings, caption: str) -> list[dict[str, Any]]:
+def _closed_table(fit: Findings, caption: str) -> list[Table]:
     rows: list[list[Any]] = []
     for j, q in enumerate(fit.quantities):
         if q.closed is not None:
             a, b = float(fit.value[j]) / q.scale, q.closed / q.scale
             rows.append([q.name, a, b, a - b, float(fit.u[j]) / q.scale, q.unit])
     head = ["coefficient", "least squares", "closed form", "difference", "u", "unit"]
-    title = "Least squares and closed form"
-    return [{"title": title, "caption": caption, "columns": head, "rows": rows}] if rows else []
+    return [Table(CLOSED, "Least squares and closed form", caption, head, rows)] if rows else []

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Reason, Table, TypeB
 
 
 def merge(
     results: Mapping[str, DriftTestResult], *, equation: str | None = None, summary: Sequence[str] | None = None,
-    tables: Sequence[dict[str, Any]] = (), warnings: Sequence[str] = (),
+    tables: Sequence[Table] = (), reasons: Sequence[Reason] = (),
 ) -> DriftTestResult:  # fmt: skip
     """One result of ``results`` (channel -> result, printed as "x channel: ..."), in this order.
 
@@ -22,7 +20,7 @@ def merge(
     A type B source that channels share (an axis of the table, the mount of the gyro) is one error in all of them.
     condition: the worst; rank and dof: sums; residual_std: pooled.  Autocorrelation, Allan deviation and spectrum
     are those of the channel with the largest residuals (of those in the unit of the first); ``noise`` says which.  A
-    warning or convention that all share is said once.  Title, method, site, instrument, provenance: of the first.
+    reason or convention that all share is said once.  Title, method, site, instrument, provenance: of the first.
     equation: Typst math in place of the channels' own below one another.  Raises ValueError for coefficients of the
     same name.
     """
@@ -53,7 +51,7 @@ def merge(
         rank=sum(r.rank for r in parts),
         dof=sum(r.dof for r in parts),
         noise=noise,
-        tests=[replace(t, name=f"{t.name}, {n}") for n, r in results.items() for t in r.tests],
+        tests=[replace(t, id=f"{t.id}:{n}", name=f"{t.name}, {n}") for n, r in results.items() for t in r.tests],
         residual_std=spread,
         acf=loud.acf,
         allan=loud.allan,
@@ -63,14 +61,13 @@ def merge(
         type_b=_side_by_side(parts),
         repeatability={f"{n}: {key}": value for n, r in results.items() for key, value in r.repeatability.items()},
         tables=[
-            *({**t, "title": f"{t.get('title', '')}, {n}".lstrip(", ")} for n, r in results.items() for t in r.tables),
+            *(replace(t, id=f"{t.id}:{n}", title=f"{t.title}, {n}") for n, r in results.items() for t in r.tables),
             *tables,
         ],
-        warnings=[*_shared(labels, [r.warnings for r in parts]), *warnings],
+        reasons=[*_shared_reasons(results), *reasons],
         summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
-        verdict=uncertainty.worst_verdict(r.verdict for r in parts),
-        withheld=_shared(labels, [r.withheld for r in parts]),
         simulated=any(r.simulated for r in parts),
+        ideal=all(r.ideal for r in parts),
     )
 
 
@@ -87,21 +84,36 @@ def _shared(labels: list[str], lists: list[list[str]]) -> list[str]:
     return out
 
 
-def _side_by_side(parts: list[DriftTestResult]) -> list[dict[str, Any]]:
+def _shared_reasons(results: Mapping[str, DriftTestResult]) -> list[Reason]:
+    """Return every reason once; what a channel says stays of its own coefficients, and names it."""
+    told = list(dict.fromkeys(reason for r in results.values() for reason in r.reasons))
+    out = []
+    for reason in told:
+        who = {n: r for n, r in results.items() if reason in r.reasons}
+        if len(who) == len(results):
+            out.append(reason)
+            continue
+        names = reason.names or tuple(c.name for r in who.values() for c in r.coefficients)
+        names = names if reason.blocks else ()
+        out.append(replace(reason, text=f"{', '.join(who)}: {reason.text}", names=names))
+    return out
+
+
+def _side_by_side(parts: list[DriftTestResult]) -> list[TypeB]:
     """Type B of all channels.  A source that several channels name is one error, the same for all of them: its
     independent parts (rows) go through all estimates; what is a channel's own has zeros for the others.
     """
     size, at = sum(len(r.coefficients) for r in parts), 0
-    rows: dict[str, list[list[float]]] = {}
+    rows: dict[tuple[str, str], list[list[float]]] = {}
     for r in parts:
         for b in r.type_b:
-            shared = rows.setdefault(b["source"], [])
-            for k, own in enumerate(b["changes"]):
+            shared = rows.setdefault((b.id, b.source), [])
+            for k, own in enumerate(b.changes):
                 if k == len(shared):
                     shared.append([0.0] * size)
                 shared[k][at : at + len(own)] = own
         at += len(r.coefficients)
-    return [{"source": source, "changes": changes} for source, changes in rows.items()]
+    return [TypeB(*source, changes) for source, changes in rows.items()]
 
 
 def _block(blocks: list[list[list[float]]]) -> list[list[float]]:

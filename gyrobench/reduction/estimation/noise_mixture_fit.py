@@ -6,7 +6,7 @@ estimate, its covariance and a restricted likelihood (REML, the scale integrated
     log L = -1/2 [ log|R| + log|X' R^-1 X| + (n - p) log(v' R^-1 v) ]
 
 Estimates and intervals are the mixture over the candidates, weighted by likelihood times prior: the spread between
-noise models that the data cannot tell apart goes into u.  A single "best" model would be too sure of itself: the
+noise models that the data cannot tell apart goes into u.  A single "best" model would understate the uncertainty: the
 regressors swallow a good part of the slow noise they are to be judged by.  Deterministic; no iteration.
 
 The prior is a population of instruments (constants of gyrobench.reduction.estimation.noise).  Given a candidate the
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,72 +30,75 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
+from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence, Likeliest, NoiseSummary
 from gyrobench.reduction.estimation.normal_equations import NormalEquations
+from gyrobench.reduction.estimation.nuisance_evidence import evidence_of, repeated
 from gyrobench.reduction.estimation.nuisance_states import Block, State
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
-JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
 SLOW = 0.125  # of the record: longer correlation times are slow drift, which a record tells from white noise badly
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """What the data say of a possible effect: probability that it is there, its constants if it is, and by how much
-    the coefficients (p,) then differ from those without it.
+class Problem:
+    """A fit as it is solved: columns scaled and at right angles, moments under every noise model.
+
+    columns: those of X, then of the blocks, the errors of known size, and what least squares leave of the data.  back
+    (c, c): from its unknowns to the coefficients.  start (c,): of least squares.
     """
 
-    block: Block
-    probability: float
-    value: Array  # (k,)
-    u: Array
-    change: Array  # (p,)
-    u_without: Array
-    u_with: Array
-    scatter: tuple[float, float, float, float]  # of its constants: mean, standard deviation, 2.5 % and 97.5 % point
+    X: Array
+    y: Array
+    t0: Array
+    t1: Array
+    blocks: Sequence[Block]
+    grid: noise.NoiseGrid
+    columns: Array
+    stated: Array
+    start: Array
+    back: Array
+    scale: Array  # of the blocks' columns
+    absorbed: known_errors.Absorbed
+
+    @classmethod
+    def of(
+        cls, X: Array, y: Array, t0: Array, t1: Array, readings: bool, blocks: Sequence[Block], known: Array | None
+    ) -> Problem:
+        n, p = X.shape
+        grid = noise.noise_grid(t0, t1, readings)
+        scale = np.linalg.norm(X, axis=0)
+        Q, R = np.linalg.qr(X / scale)
+        Z = np.column_stack([np.empty((n, 0)), *(b.columns for b in blocks)])
+        z_scale = np.linalg.norm(Z, axis=0)
+        z_scale = np.where(z_scale > 0.0, z_scale, 1.0)  # a mount of which every row is left out
+        start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
+        remainder = y - Q @ start[:p]
+        stated = known_errors.columns(known, remainder)
+        both = np.column_stack([Q, Z / z_scale, stated, remainder])
+        back = np.zeros((start.size, start.size))
+        back[:p, :p] = np.linalg.inv(R) / scale[:, None]
+        back[p:, p:] = np.diag(1.0 / z_scale)
+        absorbed = known_errors.absorb(moments(t0, t1, both, grid), start.size, n)
+        return cls(X, y, t0, t1, blocks, grid, both, stated, start, back, z_scale, absorbed)
 
     @property
-    def joined(self) -> bool:
-        return self.probability >= JOINED
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        k = self.block.columns.shape[1]
-        return (self.block.name,) if k == 1 else tuple(f"{self.block.name} {j + 1}" for j in range(k))
+    def white_only(self) -> NDArray[np.bool_]:
+        out: NDArray[np.bool_] = (self.grid.share == 0.0) & (self.grid.reading == 0.0)
+        return out
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A fit under an estimated noise model; arrays follow ``names``."""
+class Weighed:
+    """States (combinations of effects) by noise models: likelihood and weight (s, G), unknowns (s G, c), s2 (s, G)."""
 
-    names: tuple[str, ...]
-    beta: Array
-    covariance: Array  # of the mixture, scaled to ``u``
-    u: Array
-    half_width: Array  # of the 95 % interval, symmetric about beta
-    p: Array  # two-sided probability of a true zero
-    dof: Array  # of the t distribution with the same u and half width; infinite for a normal one
-    residual: Array
-    whitened: Array  # residuals under the most likely model, decorrelated, unit variance
-    gain: Array  # (p, n): beta = gain y under the most likely model
-    design: Design
-    white: float  # share of the noise models without correlation, 0..1
-    tau: tuple[float, float, float]  # correlation time: likeliest, 5 % and 95 % point, s
-    sigma: tuple[float, float, float]  # rms of the Gauss-Markov part: likeliest, 5 % and 95 % point
-    density: tuple[float, float, float]  # density N of the white part (unit sqrt(s)): likeliest, 5 % and 95 % point
-    best: tuple[float, float]  # tau and share of the most likely model
-    warnings: tuple[str, ...]
-    mixture: Mixture
-    reading: float = 0.0  # share of reading errors in the most likely model
-    sigma_reading: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of one reading: likeliest, 5 % and 95 % point
-    X: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns of ``names``
-    evidence: tuple[Evidence, ...] = ()  # of each block
-    fitted: Array = field(default_factory=lambda: np.empty((0, 0)))  # the columns that ``whitened`` are residuals of
-    models: Array = field(default_factory=lambda: np.array([[1.0, 0.0, 0.0, 1.0]]))
-    # (g, 4): tau, share, reading and weight of the noise models that count, the most likely one first
-    known: Array = field(default_factory=lambda: np.empty((0, 0)))  # (n, r): errors of known size, known_errors.columns
-    variance: Array = field(default_factory=lambda: np.ones(1))  # (g,): of unit weight beside them, of each of models
-    set_up: Array = field(default_factory=lambda: np.zeros(1))  # (n,) or 0: what is predicted of them
+    states: list[State]
+    equations: NormalEquations
+    likelihood: Array
+    weight: Array
+    unknowns: Array
+    s2: Array
+    best: tuple[int, int]  # state and noise model
 
 
 def fit(
@@ -114,66 +117,86 @@ def fit(
     """
     design = check_data(X, y, names, limit)
     check_windows(t0, t1)
-    n, p = X.shape
-    grid = noise.noise_grid(t0, t1, readings)
-    scale = np.linalg.norm(X, axis=0)
-    Q, R = np.linalg.qr(X / scale)
-    Z = np.column_stack([np.empty((n, 0)), *(b.columns for b in blocks)])
-    z_scale = np.linalg.norm(Z, axis=0)
-    z_scale = np.where(z_scale > 0.0, z_scale, 1.0)  # a mount of which every row is left out
-    start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
-    remainder = y - Q @ start[:p]
-    stated = known_errors.columns(known, remainder)
-    c = start.size
-    both = np.column_stack([Q, Z / z_scale, stated, remainder])
-    absorbed = known_errors.absorb(moments(t0, t1, both, grid), c, n)
-    M, xy, yy, logdet = absorbed.square, absorbed.own, absorbed.data, absorbed.logdet
-    T = np.zeros((start.size, start.size))  # back from the columns of both
-    T[:p, :p] = np.linalg.inv(R) / scale[:, None]
-    T[p:, p:] = np.diag(1.0 / z_scale)
-    equations, likely, unit = _all_in(blocks, M, xy, yy, logdet, n, p, grid.prior)
-    each = list(nuisance_states.states(blocks, z_scale, equations.S, np.einsum("gcc->gc", M)[:, p:], likely, unit))
-    parts = [_posterior(s, equations, logdet, n, p) for s in each]
-    ll = np.array([part[0] for part in parts]) + np.log(grid.prior)  # (states, models)
-    white_only = (grid.share == 0.0) & (grid.reading == 0.0)
-    tiny = 1e-12 * np.linalg.norm(y)
-    if np.linalg.norm(remainder) <= tiny:  # ideal data: what is left is rounding, no noise
-        ll = np.where(white_only & (np.arange(len(each)) == 0)[:, None], 0.0, -np.inf)
-    elif blocks and np.linalg.norm(remainder - both[:, :c] @ np.linalg.lstsq(both[:, :c], remainder)[0]) <= tiny:
-        ll = np.where(white_only, ll, -np.inf)
-    likelihood = _normalized(ll)
-    w = _normalized(ll + np.array([s.favour for s in each])[:, None])
-    flat = w.ravel()
-    b, s2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    problem = Problem.of(X, y, t0, t1, readings, blocks, known)
+    weighed = _weigh(problem)
+    estimates, beta, counts, mixture = _average(problem, weighed)
+    evidence = evidence_of(problem, weighed, estimates, mixture, counts)
+    keep = np.concatenate([np.ones(X.shape[1], bool), *(repeated(e.block, e.joined) for e in evidence)])
+    return _summarized(problem, weighed, beta, _kept(mixture, keep), keep, names, design, evidence)
 
-    estimates = (start + b) @ T.T
+
+def _weigh(problem: Problem) -> Weighed:
+    """Return how likely each combination of effects is under each noise model, and its unknowns."""
+    (n, p), grid, m = problem.X.shape, problem.grid, problem.absorbed
+    c = problem.start.size
+    equations, likely, unit = _all_in(problem)
+    square = np.einsum("gcc->gc", m.square)[:, p:]
+    each = list(nuisance_states.states(problem.blocks, problem.scale, equations.S, square, likely, unit))
+    parts = [_posterior(s, equations, m.logdet, n, p) for s in each]
+    ll = np.array([part[0] for part in parts]) + np.log(grid.prior)  # (states, models)
+    remainder, both = problem.columns[:, -1], problem.columns[:, :c]
+    tiny = 1e-12 * np.linalg.norm(problem.y)
+    if np.linalg.norm(remainder) <= tiny:  # ideal data: what is left is rounding, no noise
+        ll = np.where(problem.white_only & (np.arange(len(each)) == 0)[:, None], 0.0, -np.inf)
+    elif problem.blocks and np.linalg.norm(remainder - both @ np.linalg.lstsq(both, remainder)[0]) <= tiny:
+        ll = np.where(problem.white_only, ll, -np.inf)
+    weight = _normalized(ll + np.array([s.favour for s in each])[:, None])
+    unknowns, s2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
+    return Weighed(each, equations, _normalized(ll), weight, unknowns, s2.reshape(ll.shape), (int(best), int(k)))
+
+
+def _average(problem: Problem, weighed: Weighed) -> tuple[Array, Array, NDArray[np.bool_], Mixture]:
+    """Return the estimates (s G, c) of all candidates, their mean, which of them count, and those as a mixture."""
+    flat, T = weighed.weight.ravel(), problem.back
+    estimates = (problem.start + weighed.unknowns) @ T.T
     beta = flat @ estimates
     off = estimates - beta
-    counts = np.maximum(flat, likelihood.ravel()) > LIGHT * flat.max()
-    chosen = zip(each, counts.reshape(w.shape), strict=True)
-    cofactors = np.concatenate([equations.cofactors(s.extra, s.precision, models) for s, models in chosen])
-    cov_each = T @ (s2[counts, None, None] * cofactors) @ T.T
-    best, k = np.unravel_index(int(np.argmax(ll)), ll.shape)
-    dof = n - p - each[best].flat
-    slow_drift = _slow(grid, t0, t1)
-    slow_drift = np.tile(slow_drift, len(each))[counts]
-    mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], cov_each, dof, slow_drift)
-    if stated.size:
-        pulled = T @ known_errors.pulled(absorbed, cofactors, counts.reshape(w.shape))
-        part = pulled @ pulled.transpose(0, 2, 1)
-        # the errors are of known size: what the scatter says of the noise is not of them
-        extra = 1.0 - s2[counts] / np.tile(absorbed.variance, len(each))[counts]
-        likeliest = pulled[int(np.searchsorted(np.flatnonzero(counts), np.argmax(ll)))]  # as the gain
-        mixture = replace(
-            mixture, covariance=cov_each + extra[:, None, None] * part, known=likeliest @ likeliest.T, known_each=part
-        )
-    evidence = _evidence(blocks, each, likelihood, estimates, mixture, counts, s2.reshape(w.shape), p)
-    keep = np.concatenate([np.ones(p, bool), *(_repeated(e.block, e.joined) for e in evidence)])
-    mixture = replace(
+    counts = np.maximum(flat, weighed.likelihood.ravel()) > LIGHT * flat.max()
+    table = counts.reshape(weighed.weight.shape)
+    chosen = zip(weighed.states, table, strict=True)
+    cofactors = np.concatenate([weighed.equations.cofactors(s.extra, s.precision, models) for s, models in chosen])
+    s2 = weighed.s2.ravel()[counts]
+    each = T @ (s2[:, None, None] * cofactors) @ T.T
+    n, p = problem.X.shape
+    dof = n - p - weighed.states[weighed.best[0]].flat
+    slow = np.tile(_slow(problem.grid, problem.t0, problem.t1), len(weighed.states))[counts]
+    mixture = Mixture(flat[counts] / flat[counts].sum(), off[counts], each, dof, slow)
+    if problem.stated.size:
+        mixture = _with_known(problem, weighed, mixture, cofactors, table)
+    return estimates, beta, counts, mixture
+
+
+def _with_known(
+    problem: Problem, weighed: Weighed, mixture: Mixture, cofactors: Array, table: NDArray[np.bool_]
+) -> Mixture:
+    """Return the mixture with the part of its covariances that errors of known size make."""
+    counts = table.ravel()
+    pulled = problem.back @ known_errors.pulled(problem.absorbed, cofactors, table)
+    part = pulled @ pulled.transpose(0, 2, 1)
+    # the errors are of known size: what the scatter says of the noise is not of them
+    variance = np.tile(problem.absorbed.variance, len(weighed.states))[counts]
+    extra = 1.0 - weighed.s2.ravel()[counts] / variance
+    at = weighed.best[0] * problem.grid.tau.size + weighed.best[1]
+    likeliest = pulled[int(np.searchsorted(np.flatnonzero(counts), at))]  # as the gain
+    covariance = mixture.covariance + extra[:, None, None] * part
+    return replace(mixture, covariance=covariance, known=likeliest @ likeliest.T, known_each=part)
+
+
+def _kept(mixture: Mixture, keep: NDArray[np.bool_]) -> Mixture:
+    """Return the mixture of the unknowns that are reported."""
+    return replace(
         mixture, off=mixture.off[:, keep], covariance=mixture.covariance[:, keep][:, :, keep],
         known=None if mixture.known is None else mixture.known[np.ix_(keep, keep)],
         known_each=None if mixture.known_each is None else mixture.known_each[:, keep][:, :, keep],
     )  # fmt: skip
+
+
+def _summarized(
+    problem: Problem, weighed: Weighed, beta: Array, mixture: Mixture, keep: NDArray[np.bool_],
+    names: Sequence[str], design: Design, evidence: Sequence[Evidence],
+) -> Estimate:  # fmt: skip
+    """Return what is reported: moments and intervals of the mixture, and what the most likely model says."""
     eye = np.eye(int(keep.sum()))
     covariance = np.einsum("g,gpq->pq", mixture.weight, mixture.covariance)
     covariance += np.einsum("g,gp,gq->pq", mixture.weight, mixture.off, mixture.off)
@@ -184,50 +207,82 @@ def fit(
         covariance -= np.einsum("g,gpq->pq", mixture.weight, mixture.known_each)
         np.fill_diagonal(covariance, np.maximum(np.diag(covariance), RESOLVED * np.diag(mixture.known_each[0])))
         sd = np.maximum(np.sqrt(np.diag(covariance)), 1e-300)
-    covariance = covariance * np.outer(u / sd, u / sd)
-    probability = mixture.outside(eye, np.abs(beta[keep]))
+    models = weighed.weight.sum(axis=0)
+    counted = _counted(models, weighed.best[1])
+    columns = np.column_stack([problem.X, *(b.columns for b in problem.blocks)])[:, keep]
+    joined = tuple(c for e in evidence if e.joined for c in e.names)
+    return Estimate(
+        names=(*names, *joined),
+        beta=beta[keep],
+        covariance=covariance * np.outer(u / sd, u / sd),
+        u=u,
+        half_width=half,
+        p=mixture.outside(eye, np.abs(beta[keep])),
+        dof=equivalent_dof(half / np.maximum(u, 1e-300)),
+        residual=problem.y - columns @ beta[keep],
+        X=columns,
+        design=design,
+        mixture=mixture,
+        noise=_noise(problem, weighed, models, counted),
+        likeliest=_likeliest(problem, weighed, keep, counted),
+        evidence=tuple(evidence),
+    )
 
-    index, at = each[best].index(p), int(best) * grid.tau.size + int(k)
+
+def _likeliest(problem: Problem, weighed: Weighed, keep: NDArray[np.bool_], counted: NDArray[np.intp]) -> Likeliest:
+    """Return the fit under the most likely combination and noise model."""
+    (best, k), grid, absorbed = weighed.best, problem.grid, problem.absorbed
+    state, (n, p), c = weighed.states[best], problem.X.shape, problem.start.size
+    index, at = state.index(p), best * grid.tau.size + k
+    b = weighed.unknowns[at, index]
     only = slice(k, k + 1)
     one = grid.tau[only], grid.share[only], grid.reading[only]
-    Zk = noise.whiten(t0, t1, both, *one)[0][:, 0, :]
-    z = absorbed.predicted(int(k), index, b[at, index])
-    scatter = Zk[:, -1] - Zk[:, index] @ b[at, index] - Zk[:, c:-1] @ z
+    Zk = noise.whiten(problem.t0, problem.t1, problem.columns, *one)[0][:, 0, :]
+    z = absorbed.predicted(k, index, b)
+    scatter = Zk[:, -1] - Zk[:, index] @ b - Zk[:, c:-1] @ z
     plain = np.sum(Zk[:, c:-1] ** 2, axis=0) > absorbed.variance[k]  # told from the noise: the fit takes it away
     model = float(grid.tau[k]), float(grid.share[k]), float(grid.reading[k])
-    Mk = M[k][np.ix_(index, index)]
-    Mk[range(p, len(index)), range(p, len(index))] += each[best].precision[k]
-    own = noise.whiten_transposed(t0, t1, Zk[:, [*index, *range(c, c + stated.shape[1])]], model).T
-    gain = np.zeros((start.size, n))
+    Mk = absorbed.square[k][np.ix_(index, index)]
+    Mk[range(p, len(index)), range(p, len(index))] += state.precision[k]
+    columns = [*index, *range(c, c + problem.stated.shape[1])]
+    own = noise.whiten_transposed(problem.t0, problem.t1, Zk[:, columns], model).T
+    gain = np.zeros((c, n))
     gain[index] = np.linalg.solve(Mk, own[: len(index)] - absorbed.taken[k][index] @ own[len(index) :])
-    gain = (T @ gain)[keep]
-    window = float(np.median(t1 - t0))
+    return Likeliest(
+        whitened=scatter / math.sqrt(max(float(weighed.s2.ravel()[at]), 1e-300)),
+        fitted=np.column_stack([Zk[:, index], Zk[:, c:-1][:, plain]]),
+        gain=(problem.back @ gain)[keep],
+        known=problem.stated,
+        variance=absorbed.variance[counted],
+        set_up=problem.stated @ z,
+    )
+
+
+def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[np.intp]) -> NoiseSummary:
+    """Return the noise models as they are reported; models (G,): their weights."""
+    (best, k), grid = weighed.best, problem.grid
+    window = float(np.median(problem.t1 - problem.t0))
     v = noise.mean_variance(window / grid.tau)
-    models, best_s2 = w.sum(axis=0), s2.reshape(w.shape)[best]
-    white = float(models[white_only].sum())
-    without_reading = best_s2 * (1.0 - grid.reading)
-    tau = _spread(models, grid.tau, int(k), grid.share > 0.0)
-    sigma = _spread(models, np.sqrt(without_reading * grid.share / v), int(k))
-    density = _spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), int(k))
-    record = float(t1[-1] - t0[0])
-    warnings = []
-    slow = float(models[grid.share == 0.0].sum()) < 0.5
-    if slow and tau[2] > 0.9 * float(grid.tau.max()):
-        warnings.append(
+    s2 = weighed.s2[best]
+    without_reading = s2 * (1.0 - grid.reading)
+    tau = _spread(models, grid.tau, k, grid.share > 0.0)
+    record = float(problem.t1[-1] - problem.t0[0])
+    unbounded = ""
+    if float(models[grid.share == 0.0].sum()) < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
+        unbounded = (
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
             f"{tau[2]:.0f} s). Slower drift is confounded with the constant term, whose interval is valid for this "
             "record only."
         )
-    columns, counted = np.column_stack([X, Z])[:, keep], _counted(models, int(k))
-    joined = tuple(c for e in evidence if e.joined for c in e.names)
-    return Estimate(
-        (*names, *joined), beta[keep], covariance, u, half, probability, equivalent_dof(half / np.maximum(u, 1e-300)),
-        y - columns @ beta[keep], scatter / math.sqrt(max(float(s2[at]), 1e-300)), gain, design, white, tau, sigma,
-        density, model[:2], tuple(warnings), mixture, model[2],
-        _spread(models, np.sqrt(best_s2 * grid.reading / 2.0) * window, int(k)), columns, tuple(evidence),
-        np.column_stack([Zk[:, index], Zk[:, c:-1][:, plain]]), _listed(grid, models, counted), stated,
-        absorbed.variance[counted], stated @ z,
-    )  # fmt: skip
+    return NoiseSummary(
+        white=float(models[problem.white_only].sum()),
+        tau=tau,
+        sigma=_spread(models, np.sqrt(without_reading * grid.share / v), k),
+        density=_spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), k),
+        sigma_reading=_spread(models, np.sqrt(s2 * grid.reading / 2.0) * window, k),
+        models=_listed(grid, models, counted),
+        unbounded=unbounded,
+    )
 
 
 def _normalized(log_weight: Array) -> Array:
@@ -260,33 +315,27 @@ def _listed(grid: noise.NoiseGrid, weight: Array, order: NDArray[np.intp]) -> Ar
     return np.column_stack([grid.tau[order], grid.share[order], grid.reading[order], w])
 
 
-def _all_in(
-    blocks: Sequence[Block], M: Array, xy: Array, yy: Array, logdet: Array, n: int, p: int, prior: Array
-) -> tuple[NormalEquations, Array, float]:
+def _all_in(problem: Problem) -> tuple[NormalEquations, Array, float]:
     """Normal equations without the p coefficients; with all single effects in the design: weights (G,) of the noise
     models and standard deviation of unit weight.
     """
-    single = np.flatnonzero(np.concatenate([np.empty(0, bool), *(_repeated(b, not b.scatter) for b in blocks)]))
+    blocks, absorbed, (n, p) = problem.blocks, problem.absorbed, problem.X.shape
+    single = np.flatnonzero(np.concatenate([np.empty(0, bool), *(repeated(b, not b.scatter) for b in blocks)]))
     try:
-        equations = NormalEquations.of(M, xy, yy, p)
+        equations = NormalEquations.of(absorbed.square, absorbed.own, absorbed.data, p)
         _, rss, determinant = equations.solve(single.tolist())
     except np.linalg.LinAlgError:
         names = ", ".join(b.name for b in blocks)
         raise RegressionError(
-            f"{n} windows cannot tell apart what may be in them beside the coefficients ({names}); set nuisances = "
+            f"{n} windows: the candidate effects beside the coefficients ({names}) are collinear; set nuisances = "
             "none, or record more"
         ) from None
     rss = np.maximum(rss, 1e-300)
     m = n - p - single.size
-    ll = np.log(prior) - 0.5 * (logdet + determinant + m * np.log(rss))
+    ll = np.log(problem.grid.prior) - 0.5 * (absorbed.logdet + determinant + m * np.log(rss))
     likely = np.exp(ll - ll.max())
     likely /= likely.sum()
     return equations, likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
-
-
-def _repeated(block: Block, value: bool) -> NDArray[np.bool_]:
-    """A value for each column of a block."""
-    return np.full(block.columns.shape[1], value)
 
 
 def _posterior(s: State, equations: NormalEquations, logdet: Array, n: int, p: int) -> tuple[Array, Array, Array]:
@@ -298,55 +347,6 @@ def _posterior(s: State, equations: NormalEquations, logdet: Array, n: int, p: i
     ll += s.log_weight + math.lgamma(m / 2.0)
     s2: Array = rss / m
     return ll, b, s2
-
-
-def _evidence(
-    blocks: Sequence[Block], each: Sequence[State], w: Array, estimates: Array, mixture: Mixture,
-    counts: NDArray[np.bool_], s2: Array, p: int,
-) -> list[Evidence]:  # fmt: skip
-    """What the data say of each block; estimates (states * models, all columns), w and s2 (states, models)."""
-    found, at, flat = [], p, w.ravel()
-    sd = np.sqrt(np.maximum(np.einsum("gpp->gp", mixture.covariance), 0.0))
-    total = np.zeros_like(estimates)
-    total[counts] = sd**2
-    for j, block in enumerate(blocks):
-        present = np.array([s.blocks[j] for s in each])
-        probability = float(w[present].sum())
-        inside = np.repeat(present, w.shape[1])
-        columns = slice(at, at + block.columns.shape[1])
-        at = columns.stop
-
-        def mean(rows: NDArray[np.bool_]) -> tuple[Array, Array]:
-            part = np.where(rows & counts, flat, 0.0)
-            if not part.sum() > 0.0:
-                part = np.where(rows, 1.0, 0.0)
-            part = part / part.sum()
-            centre = part @ estimates
-            return centre, np.sqrt(part @ (total + (estimates - centre) ** 2))
-
-        (with_it, u_with), (without, u_without) = mean(inside), mean(~inside)
-        spread = (0.0, 0.0, 0.0, 0.0)
-        if block.scatter:
-            size = np.array([s.scatter[j] if j in s.scatter else np.zeros(w.shape[1]) for s in each]) * np.sqrt(s2)
-            part = np.where(present[:, None], w, 0.0).ravel()
-            spread = _moments_of(size.ravel(), part)
-        change, u_without = with_it[:p] - without[:p], np.maximum(u_without[:p], 1e-300)
-        found.append(
-            Evidence(block, probability, with_it[columns], u_with[columns], change, u_without, u_with[:p], spread)
-        )
-    return found
-
-
-def _moments_of(values: Array, weight: Array) -> tuple[float, float, float, float]:
-    """Mean, standard deviation, 2.5 % and 97.5 % point of weighted values; zeros without weight."""
-    if not weight.sum() > 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    weight = weight / weight.sum()
-    centre = float(weight @ values)
-    order = np.argsort(values)
-    total = np.cumsum(weight[order])
-    low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.025, 0.975))
-    return centre, math.sqrt(float(weight @ (values - centre) ** 2)), low, high
 
 
 def ordinary(
@@ -364,13 +364,21 @@ def ordinary(
     spread = ols.s / float(np.median(root))
     density = spread * math.sqrt(float(np.median(t1 - t0)))
     whitened = ols.residual * root / ols.s if ols.s > 0.0 else np.zeros_like(y)
-    dof = np.full(len(names), float(ols.dof))
     return Estimate(
-        ols.names, ols.beta, ols.covariance, ols.u, ols.half_width(), ols.p, dof, ols.residual, whitened,
-        ols.gain, design, 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (density, density, density), (1.0, 0.0), (),
-        Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof), X=X,
-        fitted=X * root[:, None],
-    )  # fmt: skip
+        names=ols.names,
+        beta=ols.beta,
+        covariance=ols.covariance,
+        u=ols.u,
+        half_width=ols.half_width(),
+        p=ols.p,
+        dof=np.full(len(names), float(ols.dof)),
+        residual=ols.residual,
+        X=X,
+        design=design,
+        mixture=Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof),
+        noise=NoiseSummary(density=(density, density, density)),
+        likeliest=Likeliest(whitened, X * root[:, None], ols.gain),
+    )
 
 
 def check_windows(t0: Array, t1: Array) -> None:

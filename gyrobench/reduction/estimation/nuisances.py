@@ -16,15 +16,21 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import noise_mixture_fit, nuisance_states
+from gyrobench.reduction.estimation import nuisance_states
+from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
 from gyrobench.reduction.estimation.nuisance_states import Block
+from gyrobench.result import Reason, Table
 from gyrobench.units import DPH
 
-MOUNTS = "standard deviation of the drift from mount to mount"
-TURN_ONS = "standard deviation of the drift from turn-on to turn-on"
+SCATTERS = {  # kind of the constants -> meaning of their scatter
+    "mount": "standard deviation of the drift from mount to mount",
+    "turn_on": "standard deviation of the drift from turn-on to turn-on",
+}
+BOTH = ("pass", "fail")
 FREEDOM = 10  # degrees of freedom that must be left beside all candidates
 CONTRASTS = 2  # of a scatter's constants that the rest of the model leaves free
 VISIBLE = 1e-3  # least share of a column's length at right angles to the others
@@ -33,7 +39,7 @@ ASYMMETRY, SCALE_FACTOR = 1e-3, 1e-2  # largest of a sound torquer; also what a 
 #: largest error of a set-up that is meant to be sound, by its unit: a small angle, a torquer
 MISTAKEN = {"arcsec": units.factor("deg"), "%": 0.1}
 FLAGRANT = 10.0  # white-noise uncertainties from which on an effect beyond its bound is weighed too
-TITLE = "Nuisance model"
+NUISANCES = "nuisances"  # id of the table
 COLUMNS = ["candidate", "meaning", "estimate", "u", "unit", "probability", "in the model", "largest change", "of u"]
 
 
@@ -50,6 +56,7 @@ class Candidate:
     visible: float = VISIBLE  # least share of its length at right angles to the coefficients
     bound: float = math.inf  # SI; an effect that a record determines less well than this is not weighed
     largest: float = math.inf  # SI; of an error of the set-up: beyond it, something else is mistaken
+    kind: str = ""  # of a scatter, see SCATTERS
 
     @classmethod
     def of(
@@ -88,11 +95,14 @@ def temperature(windows: Mapping[str, Array]) -> list[Candidate]:
     return found
 
 
-def scatter(name: str, meaning: str, groups: Sequence[object]) -> Candidate:
-    """Constants that scatter from group to group: groups (n,) names each row's mount, or turn-on."""
+def scatter(kind: str, groups: Sequence[object], channel: str = "") -> Candidate:
+    """Return constants that scatter from group to group: groups (n,) names each row's mount, or turn-on.
+
+    channel: as of :func:`common`.
+    """
     keys = list(dict.fromkeys(groups))
     columns = np.array([[g == k for k in keys] for g in groups], dtype=float)
-    return Candidate(name, meaning, "°/h", DPH, columns, scatter=True)
+    return Candidate(f"σ_{kind}{channel}", SCATTERS[kind], "°/h", DPH, columns, scatter=True, kind=kind)
 
 
 def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
@@ -105,7 +115,7 @@ def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
     found = [*temperature(windows), trend(t0, t1)]
     if "turn_on" in windows:
-        found.append(scatter("σ_turn_on", TURN_ONS, np.round(windows["turn_on"]).tolist()))
+        found.append(scatter("turn_on", np.round(windows["turn_on"]).tolist()))
     return [replace(c, name=c.name + channel) for c in found]
 
 
@@ -132,13 +142,17 @@ def fitted(rate: Array, X: Array, y: Array) -> Array:
     return np.asarray(rate - X @ np.linalg.lstsq(X, y, rcond=None)[0])
 
 
-def mounts(phase: Array, faces: Mapping[int, Array]) -> list[int]:
+def mounts(phase: Array | NDArray[np.int_], faces: Mapping[int, Array]) -> list[int]:
     """Return the number of the mount of each row: phases one after the other on the same face are one mount."""
     order = list(dict.fromkeys(np.asarray(phase).astype(int).tolist()))
     number = {order[0]: 0}
     for before, p in pairwise(order):
         number[p] = number[before] + (not np.allclose(faces[before], faces[p]))
     return [number[p] for p in np.asarray(phase).astype(int).tolist()]
+
+
+class InTheModel(str):
+    """A sentence of the summary on an effect that joined the model."""
 
 
 @dataclass(frozen=True)
@@ -222,9 +236,9 @@ def _partners(columns: Array, model: Array, names: Sequence[str]) -> list[str]:
 
 
 def table(
-    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: noise_mixture_fit.Estimate, names: Sequence[str]
-) -> dict[str, object] | None:
-    """The candidates with their estimates (if present), probabilities and what they change most; None without any."""
+    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: Estimate, names: Sequence[str]
+) -> list[Table]:
+    """Return the candidates with their estimates (if present), probabilities and what they change most."""
     rows: list[list[object]] = []
     for c, e in zip(candidates, est.evidence, strict=True):
         change = e.change / e.u_without
@@ -237,40 +251,42 @@ def table(
     for h in hidden:
         rows.append([h.candidate.name, h.candidate.meaning, None, None, h.candidate.unit, None, h.reason, "", None])
     if not rows:
-        return None
+        return []
     caption = (
         "Set-up effects weighed by the data, each with even odds beforehand. Estimate and u: if it is present. Largest "
         "change: coefficient that moves most when the effect is in the model, in its u without the effect. Estimates "
         "and intervals are means over all combinations, weighted by their probabilities, in which the odds of a single "
         f"effect count {nuisance_states.FAVOUR:g} times, so that effects of every size are covered alike."
     )
-    return {"title": TITLE, "caption": caption, "columns": COLUMNS, "rows": rows}
+    return [Table(NUISANCES, "Nuisance model", caption, COLUMNS, rows)]
 
 
-def sentences(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
+def sentences(candidates: Sequence[Candidate], est: Estimate) -> list[str]:
     """Return what joined the model, as sentences."""
-    out = []
+    out: list[str] = []
     for c, e in zip(candidates, est.evidence, strict=True):
         if not e.joined:
             continue
         value, u = (e.scatter[0], e.scatter[1]) if c.scatter else (float(e.value[0]), float(e.u[0]))
-        out.append(
+        text = (
             f"In the model: {c.meaning}, {c.name} = {value / c.scale:.3g} {c.unit} (u = {u / c.scale:.2g} {c.unit}, "
             f"probability {_percent(e.probability)})."
         )
+        out.append(InTheModel(text))
     return out
 
 
-def implausible(candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate) -> list[str]:
-    """Return which effects that joined are larger than an error of the set-up can be, as sentences."""
+def implausible(candidates: Sequence[Candidate], est: Estimate) -> list[Reason]:
+    """Return which effects that joined are larger than an error of the set-up can be."""
     out = []
     for c, e in reported(candidates, est):
         if not c.scatter and abs(float(e.value[0])) > c.largest:
             size, most = float(e.value[0]) / c.scale, c.largest / c.scale
-            out.append(
+            text = (
                 f"The fit takes the residuals for {c.name} = {size:.3g} {c.unit} ({c.meaning}), more than {most:g} "
                 f"{c.unit}: no error of the set-up, but an attitude, a sign, a column or a unit is mistaken."
             )
+            out.append(Reason("nuisance.implausible", text, BOTH, severity="doubt"))
     return out
 
 
@@ -278,8 +294,6 @@ def _percent(p: float) -> str:
     return "above 99.9 %" if p > 0.999 else f"{100.0 * p:.3g} %"
 
 
-def reported(
-    candidates: Sequence[Candidate], est: noise_mixture_fit.Estimate
-) -> list[tuple[Candidate, noise_mixture_fit.Evidence]]:
+def reported(candidates: Sequence[Candidate], est: Estimate) -> list[tuple[Candidate, Evidence]]:
     """Return those that joined."""
     return [(c, e) for c, e in zip(candidates, est.evidence, strict=True) if e.joined]

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,8 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Reason, Table
 
 LEVEL = 0.01  # probability that any row of a clean record is named
 MOST = 0.2  # share of the rows that may be outliers
@@ -56,7 +55,7 @@ def find(found: Findings) -> Outliers | None:
     if found.ideal or most < 1 or not asked.whole():
         return None
     limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
-    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.set_up))
+    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.likeliest.set_up))
     size = np.max([r / max(float(np.median(r)), 1e-300) for r in each], axis=0)
     rows = np.flatnonzero(size > limit)
     if not rows.size:
@@ -78,11 +77,11 @@ def find(found: Findings) -> Outliers | None:
 
 def _decorrelated(found: Findings) -> Array:
     """r (n,) of the residuals, up to a factor."""
-    v = found.est.residual - found.est.set_up
+    v = found.est.residual - found.est.likeliest.set_up
     if found.white:
         return v if found.weights is None else v * np.sqrt(found.weights)
     n = v.size
-    model = (*found.est.best, found.est.reading)
+    model = found.est.noise.best
     one = tuple(np.array([m]) for m in model)
     z = noise_model.whiten(found.t_start, found.t_end, v[:, None], *one)[0][:, 0, :]
     inverse = noise_model.whiten_transposed(found.t_start, found.t_end, z, model)[:, 0]
@@ -99,18 +98,11 @@ def _fitted_without(found: Findings, rows: NDArray[np.intp]) -> Findings | None:
     keep = np.ones(found.y.size, dtype=bool)
     keep[rows] = False
     try:
-        rest = fit(
-            found.linear, found.X[keep], found.y[keep], found.t_start[keep], found.t_end[keep], [], found.y_name,
-            found.y_unit, found.y_scale, noise=found.mode, limit=math.inf,
-            weights=None if found.weights is None else found.weights[keep],
-            candidates=[replace(c, columns=np.asarray(c.columns)[keep]) for c in found.candidates],
-            known=None if found.known is None else found.known[:, keep],
-        )  # fmt: skip
+        few = replace(found.data, candidates=found.candidates).rows(keep)
+        rest = few.fit(None if found.known is None else found.known[:, keep])
     except ReductionError:
         return None  # these rows carry a coefficient alone
-    if found.function is None:
-        return rest
-    return rest.derive(found.quantities[: found.value.size - len(found.joined)], found.function)
+    return found.reported_alike(rest)
 
 
 def _against(found: Findings, rest: Findings, rows: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -130,7 +122,7 @@ def _against(found: Findings, rest: Findings, rows: NDArray[np.intp]) -> tuple[A
     return distance, distance / np.sqrt(variance)
 
 
-def warnings(found: Findings, outliers: Outliers | None) -> list[str]:
+def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     """Return which rows, and what changes most without them, as a warning."""
     if outliers is None:
         return []
@@ -147,10 +139,11 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[str]:
     plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})"
     what, them = ("Row", "it") if rows.size == 1 else ("Rows", "them")
     verb = "lies" if rows.size == 1 else "lie"
-    return [
+    text = (
         f"{what} {listed}{more} {verb} outside the noise of the others. They are in the estimates; without {them} "
         f"{q.title} = {values} in place of {plain}. Look for the cause, and leave {them} out only if it is one."
-    ]
+    )
+    return [Reason("outliers", text)]
 
 
 def _common(found: Findings, rest: Findings) -> list[tuple[int, int]]:
@@ -158,7 +151,7 @@ def _common(found: Findings, rest: Findings) -> list[tuple[int, int]]:
     return [(j, there[q.name]) for j, q in enumerate(found.quantities) if q.name in there]
 
 
-def tables(found: Findings, outliers: Outliers | None) -> list[dict[str, Any]]:
+def tables(found: Findings, outliers: Outliers | None) -> list[Table]:
     """Return the estimates with and without the outliers."""
     if outliers is None:
         return []
@@ -170,11 +163,11 @@ def tables(found: Findings, outliers: Outliers | None) -> list[dict[str, Any]]:
     which = ", ".join(str(r + 1) for r in outliers.rows)
     caption = f"Rows left out: {which}. The result is that of all rows."
     head = ["coefficient", "all rows", "u", "without", "u without", "unit"]
-    return [{"title": "Estimates without outliers", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("outliers", "Estimates without outliers", caption, head, rows)]
 
 
 # ------------------------------------------------------------------------------------------- robust fit
-def robust(found: Findings) -> list[dict[str, Any]]:
+def robust(found: Findings) -> list[Table]:
     """Return the table of the robust fit beside the plain one; nothing for data without noise."""
     if found.ideal:
         return []
@@ -195,17 +188,17 @@ def robust(found: Findings) -> list[dict[str, Any]]:
         f"Weight below a half: {light} of {found.y.size} windows."
     )
     head = ["coefficient", "least squares", "u", "robust", "u robust", "difference / u", "unit"]
-    return [{"title": "Robust fit", "caption": caption, "columns": head, "rows": rows}]
+    return [Table("robust_fit", "Robust fit", caption, head, rows)]
 
 
 def bisquare(found: Findings) -> tuple[Array, Array, int]:
     """Coefficients of the whitened problem, their covariance, and the number of weights below a half."""
     X = found.est.X
-    columns = np.column_stack([X, found.y - found.est.set_up])
+    columns = np.column_stack([X, found.y - found.est.likeliest.set_up])
     if found.white:
         Z = columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
     else:
-        one = tuple(np.array([m]) for m in (*found.est.best, found.est.reading))
+        one = tuple(np.array([m]) for m in found.est.noise.best)
         Z = noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :]
     A, z = Z[:, :-1], Z[:, -1]
     n, p = A.shape

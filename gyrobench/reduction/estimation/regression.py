@@ -1,9 +1,10 @@
-"""Linear regression: identifiability in coefficient names, least squares white, weighted and with a given covariance.
+"""Linear regression: identifiability in coefficient names, ordinary and weighted least squares.
 
-    y = X a + e,  cov e = s^2 R,  a = (X' R^-1 X)^-1 X' R^-1 y,  s^2 = v' R^-1 v / (n - p),   cov a = s^2 (X'R^-1X)^-1
+    y = X a + e,  cov e = s^2/w,  a = (X' w X)^-1 X' w y,  s^2 = v' w v / (n - p),   cov a = s^2 (X' w X)^-1
 
-solved by singular value or QR decomposition of the whitened, column-scaled X, never by the normal equations.
-[RED-OLS, RED-GLS; Hu 1981, eq. 4-64..4-97 with the divisor n - p and t tests on the residual sum]
+w a diagonal matrix of weights, solved by singular value or QR decomposition of the weighted, column-scaled X, never by
+the normal equations.
+[RED-OLS; Hu 1981, eq. 4-64..4-97 with the divisor n - p and t tests on the residual sum]
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, special
+from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
@@ -32,6 +33,18 @@ class Design:
     condition: float  # of X with columns scaled to length 1; infinite when the rank is short
     lost: tuple[str, ...]  # combinations the data do not see, in words
     weakest: str  # the direction the data see least, in words
+
+    @property
+    def short(self) -> bool:
+        """True where some combination leaves every datum as it is."""
+        return self.rank < len(self.names)
+
+    @property
+    def weakness(self) -> str:
+        """What is not estimable, or else least determined, in words."""
+        if self.short:
+            return f"rank {self.rank} of {len(self.names)}, not estimable: {'; '.join(self.lost)}"
+        return f"condition {self.condition:.3g}, least determined: {self.weakest}"
 
 
 def _words(names: Sequence[str], vector: Array, floor: float = 0.05) -> str:
@@ -96,6 +109,11 @@ class Fit:
     gain: Array  # (p, n): beta = gain y
 
     @property
+    def named(self) -> dict[str, float]:
+        """Return beta by name."""
+        return dict(zip(self.names, self.beta.tolist(), strict=True))
+
+    @property
     def u(self) -> Array:
         """Standard uncertainties."""
         out: Array = np.sqrt(np.diag(self.covariance))
@@ -118,21 +136,6 @@ class Fit:
         """Half the confidence interval."""
         out: Array = float(special.stdtrit(self.dof, 0.5 + level / 2.0)) * self.u
         return out
-
-    @property
-    def correlation(self) -> Array:
-        return correlation(self.covariance)
-
-    def f_test(self) -> tuple[float, float]:
-        """F and its probability that all coefficients but the constant are zero; refuses a model without constant."""
-        y = self.fitted + self.residual
-        n, p = y.size, self.beta.size
-        if not np.any(np.all(np.isclose(self.gain.sum(axis=1)[:, None], np.eye(p), atol=1e-9), axis=0)):
-            raise RegressionError("the F test needs a constant column")
-        total = float(np.sum((y - y.mean()) ** 2))
-        unexplained = float(np.sum(self.residual**2))
-        value = ((total - unexplained) / (p - 1)) / (unexplained / (n - p))
-        return value, float(special.fdtrc(p - 1, n - p, value))
 
 
 def correlation(covariance: Array) -> Array:
@@ -163,8 +166,17 @@ def check_data(X: Array, y: Array, names: Sequence[str], limit: float = 1e3) -> 
     return design
 
 
-def _solve(Z: Array, z: Array, X: Array, y: Array, names: Sequence[str], whitener: Array | None) -> Fit:
-    """Least squares of Z = W X and z = W y; whitener: W, or its diagonal."""
+def least_squares(X: Array, y: Array, names: Sequence[str], weights: Array | None = None) -> Fit:
+    """Fit by ordinary, or with ``weights`` (n,) proportional to 1/variance, weighted least squares.
+
+    Raises RegressionError as :func:`check_data` does, and for a weight that is not finite and positive.
+    """
+    check_data(X, y, names, math.inf)
+    w = np.ones_like(y) if weights is None else weights
+    if w.shape != y.shape or not np.all(np.isfinite(w)) or np.any(w <= 0):
+        raise RegressionError("weights must be finite and positive, one for each datum")
+    w = np.sqrt(w)
+    Z, z = X * w[:, None], y * w
     n, p = Z.shape
     scale = np.linalg.norm(Z, axis=0)
     q, r = np.linalg.qr(Z / scale)
@@ -173,36 +185,5 @@ def _solve(Z: Array, z: Array, X: Array, y: Array, names: Sequence[str], whitene
     beta = gain @ z
     v = z - Z @ beta
     s2 = float(v @ v) / (n - p)
-    if whitener is not None:
-        gain = gain * whitener if whitener.ndim == 1 else gain @ whitener
     fitted = X @ beta
-    return Fit(tuple(names), beta, s2 * inverse @ inverse.T, math.sqrt(s2), n - p, fitted, y - fitted, gain)
-
-
-def least_squares(X: Array, y: Array, names: Sequence[str], weights: Array | None = None) -> Fit:
-    """Ordinary, or with ``weights`` (n,) proportional to 1/variance, weighted least squares.
-
-    Raises RegressionError as :func:`check_data` does, and for a weight that is not finite and positive.
-    """
-    check_data(X, y, names, math.inf)
-    if weights is None:
-        return _solve(X, y, X, y, names, None)
-    if weights.shape != y.shape or not np.all(np.isfinite(weights)) or np.any(weights <= 0):
-        raise RegressionError("weights must be finite and positive, one for each datum")
-    w = np.sqrt(weights)
-    return _solve(X * w[:, None], y * w, X, y, names, w)
-
-
-def generalized_least_squares(X: Array, y: Array, names: Sequence[str], covariance: Array) -> Fit:
-    """Least squares with the covariance of the data known up to a factor; it must be symmetric and positive
-    definite.
-    """
-    check_data(X, y, names, math.inf)
-    if covariance.shape != (y.size, y.size) or not np.allclose(covariance, covariance.T, rtol=1e-10, atol=0.0):
-        raise RegressionError(f"the covariance must be symmetric, {y.size} by {y.size}")
-    try:
-        L = np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
-        raise RegressionError("the covariance is not positive definite") from None
-    whitener = linalg.solve_triangular(L, np.eye(y.size), lower=True)
-    return _solve(whitener @ X, whitener @ y, X, y, names, whitener)
+    return Fit(tuple(names), beta, s2 * inverse @ inverse.T, math.sqrt(s2), n - p, fitted, y - fitted, gain * w)

@@ -12,7 +12,7 @@ Not modelled: trend over the days (a table in the order of time shows it), days 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,9 +20,14 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import nuisances, uncertainty
+from gyrobench.record.record import Record
+from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import TYPE_A
+from gyrobench.reduction.estimation.nuisances import NUISANCES
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Series, Specification, Test
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Series, Table, Test
+
+REPEATS = "repeats"  # id of the tests of constancy, with the coefficient
 
 
 @dataclass(frozen=True)
@@ -57,9 +62,20 @@ def agreement(values: Sequence[float], u: Sequence[float]) -> tuple[float, float
     return q, float(special.chdtrc(x.size - 1, q))
 
 
-def combine_days(
-    results: Mapping[str, DriftTestResult], what: str = "day", specification: Specification | None = None
-) -> DriftTestResult:
+def reduce_days(record: Record, reduce: Callable[[Mapping[str, Array]], DriftTestResult]) -> DriftTestResult:
+    """Return the result of a record, day by day where its plan holds several.  Raises ReductionError."""
+    day = {row.phase: row.day for row in record.run.plan}
+    names = np.array([day.get(int(p), "") for p in record.windows["phase"]])
+    each = {}
+    for name in dict.fromkeys(names.tolist()) or [""]:
+        try:
+            each[name] = reduce({n: np.asarray(v)[names == name] for n, v in record.windows.items()})
+        except ReductionError as error:
+            raise ReductionError([f"day {name}: {p}" if name else p for p in error.problems]) from None
+    return combine_days(each) if len(each) > 1 else next(iter(each.values()))
+
+
+def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> DriftTestResult:
     """One result of repeats (name of the day -> its result) with the same coefficients.
 
     Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common
@@ -80,13 +96,15 @@ def combine_days(
     coefficients, series, tests, budget = [], [], [], []
     for j, name in enumerate(names):
         per_day = [r.coefficients[j] for r in parts]
-        coefficients.append(_mean(per_day, (specification or {}).get(name, per_day[0].limit)))
+        coefficients.append(_mean(per_day))
         stats = statistics(table[:, j].tolist())
         u_own = [c.u_a or 0.0 for c in per_day]
         if min(u_own) > 0.0 and stats.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
             q, p = agreement(table[:, j].tolist(), u_own)
             text = f"varies from {what} to {what} by more than its noise" if p < 0.05 else "constant within its noise"
-            tests.append(Test(f"{what} to {what}, {name}", q, p, f"change between the {what}s", text))
+            tests.append(
+                Test(f"{REPEATS}:{name}", f"{what} to {what}, {name}", q, p, f"change between the {what}s", text)
+            )
         x = [float(k + 1) for k in range(n)]
         y = table[:, j].tolist()
         series.append(
@@ -98,13 +116,15 @@ def combine_days(
         c = coefficients[-1]
         note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
         budget.append(
-            BudgetLine(f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note)
+            BudgetLine(
+                TYPE_A, f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note
+            )
         )
-        budget += [b for b in parts[0].budget if b.coefficient == name and not b.note.startswith("Type A")]
-    varying = [t.name.split(", ", 1)[1] for t in tests if t.p is not None and t.p < 0.05]
+        budget += [b for b in parts[0].budget if b.coefficient == name and b.id != TYPE_A]
+    varying = [t.id.partition(":")[2] for t in tests if t.p is not None and t.p < 0.05]
     variation = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
     first = parts[0]
-    combined = replace(
+    return replace(
         first,
         coefficients=coefficients,
         series=series,
@@ -117,16 +137,24 @@ def combine_days(
         budget=budget,
         repeatability={f"σ of {c.name} / ({c.unit})": statistics(table[:, j].tolist()).sigma
                        for j, c in enumerate(first.coefficients)},
-        tables=[_table(days, parts, table, what), *({**t, "title": f"{t['title']}, {what} {days[0]}"}
-                                                    for t in first.tables)],
-        warnings=list(dict.fromkeys(w for r in parts for w in r.warnings)),
+        tables=[_table(days, parts, table, what),
+                *(replace(t, id=f"{t.id}:{days[0]}", title=f"{t.title}, {what} {days[0]}") for t in first.tables)],
+        reasons=_reasons(results, what),
         summary=[
             f"{n} {what}s; {variation} from {what} to {what} by more than noise.", *_few(coefficients, table, what)
         ],
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients), withheld=[],
     )  # fmt: skip
-    reasons = [f"{what} {day}: {text}" for day, r in results.items() for text in r.withheld]
-    return uncertainty.withhold(combined, reasons)
+
+
+def _reasons(results: Mapping[str, DriftTestResult], what: str) -> list[Reason]:
+    """Return what limits the days: a warning of several once, a doubt of one with its day."""
+    found = [
+        r if r.severity in ("error", "warning") else replace(r, text=f"{what} {day}: {r.text}", names=(), intervals={})
+        for day, result in results.items()
+        for r in result.reasons
+        if r.severity != "condition"
+    ]
+    return list(dict.fromkeys(found))
 
 
 def _without_own_effects(results: Mapping[str, DriftTestResult]) -> dict[str, DriftTestResult]:
@@ -134,10 +162,10 @@ def _without_own_effects(results: Mapping[str, DriftTestResult]) -> dict[str, Dr
     of_all = set.intersection(*({c.name for c in r.coefficients} for r in results.values()))
     out = {}
     for day, r in results.items():
-        effects = {row[0] for t in r.tables if t["title"].startswith(nuisances.TITLE) for row in t["rows"]}
+        effects = {row[0] for t in r.tables if t.kind == NUISANCES for row in t.rows}
         kept = [j for j, c in enumerate(r.coefficients) if c.name in of_all or c.name not in effects]
         correlation = [[r.correlation[i][j] for j in kept] for i in kept]
-        changes = [{**b, "changes": [[row[j] for j in kept] for row in b["changes"]]} for b in r.type_b]
+        changes = [replace(b, changes=[[row[j] for j in kept] for row in b.changes]) for b in r.type_b]
         out[day] = replace(r, coefficients=[r.coefficients[j] for j in kept], correlation=correlation, type_b=changes)
     return out
 
@@ -148,7 +176,7 @@ def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:
     return [f"{c.name} = {c.estimate:.6g} {c.unit}, σ over the {what}s {s:.2g} {c.unit}." for c, s in both]
 
 
-def _mean(per_day: list[Coefficient], limit: tuple[float | None, float | None] | None) -> Coefficient:
+def _mean(per_day: list[Coefficient]) -> Coefficient:
     stats = statistics([c.estimate for c in per_day])
     half = float(special.stdtrit(stats.n - 1, 0.975)) * stats.u
     common = math.sqrt(float(np.mean([max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0) for c in per_day])))
@@ -171,8 +199,6 @@ def _mean(per_day: list[Coefficient], limit: tuple[float | None, float | None] |
         closed=float(np.mean(closed)) if len(closed) == len(per_day) else None,
         truth=true,
         z=(stats.mean - true) / u if true is not None and u > 0.0 else None,
-        limit=limit,
-        verdict=uncertainty.assess_conformity(stats.mean, U, limit),
     )
 
 
@@ -186,7 +212,7 @@ def _correlation(table: Array) -> list[list[float]]:
     return matrix
 
 
-def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: str) -> dict[str, Any]:
+def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: str) -> Table:
     """Like Table 3-1: a row for each day, then mean and standard deviation; under it the days' own u of type A."""
     per_coefficient = [statistics(column) for column in table.T.tolist()]
     u_own = [
@@ -200,6 +226,5 @@ def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: st
         [f"u within a {what}", *u_own],
     ]
     head = [f"{c.name} / ({c.unit})" for c in parts[0].coefficients]
-    title = f"Estimates by {what}"
-    return {"title": title, "caption": f"Estimates of each {what}, their mean and standard deviation",
-            "columns": [what, *head], "rows": rows}  # fmt: skip
+    caption = f"Estimates of each {what}, their mean and standard deviation"
+    return Table("repeats", f"Estimates by {what}", caption, [what, *head], rows)

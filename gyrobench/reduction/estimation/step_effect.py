@@ -1,7 +1,7 @@
 """What the communication step does to the measures of a run, as a part of their uncertainty.
 
-    effects = step_effects(at_step, other, factor=0.5)     # quiet runs at the step h and at factor h
-    apply_step(result, {"step": h, "rows": effects})       # lines of the budget, u, intervals, verdicts, warnings
+    effects = step_effects(at_step, other, factor=0.5)            # quiet runs at the step h and at factor h
+    result = with_step(result, {"step": h, "rows": effects})      # lines of the budget, u, intervals, warning
 
 The effect is what a measure at the step h is away from that at step zero, from two steps, of first order in the step:
 
@@ -18,16 +18,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
-from gyrobench.reduction.estimation.uncertainty import NORMAL, assess_conformity, worst_verdict
-from gyrobench.reduction.loops.loop_summary import Sentence
-from gyrobench.result import BudgetLine, Coefficient, Result
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.result import BudgetLine, Coefficient, Reason, Result
 
-SOURCE = "coupling step"
+R = TypeVar("R", bound=Result)
+STEP = "step"  # id of its line of the budget, and of the warning
 RELATIVE = 1e-3  # of the estimate: an effect below it is in u without a warning
 FLOOR = 0.1  # amplitude at step zero over that at the step: no extrapolation beyond, 20 dB
-NOTED = 0.5  # effect over u from which the sentences, written before, are said to be without it
 LISTED = 3  # measures in a warning
 FINEST = 4  # the step recommended is at most that much shorter
 
@@ -54,71 +54,58 @@ def _effect(unit: str, at_step: float, other: float, factor: float) -> float:
     return -20.0 * math.log10(max(zero, FLOOR))
 
 
-def apply_step(result: Result, check: Mapping[str, Any]) -> None:
-    """Take the effects of the step into u, intervals and verdicts of a result; add budget lines and a warning.
+def with_step(result: R, check: Mapping[str, Any]) -> R:
+    """Return the result with the effects of the step in u and intervals, lines of the budget and a warning.
 
     check: ``{"step": s, "rows": ...}`` of :func:`step_effects`, with whatever else is to stand in the result.  Its rows
     get u without the step, and the ratio of effect and u.
     """
-    before = worst_verdict(c.verdict for c in result.coefficients)
-    old = {c.name: c.u for c in result.coefficients}
-    rows, parts = [], dict.fromkeys(old, 0.0)
-    for row in check["rows"]:
-        c = next((c for c in result.coefficients if c.name == row["name"] and not c.no_value), None)
-        if c is None:
+    step = float(check["step"])
+    changes = {row["name"]: row for row in check["rows"]}
+    rows, parts, widened, budget = [], {}, [], list(getattr(result, "budget", ()))
+    for c in result.coefficients:
+        row = changes.get(c.name)
+        if row is None or c.no_value:
+            widened.append(c)
             continue
         change = float(row["change"])
         rows.append({**row, "u": c.u, "ratio": abs(change) / c.u if c.u > 0.0 else None})
         parts[c.name] = change / math.sqrt(3.0)
-        _budget(result, c, parts[c.name], float(check["step"]))
-        _widen(c, abs(parts[c.name]))
+        if c.u > 0.0 and not any(b.coefficient == c.name for b in budget):
+            budget.append(
+                BudgetLine("type_a", "noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A")
+            )
+        size = (step, "s", parts[c.name] / step, f"{c.unit}/s", abs(parts[c.name]), c.unit, c.name)
+        budget.append(BudgetLine(STEP, "coupling step", *size, "m(h) − m(0), rectangular"))
+        widened.append(_widened(c, abs(parts[c.name])))
     worst = max((r["ratio"] for r in rows if r["ratio"] is not None), default=None)
-    result.step_check = {**check, "rows": rows, "worst": worst}
-    if result.verdict == before:
-        result.verdict = worst_verdict(c.verdict for c in result.coefficients)
-    _correlate(result, old, parts)
-    stated = any("±" in s and not isinstance(s, Sentence) for s in result.summary)  # the others are renewed
-    if stated and worst is not None and worst > NOTED:
-        result.summary.append("These are without the effect of the communication step; the table has it in u.")
-    warning = _warning(result, rows, float(check["step"]))
-    if warning:
-        result.warnings.append(warning)
+    text = _warning(result, rows, step)
+    more: dict[str, Any] = {"budget": budget} if hasattr(result, "budget") else {}
+    if getattr(result, "correlation", None):
+        more["correlation"] = _correlation(result, widened, parts)
+    reasons = [*result.reasons, Reason(STEP, text)] if text else result.reasons
+    step_check = {**check, "rows": rows, "worst": worst}
+    return replace(result, coefficients=widened, step_check=step_check, reasons=reasons, **more)
 
 
-def _budget(result: Result, c: Coefficient, part: float, step: float) -> None:
-    lines: list[BudgetLine] | None = getattr(result, "budget", None)
-    if lines is None:
-        return
-    if c.u > 0.0 and not any(b.coefficient == c.name for b in lines):
-        lines.append(BudgetLine("noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A"))
-    note = "m(h) − m(0), rectangular"
-    lines.append(BudgetLine(SOURCE, step, "s", part / step, f"{c.unit}/s", abs(part), c.unit, c.name, note))
-
-
-def _widen(c: Coefficient, part: float) -> None:
+def _widened(c: Coefficient, part: float) -> Coefficient:
     """U2 = (k u)2 + (1.96 part)2: the step's part has many degrees of freedom."""
-    plain = c.verdict == assess_conformity(c.estimate, c.k * c.u, c.limit)
-    half = math.hypot(c.k * c.u, NORMAL * part)
-    c.u = math.hypot(c.u, part)
-    c.k = half / c.u if c.u > 0.0 else c.k
-    c.interval = (c.estimate - half, c.estimate + half)
-    if c.z is not None and c.truth is not None and c.u > 0.0:
-        c.z = (c.estimate - c.truth) / c.u
-    if plain:
-        c.verdict = assess_conformity(c.estimate, half, c.limit)
+    half, u = math.hypot(c.k * c.u, NORMAL * part), math.hypot(c.u, part)
+    z = (c.estimate - c.truth) / u if c.z is not None and c.truth is not None and u > 0.0 else c.z
+    k = half / u if u > 0.0 else c.k
+    return replace(c, u=u, k=k, interval=(c.estimate - half, c.estimate + half), z=z)
 
 
-def _correlate(result: Result, old: Mapping[str, float], parts: Mapping[str, float]) -> None:
+def _correlation(result: Result, widened: Sequence[Coefficient], parts: Mapping[str, float]) -> list[list[float]]:
     """One step moves all estimates together: its covariance is the product of its signed parts."""
-    correlation: list[list[float]] | None = getattr(result, "correlation", None)
-    if not correlation:
-        return
-    c = result.coefficients
-    for i, row in enumerate(correlation):
+    old, new = result.coefficients, widened
+    matrix = [list(row) for row in getattr(result, "correlation", [])]
+    for i, row in enumerate(matrix):
         for j, r in enumerate(row):
-            if i != j and c[i].u > 0.0 and c[j].u > 0.0:
-                a, b = c[i].name, c[j].name
-                row[j] = (r * old[a] * old[b] + parts[a] * parts[b]) / (c[i].u * c[j].u)
+            if i != j and new[i].u > 0.0 and new[j].u > 0.0:
+                both = parts.get(new[i].name, 0.0) * parts.get(new[j].name, 0.0)
+                row[j] = (r * old[i].u * old[j].u + both) / (new[i].u * new[j].u)
+    return matrix
 
 
 def _warning(result: Result, rows: Sequence[Mapping[str, Any]], step: float) -> str:

@@ -1,4 +1,4 @@
-"""How good an estimator is, where the truth is known: error, delay, noise against distortion, consistency.
+"""Quality of an estimator where the truth is known: error, delay, noise against distortion, consistency.
 
 Less noise alone proves nothing (an estimate that is always 0 has none): every measure of noise has one of distortion
 beside it, the gain and phase with which a known signal comes through.  [EST-KF-AR, BENCH-DYN-SINE]
@@ -42,8 +42,13 @@ class UncertainValue:
 
     @property
     def k(self) -> float:
-        """Coverage factor of the 95 % interval."""
+        """Return the coverage factor of the 95 % interval."""
         return float(special.stdtrit(self.dof, 0.975)) if math.isfinite(self.dof) else NORMAL
+
+    @property
+    def pair(self) -> tuple[float, float]:
+        """Return value and u, for an interval of normal size."""
+        return self.value, self.u
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -76,7 +81,7 @@ class Consistency:
 
 # ------------------------------------------------------------------------------------ mean squares
 def independent_squares(x: Array) -> float:
-    """Return how many of the n squares of a series about zero count as independent, n/(1 + 2 sum rho_k^2).
+    """Return the number of independent ones among the n squares of a series about zero, n/(1 + 2 sum rho_k^2).
 
     Lags up to n/20; each squared correlation is taken less 1/n, which is what white noise leaves of it.
     """
@@ -84,9 +89,7 @@ def independent_squares(x: Array) -> float:
     power = float(x @ x)
     if n < 40 or power == 0.0:
         return float(max(n, 1))
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(x, size)
-    rho = np.fft.irfft(spectrum * spectrum.conj(), size)[1 : n // 20 + 1] / power
+    rho = _products(x)[1 : n // 20 + 1] / power
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum(rho * rho - 1.0 / n))))
 
 
@@ -99,11 +102,16 @@ def lasting_squares(x: Array) -> float:
     power = float(x @ x) / n
     if n < 40 or power == 0.0:
         return 1.0
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(x, size)
     lags = np.arange(1, n)
-    rho = np.fft.irfft(spectrum * spectrum.conj(), size)[lags] / (n - lags) / power
+    rho = _products(x)[lags] / (n - lags) / power
     return float(n / max(1.0, 1.0 + 2.0 * float(np.sum((1.0 - lags / n) * (rho * rho - 1.0 / (n - lags))))))
+
+
+def _products(x: Array) -> Array:
+    """Return the sums of x_j x_(j+k) over all j, k = 0, 1, ... (n - 1 at least)."""
+    size = 1 << (2 * x.size - 1).bit_length()
+    spectrum = np.fft.rfft(x, size)
+    return np.asarray(np.fft.irfft(spectrum * spectrum.conj(), size))
 
 
 def rms(x: Array) -> UncertainValue:
@@ -113,7 +121,7 @@ def rms(x: Array) -> UncertainValue:
 
 
 def decibels(a: UncertainValue, b: UncertainValue) -> UncertainValue:
-    """20 log10 of a over b; u as if the two were independent (too large for an error and the noise behind it)."""
+    """Return 20 log10 of a over b; u as of independent ones (too large for an error and the noise behind it)."""
     if a.value == 0.0 or b.value == 0.0:
         return UncertainValue(-math.inf if b.value > 0.0 else math.nan, math.nan)
     return UncertainValue(DECIBEL * math.log(a.value / b.value), DECIBEL * math.hypot(a.u / a.value, b.u / b.value))
@@ -121,12 +129,12 @@ def decibels(a: UncertainValue, b: UncertainValue) -> UncertainValue:
 
 # --------------------------------------------------------------------------------- delay and distortion
 def delay_signal(time: Array, x: Array, delay: float) -> Array:
-    """x of ``delay`` s ago, linear between samples; before the record its first value."""
+    """Return x of ``delay`` s ago, linear between samples; before the record its first value."""
     return np.interp(time - delay, time, x)
 
 
 def delay(time: Array, estimate: Array, truth: Array, most: float) -> UncertainValue:
-    """Delay at which the truth fits the estimate best (least mean square difference), 0 to ``most`` s.
+    """Return the delay at which the truth fits the estimate best (least mean square difference), 0 to ``most`` s.
 
     Whole samples first, then the parabola through the three least; u from ten stretches.  Both about their means.
     Raises ValueError when a stretch is not longer than twice ``most``.
@@ -151,13 +159,13 @@ def _delay(estimate: Array, truth: Array, lags: int) -> float:
 
 
 def _scatter(values: list[float]) -> float:
-    """Standard error of the mean of the stretches."""
+    """Return the standard error of the mean of the stretches."""
     return float(np.std(values, ddof=1) / math.sqrt(len(values)))
 
 
 @dataclass(frozen=True)
-class Response:
-    """How a known signal comes through: gain, phase (rad, negative: late), and what else the estimate holds."""
+class SignalResponse:
+    """Response to a known signal: gain, phase (rad, negative: late), and what else the estimate holds."""
 
     gain: UncertainValue
     phase: UncertainValue | None
@@ -181,7 +189,7 @@ class Sine:
 
 
 def sine(time: Array, x: Array, frequency: float) -> Sine:
-    """Fits a sine of ``frequency`` Hz.  Raises ValueError below ten periods."""
+    """Fit a sine of ``frequency`` Hz.  Raises ValueError below ten periods."""
     step = float(time[1] - time[0])
     periods = math.floor((time.size * step) * frequency + 1e-9)
     if periods < STRETCHES:
@@ -212,7 +220,7 @@ def rms_of_sine(time: Array, x: Array, frequency: float) -> UncertainValue:
     return UncertainValue(value, math.hypot(abs(s.whole) * s.u, 2.0 * rest.value * rest.u) / (2.0 * value))
 
 
-def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> Response:
+def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: float) -> SignalResponse:
     """Return the gain and phase at ``frequency`` (Hz): sines fitted to estimate and truth.
 
     u from the scatter of ten stretches.  Raises ValueError below ten periods.
@@ -222,10 +230,10 @@ def response_to_sine(time: Array, estimate: Array, truth: Array, frequency: floa
     parts = e.parts / x.parts / whole
     gain = UncertainValue(abs(whole), abs(whole) * _scatter(np.abs(parts).tolist()), STRETCHES - 1)
     phase = UncertainValue(math.atan2(whole.imag, whole.real), _scatter(np.angle(parts).tolist()), STRETCHES - 1)
-    return Response(gain, phase, e.rest)
+    return SignalResponse(gain, phase, e.rest)
 
 
-def response_to_truth(estimate: Array, truth: Array) -> Response:
+def response_to_truth(estimate: Array, truth: Array) -> SignalResponse:
     """Return gain of a random truth: regression of the estimate on it (align them first), both about their means."""
     e, x = estimate - estimate.mean(), truth - truth.mean()
 
@@ -238,7 +246,7 @@ def response_to_truth(estimate: Array, truth: Array) -> Response:
     weights = [float(x[s] @ x[s]) for s in stretches]
     share = np.array(weights) / sum(weights)
     u = math.sqrt(float(np.sum((share * (np.array(parts) - gain)) ** 2)) * STRETCHES / (STRETCHES - 1))
-    return Response(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
+    return SignalResponse(UncertainValue(gain, u, STRETCHES - 1), None, e - gain * x)
 
 
 # ------------------------------------------------------------------------------------- consistency
@@ -250,7 +258,7 @@ def _consistency(mean: float, dof: float, level: float) -> Consistency:
 
 
 def nees(error: Array, variance: Array, level: float = 0.999) -> Consistency:
-    """Normalized estimation error squared of one state: mean of error2/variance against chi-square.
+    """Return the normalized estimation error squared of one state: mean of error2/variance against chi-square.
 
     Errors follow one another slowly, so the degrees of freedom are the independent squares among them.
     """
@@ -259,7 +267,7 @@ def nees(error: Array, variance: Array, level: float = 0.999) -> Consistency:
 
 
 def nis(values: Array, level: float = 0.999) -> Consistency:
-    """Normalized innovation squared, scalar readings; innovations are white if the filter is right: dof = n."""
+    """Return the normalized innovation squared of scalar readings; white innovations of a right filter: dof = n."""
     return _consistency(float(np.mean(values)), float(values.size), level)
 
 

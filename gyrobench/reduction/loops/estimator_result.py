@@ -1,8 +1,7 @@
-"""The measures of one estimator over one record, as coefficients, tests and tables of a result.
+"""The measures of one estimator over one record, as coefficients and tests of its findings.
 
     s = Signals(time, z, estimate, truth, latency, variance, innovation, nis, R_hat)
-    m = measure(s, frequency=1.0, R=2.7e-6)      # frequency: of the sine in the truth; None: a random truth
-    result.coefficients, result.tests ... = m.coefficients, m.tests ...
+    measure(found, s, frequency=1.0, R=2.7e-6)      # frequency: of the sine in the truth; None: a random truth
 
 What stands there, and why: the error against the truth of the same instant ranks estimators (:data:`RANKED`), for that
 is what a loop feels; noise reduction never stands without gain and phase; consistency tells whether a filter that
@@ -12,16 +11,16 @@ states a variance may be believed.  [EST-KF-AR: mandatory pair; EST-WAVELET-ONLI
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
+from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, Test
+from gyrobench.result import Test
 
 RANKED = "error"  # the coefficient that ranks estimators, smallest first
 LOOP = 5.0  # degrees of phase that an estimator may cost in a loop
@@ -71,32 +70,10 @@ class Signals:
         return problems
 
 
-@dataclass
-class Measures:
-    """What :func:`measure` found."""
-
-    coefficients: list[Coefficient] = field(default_factory=list)
-    tests: list[Test] = field(default_factory=list)
-    acf: dict[str, list[float]] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
-    error: Array = field(default_factory=lambda: np.zeros(0))
-
-    def named(self, name: str) -> Coefficient:
-        return next(c for c in self.coefficients if c.name == name)
-
-    def add(
-        self, name: str, meaning: str, unit: str, v: UncertainValue, truth: float | None = None, **more: Any
-    ) -> None:
-        low, high = v.interval
-        c = Coefficient(
-            name, meaning, unit, v.value, v.u, v.k, (low, high), u_a=v.u, truth=truth, **more,
-            dof=v.dof if math.isfinite(v.dof) else None,
-        )  # fmt: skip
-        self.coefficients.append(replace(c, z=(v.value - truth) / v.u) if truth is not None and v.u > 0.0 else c)
-
-
-def measure(s: Signals, frequency: float | None = None, R: float | None = None, unit: str = "1") -> Measures:
-    """Return all measures; raises ReductionError with everything that is wrong with the series.
+def measure(
+    found: MeasureFindings, s: Signals, frequency: float | None = None, R: float | None = None, unit: str = "1"
+) -> None:
+    """Add all measures; raises ReductionError with everything that is wrong with the series.
 
     frequency: Hz, of the sine that the truth is; None where the truth is random.  R: true variance of a reading.
     unit: of z, as printed.
@@ -109,10 +86,9 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     known = slice(math.ceil(latency / step - 1e-9), None)  # where the truth of one latency ago is in the record
     if s.time[known].size < 400:
         raise ReductionError(f"the record is too short for the latency of {latency:g} s")
-    m = Measures()
     try:
-        _errors(m, s, behind, known, frequency, unit)
-        _distortion(m, s, behind, known, frequency)
+        _errors(found, s, behind, known, frequency, unit)
+        _distortion(found, s, behind, known, frequency)
         most = max(3.0 * latency, 50.0 * step)
         delay = estimator_metrics.delay(s.time, s.estimate, s.truth, most)
     except ValueError as error:
@@ -120,40 +96,43 @@ def measure(s: Signals, frequency: float | None = None, R: float | None = None, 
     stated = "the estimator states none" if s.latency is None else "closed form: the latency stated by the estimator"
     scale, in_unit = (1.0, "s") if step > 0.1 else (1e-3, "ms")
     meaning, closed = f"delay of the best fit to the truth; {stated}", None if s.latency is None else latency / scale
-    m.add("delay", meaning, in_unit, _times(delay, 1.0 / scale), closed=closed)
-    _consistency(m, s, R)
+    found.add("delay", meaning, in_unit, _times(delay, 1.0 / scale), closed=closed)
+    _consistency(found, s, R)
     phase = 360.0 * CROSSOVER * latency
     if phase > LOOP:
-        m.warnings.append(
+        text = (
             f"The stated delay of {latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
             f"{CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
         )
-    return m
+        found.warn("estimator.delay", text)
 
 
-def _errors(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str) -> None:
-    """Errors against the truth of the same instant and of one latency ago."""
+def _errors(
+    found: MeasureFindings, s: Signals, behind: Array, known: slice, frequency: float | None, unit: str
+) -> None:
+    """Add the errors against the truth of the same instant and of one latency ago."""
 
     def size(time: Array, x: Array) -> UncertainValue:
         return estimator_metrics.rms_of_sine(time, x, frequency) if frequency else estimator_metrics.rms(x)
 
-    raw, m.error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
-    now = size(s.time, m.error)
-    m.add(RANKED, "rms error against the truth at the same time", unit, now)
-    m.add("error re raw", "rms error relative to that of the readings", "dB", estimator_metrics.decibels(now, raw))
+    raw, error = estimator_metrics.rms(s.z - s.truth), s.estimate - s.truth
+    found.facts |= {"dof": float(s.time.size), "residual_std": float(np.sqrt(np.mean(error**2))), "residual_unit": unit}
+    now = size(s.time, error)
+    found.add(RANKED, "rms error against the truth at the same time", unit, now)
+    found.add("error re raw", "rms error relative to that of the readings", "dB", estimator_metrics.decibels(now, raw))
     if s.latency is None:
         return
     late = size(s.time[known], (s.estimate - behind)[known])
     against = "rms error against the delayed truth (delay-compensated), relative to that of the readings"
-    m.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
+    found.add("late error re raw", against, "dB", estimator_metrics.decibels(late, raw))
 
 
 def _times(v: UncertainValue, factor: float) -> UncertainValue:
     return UncertainValue(v.value * factor, v.u * factor, v.dof)
 
 
-def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency: float | None) -> None:
-    """Noise reduction and the gain (and phase) that goes with it."""
+def _distortion(found: MeasureFindings, s: Signals, behind: Array, known: slice, frequency: float | None) -> None:
+    """Add the noise reduction and the gain (and phase) that goes with it."""
     if frequency:
         r = estimator_metrics.response_to_sine(s.time, s.estimate, s.truth, frequency)
         gain = f"gain at {frequency:g} Hz"
@@ -161,54 +140,53 @@ def _distortion(m: Measures, s: Signals, behind: Array, known: slice, frequency:
         r = estimator_metrics.response_to_truth(s.estimate[known], behind[known])
         gain = "gain on the delayed truth (regression)"
     noise = estimator_metrics.decibels(estimator_metrics.rms(r.rest), estimator_metrics.rms(s.z - s.truth))
-    m.add(
-        "noise re raw",
-        "rms of the estimate without its response to the truth, relative to the error of the readings",
-        "dB",
-        noise,
-    )
-    m.add("gain", gain, "1", r.gain)
+    meaning = "rms of the estimate without its response to the truth, relative to the error of the readings"
+    found.add("noise re raw", meaning, "dB", noise)
+    found.add("gain", gain, "1", r.gain)
     if r.phase is not None:
-        m.add("phase", f"phase at {frequency:g} Hz, negative: lag", "°", _times(r.phase, 180.0 / math.pi))
+        found.add("phase", f"phase at {frequency:g} Hz, negative: lag", "°", _times(r.phase, 180.0 / math.pi))
     if not 0.9 <= r.gain.value <= 1.1:
-        worse = m.named("error re raw").estimate > 0.0
-        so = (
-            "Its error is larger than that of the readings"
-            if worse
-            else "Part of the noise reduction is attenuation of the signal"
-        )
-        m.warnings.append(f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
+        worse = found["error re raw"].estimate > 0.0
+        so = "Part of the noise reduction is attenuation of the signal"
+        so = "Its error is larger than that of the readings" if worse else so
+        found.warn("estimator.gain", f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
 
 
-def _consistency(m: Measures, s: Signals, R: float | None) -> None:
+def _consistency(found: MeasureFindings, s: Signals, R: float | None) -> None:
     if s.variance is not None and np.all(s.variance > 0.0):
-        _against_chi_square(m, "NEES", "error", estimator_metrics.nees(m.error, s.variance))
+        _against_chi_square(found, "NEES", "error", estimator_metrics.nees(s.estimate - s.truth, s.variance))
     if s.nis is not None and np.any(s.nis > 0.0):
-        _against_chi_square(m, "NIS", "innovation", estimator_metrics.nis(s.nis[s.nis > 0.0]))
+        _against_chi_square(found, "NIS", "innovation", estimator_metrics.nis(s.nis[s.nis > 0.0]))
     if s.innovation is not None and np.any(s.innovation != 0.0):
-        m.acf, q, p = estimator_metrics.whiteness(s.innovation[s.innovation != 0.0])
-        white = (
-            "white: compatible with the signal model" if p >= 0.001 else "not white: the signal model does not apply"
-        )
-        m.tests.append(Test("Ljung-Box, innovations", q, p, "autocorrelation, absent for the correct model", white))
-        if p < 0.001:
-            m.warnings.append(
-                "The innovations are not white (Ljung-Box, p < 0.001). The signal model of the filter does not apply."
-            )
+        found.facts["acf"], q, p = estimator_metrics.whiteness(s.innovation[s.innovation != 0.0])
+        white = "white: compatible with the signal model"
+        white = white if p >= 0.001 else "not white: the signal model does not apply"
+        what = "autocorrelation, absent for the correct model"
+        found.tests.append(Test("ljung_box.innovations", "Ljung-Box, innovations", q, p, what, white))
+        text = "The innovations are not white (Ljung-Box, p < 0.001). The signal model of the filter does not apply."
+        found.warn("estimator.innovations", text if p < 0.001 else "")
     if s.R_hat is not None and R:
-        m.add("R̂/R", "estimated variance of a reading divided by the true one", "1",
-              estimator_metrics.variance_ratio(s.R_hat, R), truth=1.0)  # fmt: skip
+        ratio = estimator_metrics.variance_ratio(s.R_hat, R)
+        found.add("R̂/R", "estimated variance of a reading divided by the true one", "1", ratio, truth=1.0)
 
 
-def _against_chi_square(m: Measures, name: str, what: str, c: Consistency) -> None:
-    m.add(name, f"mean squared {what} divided by its stated variance", "1", c.value, truth=1.0)
-    if c.holds:
-        finding = "consistent with the stated variance"
-    elif c.mean > 1.0:
-        finding = f"inconsistent: the filter understates its {what} variance"
-    else:
-        finding = f"inconsistent: the filter overstates its {what} variance"
-    what_for = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
-    m.tests.append(Test(name, c.mean, c.p, what_for, finding))
-    if not c.holds:
-        m.warnings.append(f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {finding}.")
+def _against_chi_square(found: MeasureFindings, name: str, what: str, c: Consistency) -> None:
+    found.add(name, f"mean squared {what} divided by its stated variance", "1", c.value, truth=1.0)
+    seeks = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
+    wrong = consistency_test(found, name, c.mean, 1.0, c.p, c.holds, seeks, f"{what} variance", "variance")
+    text = f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {wrong}."
+    found.warn(f"estimator.consistency:{name}", text if wrong else "")
+
+
+def consistency_test(
+    found: MeasureFindings, name: str, value: float, wanted: float, p: float, holds: bool, seeks: str, its: str,
+    stated: str = "covariance",
+) -> str:  # fmt: skip
+    """Add the test whether a mean of squares is the one that a filter states; return what is wrong, "" where it holds.
+
+    seeks: what the test looks for.  its, stated: of what the filter says too little or too much, and by what.
+    """
+    less = "understates" if value > wanted else "overstates"
+    finding = f"consistent with the stated {stated}" if holds else f"inconsistent: the filter {less} its {its}"
+    found.tests.append(Test(f"consistency:{name}", name, value, p, seeks, finding))
+    return "" if holds else finding

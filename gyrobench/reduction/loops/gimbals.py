@@ -3,7 +3,6 @@
 flight = Flight(gates, "platform.attitude", rest)
 flight.error                                                      # rad, at flight.t
 lock_table(flight, {"lock": flight["platform.lock"]}, pitch, "pitch")   # one row for each time of lock
-over_time("gimbal angles", flight.t, {"roll": roll / DEG})        # a figure
 
 SI inside, degrees where people read.
 """
@@ -12,8 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +18,9 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Response
+from gyrobench.result import Table
 
 DEG = math.pi / 180.0
-SHOWN = 700  # points of a drawn line
 
 
 class Flight:
@@ -63,7 +59,7 @@ class Flight:
         return self.channels[name][self.first : self.last]
 
     def u(self, step: float) -> float:
-        """Standard uncertainty of the largest error, rad: the noise, and what the platform turns in a step at most."""
+        """Return u of the largest error, rad: the noise, and what the platform turns in a step at most."""
         moves = float(np.abs(np.gradient(self.error, self.t)).max()) * step if self.t.size > 1 else 0.0
         return math.hypot(self.noise, moves / math.sqrt(12.0))
 
@@ -72,7 +68,7 @@ class Flight:
         return slice(gate.inside.start - self.first, gate.inside.stop - self.first)
 
     def leg_at(self, k: int) -> str:
-        """Label of the phase in which sample k lies, or the one before it."""
+        """Return the label of the phase in which sample k lies, or the one before it."""
         return next((g.label for g in reversed(self.gates) if g.inside.start - self.first <= k), self.gates[0].label)
 
 
@@ -96,30 +92,39 @@ def rate_servo_limits(flight: Flight, rates: Sequence[str], rate_max: float | No
 
 
 def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last sample of each stretch in which a flag is 1."""
+    """Return first and last sample of each stretch in which a flag is 1."""
     on = np.concatenate([[False], np.asarray(flag, dtype=float) > 0.5, [False]])
     edges = np.flatnonzero(np.diff(on.astype(int)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> dict[str, Any]:
-    """Table with a row for each stretch of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
+def lock_table(flight: Flight, kinds: Mapping[str, Array], angle: Array, name: str) -> Table:
+    """Return the table of the stretches of locked gimbals.  kinds: what it is -> flag; angle: rad, called ``name``."""
     rows = []
     for kind, flag in kinds.items():
         for a, b in spans(flag):
             numbers = [flight.t[a], flight.t[b], angle[a] / DEG, angle[b] / DEG, flight.error[a] / DEG]
             worst = float(np.max(flight.error[a : b + 1])) / DEG
             rows.append([kind, flight.leg_at(a), *map(float, numbers), worst])
-    return {
-        "title": "Gimbal lock",
-        "caption": "Intervals in which the gimbals were locked or close to lock; times are those of the record",
-        "columns": ["event", "leg", "from / s", "to / s", f"{name} at the start / °", "at the end / °",
-                    "platform error at the start / °", "largest / °"],
-        "rows": sorted(rows, key=lambda r: float(r[2])),
-    }  # fmt: skip
+    return Table(
+        "flight.lock",
+        "Gimbal lock",
+        "Intervals in which the gimbals were locked or close to lock; times are those of the record",
+        [
+            "event",
+            "leg",
+            "from / s",
+            "to / s",
+            f"{name} at the start / °",
+            "at the end / °",
+            "platform error at the start / °",
+            "largest / °",
+        ],
+        sorted(rows, key=lambda r: float(r[2])),
+    )
 
 
-def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> dict[str, Any]:
+def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[slice], float]]) -> Table:
     """Return the table of what each leg did.  columns: name -> value in the stretch of the flight that is the leg."""
     rows = []
     for gate in flight.gates:
@@ -128,44 +133,10 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
         error = flight.error[s] / DEG
         known = [gate.label, float(gate.t[-1] - gate.t[0]), float(base.max()) / DEG]
         rows.append([*known, *(float(value(s)) for value in columns.values()), float(error.max()), float(error[-1])])
-    return {
-        "title": "Legs of the flight",
-        "caption": caption,
-        "columns": ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
-        "rows": rows,
-    }
-
-
-def over_time(
-    name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = ""
-) -> Response:
-    """Return the figure of several quantities (printed units) over time; runs are compared by the first one.
-
-    Each stretch of samples is drawn by its smallest and largest value.
-    """
-    drawn = []
-    for label, y in lines.items():
-        x, thin = _envelope(t, y)
-        drawn.append({"label": label, "x": x.tolist(), "y": thin.tolist(), "phase": []})
-    return Response(
-        name=name,
-        kind="time",
-        caption=caption or f"{name[:1].upper()}{name[1:]} over time.",
-        x=drawn[0]["x"],
-        x_name="time",
-        x_unit="s",
-        y=drawn[0]["y"],
-        y_name=y_name or name,
-        y_unit=unit,
-        curves=drawn,
+    return Table(
+        "flight.legs",
+        "Legs of the flight",
+        caption,
+        ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
+        rows,
     )
-
-
-def _envelope(t: Array, y: Array) -> tuple[Array, Array]:
-    if t.size <= SHOWN:
-        return t, y
-    edges = np.linspace(0, t.size, SHOWN // 2 + 1).astype(int)
-    pick = []
-    for a, b in pairwise(edges):
-        pick += sorted({a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))})
-    return t[pick], y[pick]

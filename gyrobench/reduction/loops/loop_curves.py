@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
@@ -15,18 +17,74 @@ from gyrobench.result import Response
 
 CURVE = 241  # points of a drawn curve
 SHOWN = 600  # points of a drawn step response
+ENVELOPE = 700  # points of a drawn line of a flight
 
 
 def curve(label: str, f: Array, values: Any) -> dict[str, Any]:
     """Return a model's curve, thinned for drawing; phase unwrapped, degrees."""
     phase = np.degrees(np.unwrap(np.angle(values)))
-    pick = np.unique(np.linspace(0, len(f) - 1, CURVE).astype(int))
+    pick = thinned(len(f), CURVE)
     return {
         "label": label,
         "x": np.asarray(f)[pick].tolist(),
         "y": np.abs(values)[pick].tolist(),
         "phase": phase[pick].tolist(),
     }
+
+
+def thinned(n: int, most: int) -> NDArray[np.int_]:
+    """Return at most so many of n samples, evenly spread, with the first and the last one."""
+    return np.unique(np.linspace(0, n - 1, min(most, n)).astype(int))
+
+
+def line(label: str, x: Array, y: Array) -> dict[str, Any]:
+    """Return a curve of a figure against time."""
+    return {"label": label, "x": x.tolist(), "y": y.tolist(), "phase": []}
+
+
+def trace(
+    name: str, caption: str, t: Array, y: Array, y_name: str, y_unit: str, lines: Mapping[str, Array] | None = None,
+    shown: int = SHOWN, marked: int | None = None,
+) -> Response:  # fmt: skip
+    """Return the figure of a signal against time (s), with lines at the same times over it.
+
+    shown: at most so many points of the lines, marked: of the signal; None: as many.
+    """
+    pick, few = thinned(t.size, shown), thinned(t.size, marked or shown)
+    curves = [line(label, t[pick], np.asarray(x)[pick]) for label, x in (lines or {}).items()]
+    return Response(
+        name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), y_name, y_unit, curves=curves
+    )  # fmt: skip
+
+
+def over_time(
+    name: str, t: Array, lines: Mapping[str, Array], *, unit: str = "°", y_name: str = "", caption: str = "",
+    shown: int = ENVELOPE, envelope: bool = True, x_unit: str = "s", compared: str = "",
+) -> Response:  # fmt: skip
+    """Return the figure of several quantities (printed units) over time; runs are compared by ``compared``, "": the
+    first one.
+
+    Of more points than ``shown`` each stretch of samples is drawn by its smallest and largest value; without
+    ``envelope``, by one of them.
+    """
+    drawn = {}
+    for label, y in lines.items():
+        pick = _envelope(y, shown) if envelope else thinned(t.size, shown)
+        drawn[label] = line(label, t[pick], y[pick])
+    first = drawn[compared or next(iter(drawn))]
+    return Response(
+        name, "time", caption or f"{name[:1].upper()}{name[1:]} over time.", first["x"], "time", x_unit, first["y"],
+        y_name or name, unit, curves=[*drawn.values()],
+    )  # fmt: skip
+
+
+def _envelope(y: Array, shown: int) -> NDArray[np.int_]:
+    if y.size <= shown:
+        return np.arange(y.size)
+    pick = []
+    for a, b in pairwise(np.linspace(0, y.size, shown // 2 + 1).astype(int)):
+        pick += sorted({a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))})
+    return np.array(pick)
 
 
 def bode(
@@ -51,14 +109,12 @@ def bode(
 
 
 def step_figure(
-    gate: Gate, y: Array, line: Array | None, label: str, scale: float, what: str, unit: str
+    gate: Gate, y: Array, model: Array | None, label: str, scale: float, what: str, unit: str
 ) -> Response:  # fmt: skip
-    """Return the figure of a step phase.  y, line: measured and of a linear model, SI; scale: SI per printed unit."""
+    """Return the figure of a step phase.  y, model: measured and of a linear model, SI; scale: SI per printed unit."""
     t = gate.t - gate.t[0]
-    pick = np.unique(np.linspace(0, t.size - 1, min(SHOWN, t.size)).astype(int))
-    curves = [] if line is None else [
-        {"label": label, "x": t[pick].tolist(), "phase": [], "y": (line[pick] / scale).tolist()}
-    ]  # fmt: skip
+    pick = thinned(t.size, SHOWN)
+    curves = [] if model is None else [line(label, t[pick], model[pick] / scale)]
     size = f"{gate.amplitude:g}".replace("-", "−")
     cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
     return Response(

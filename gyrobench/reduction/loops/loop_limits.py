@@ -1,4 +1,4 @@
-"""What limits a loop: the lags that take its phase margin.
+"""Limits of a loop: the lags that take its phase margin.
 
     phase at the crossover = that of the ideal loop - atan(2 pi f T) for each lag T - that of the step and its delays
 

@@ -25,6 +25,7 @@ from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.estimation import noise_mixture_fit, residual_series
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Table
 
 SEGMENTS = 8  # of a sine, for scatter and coherence
 UNSETTLED = 0.02  # of the change in the last tenth: more is no final value
@@ -79,8 +80,13 @@ class Gate:
 
     @property
     def f(self) -> float:
-        """Frequency, Hz."""
+        """Return the frequency, Hz."""
         return self.row.frequency
+
+
+def wrapped(angle: Array) -> Array:
+    """Return angles in -pi to pi."""
+    return np.asarray(angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5))
 
 
 def gates(record: Record, slot: str = "exciter") -> list[Gate]:
@@ -128,7 +134,7 @@ class Point:
 
 
 def phasor(t: Array, y: Array, f: float) -> complex:
-    """Complex amplitude of the sine of f Hz in y, least squares, beside a mean and a slope: A cos + B sin -> A - jB."""
+    """Return the complex amplitude A - jB of the sine A cos + B sin of f Hz in y, beside a mean and a slope."""
     return _phasors(t, f, y)[0]
 
 
@@ -140,7 +146,7 @@ def _phasors(t: Array, f: float, *signals: Array) -> list[complex]:
 
 
 def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False) -> Point:
-    """y over x at f Hz from a record of some whole periods.
+    """Return y over x at f Hz from a record of some whole periods.
 
     The record is cut into up to 8 segments of whole periods; their scatter gives the uncertainty (type A, independent
     segments) and the coherence |sum Y X*|^2 / (sum |X|^2 sum |Y|^2).  by_neighbours: the uncertainty is that of y at
@@ -161,12 +167,16 @@ def response(t: Array, x: Array, y: Array, f: float, by_neighbours: bool = False
         return Point(f, value, None, 1.0)
     xs, ys = segment_phasors(t, f, x, y)
     n = xs.size
-    power = float(np.sum(np.abs(xs) ** 2) * np.sum(np.abs(ys) ** 2))
-    coherence = float(np.abs(np.sum(ys * np.conj(xs))) ** 2) / power if power > 0.0 else 0.0
     scatter = float(np.sum(np.abs(ys / xs - value) ** 2)) / (2.0 * n * (n - 1))
     noise = neighbour_noise(t, y, f) if by_neighbours else None
     own = noise / abs(whole) if noise is not None else math.sqrt(scatter)
-    return Point(f, value, own / abs(value) if value else None, coherence)
+    return Point(f, value, own / abs(value) if value else None, coherence(xs, ys))
+
+
+def coherence(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> float:
+    """Return |sum y x*|^2 / (sum |x|^2 sum |y|^2) of phasors of segments; 0 where either has none."""
+    power = float(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2))
+    return float(np.abs(np.sum(y * np.conj(x))) ** 2) / power if power > 0.0 else 0.0
 
 
 def neighbour_noise(t: Array, y: Array, f: float) -> float | None:
@@ -200,7 +210,7 @@ def segment_phasors(t: Array, f: float, *signals: Array) -> list[NDArray[np.comp
 # ------------------------------------------------------------------------------------------- steps
 @dataclass(frozen=True)
 class Step:
-    """What a step did.  Values in the unit of the signal, times in s after the gate opened.
+    """Measures of a step response: values in the unit of the signal, times in s after the gate opened.
 
     overshoot: share of the change beyond it.  settled_5, settled_2: time after which the signal stays within 5 or
     2 % of the change about the final value; None when it did not settle before the last tenth of the record.
@@ -246,8 +256,9 @@ class Step:
 
 
 def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
-    """Measures of a step response.  rest: the signal before it (empty: 0).  start: time of the step, default t[0].
+    """Return the measures of a step response.
 
+    rest: the signal before it (empty: 0).  start: time of the step, default t[0].
     The uncertainty of the change is that of two means of white noise, and what the signal still moves; that of the
     settling times is the sampling interval's, dt / sqrt(12).
     """
@@ -272,18 +283,12 @@ def step(t: Array, y: Array, rest: Array, start: float | None = None) -> Step:
         share = (a - band * abs(change)) / (a - b) if a != b else 1.0
         return float(t[k] + share * (t[k + 1] - t[k])) - t0
 
+    overshoot = max(0.0, peak / abs(change) - 1.0) if change else 0.0
+    settled_5, settled_2 = (settled(band) if change else None for band in (0.05, 0.02))
     return Step(
-        initial,
-        final,
-        u,
-        max(0.0, peak / abs(change) - 1.0) if change else 0.0,
-        settled(0.05) if change else None,
-        settled(0.02) if change else None,
-        float(t[1] - t[0]) / math.sqrt(12.0),
-        float(slope),
-        last=float(t[-1] - t[-last]),
-        ahead=_ahead(float(slope), y[-2 * last : -last], t[-2 * last : -last]),
-    ).with_noise(u)
+        initial, final, u, overshoot, settled_5, settled_2, float(t[1] - t[0]) / math.sqrt(12.0), float(slope),
+        last=float(t[-1] - t[-last]), ahead=_ahead(float(slope), y[-2 * last : -last], t[-2 * last : -last]),
+    ).with_noise(u)  # fmt: skip
 
 
 def _ahead(slope: float, before: Array, t: Array) -> float:
@@ -300,7 +305,7 @@ def _ahead(slope: float, before: Array, t: Array) -> float:
 
 
 def step_noise_std(y: Array, before: int, gap: int, after: int) -> float | None:
-    """Standard deviation that noise gives a change between two means, as half of a 95 % interval over 1.96.
+    """Return the standard deviation that noise gives a change between two means, as half a 95 % interval over 1.96.
 
     y: a record at rest.  The change is that from the mean of ``before`` samples (0: none) to the mean of ``after``
     samples that end ``gap`` samples later; it is taken from every piece of the record without overlap, so noise of any
@@ -385,7 +390,9 @@ def drift(t: Array, angle: Array, blocks: int = 30) -> Drift:
 
 
 # ------------------------------------------------------------------------------------------- axes
-def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str) -> dict[str, Any]:
+def cross_axis(
+    points: Mapping[tuple[int, int], complex], axes: Sequence[str], what: str, caption: str = ""
+) -> Table:  # fmt: skip
     """Return the table of |response of axis j to excitation of axis k| over |response of k itself|, in percent.
 
     points: (k, j) -> complex ratio at one frequency, numbered from 1.  axes: their names.  A missing pair stays empty.
@@ -399,4 +406,4 @@ def cross_axis(points: Mapping[tuple[int, int], complex], axes: Sequence[str], w
             cells.append(None if direct is None or coupled is None or not direct else 100.0 * abs(coupled / direct))
         rows.append(cells)
     columns = ["excited axis", *(f"{a} / %" for a in axes)]
-    return {"title": f"Cross-axis coupling, {what}", "caption": "", "columns": columns, "rows": rows}
+    return Table("cross_axis", f"Cross-axis coupling, {what}", caption, columns, rows)

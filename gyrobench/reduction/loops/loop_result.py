@@ -1,11 +1,10 @@
-"""From the measures of a loop to the Result that its report shows.
+"""What was found of a loop in one record.
 
-builder = LoopFindings(record)
-loop = builder.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
-builder.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
-builder.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
-builder.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
-return builder.result(title=..., method=..., sources=[...], equation=..., conventions=[...], specification=...)
+found = LoopFindings(record)
+loop = found.open_loop("pitch", "stabilizer.e", "exciter.test[1]")          # Bode plot, margins, check against linear
+found.ratio("isolation", "motion", 1, "platform.attitude", "exciter.motion_angle[1]", ...)
+found.step("load step", gate, "platform.attitude", scale=ARCSEC, unit="arcsec")
+found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
 from gyrobench.reduction.loops.loop_measures import (
@@ -35,6 +35,7 @@ from gyrobench.reduction.loops.loop_measures import (
     step,
     step_noise_std,
 )
+from gyrobench.reduction.loops.measure_findings import MeasureFindings
 from gyrobench.reduction.loops.open_loop import (
     Twin,
     disagreement,
@@ -45,34 +46,36 @@ from gyrobench.reduction.loops.open_loop import (
     why_no_crossover,
 )
 from gyrobench.reduction.loops.validity import why_void
-from gyrobench.reduction.setup import run_metadata
-from gyrobench.result import Coefficient, LoopResult, Response, Specification
+from gyrobench.result import LoopResult, Reason, Table
 from gyrobench.units import DPH
 
+AGREEMENT = "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
+AGREEMENT_COLUMNS = ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"]
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 
-class LoopFindings:
+class LoopFindings(MeasureFindings):
     """Collects what was found in one record; see the module.
 
-    record: gyrobench.record.record.Record.  slot: the exciter's.  by_neighbours: u of sines from the lines beside them,
-    for noise that is larger at other frequencies (loop_measures.neighbour_noise).  Raises ReductionError, as
-    :func:`loops.gates`.
+    slot: the exciter's.  by_neighbours: u of sines from the lines beside them, for noise that is larger at other
+    frequencies (loop_measures.neighbour_noise).  linearized: False where there is no loop to be linearized.  Raises
+    ReductionError, as :func:`loops.gates`.
     """
 
-    def __init__(self, record: Record, slot: str = "exciter", by_neighbours: bool = False) -> None:
-        self.record, self.slot, self.by_neighbours = record, slot, by_neighbours
+    def __init__(
+        self, record: Record, slot: str = "exciter", by_neighbours: bool = False, linearized: bool = True
+    ) -> None:
+        super().__init__(record)
+        self.slot, self.by_neighbours = slot, by_neighbours
         self.gates = gates(record, slot)
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
-        self.coefficients: list[Coefficient] = []
-        self.responses: list[Response] = []
-        self.tables: list[dict[str, Any]] = []
-        self.warnings: list[str] = []
+        self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
+        self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
         self.allan: dict[str, Any] = {}
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
         self.unstable = why_void(self.linear, self.gates)
-        if self.linear.missing:
-            self.warnings.append(f"No linear model for comparison: {self.linear.missing}")
+        if self.linear.missing and linearized:
+            self.warn("linear.missing", f"No linear model for comparison: {self.linear.missing}")
 
     def of(self, kind: str, axis: int | None = None, shape: str | None = None) -> list[Gate]:
         """Return the phases of a kind, in their order."""
@@ -80,65 +83,10 @@ class LoopFindings:
             g for g in self.gates if g.kind == kind and axis in (None, g.axis) and (shape is None or g.shape == shape)
         ]
 
-    def measure(
-        self,
-        name: str,
-        meaning: str,
-        unit: str,
-        estimate: float | None,
-        u: float | None = None,
-        *,
-        closed: float | None = None,
-        truth: float | None = None,
-        limits: Specification | None = None,
-        no_value: str = "",
-        unsettled: str = "",
-    ) -> None:
-        """One row of the table of coefficients, in printed units; nothing for an estimate of None without a reason.
-
-        u: standard uncertainty, None or 0 where the data leave none.  closed: the closed form.  no_value: why there is
-        no estimate; without a limit such a row says no more than that.  unsettled: the same, with the verdict void.
-        """
-        no_value = unsettled or no_value
-        if no_value:
-            estimate = u = math.nan
-        elif estimate is None or not math.isfinite(estimate):
-            return
-        size = u if u is not None and (no_value or math.isfinite(u)) else 0.0
-        half = uncertainty.NORMAL * size
-        limit = (limits or {}).get(name)
-        self.coefficients.append(
-            Coefficient(
-                name=name,
-                meaning=meaning,
-                unit=unit,
-                estimate=estimate,
-                u=size,
-                k=uncertainty.NORMAL,
-                interval=(estimate - half, estimate + half),
-                u_a=size,
-                closed=closed,
-                truth=truth,
-                z=(estimate - truth) / size if truth is not None and size > 0.0 else None,
-                limit=limit,
-                verdict="void" if unsettled else uncertainty.assess_conformity(estimate, half, limit),
-                no_value=no_value,
-            )
-        )
-
-    def void(self, names: Sequence[str], reason: str) -> None:
-        """Take the values of coefficients away: their phase was unstable or unsettled."""
-        for k, c in enumerate(self.coefficients):
-            if c.name in names:
-                self.coefficients[k] = replace(
-                    c, estimate=math.nan, u=math.nan, interval=(math.nan, math.nan), u_a=None, z=None, verdict="void",
-                    no_value=reason,
-                )  # fmt: skip
-
     @property
-    def estimates(self) -> dict[str, float]:
-        """Return what was measured, in printed units."""
-        return {c.name: c.estimate for c in self.coefficients if not c.no_value}
+    def at_rest(self) -> Gate | None:
+        """Return the drift hold, in which nothing is excited; None where it is not whole in the record."""
+        return next((g for g in self.of("hold") if g.label == "drift"), None)
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
@@ -167,34 +115,33 @@ class LoopFindings:
         )
         if not all(counts):
             caption += " Grey: too noisy to count, or of an unstable run."
-        curves, rows = [], []
+        curves = []
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
         at = [p.f for p in sure]
         shown = m.measured_margins(sure)
         computed: dict[str, m.Margins] = {}
-        rows.append(shown.row("measured"))
+        rows = {"measured": shown.row("measured")}
         for kind, label in NAMES.items():
             model = models.of(kind)
             if model is None:
                 continue
             dense = model_response(model, span)[:, 0, 0]
             limits = computed[kind] = m.margins(span, dense)
-            rows.append(limits.row(label))
+            rows[kind] = limits.row(label)
             curves.append(curve(label, span, dense))
             if limits.crossover is not None:
                 self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
             if kind == "discrete" and not self.unstable:
                 self._conditional(title, limits)
-        self.responses.append(bode(title, "loop", caption, points, curves, "gain", "1"))
-        self.responses[-1].counts = counts
-        self.tables.append(
-            {"title": f"Stability margins, {title}", "caption": _margin_note(self.record.run), "columns": m.COLUMNS,
-             "rows": rows}
-        )  # fmt: skip
+        drawn = bode(title, "loop", caption, points, curves, "gain", "1")
+        self.responses.append(replace(drawn, counts=counts))
+        self.margins[loop] = {kind: row[1:] for kind, row in rows.items()}
+        note = _margin_note(self.record.run)
+        self.tables.append(Table(f"margins:{loop}", f"Stability margins, {title}", note, m.COLUMNS, [*rows.values()]))
         key = "" if loop == "stabilizer" else f" {loop}"
         self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
         values = m.measured_values(sure, self.excluded[loop])
-        closest = next((r for r in rows if r[0] == NAMES["discrete"]), [None] * 3)
+        closest = rows.get("discrete", [None] * 3)
         twin = None
         if "phase" in values and models.discrete is not None:
             twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
@@ -208,12 +155,12 @@ class LoopFindings:
         ):
             self.measure(name, what, unit, *value, closed=closed, no_value=none)
         noisy = "" if self.unstable else excluded_words(title, points, counts)
-        self.warnings += [noisy] if noisy else []
+        self.warn("loop.noisy", noisy)
         if "phase" in values:
             self._missed(title, *values["crossover"], self.linear.wanted.get(loop) if self.linear.missing else None)
         if twin is not None and twin.contradicts(values["crossover"], values["phase"]):
             causes = self._causes(sines, noisy)
-            self.warnings.append(disagreement(title, values["crossover"], values["phase"], twin, causes))
+            self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
 
     def _causes(self, sines: Sequence[Gate], noisy: str) -> list[str]:
@@ -228,7 +175,8 @@ class LoopFindings:
     def _missed(self, title: str, crossover: float, u: float, wanted: float | None) -> None:
         """Warn of a crossover that is not the one asked for, where no linear model said so before the run."""
         if wanted is not None and abs(crossover - wanted) > TOLERANCE * wanted + uncertainty.NORMAL * u:
-            self.warnings.append(f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for.")
+            text = f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for."
+            self.warn("loop.crossover_missed", text)
 
     def _agreement(
         self, points: Sequence[Point], model: Any, limits: m.Margins, names: tuple[str, str], up_to: float
@@ -236,30 +184,20 @@ class LoopFindings:
         limit = up_to * float(limits.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
-        table = next((t for t in self.tables if t["title"] == "Linear models and measured loop"), None)
-        if table is None:
-            table = {
-                "title": "Linear models and measured loop",
-                "caption": (
-                    "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
-                ),
-                "columns": ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"],
-                "rows": [],
-            }
-            self.tables.append(table)
-        table["rows"].append([names[0], limit, count, db, degrees, names[1]])
+        self.agreement.append([names[0], limit, count, db, degrees, names[1]])
 
     def _conditional(self, title: str, limits: m.Margins) -> None:
         if limits.lower is not None:
             text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {limits.lower:.3g}"
             upper = f" or rises to {limits.upper:.3g}" if limits.upper is not None else ""
-            self.warnings.append(f"{text}{upper} times its value. Saturation of the motor reduces the gain.")
+            text = f"{text}{upper} times its value. Saturation of the motor reduces the gain."
+            self.warn("loop.conditionally_stable", text)
 
     def ratio(
         self, name: str, kind: str, axis: int, output: str, reference: str, *, caption: str = "", scale: float = 1.0,
         unit: str = "1", plus: str | None = None,
     ) -> list[Point]:  # fmt: skip
-        """Gain of ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
+        """Measure ``output`` over ``reference`` at the sines of a kind on an axis, with the linear curves over it.
 
         reference: a channel of the exciter, or another one (then the linear curve is the ratio of two).  plus: a second
         channel added to the output (all "slot.variable").  scale, unit: SI of the ratio per printed unit.  Returns the
@@ -290,7 +228,7 @@ class LoopFindings:
     def excited(
         self, which: str, kind: str, axis: int, output: str, f: Array | Sequence[float], plus: str | None = None
     ) -> Any:
-        """Linear response ("discrete" or "continuous") of a channel to an excitation, SI; None where there is none."""
+        """Return the linear response ("discrete", "continuous") of a channel to an excitation, SI; None without one."""
         model = self.linear.closed.of(which)
         if model is None or output not in model.outputs:
             return None
@@ -321,8 +259,7 @@ class LoopFindings:
             at_rest = quiet[output] + (quiet[plus] if plus else 0.0)
             u = step_noise_std(at_rest, baseline.size, y.size, max(2, int(LAST * y.size)))
             measures = measures if u is None else measures.with_noise(u)
-            short = short_rest(quiet, baseline.size + y.size, measures)
-            self.warnings += [short] if short and short not in self.warnings else []
+            self.warn("hold.short", short_rest(quiet, baseline.size + y.size, measures))
         model = self.linear.closed.discrete
         predicted = None if model is None else simulated(model, gate, output)
         if model is not None and predicted is not None and plus:
@@ -332,78 +269,46 @@ class LoopFindings:
         self.responses.append(step_figure(gate, y, line, NAMES["discrete"], scale, y_name or output, unit))
         return measures
 
+    def loaded(self, gate: Gate, output: str, own: Drift | None, **figure: Any) -> Step:
+        """Return :meth:`step` less the output's own drift, whose uncertainty is in that of the change."""
+        if own is None:
+            return self.step(gate, output, **figure)
+        found = self.step(gate, output, drift=own.rate, **figure)
+        return replace(found, u_change=math.hypot(found.u_change, own.u * float(gate.t[-1] - gate.t[0])))
+
     # ------------------------------------------------------------------ drift
     def drift(
         self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
     ) -> Drift:
-        """Drift and random walk of an angle in a hold phase, °/h and °/√h, and the Allan deviation of the report.
+        """Measure drift and random walk of an angle in a hold phase, °/h and °/√h; show the Allan deviation.
 
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
         """
         measures = drift(gate.t, gate[output])
-        scaled: dict[str, Any] = {
-            k: [x / DPH for x in measures.allan[k]] for k in ("dev", "lo", "hi") if k in measures.allan
-        }
-        self.allan = {**measures.allan, **scaled, "unit": "°/h"} if measures.allan else {}
-        true = None if truth is None else truth / DPH
-        self.measure(
-            f"drift{key}",
-            "mean drift rate of the platform at rest",
-            "°/h",
-            measures.rate / DPH,
-            measures.u / DPH,
-            truth=true,
-        )
+        self.show_allan(measures)
+        meaning = "mean drift rate of the platform at rest"
+        self.measure(f"drift{key}", meaning, "°/h", measures.rate, measures.u, scale=DPH, truth=truth)
         if measures.walk is not None:
             size, u = (math.degrees(w) * 60.0 for w in measures.walk)
             true = math.degrees(walk) * 60.0 if walk else None
             self.measure(f"N{key}", "angle random walk", "°/√h", size, u, truth=true)
         return measures
 
-    def result(
-        self,
-        *,
-        title: str,
-        method: str,
-        sources: Sequence[str],
-        equation: str,
-        conventions: Sequence[str],
-        summary: Sequence[str] = (),
-        instrument: str = "",
-        ranked_by: str = "",
-        specification: Specification | None = None,
-    ) -> LoopResult:
-        """The Result with all that was collected; limits of the specification are applied by coefficient name."""
-        for c in self.coefficients if specification else ():
-            c.limit = (specification or {}).get(c.name, c.limit)
-            if c.verdict != "void":
-                c.verdict = uncertainty.assess_conformity(c.estimate, c.k * c.u, c.limit)
-        if self.unstable:
-            self.void([c.name for c in self.coefficients], self.unstable)
-            self.warnings.insert(0, f"The run has no value: {self.unstable}. Its figures show what it did, no measure.")
-            summary = [f"No value: {self.unstable}."]
-        run = self.record.run
-        result = LoopResult(
-            system=run.system,
-            title=title,
-            method=method,
-            sources=list(sources),
-            equation=equation,
-            conventions=list(conventions),
-            coefficients=self.coefficients,
-            allan=self.allan,
-            tables=self.tables,
-            warnings=self.warnings,
-            summary=list(summary),
-            decision_rule=uncertainty.DECISION_RULE,
-            verdict=uncertainty.worst_verdict(c.verdict for c in self.coefficients),
-            instrument=instrument or run.instrument,
-            simulated=not run.measured,
-            ranked_by=ranked_by,
-            responses=self.responses,
-        )
-        result.warnings += self.linear.warnings
-        return run_metadata.finish(result, self.record)
+    def show_allan(self, measures: Drift) -> None:
+        """Take the Allan deviation of a drift, °/h, for the report."""
+        allan = measures.allan
+        scaled: dict[str, Any] = {k: [x / DPH for x in allan[k]] for k in ("dev", "lo", "hi") if k in allan}
+        self.allan = {**allan, **scaled, "unit": "°/h"} if allan else {}
+
+    def result(self, account: Account, summary: Sequence[str] = (), ranked_by: str = "") -> LoopResult:
+        """Return what was found, with what the test says of itself."""
+        self.reasons += [*account.reasons, *(Reason("linear", w) for w in self.linear.warnings)]
+        if self.agreement:
+            title = "Linear models and measured loop"
+            self.tables.append(Table("margins.agreement", title, AGREEMENT, AGREEMENT_COLUMNS, self.agreement))
+        if self.allan:
+            self.facts["allan"] = self.allan
+        return super().result(replace(account, reasons=()), summary, ranked_by)
 
 
 def _margin_note(run: RunDocument) -> str:

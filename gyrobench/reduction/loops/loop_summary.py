@@ -3,67 +3,23 @@
     result = found.result(..., summary=[*margins(found), *isolation(found, "isolation", "platform.attitude"),
                                         *told(found.coefficients, "A load turns it by up to {peak}.")])
 
-A sentence names coefficients in braces; they are printed with their expanded uncertainty, of the time at which the
-report is made (:func:`renew`), for what the communication step does to u is found after the reduction.
+A sentence names coefficients in braces (gyrobench.reduction.estimation.sentences).
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-from gyrobench.reduction.estimation.fit_result import plus_minus
+from gyrobench.reduction.estimation.sentences import Sentence, told
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.open_loop import friction_of
-from gyrobench.result import Coefficient, Response, Result
+from gyrobench.result import Response
 
-FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 DRIFTS = "At rest the platform drifts by {drift}."
 AGREES = 0.05  # relative: contributions that miss the whole by more do not explain it
 SAME = 1.0  # dB, between the isolation at 1 Hz and the worst one
-
-
-class Sentence(str):
-    """A sentence with numbers, and the template that they were put in; a copy is plain text."""
-
-    template: str
-
-    def __reduce__(self) -> tuple[type[str], tuple[str]]:
-        return str, (str(self),)
-
-    def __new__(cls, template: str, coefficients: Sequence[Coefficient]) -> Sentence:
-        """Put coefficients into a template: {name}, or {-name} for the value with the other sign."""
-        known = {c.name: c for c in coefficients}
-        texts = {m[0]: with_u(known[m[2]], negated=bool(m[1])) for m in FIELD.finditer(template)}
-        uncertain = [field for field, text in texts.items() if "±" in text]
-        if uncertain:  # said once, behind the last of them
-            texts[uncertain[-1]] += " (95 %)"
-        made = super().__new__(cls, FIELD.sub(lambda m: texts[m[0]], template))
-        made.template = template
-        return made
-
-
-def with_u(c: Coefficient, negated: bool = False) -> str:
-    """ "10.151 ± 0.046 Hz": estimate and expanded uncertainty; six digits of one without; whether it may be zero."""
-    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
-    text = plus_minus(replace(c, estimate=-c.estimate) if negated else c).removesuffix(" (95 %)")
-    return re.sub(r" (?=[°″′]$)| 1$", "", text) + zero
-
-
-def told(coefficients: Sequence[Coefficient], *templates: str) -> list[str]:
-    """Return the sentences of whose coefficients all have a value; none of ""."""
-    measured = {c.name for c in coefficients if not c.no_value}
-    return [Sentence(t, coefficients) for t in templates if t and measured >= {name for _, name in FIELD.findall(t)}]
-
-
-def renew(result: Result) -> None:
-    """Put the present estimates and uncertainties of a result into its sentences."""
-    result.summary = [
-        Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else s for s in result.summary
-    ]
 
 
 def margins(found: LoopFindings, *loops: str) -> list[str]:
@@ -79,9 +35,8 @@ def margins(found: LoopFindings, *loops: str) -> list[str]:
 
 def _gain(found: LoopFindings, loop: str) -> str:
     """Return by how much the gain may rise and fall: as measured, or where that shows no limit, by the linear model."""
-    table = next((t for t in found.tables if t["title"] == f"Stability margins, open loop, {loop}"), None)
-    rows = {row[0]: row[1:] for row in table["rows"]} if table else {}
-    by_model = rows.get("linear, with step and delays") or rows.get("linear, continuous") or [None] * 6
+    rows = found.margins.get(loop, {})
+    by_model = rows.get("discrete") or rows.get("continuous") or [None] * 6
     texts, modelled = [], False
     for verb, at in (("rise", 2), ("fall", 4)):
         value = next((r for r in (rows.get("measured", [None] * 6), by_model) if r[at] is not None), None)
@@ -155,7 +110,7 @@ def base_ways(
 
 
 def base_torques(p: Mapping[str, Any], f: float) -> dict[str, complex]:
-    """Torque on a platform at rest for a unit angle of the base about its axis, N.m/rad, by the ways it takes.
+    """Return the torque on a platform at rest for a unit angle of the base about its axis, N.m/rad, by its ways.
 
     n ratio, s = 2j pi f:  B s,  n2 k_t k_e s/(R + L s),  n (n - 1) J_motor s2, and of a bearing that sticks with the
     stiffness K = stiction/presliding K + s sqrt(K (J + n2 J_motor)).

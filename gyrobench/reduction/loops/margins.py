@@ -26,10 +26,10 @@ DENSE = 2000  # points of a response on which margins are looked for
 
 
 def excitation_response(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
-    """Response of a channel ("slot.output") to an excitation: torque, command, test, or motion (angle of the base).
+    """Return the response of a channel ("slot.output") to an excitation.
 
-    A motion moves angle, rate and acceleration at once; they are summed as 1, s, s^2.  Raises KeyError where the model
-    has no such output or the excitation is not wired.
+    kind: torque, command, test, or motion (angle of the base), which moves angle, rate and acceleration at once; they
+    are summed as 1, s, s^2.  Raises KeyError where the model has no such output or the excitation is not wired.
     """
     names = ("motion_angle", "motion_rate", "motion_acceleration") if kind == "motion" else (kind,)
     if output not in model.outputs:
@@ -55,7 +55,7 @@ def grid(low: float, high: float, count: int = DENSE) -> Array:
 
 @dataclass(frozen=True)
 class Margins:
-    """Where |L| = 1 and where the phase of L is -180 degrees.
+    """Points at which |L| = 1 and at which the phase of L is -180 degrees.
 
     crossovers: (Hz, phase margin in degrees).  gains: (Hz, factor on the gain that brings the loop to its limit).
     upper, lower: smallest factor above 1 and largest below 1, None where there is none; a loop with a lower one is
@@ -83,7 +83,7 @@ class Margins:
         return max((g for _, g in self.gains if 0.0 < g < 1.0), default=None)
 
     def row(self, name: str) -> list[Any]:
-        """Of a table with :data:`COLUMNS`."""
+        """Return the row of a table with :data:`COLUMNS`."""
 
         def db(x: float | None) -> float | None:
             return None if x is None else 20.0 * math.log10(x)
@@ -133,7 +133,7 @@ def margins(f: Array, gain: Complex) -> Margins:
 
 
 def interpolate_response(points: Sequence[Point], f: Array, spline: bool = False) -> Complex:
-    """Measured points interpolated in log gain and unwrapped phase over log frequency, monotone between points.
+    """Return measured points interpolated in log gain and unwrapped phase over log frequency, monotone between points.
 
     Consecutive points must not turn by more than 180 degrees; f must lie inside their range.  spline: by a cubic spline
     instead, which is smoother and may overshoot.
@@ -269,7 +269,7 @@ def _spread(f: Array, value: Array, inside: tuple[float, float], at: float) -> f
 
 
 def deviation(points: Sequence[Point], model: Complex, up_to: float) -> tuple[float, float]:
-    """Largest difference of measured points to a model at the same frequencies, up to a frequency: (dB, degrees)."""
+    """Return the largest difference (dB, degrees) of points to a model at their frequencies, up to a frequency."""
     ratios = [p.value / m for p, m in zip(points, model, strict=True) if p.f <= up_to * (1.0 + 1e-9)]
     if not ratios:
         return 0.0, 0.0

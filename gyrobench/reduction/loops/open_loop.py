@@ -11,20 +11,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.run_document import LinearModel, RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_measures import Gate, Point, neighbour_noise, phasor, response, segment_phasors
+from gyrobench.reduction.loops.loop_measures import (
+    Gate,
+    Point,
+    coherence,
+    neighbour_noise,
+    phasor,
+    response,
+    segment_phasors,
+)
 from gyrobench.reduction.loops.margins import Margins, measured_margins, unity_range
 
 Value = tuple[float, float]  # estimate and standard uncertainty
 COHERENCE = 0.8  # least one of a point that counts
-SHARE, DEGREES = (
-    0.01,
-    1.0,
-)  # of crossover and phase margin: smaller differences from the linear model have no consequence
+SHARE, DEGREES = 0.01, 1.0  # of crossover and phase margin: no consequence of smaller differences from the linear model
 CHANCE = 0.01  # share of points of noise alone that may pass
 
 
@@ -54,14 +58,9 @@ def open_loop_point(gate: Gate, inside: str, test: str, by_neighbours: bool = Fa
     scatter = math.sqrt(float(np.sum(np.abs(es / rs - S) ** 2)) / (2.0 * n * (n - 1)))
     noise = neighbour_noise(t, e, gate.f) if by_neighbours else None
     scatter = scatter if noise is None else noise / abs(phasor(t, r, gate.f))
-    coherence = min(_coherence(rs, es), _coherence(rs, rs - es))
+    least = min(coherence(rs, es), coherence(rs, rs - es))
     u = scatter / (abs(S) * abs(1.0 - S)) if S not in (0.0, 1.0) else loop.u
-    return Point(loop.f, loop.value, u, coherence), coherence >= coherence_limit(n)
-
-
-def _coherence(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> float:
-    power = float(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2))
-    return float(np.abs(np.sum(y * np.conj(x))) ** 2) / power if power > 0.0 else 0.0
+    return Point(loop.f, loop.value, u, least), least >= coherence_limit(n)
 
 
 def excluded_words(title: str, points: Sequence[Point], counts: Sequence[bool]) -> str:
@@ -125,7 +124,7 @@ def why_no_crossover(points: Sequence[Point], measured: int, run: RunDocument) -
 
 @dataclass(frozen=True)
 class Twin:
-    """What the linear model says of the same loop: its margins, and those read from it as the measured ones are.
+    """Margins of the linear model of the same loop, on a dense response and read as the measured ones are.
 
     at, margin: crossover, Hz, and phase margin, degrees, on a dense response; f, phase: the same interpolated between
     its values at the measured frequencies.

@@ -14,7 +14,7 @@ DECIBEL = 10.0 / math.log(10.0)  # of a ratio of mean squares
 
 
 def still(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """y without its mean and slope: a drift is the gyro's, not the loop's."""
+    """Return y without its mean and slope: a drift is the gyro's, not the loop's."""
     return np.asarray(y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0]))
 
 

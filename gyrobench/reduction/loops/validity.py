@@ -1,4 +1,4 @@
-"""Whether the run of a loop has figures at all: poles of its linear model, and what the record shows at rest.
+"""Validity of the run of a loop: poles of its linear model, and what the record shows at rest.
 
     reason = why_void(record.run.linear, gates)     # "" where the loop was stable and came to rest
 

@@ -168,10 +168,10 @@ def _deviations(raw: Array, treated: Treated) -> _Scaled:
         at = s.start + s.done.wild
         removed[at] = raw[at] - s.clean[s.done.wild]
     off = removed - np.nanmean(removed)
-    own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), "quarter")["allan"]
+    own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
     quiet = float(np.nanmax(np.abs(off))) < 1e-9
-    out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), "quarter")["allan"].deviation ** 2
-    return _Scaled(own, deviations(clean, 1.0, ("allan",), "quarter")["allan"], np.resize(out, own.tau.size))
+    out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), fine=True)["allan"].deviation ** 2
+    return _Scaled(own, deviations(clean, 1.0, ("allan",), fine=True)["allan"], np.resize(out, own.tau.size))
 
 
 class _Judge:

@@ -19,7 +19,7 @@ from gyrobench.reduction.noise_model.completion import Completed, complete
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
 from gyrobench.reduction.noise_model.steps import Step, without
 from gyrobench.reduction.series.checks import SeriesError
-from gyrobench.reduction.series.lines import Line, find_lines
+from gyrobench.reduction.series.lines import SpectralLine, find_lines
 
 LONG = 1000  # samples of a gap that ends a stretch
 MOST = 64  # stretches that are used, the longest
@@ -57,7 +57,7 @@ class Treated:
 
     samples: int
     stretches: tuple[Stretch, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     complete_lines: bool
     spread: float
     levels: Array
@@ -130,7 +130,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
         raise SeriesError("the record is constant; it has no noise to fit")
     done = [complete(rate[s], find_wild) for s in parts]
     longest = int(np.argmax([s.stop - s.start for s in parts]))
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
     full = True
     own = [rate[s].copy() for s in parts]
     if remove_lines:

@@ -4,9 +4,10 @@
     x_t = l_t + v_t,  l_{t+1} = l_t + n_t,  var v = r, var n = q   local level = ARIMA(0,1,1), theta from q/r
 
 Differencing white noise makes the coefficients a_k = (p + 1 - k)/(p + 1), which is the table of the source in every
-order (:func:`differenced_white`).  Where the difference is flagged as one too many, the local level is the model to
-use; q and r come from one maximum-likelihood fit.  A model of the difference must not be fed with readings.
-[DRIFT-ARIMA310; Xia 2008, eq. 3.4.18, table 3.4.2 with EX14, EX17, EX19]
+order.  Where the difference is flagged as one too many, the local level is the model to use; q and r come from one
+maximum-likelihood fit.  A model of the difference must not be fed with readings.  Lines nearly vanish from a
+differenced series (their amplitude times 2 sin(pi f dt)) and stay in the series itself: they are removed before.
+[DRIFT-ARIMA310, DRIFT-DIFF; Xia 2008, eq. 3.4.1, 3.4.18, table 3.4.2 with EX10, EX14, EX17, EX19]
 """
 
 from __future__ import annotations
@@ -18,50 +19,31 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar
 from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
-from gyrobench.reduction.series.differencing import OverDifferencing, over_differencing
+from gyrobench.reduction.series.moving_average import LONGEST, fit_arma
 
-LONGEST = 100_000
-
-
-def differenced_white(order: int, variance: float = 1.0) -> tuple[Array, float]:
-    """Return phi of ``order`` and the innovation variance of differenced white noise, -(p + 1 - k)/(p + 1)."""
-    if order < 1:
-        raise SeriesError(f"order {order}: it must be at least 1")
-    k = np.arange(1.0, order + 1.0)
-    phi: Array = -(order + 1.0 - k) / (order + 1.0)
-    return phi, variance * (order + 2.0) / (order + 1.0)
+MOST_NEGATIVE = -0.45  # lag-one correlation from which on a series counts as over-differenced
+NEAR_MINUS_ONE = 0.05  # of its moving-average coefficient
 
 
 @dataclass(frozen=True)
 class LocalLevel:
-    """White noise over a random walk; intervals of 95 %, symmetric in the logarithm."""
+    """White noise over a random walk."""
 
     r: float  # variance of the white noise, unit^2
-    r_low: float
-    r_high: float
     q: float  # variance of the increment of the level, unit^2 per sample
-    q_low: float
-    q_high: float  # NaN where q is not determined
-    n: int
+    determined: bool  # the record shows a walk at all: q exceeds twice its standard uncertainty
     dt: float
 
     @property
-    def determined(self) -> bool:
-        """Whether the record shows a walk at all."""
-        return math.isfinite(self.q_high)
-
-    @property
     def white_density(self) -> float:
-        """N of the white noise, unit sqrt(s) (two-sided density N^2)."""
+        """Return N of the white noise, unit sqrt(s) (two-sided density N^2)."""
         return math.sqrt(self.r * self.dt)
 
     @property
     def walk_density(self) -> float:
-        """K of the random walk, unit/sqrt(s)."""
+        """Return K of the random walk, unit/sqrt(s)."""
         return math.sqrt(self.q / self.dt)
 
 
@@ -76,17 +58,28 @@ def fit_local_level(x: Any, dt: float) -> LocalLevel:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a variance at zero is judged below
         fit = UnobservedComponents((x - x.mean()) / scale, "llevel").fit(disp=0)
-    (r, q), cov = np.asarray(fit.params), np.asarray(fit.cov_params())
-    widths = []
-    for k, value in enumerate((r, q)):
-        u = math.sqrt(max(float(cov[k, k]), 0.0))
-        clear = value > 2.0 * u > 0.0 and math.isfinite(u)
-        widths.append(math.exp(NORMAL * u / value) if clear else math.nan)
+    (r, q), u_q = fit.params, math.sqrt(max(float(np.asarray(fit.cov_params())[1, 1]), 0.0))
     unit = scale * scale
-    r, q = float(r) * unit, float(q) * unit
-    return LocalLevel(
-        r, r / widths[0], r * widths[0], q, q / widths[1], q * widths[1], x.size, dt
-    )  # fmt: skip
+    return LocalLevel(float(r) * unit, float(q) * unit, bool(q > 2.0 * u_q > 0.0 and math.isfinite(u_q)), dt)
+
+
+@dataclass(frozen=True)
+class OverDifferencing:
+    """The two signs of one difference too many; white noise differenced has -1/2 and -1."""
+
+    lag_one: float  # correlation
+    ma: float  # coefficient theta of x_t = e_t + theta e_{t-1}, exact maximum likelihood
+
+    @property
+    def flagged(self) -> bool:
+        return self.lag_one <= MOST_NEGATIVE or self.ma <= -1.0 + NEAR_MINUS_ONE
+
+
+def over_differencing(x: Any) -> OverDifferencing:
+    """Return lag-one correlation and moving-average coefficient of a (differenced) series."""
+    x = checked(x, 50)
+    y = x - x.mean()
+    return OverDifferencing(float(y[1:] @ y[:-1] / (y @ y)), float(fit_arma(x, 0, 1).theta[0]))
 
 
 @dataclass(frozen=True)
@@ -95,14 +88,10 @@ class Arima310:
 
     ar: Autoregression  # of the first difference
     over: OverDifferencing
-    table_distance: float  # largest difference of phi from that of differenced white noise
     level: LocalLevel
 
 
 def arima310(x: Any, dt: float) -> Arima310:
     """Fit both to ``x`` (n,); lines must be removed before: differencing hides them."""
-    x = checked(x, 52)
-    step = np.diff(x)
-    ar = fit_ar(step, dt, 3)
-    distance = float(np.abs(ar.phi - differenced_white(3)[0]).max())
-    return Arima310(ar, over_differencing(step), distance, fit_local_level(x, dt))
+    step = np.diff(checked(x, 52))
+    return Arima310(fit_ar(step, 3), over_differencing(step), fit_local_level(x, dt))

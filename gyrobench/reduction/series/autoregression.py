@@ -1,14 +1,13 @@
-"""Autoregressive models by Burg's method and by Yule-Walker, with intervals, and the two conventions of sign.
+"""Autoregressive models by Burg's method, with intervals, and by Yule-Walker.
 
     x_t - m = sum_i phi_i (x_{t-i} - m) + w_t          (phi: statsmodels, and everywhere in the bench)
     x_t - m + sum_i a_i (x_{t-i} - m) = w_t,  a = -phi (MATLAB's arburg and aryule, spectrum.arburg)
 
-A list of a used as phi is another model, often an explosive one: :func:`from_coefficients` wants the convention named.
-:func:`modes` reads a model as decay times and frequencies.
-Burg minimizes the forward and backward errors from p + 1 on; Yule-Walker takes the biased autocovariances, which
-shrinks sharp resonances in short records (60 samples, poles at 0.97: six times Burg's error).
+A list of a used as phi is another model, often an explosive one.  Burg minimizes the forward and backward errors from
+p + 1 on; Yule-Walker takes the biased autocovariances, which shrinks sharp resonances in short records (60 samples,
+poles at 0.97: six times Burg's error).  Both are those of statsmodels, which gives no intervals of them.
 
-Intervals: both estimators are biased by about (order + 3)/n towards faster decay, and their variance exceeds the
+Intervals: Burg's estimator is biased by about (order + 3)/n towards faster decay, and its variance exceeds the
 large-sample sigma^2 Gamma^-1/n by terms in 1/n^2.  Both are found by simulation of the fitted model (30 to 500 records,
 fixed seed).  The interval holds the values whose own 1.96 u reaches the estimate less its bias.  It covers where the
 record is longer than some 20 correlation times; the result says if not.
@@ -17,21 +16,19 @@ record is longer than some 20 correlation times; the result says if not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy import linalg, signal
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_order
 
-Method = Literal["burg", "yule-walker"]
 RECORDS, FEWEST, LENGTH = 500, 30, 2000  # of the simulation of bias and variance
 NEGLIGIBLE = 0.01  # bias over u that needs no simulation
-EQUAL = 1e-6  # distance of two roots that count as one
 ENOUGH_TIMES = 20.0  # correlation times in a record
 
 
@@ -40,82 +37,22 @@ def spectral_radius(phi: Array) -> float:
     return float(np.abs(np.roots(np.concatenate([[1.0], -np.asarray(phi)]))).max(initial=0.0))
 
 
-def from_coefficients(values: Sequence[float], convention: Literal["phi", "a"]) -> Array:
-    """Return phi from listed coefficients of the named ``convention``; refuses a model that is not stationary."""
-    if convention not in ("phi", "a"):
-        raise SeriesError(f"convention '{convention}': 'phi' (statsmodels) or 'a' (arburg, a = -phi) must be named")
-    phi = np.asarray(values, dtype=float) * (1.0 if convention == "phi" else -1.0)
-    radius = spectral_radius(phi)
-    if radius >= 1.0:
-        other = "a" if convention == "phi" else "phi"
-        turned = spectral_radius(-phi)
-        hint = f"; as '{other}' it is {turned:.3f}: probably the list is in that convention" if turned < 1.0 else ""
-        raise SeriesError(
-            f"autoregressive coefficients as '{convention}': spectral radius {radius:.3f}, not below 1{hint}"
-        )
-    return phi
-
-
-@dataclass(frozen=True)
-class Mode:
-    """One root G of the model: psi_j = sum K G^j, decay time ``tau`` s, ``frequency`` Hz (0: without turning)."""
-
-    tau: float
-    frequency: float
-    weight: complex  # K
-
-
-def modes(phi: Sequence[float], dt: float) -> tuple[Mode, ...]:
-    """Return the modes of an autoregression, slowest first; of a conjugate pair the one of positive frequency.
-
-    K_i = 1/prod_{j != i}(1 - G_j/G_i) holds for distinct roots only.  Raises SeriesError for equal ones, for a zero
-    root (last coefficient 0) and for a model that is not stationary.
-    """
-    dt, G = checked_step(dt), np.roots(np.concatenate([[1.0], -np.asarray(phi, dtype=float)]))
-    if np.abs(G).max(initial=0.0) >= 1.0 or np.abs(G).min(initial=1.0) == 0.0 or G.size != len(phi):
-        raise SeriesError("modes: the roots must lie inside the circle, none at zero")
-    apart = np.abs(G[:, None] - G) + 2.0 * np.eye(G.size)
-    if apart.min() < EQUAL:
-        raise SeriesError("modes: two roots are equal; the partial fractions hold for distinct roots only")
-    ratio = 1.0 - G / G[:, None] + np.eye(G.size)
-    out = [
-        Mode(float(-dt / np.log(abs(g))), float(np.angle(g) / (2.0 * np.pi * dt)), complex(1.0 / np.prod(row)))
-        for g, row in zip(G, ratio, strict=True)
-        if g.imag >= 0.0
-    ]
-    return tuple(sorted(out, key=lambda mode: -mode.tau))
-
-
 @dataclass(frozen=True)
 class Autoregression:
     """One fitted model; arrays over the coefficients 1..p."""
 
-    method: str
-    phi: Array  # estimate of the method, as statsmodels returns it
+    phi: Array  # Burg's estimate, as statsmodels returns it
     bias: Array  # estimated
     u: Array  # standard uncertainty of phi - bias
     low: Array  # 95 % interval, about phi - bias
     high: Array
     variance: float  # of w, unit^2
     mean: float
-    n: int
-    dt: float
-    radius: float
-    times: float  # record over correlation time -dt/ln(radius)
-
-    @property
-    def a(self) -> Array:
-        """The same model in arburg's convention."""
-        out: Array = -self.phi
-        return out
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        return modes(tuple(self.phi), self.dt)
+    times: float  # length of the record over the correlation time, samples over -1/ln(radius)
 
     @property
     def long_enough(self) -> bool:
-        """Whether the intervals may be relied on."""
+        """Return whether the intervals may be relied on."""
         return self.times >= ENOUGH_TIMES
 
     def residual(self, x: Any) -> Array:
@@ -124,57 +61,50 @@ class Autoregression:
         out: Array = signal.lfilter(np.concatenate([[1.0], -self.phi]), [1.0], y)[self.phi.size :]
         return out
 
-    def density(self, frequency: Array) -> Array:
-        """Return the one-sided density at frequencies (Hz), unit^2/Hz."""
-        k = np.arange(1, self.phi.size + 1)
-        turn = np.exp(-2j * np.pi * np.multiply.outer(np.asarray(frequency) * self.dt, k))
-        out: Array = 2.0 * self.dt * self.variance / np.abs(1.0 - turn @ self.phi) ** 2
-        return out
 
-
-def fit_ar(x: Any, dt: float, order: int, method: Method = "burg") -> Autoregression:
-    """Fit a model of ``order`` to ``x`` (n,), mean removed.
+def fit_ar(x: Any, order: int) -> Autoregression:
+    """Fit a model of ``order`` to ``x`` (n,), mean removed, by Burg's method.
 
     Raises SeriesError for order < 1, order >= n/3, a constant or non-finite series, and a fit that is not stationary.
     """
-    x, dt = checked(x), checked_step(dt)
-    n = x.size
-    if order < 1 or 3 * order >= n:
-        raise SeriesError(f"autoregression of order {order} on {n} values: 1 to {max((n - 1) // 3, 0)} are possible")
-    if method not in ("burg", "yule-walker"):
-        raise SeriesError(f"method '{method}': 'burg' or 'yule-walker'")
-    mean = float(x.mean())
-    phi, variance = _estimate(x - mean, order, method)
+    from statsmodels.regression.linear_model import burg
+
+    x = checked(x)
+    n, mean = x.size, float(x.mean())
+    checked_order(order, n)
+    phi, variance = burg(x - mean, order=order, demean=False)
+    _check_stationary(phi, "burg")
+    bias, extra = np.zeros(order), np.zeros(order)
+    if (order + 3.0) / n > NEGLIGIBLE * _standard(phi, n).min():
+        simulated = _higher_order(phi, n)
+        if spectral_radius(phi - simulated[0]) < 1.0:
+            bias, extra = simulated
+    centre = phi - bias
+    radius = spectral_radius(centre)
+    times = n * -float(np.log(radius)) if radius > 0.0 else float(n)
+    low, high = _interval(centre, n, extra)
+    return Autoregression(phi, bias, _standard(centre, n, extra), low, high, float(variance), mean, times)
+
+
+def yule_walker(x: Any, order: int) -> Array:
+    """Return phi (order,) of ``x`` (n,), mean removed, by Yule-Walker; raises SeriesError as :func:`fit_ar`."""
+    from statsmodels.regression import linear_model
+
+    x = checked(x)
+    checked_order(order, x.size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # announcements of what the library will return
+        phi, _ = linear_model.yule_walker(x - x.mean(), order, "mle", demean=False)
+    _check_stationary(phi, "yule-walker")
+    return np.asarray(phi)
+
+
+def _check_stationary(phi: Array, method: str) -> None:
     radius = spectral_radius(phi)
     if not radius < 1.0:
         raise SeriesError(
-            f"autoregression of order {order} by {method}: spectral radius {radius:.6f}; difference first"
+            f"autoregression of order {phi.size} by {method}: spectral radius {radius:.6f}; difference first"
         )
-    bias, extra = np.zeros(order), np.zeros(order)
-    if (order + 3.0) / n > NEGLIGIBLE * _standard(phi, n).min():
-        found = _higher_order(phi, n, method)
-        if spectral_radius(phi - found[0]) < 1.0:
-            bias, extra = found
-    centre = phi - bias
-    largest = spectral_radius(centre)
-    times = n * -np.log(largest) if largest > 0.0 else float(n)
-    u = _standard(centre, n, extra)
-    return Autoregression(
-        method, phi, bias, u, *_interval(centre, n, extra), variance, mean, n, dt, radius, float(times)
-    )
-
-
-def _estimate(y: Array, order: int, method: Method) -> tuple[Array, float]:
-    from statsmodels.regression import linear_model
-
-    if method == "burg":
-        phi, variance = linear_model.burg(y, order=order, demean=False)
-        return np.asarray(phi), float(variance)
-    from gyrobench.reduction.series.correlation import autocovariance
-
-    r = autocovariance(y, order)
-    phi = linalg.solve_toeplitz(r[:-1], r[1:])
-    return phi, float(r[0] - phi @ r[1:])
 
 
 def covariance_of(phi: Array, n: int) -> Array:
@@ -219,7 +149,7 @@ def _interval(phi: Array, n: int, extra: Array) -> tuple[Array, Array]:
     return ends[0], ends[1]
 
 
-def _higher_order(phi: Array, n: int, method: Method) -> tuple[Array, Array]:
+def _higher_order(phi: Array, n: int) -> tuple[Array, Array]:
     """Return what n values add to the large-sample law: the bias (as 1/n) and a part of the variance (as 1/n^2).
 
     From simulated records, shorter where n is large and scaled, and fewer there: both matter less against u.  The error
@@ -243,7 +173,7 @@ def _higher_order(phi: Array, n: int, method: Method) -> tuple[Array, Array]:
         before = [y[:, p - i : -i] for i in range(1, p + 1)]
         first.append(np.stack([np.einsum("ij,ij->i", b, w) for b in before], axis=1) @ C)
         y = y[:, p:] - y[:, p:].mean(axis=1, keepdims=True)
-        errors.append((_burg_rows(y, p) if method == "burg" else _yule_walker_rows(y, p)) - phi)
+        errors.append(_burg_rows(y, p) - phi)
         done += len(w)
     error, linear = np.concatenate(errors), np.concatenate(first)
     bias: Array = (error - linear).mean(axis=0) * (m / n)
@@ -252,7 +182,7 @@ def _higher_order(phi: Array, n: int, method: Method) -> tuple[Array, Array]:
 
 
 def _burg_rows(y: Array, order: int) -> Array:
-    """Burg's coefficients phi (rows, order) of each row, as statsmodels has them of one."""
+    """Return Burg's coefficients phi (rows, order) of each row; statsmodels' burg takes one series."""
     forward, backward = y[:, 1:].copy(), y[:, :-1].copy()
     phi = np.zeros((len(y), 0))
     for _ in range(order):
@@ -261,9 +191,3 @@ def _burg_rows(y: Array, order: int) -> Array:
         phi = np.column_stack([phi - k[:, None] * phi[:, ::-1], k])
         forward, backward = (forward - k[:, None] * backward)[:, 1:], (backward - k[:, None] * forward)[:, :-1]
     return phi
-
-
-def _yule_walker_rows(y: Array, order: int) -> Array:
-    n = y.shape[1]
-    r = np.stack([np.einsum("ij,ij->i", y[:, k:], y[:, : n - k]) for k in range(order + 1)], axis=1)
-    return np.array([linalg.solve_toeplitz(row[:-1], row[1:]) for row in r])

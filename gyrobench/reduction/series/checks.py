@@ -1,4 +1,4 @@
-"""What every series must be before anything is computed from it, and block means."""
+"""Conditions that every series must meet before anything is computed from it, and block means."""
 
 from __future__ import annotations
 
@@ -38,6 +38,12 @@ def checked_step(dt: float) -> float:
     if not (np.isfinite(dt) and dt > 0.0):
         raise SeriesError(f"sampling interval {dt}: it must be finite and positive")
     return float(dt)
+
+
+def checked_order(order: int, n: int) -> None:
+    """Raise SeriesError unless an autoregression of ``order`` can be fitted to ``n`` values."""
+    if order < 1 or 3 * order >= n:
+        raise SeriesError(f"autoregression of order {order} on {n} values: 1 to {max((n - 1) // 3, 0)} are possible")
 
 
 def block_means(x: Array, m: int) -> Array:

@@ -3,9 +3,9 @@
     r(p) = (1/N) sum_{j < N-p} (x_j - m)(x_{j+p} - m),  rho = r/r(0);   white bounds +-1.96/sqrt N
 
 Removing the mean biases r(p) low: E r(p) = (1 - p/N)(lambda_p - var m) nearly; in slow drift that is far more than
-the bound (phi = 0.95, N = 500, p = 20: 0.27 for 0.36) and is normal.  `bias` is its estimate, -var m/r(0) and the
-factor, from the same record.  Trend and lines must be removed before; gaps need a call for each stretch.
-[RED-ACF, DRIFT-ACF-PACF; Hu 1981, eq. 4-23..4-63 with ER11, ER21; Xia 2008, eq. 3.4.9, 3.4.10]
+the bound (phi = 0.95, N = 500, p = 20: 0.27 for 0.36) and is normal.  Trend and lines must be removed before; gaps need
+a call for each stretch.   [RED-ACF, DRIFT-ACF-PACF; Hu 1981, eq. 4-23..4-63 with ER11, ER21; Xia 2008, eq. 3.4.9,
+3.4.10]
 """
 
 from __future__ import annotations
@@ -29,15 +29,16 @@ class Correlation:
     """Arrays over lags 0..p."""
 
     lag: Array  # s
-    r: Array  # autocovariance, unit^2
     rho: Array
     partial: Array
     bound: float  # 95 %, of white noise
-    bias: Array  # estimated, of rho
 
 
 def autocovariance(x: Any, lags: int) -> Array:
-    """Return r(0..lags), mean removed, divisor N.  Raises SeriesError for lags >= N."""
+    """Return r(0..lags), mean removed, divisor N.  Raises SeriesError for lags >= N.
+
+    statsmodels' acovf transforms the whole record at once, or sums lag by lag.
+    """
     x = checked(x, 4)
     if not 1 <= lags < x.size:
         raise SeriesError(f"{lags} lags of {x.size} values: 1 to {x.size - 1} are possible")
@@ -54,17 +55,11 @@ def autocovariance(x: Any, lags: int) -> Array:
 
 
 def correlation(x: Any, dt: float, lags: int) -> Correlation:
-    """Return autocorrelation, partial autocorrelation (Durbin-Levinson on r) and what removing the mean costs."""
+    """Return autocorrelation and partial autocorrelation (Durbin-Levinson on r) of ``x`` sampled every ``dt`` s."""
     from statsmodels.tsa.stattools import levinson_durbin
 
     dt = checked_step(dt)
     r = autocovariance(x, lags)
-    n = len(x)
     partial: Array = np.asarray(levinson_durbin(r, nlags=lags, isacov=True)[2], dtype=float)
     partial[0] = 1.0
-    rho = r / r[0]
-    k = np.arange(lags + 1)
-    mean = max(1.0 + 2.0 * float(np.sum((1.0 - k[1:] / n) * rho[1:])), 0.0) / n  # variance of the mean over r(0)
-    bias: Array = -(k / n) * rho - (1.0 - k / n) * mean
-    bias[0] = 0.0
-    return Correlation(np.asarray(dt * k), r, rho, partial, NORMAL / math.sqrt(n), bias)
+    return Correlation(dt * np.arange(lags + 1.0), r / r[0], partial, NORMAL / math.sqrt(len(x)))

@@ -6,10 +6,11 @@ The record is means of the rate over tau0; theta_i is their running sum, the ang
     modified   the same of the mean angle over m readings from i on
     hadamard   sigma^2 = <(theta_{i+3m} - 3 theta_{i+2m} + 3 theta_{i+m} - theta_i)^2> / (6 tau^2)
 
-over every start i up to m = STARTS.  For longer m the starts are spaced evenly, STARTS/2 or more of them within tau,
-and tau is a multiple of their spacing; the degrees of freedom do not change by that (a few starts within tau are
-enough, Riley 2008).  Intervals: chi-squared with the equivalent degrees of freedom of Greenhall 2003 for the power law
-that the deviation shows around tau.  They hold for one tau; values at neighbouring tau are correlated.
+for m = 1, 2, 4, 8, ..., over every start i up to m = STARTS.  For longer m the starts are spaced evenly, STARTS/2 or
+more of them within tau, and tau is a multiple of their spacing; the degrees of freedom do not change by that (a few
+starts within tau are enough, Riley 2008).  Intervals: chi-squared with the equivalent degrees of freedom of Greenhall
+2003 for the power law that the deviation shows around tau.  They hold for one tau; values at neighbouring tau are
+correlated.  allantools, which gives the degrees of freedom, takes a record whole and without gaps.
 [DRIFT-ALLAN; IEEE 952, annex C; Riley 2008, eq. 11, 14, 20, 45; Greenhall 2003]
 
 Residuals of a fit: a constant changes nothing; what the fitted terms take at long tau is missing in the deviation,
@@ -19,9 +20,8 @@ which then falls although the instrument does not.
 from __future__ import annotations
 
 import functools
-import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,24 +34,6 @@ KINDS = ("allan", "modified", "hadamard")
 STARTS = 1024  # longest m that is computed from every start
 FULL, COARSE = 16384, 4096  # cells processed at a time, at the sampling interval and above
 MISSING = 0.01  # part of a mean over tau that may be missing
-
-
-def octave() -> Iterator[int]:
-    """Yield 1, 2, 4, 8, ..."""
-    yield from (1 << k for k in range(60))
-
-
-def decade() -> Iterator[int]:
-    """Yield 1, 2, 4, 10, 20, 40, 100, ..."""
-    yield from (d * 10**k for k in range(18) for d in (1, 2, 4))
-
-
-def quarter() -> Iterator[int]:
-    """Yield whole numbers, four to an octave: 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 13, 16, ..."""
-    yield from (round(2.0 ** (k / 4.0)) for k in (0, *range(4, 240)) if k == 0 or round(2.0 ** (k / 4.0)) > round(2.0 ** ((k - 1) / 4.0)))
-
-
-GRIDS = {"octave": octave, "decade": decade, "quarter": quarter}
 
 
 @dataclass(frozen=True)
@@ -148,7 +130,7 @@ class _Stage:
                 self._add("modified", m, second[m:] - second[:-m], 2.0 * (m * m * self.stride) ** 2)
 
     def _with_gaps(self, cells: Array, old: int) -> None:
-        """The same where samples are missing: means of those present, if no more than MISSING of a mean is not."""
+        """Sum up where samples are missing: means of those present, if no more than MISSING of a mean is not."""
         rate, angle, present = cells
         area = np.concatenate([[0.0], np.cumsum(rate * present)])
         there = np.concatenate([[0.0], np.cumsum(present)])
@@ -178,7 +160,7 @@ def _second(x: Array, m: int) -> Array:
 
 
 def _pairs(cells: Array, stride: int) -> Array:
-    """Cells of twice the length (3, n/2)."""
+    """Return cells of twice the length (3, n/2)."""
     a, b = cells[:, ::2], cells[:, 1::2]
     present = 0.5 * (a[2] + b[2])
     share = np.where(present > 0.0, 0.5 * a[2] / np.where(present > 0.0, present, 1.0), 0.5)
@@ -193,19 +175,21 @@ class DeviationAccumulator:
     The memory does not depend on the record.
     """
 
-    def __init__(self, tau0: float, kinds: Iterable[str] = ("allan",), grid: str = "octave") -> None:
-        self.tau0, self.kinds = tau0, tuple(kinds)
+    def __init__(self, tau0: float, kinds: Iterable[str] = ("allan",), fine: bool = False) -> None:
+        """fine: four averaging times to an octave, whole numbers of samples, in place of one."""
+        self.tau0, self.kinds, self.fine = tau0, tuple(kinds), fine
         unknown = [k for k in self.kinds if k not in KINDS]
-        if unknown or grid not in GRIDS or not tau0 > 0.0:
-            raise ValueError(f"kinds are of {KINDS}, grids of {tuple(GRIDS)}, tau0 positive: {unknown}, {grid}, {tau0}")
-        self._grid, self._stages = GRIDS[grid], list[_Stage]()
+        if unknown or not tau0 > 0.0:
+            raise ValueError(f"kinds are of {KINDS}, tau0 is positive: {unknown}, {tau0}")
+        self._stages = list[_Stage]()
 
     def _stage(self, k: int) -> _Stage:
-        if k == len(self._stages):
-            stride = 1 << k
-            shorter = itertools.takewhile(lambda m: m <= STARTS * stride, self._grid())
-            steps = [round(m / stride) for m in shorter if k == 0 or m > STARTS * stride // 2]
-            self._stages.append(_Stage(stride, steps, self.kinds))
+        if k == len(self._stages):  # octaves: up to STARTS cells of one sample, then one more for each pairing of cells
+            steps = [STARTS] if k else [1 << j for j in range(STARTS.bit_length())]
+            if self.fine:  # from 3/4 of an octave below STARTS on, or from one sample
+                least = STARTS.bit_length() * 4 - 7 if k else 0
+                steps = sorted({round(2.0 ** (j / 4.0)) for j in range(least, STARTS.bit_length() * 4 - 3)})
+            self._stages.append(_Stage(1 << k, steps, self.kinds))
         return self._stages[k]
 
     def add(self, block: Array) -> None:
@@ -232,7 +216,7 @@ class DeviationAccumulator:
             k += 1
 
     def result(self) -> dict[str, Deviation]:
-        """End the record; return its deviations, every tau of the grid that has two differences or more."""
+        """End the record; return its deviations, every tau that has two differences or more."""
         self.gap()
         return {kind: self._deviation(kind) for kind in self.kinds}
 
@@ -247,10 +231,10 @@ class DeviationAccumulator:
 
 
 def deviations(
-    rate: Array | Iterable[Array], tau0: float, kinds: Iterable[str] = ("allan",), grid: str = "octave"
-) -> dict[str, Deviation]:
+    rate: Array | Iterable[Array], tau0: float, kinds: Iterable[str] = ("allan",), fine: bool = False
+) -> dict[str, Deviation]:  # fmt: skip
     """Return the deviations of a rate (n,), or of stretches of it that have no known relation in time."""
-    total = DeviationAccumulator(tau0, kinds, grid)
+    total = DeviationAccumulator(tau0, kinds, fine)
     for stretch in [rate] if isinstance(rate, np.ndarray) else rate:
         total.add(stretch)
         total.gap()

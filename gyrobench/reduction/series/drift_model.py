@@ -8,12 +8,12 @@
     model.recommended, model.sentences                                       what to use, and what the record cannot
     show
 
-Block means: models have at most MODEL_SAMPLES values; of a longer record (or with ``model_dt``) they describe means
-over ``model.factor`` samples, an interval of ``model.model_dt`` s, and faster correlation is not in them (the
-spectrum has it).  Every part is a function of its own in this room; a part that the record does not allow is None with
-the reason in ``refused``.  Samples count as means over ``dt`` (rates from angles, averaging converters), which matters
-only where the correlation time is a few of them.  Intervals of the autoregression hold for its order as given.  A
-record of 10^7 samples takes some 30 s, the fits of the models 10 s of it.
+Block means: models have at most MODEL_SAMPLES values; of a longer record they describe means over ``model.factor``
+samples, an interval of ``model.model_dt`` s, and faster correlation is not in them (the spectrum has it).  Every part
+is a function of its own in this room; a part that the record does not allow is None with the reason in ``refused``.
+Samples count as means over ``dt`` (rates from angles, averaging converters), which matters only where the correlation
+time is a few of them.  Intervals of the autoregression hold for its order as given.  A record of 10^7 samples takes
+some 30 s, the fits of the models 10 s of it.
 [DRIFT-STATS-RUNS, -TREND, DRIFT-DIFF, DRIFT-PERIODIC, DRIFT-NORMALITY, DRIFT-ACF-PACF, DRIFT-AR-YW, -BURG, RED-ARMA,
 DRIFT-ARIMA310, DRIFT-ORDER, DRIFT-WHITENESS-LB]
 """
@@ -23,215 +23,184 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.series import gauss_markov as markov
+from gyrobench.reduction.series import stationarity
 from gyrobench.reduction.series.arima import Arima310, arima310
-from gyrobench.reduction.series.autoregression import Autoregression, fit_ar
-from gyrobench.reduction.series.checks import SeriesError, block_means, checked, checked_step
+from gyrobench.reduction.series.autoregression import Autoregression, fit_ar, yule_walker
+from gyrobench.reduction.series.checks import block_means, checked, checked_step
 from gyrobench.reduction.series.correlation import Correlation, correlation
 from gyrobench.reduction.series.gauss_markov import GaussMarkov
 from gyrobench.reduction.series.lines import Lines, find_lines
 from gyrobench.reduction.series.moving_average import Arma, fit_arma
 from gyrobench.reduction.series.normality import Normality, normality
-from gyrobench.reduction.series.orders import OrderTable, order_table
+from gyrobench.reduction.series.orders import LjungBox, OrderTable, ljung_box, order_table
 from gyrobench.reduction.series.spectrum import Spectrum, spectrum
-from gyrobench.reduction.series.stationarity import (
-    RunsTest,
-    Trend,
-    UnitRoot,
-    block_runs,
-    trend,
-    unit_root,
-    up_down_runs,
-)
-from gyrobench.reduction.series.whiteness import LjungBox, ljung_box
 
 T = TypeVar("T")
 MODEL_SAMPLES = 10_000  # values the models are fitted to
 RUN_BLOCKS = 200  # of the counts of runs, 40 at least
+LAGS = 100  # of the autocorrelation
+HIGHEST = 12  # order tried
 WHITENESS_LAGS = 20
 FEWEST = 512  # samples
 
 
-@dataclass(frozen=True)
+@dataclass
 class DriftModel:
-    """What :func:`describe` finds; parts that the record does not allow are None, see ``refused``."""
+    """Time-series model of a record, filled by :func:`describe`; parts that the record does not allow stay None."""
 
     n: int
     dt: float  # s
     factor: int  # samples in a block of the models
     lines: Lines
     spectrum: Spectrum
-    normality: Normality | None
     correlation: Correlation
-    runs: tuple[RunsTest, RunsTest] | None  # block means, block variances
-    up_down: RunsTest | None
-    trend: Trend | None
-    unit_root: UnitRoot | None
-    detrended: bool  # a significant slope was taken off before the models
-    orders: OrderTable | None
-    burg: Autoregression | None  # of the order SBC chose, at least 1
-    yule_walker: Autoregression | None
-    arma: Arma | None  # ARMA(1,1): Gauss-Markov with white noise
-    ma: Arma | None  # MA(1)
-    arima: Arima310 | None
-    gauss_markov: GaussMarkov | None
-    whiteness: dict[str, LjungBox]  # "block means", "burg", "arma"
-    recommended: str  # "white noise", "AR(p)", "ARMA(1,1)", "local level", "none"
-    sentences: tuple[str, ...]
-    refused: dict[str, str]  # name of a part -> reason
+    normality: Normality | None = None
+    runs: tuple[stationarity.RunsTest, stationarity.RunsTest] | None = None  # block means, block variances
+    up_down: stationarity.RunsTest | None = None
+    trend: stationarity.Trend | None = None
+    unit_root: stationarity.UnitRoot | None = None
+    detrended: bool = False  # a significant slope was taken off before the models
+    orders: OrderTable | None = None
+    burg: Autoregression | None = None  # of the order SBC chose, at least 1
+    yule_walker: Array | None = None  # coefficients of the same order
+    arma: Arma | None = None  # ARMA(1,1): Gauss-Markov with white noise
+    ma: Arma | None = None  # MA(1)
+    arima: Arima310 | None = None
+    gauss_markov: GaussMarkov | None = None
+    whiteness: dict[str, LjungBox] = field(default_factory=dict)  # "block means", "burg", "arma"
+    recommended: str = "none"  # "white noise", "AR(p)", "ARMA(1,1)", "local level", "none"
+    sentences: list[str] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)  # name of a part -> reason
 
     @property
     def model_dt(self) -> float:
         return self.dt * self.factor
 
-
-class _Parts:
-    """Runs a part and keeps the reason where the record does not allow it."""
-
-    def __init__(self) -> None:
-        self.refused: dict[str, str] = {}
-
-    def __call__(self, name: str, part: Callable[[], T]) -> T | None:
+    def part(self, name: str, find: Callable[[], T]) -> T | None:
+        """Return what ``find`` returns; None, with the reason in ``refused``, where the record does not allow it."""
         try:
-            return part()
-        except (
-            ValueError,
-            np.linalg.LinAlgError,
-        ) as error:  # of this room, or of statsmodels
+            return find()
+        except (ValueError, np.linalg.LinAlgError) as error:  # of this room, or of statsmodels
             self.refused[name] = str(error)
             return None
 
 
-def describe(
-    x: Any, dt: float, model_dt: float | None = None, lags: int = 100, highest: int = 12, false_alarm: float = 1e-3
-) -> DriftModel:
+def describe(x: Array, dt: float) -> DriftModel:
     """Analyse a record ``x`` (n,) sampled every ``dt`` s without gaps.
 
-    model_dt: interval of the models, s (at least dt; default: as short as MODEL_SAMPLES allow).  lags: of the
-    autocorrelation.  highest: order tried.  false_alarm: probability of finding a line in a record without.
     Raises SeriesError for fewer than 512 samples, gaps (NaN) and a constant record.
     """
     x, dt = checked(x, FEWEST, "record"), checked_step(dt)
-    factor = -(-x.size // MODEL_SAMPLES) if model_dt is None else max(1, round(model_dt / dt))
-    if x.size // factor < FEWEST // 4:
-        raise SeriesError(f"model_dt = {model_dt} s leaves {x.size // factor} block means; {FEWEST // 4} are needed")
-    part = _Parts()
-    lines = find_lines(x, dt, false_alarm)
+    factor = -(-x.size // MODEL_SAMPLES)
+    lines = find_lines(x, dt)
     clean = lines.residual
-    whole = (
-        spectrum(clean, dt), part("normality", lambda: normality(clean)),
-        correlation(clean, dt, min(lags, x.size // 4)),
-    )  # fmt: skip
-    y, step = block_means(clean, factor), dt * factor
+    m = DriftModel(x.size, dt, factor, lines, spectrum(clean, dt), correlation(clean, dt, LAGS))
+    m.normality = m.part("normality", lambda: normality(clean))
+    y = block_means(clean, factor)
+    _stationarity(m, y)
+    if m.trend is not None and m.trend.significant:
+        m.detrended = True
+        y = y - m.trend.slope * m.model_dt * np.arange(y.size)
+    _models(m, y)
+    m.recommended, why = _recommend(m)
+    m.sentences = [*why, *_limits(m)]
+    if m.detrended:
+        m.sentences.append("The slope is significant; it was taken off before the models were fitted.")
+    return m
+
+
+def _stationarity(m: DriftModel, y: Array) -> None:
     block = max(2, y.size // RUN_BLOCKS)
-    runs = part("runs", lambda: block_runs(y, block))
-    up_down = part("up_down", lambda: up_down_runs(block_means(y, block)))
-    slope = part("trend", lambda: trend(y, step))
-    root = part("unit_root", lambda: unit_root(y))
-    detrended = slope is not None and slope.significant
-    if slope is not None and detrended:
-        y = y - slope.slope * step * np.arange(y.size)
-    table = part("orders", lambda: order_table(y, min(highest, (y.size - 1) // 3)))
-    order = max(1, table.chosen["sbc"]) if table else 1
-    burg = part("burg", lambda: fit_ar(y, step, order))
-    walker = part("yule_walker", lambda: fit_ar(y, step, order, "yule-walker"))
-    arma, ma = part("arma", lambda: fit_arma(y, 1, 1)), part("ma", lambda: fit_arma(y, 0, 1))
-    arima, drift = (
-        part("arima", lambda: arima310(y, step)),
-        part("gauss_markov", lambda: markov.gauss_markov(y, step, means=True)),
-    )
-    whiteness = _whiteness(part, y, burg, arma)
-    recommended, why = _recommend(whiteness, table, burg, arma, arima, root, drift)
-    sentences = [*why, *_limits(x.size, factor, step, lines, drift, burg, whole[1], whiteness.get("arma"))]
-    if detrended:
-        sentences.append("The slope is significant; it was taken off before the models were fitted.")
-    return DriftModel(
-        x.size, dt, factor, lines, *whole, runs, up_down, slope, root, detrended, table, burg, walker, arma, ma, arima,
-        drift, whiteness, recommended, tuple(sentences), part.refused,
-    )  # fmt: skip
+    m.runs = m.part("runs", lambda: stationarity.block_runs(y, block))
+    m.up_down = m.part("up_down", lambda: stationarity.up_down_runs(block_means(y, block)))
+    m.trend = m.part("trend", lambda: stationarity.trend(y, m.model_dt))
+    m.unit_root = m.part("unit_root", lambda: stationarity.unit_root(y))
 
 
-def _whiteness(part: _Parts, y: Array, burg: Autoregression | None, arma: Arma | None) -> dict[str, LjungBox]:
-    residuals = [("block means", y, 0)]
-    if burg is not None:
-        residuals.append(("burg", burg.residual(y), burg.phi.size))
-    if arma is not None:
-        residuals.append(("arma", arma.residual, 2))
-    out = {}
-    for name, e, fitted in residuals:
+def _models(m: DriftModel, y: Array) -> None:
+    m.orders = m.part("orders", lambda: order_table(y, HIGHEST))
+    order = max(1, m.orders.chosen["sbc"]) if m.orders else 1
+    m.burg = m.part("burg", lambda: fit_ar(y, order))
+    m.yule_walker = m.part("yule_walker", lambda: yule_walker(y, order))
+    m.arma, m.ma = m.part("arma", lambda: fit_arma(y, 1, 1)), m.part("ma", lambda: fit_arma(y, 0, 1))
+    m.arima = m.part("arima", lambda: arima310(y, m.model_dt))
+    m.gauss_markov = m.part("gauss_markov", lambda: markov.gauss_markov(y, m.model_dt, means=True))
+    residuals = {"block means": (y, 0)}
+    if m.burg is not None:
+        residuals["burg"] = m.burg.residual(y), order
+    if m.arma is not None:
+        residuals["arma"] = m.arma.residual, 2
+    for name, (e, fitted) in residuals.items():
         lags = max(WHITENESS_LAGS, fitted + 10)
-        test = part(f"whiteness of {name}", functools.partial(ljung_box, e, lags, fitted))
+        test = m.part(f"whiteness of {name}", functools.partial(ljung_box, e, lags, fitted))
         if test is not None:
-            out[name] = test
-    return out
+            m.whiteness[name] = test
 
 
-def _recommend(
-    white: dict[str, LjungBox], table: OrderTable | None, burg: Autoregression | None, arma: Arma | None,
-    arima: Arima310 | None, root: UnitRoot | None, drift: GaussMarkov | None,
-) -> tuple[str, list[str]]:  # fmt: skip
+def _recommend(m: DriftModel) -> tuple[str, list[str]]:
     """Return the simplest model whose residuals are white, and why."""
+    burg, level = m.burg, m.arima.level if m.arima is not None else None
 
     def passes(name: str) -> bool:
-        return name in white and white[name].white
+        return name in m.whiteness and m.whiteness[name].white
 
     if passes("block means"):
         return "white noise", ["The block means are white (Ljung-Box)."]
+    drift, root = m.gauss_markov, m.unit_root
     open_above = drift is not None and drift.determined and math.isinf(drift.high)
     walks = open_above or (root is not None and root.reading.startswith("random walk"))
-    if walks and arima is not None and arima.level.determined:
-        over = " The first difference is flagged as over-differenced." if arima.over.flagged else ""
+    if walks and m.arima is not None and m.arima.level.determined:
+        over = " The first difference is flagged as over-differenced." if m.arima.over.flagged else ""
         return "local level", [f"The level wanders: white noise over a random walk describes the record.{over}"]
-    short = table is not None and not table.at_limit
+    short = m.orders is not None and not m.orders.at_limit
     if burg is not None and short and passes("burg"):
-        if arma is not None and passes("arma") and burg.phi.size > 2:
+        if passes("arma") and burg.phi.size > 2:
             return "ARMA(1,1)", [f"ARMA(1,1) leaves white residuals with 2 coefficients, AR needs {burg.phi.size}."]
         return f"AR({burg.phi.size})", [f"AR({burg.phi.size}) by SBC leaves white residuals."]
-    if arma is not None and passes("arma"):
+    if passes("arma"):
         return "ARMA(1,1)", ["ARMA(1,1), a Gauss-Markov drift with white noise, leaves white residuals."]
-    reason = "SBC is least at the highest order tried" if table is not None and not short else "no residuals are white"
-    if arima is not None and arima.level.determined:
+    limited = m.orders is not None and not short
+    reason = "SBC is least at the highest order tried" if limited else "no residuals are white"
+    if level is not None and level.determined:
         return "local level", [f"No stationary model fits ({reason}); a local level is the better description."]
     return "none", [f"No model of these kinds fits ({reason}): the record holds what they do not."]
 
 
-def _limits(
-    n: int, factor: int, step: float, lines: Lines, drift: GaussMarkov | None, burg: Autoregression | None,
-    normal: Normality | None, mixed: LjungBox | None,
-) -> list[str]:  # fmt: skip
+def _limits(m: DriftModel) -> list[str]:
+    """Return what the record cannot show, as sentences."""
     out = []
-    if factor > 1:
+    if m.factor > 1:
         out.append(
-            f"The models describe means over {factor} samples ({step:.4g} s): the record of {n} samples is longer than "
-            f"the {MODEL_SAMPLES} values they are fitted to, or model_dt asked for it."
+            f"The models describe means over {m.factor} samples ({m.model_dt:.4g} s): the record of {m.n} samples is "
+            f"longer than the {MODEL_SAMPLES} values they are fitted to."
         )
-    if not lines.complete:
-        out.append(f"{len(lines.lines)} lines were removed; there may be more.")
-    if moving := [line for line in lines.lines if not line.steady]:
+    if not m.lines.complete:
+        out.append(f"{len(m.lines.lines)} lines were removed; there may be more.")
+    if moving := [line for line in m.lines.lines if not line.steady]:
         out.append(
             f"The line at {moving[0].frequency:.4g} Hz changes its frequency or amplitude during the record; only its "
             "steady part was removed."
         )
-    if drift is not None and (limit := markov.check_length(drift)):
+    if m.gauss_markov is not None and (limit := markov.check_length(m.gauss_markov)):
         out.append(f"Correlation time: {limit}.")
-    elif drift is not None and mixed is not None and not mixed.white:
+    elif m.gauss_markov is not None and "arma" in m.whiteness and not m.whiteness["arma"].white:
         out.append(
             "The residuals of ARMA(1,1) are not white: a Gauss-Markov drift with white noise does not describe the "
             "record, and its correlation time and interval are those of the nearest one."
         )
-    if burg is not None and not burg.long_enough:
+    if m.burg is not None and not m.burg.long_enough:
         out.append(
-            f"The record has {burg.times:.3g} correlation times of the autoregression; its intervals need 20 and may "
+            f"The record has {m.burg.times:.3g} correlation times of the autoregression; its intervals need 20 and may "
             "not cover."
         )
-    if normal is not None and not math.isfinite(normal.p):
-        out.append(
-            f"Normality is not decided: the correlated record is worth {min(normal.effective):.3g} independent values."
-        )
+    if m.normality is not None and not math.isfinite(m.normality.p):
+        worth = min(m.normality.effective)
+        out.append(f"Normality is not decided: the correlated record is worth {worth:.3g} independent values.")
     return out

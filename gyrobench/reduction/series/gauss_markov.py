@@ -51,10 +51,6 @@ class GaussMarkov:
     def determined(self) -> bool:
         return self.gain >= GAIN
 
-    @property
-    def phi(self) -> float:
-        return math.exp(-self.dt / self.tau)
-
 
 class _Likelihood:
     """Restricted log likelihood with the scale taken out."""

@@ -2,9 +2,6 @@
 
     x_k = c + s t_k + sum A_i sin(2 pi f_i t_k + psi_i) + noise,   t_k = k dt,   A = hypot(a, b), psi = atan2(b, a)
 
-    find_lines(x, dt)        all significant lines (Lines), largest first, and the series without them
-    fit_line(x, dt, f)       one line near a known frequency
-
 Detection compares each value of the periodogram with the level around it, so the noise need not be white: the level is
 the mean logarithm over up to 64 bins on either side (a straight line over log f below bin 128), which k degrees of
 gamma type describe, trigamma(k) = its variance.  The ratio R then exceeds r by chance with the probability
@@ -28,7 +25,6 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage, special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 
 LEVEL = 1e-3  # false-alarm probability of a whole record
@@ -41,17 +37,15 @@ CLUSTER = 32  # bins: two lines may be as near as that, of more it is one that w
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """One line with standard uncertainties; phase of the sine at the first sample."""
 
     frequency: float  # Hz
     u_frequency: float
     amplitude: float
     u_amplitude: float
-    phase: float  # rad, -pi..pi
-    u_phase: float
-    density: float  # one-sided, of the noise around it, unit^2/Hz
-    false_alarm: float  # probability that a record without lines shows one as clear as this; NaN: not tested
+    phase: float  # rad, -pi..pi; standard uncertainty 2 u_amplitude/amplitude
+    false_alarm: float  # probability that a record without lines shows one as clear as this
     steady: bool = True  # False: power around it that is no third line, so its frequency or amplitude changes
 
 
@@ -59,85 +53,79 @@ class Line:
 class Lines:
     """Lines of a record and what is left of it."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     residual: Array  # (n,) the series without the lines; level and slope stay in
     level: float  # asked-for false-alarm probability
     complete: bool  # False: the most lines were found, there may be more
-
-
-class _Model:
-    """Sine of one frequency on a record cut into blocks: its sums are products of two short tables."""
-
-    def __init__(self, n: int, dt: float) -> None:
-        self.n, self.dt = n, dt
-        self.block = max(1, math.isqrt(n))
-        self.rows = -(-n // self.block)
-        self.within = dt * np.arange(self.block)
-        self.starts = dt * self.block * np.arange(self.rows) - dt * (n - 1) / 2.0  # from the middle of the record
-
-    def tables(self, f: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        return np.exp(2j * math.pi * f * self.starts), np.exp(2j * math.pi * f * self.within)
-
-    def sums(self, padded: Array, f: float) -> tuple[complex, complex]:
-        """Sum of r exp(-i phi) and of t r exp(-i phi), t from the middle of the record."""
-        phase, inner = self.tables(f)
-        X = padded.reshape(self.rows, self.block)
-        weights = np.column_stack([inner.real, inner.imag, self.within * inner.real, self.within * inner.imag])
-        both = X @ weights
-        y0, y1 = both[:, 0] - 1j * both[:, 1], both[:, 2] - 1j * both[:, 3]
-        turned = np.conj(phase)
-        return complex(turned @ y0), complex(turned @ (self.starts * y0 + y1))
-
-    def add(self, padded: Array, f: float, c: complex) -> None:
-        """Add Re(c exp(i phi)) in place."""
-        phase, inner = self.tables(f)
-        X, turned = padded.reshape(self.rows, self.block), c * phase
-        X += np.column_stack([turned.real, -turned.imag]) @ np.stack([inner.real, inner.imag])
-        padded[self.n :] = 0.0
 
 
 @dataclass
 class _Fitted:
     f: float
     density: float  # of the noise around it
+    false_alarm: float
     steady: bool = True
     c: complex = 0j  # b - i a, about the middle of the record
 
 
 class _Removal:
-    """Least squares of lines, level and slope; ``padded`` holds the residual."""
+    """Least squares of lines, level and slope; ``padded`` holds the residual.
+
+    The record is cut into blocks: the sums of a sine over it are products of two short tables.
+    """
 
     def __init__(self, x: Array, dt: float) -> None:
-        n = x.size
-        self.model, self.n, self.dt = _Model(n, dt), n, dt
-        self.padded = np.zeros(self.model.rows * self.model.block)
-        self.padded[:n] = x
-        self.time = (np.arange(n) - (n - 1) / 2.0) / n  # of the record, -1/2..1/2
+        self.n, self.dt = x.size, dt
+        self.block = max(1, math.isqrt(self.n))
+        self.rows = -(-self.n // self.block)
+        self.within = dt * np.arange(self.block)
+        # from the middle of the record
+        self.starts = dt * self.block * np.arange(self.rows) - dt * (self.n - 1) / 2.0
+        self.padded = self.pad(x)
+        self.time = (np.arange(self.n) - (self.n - 1) / 2.0) / self.n  # of the record, -1/2..1/2
         self.lines: list[_Fitted] = []
-        self.tests: list[float] = []
 
-    def start(self, f: float, density: float, false_alarm: float) -> None:
-        self.lines.append(_Fitted(f, density))
-        self.tests.append(false_alarm)
+    def pad(self, x: Array) -> Array:
+        return np.pad(x, (0, self.rows * self.block - self.n))
+
+    def tables(self, f: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        return np.exp(2j * math.pi * f * self.starts), np.exp(2j * math.pi * f * self.within)
+
+    def sums(self, f: float) -> tuple[complex, complex]:
+        """Return the sums of r exp(-i phi) and of t r exp(-i phi), t from the middle of the record."""
+        phase, inner = self.tables(f)
+        weights = np.column_stack([inner.real, inner.imag, self.within * inner.real, self.within * inner.imag])
+        both = self.padded.reshape(self.rows, self.block) @ weights
+        y0, y1 = both[:, 0] - 1j * both[:, 1], both[:, 2] - 1j * both[:, 3]
+        turned = np.conj(phase)
+        return complex(turned @ y0), complex(turned @ (self.starts * y0 + y1))
+
+    def add(self, padded: Array, line: _Fitted, sign: float) -> None:
+        """Add sign Re(c exp(i phi)) in place."""
+        phase, inner = self.tables(line.f)
+        turned = sign * line.c * phase
+        X = padded.reshape(self.rows, self.block)
+        X += np.column_stack([turned.real, -turned.imag]) @ np.stack([inner.real, inner.imag])
+        padded[self.n :] = 0.0
 
     def fit(self) -> None:
-        """Gauss-Newton steps, one line after the other, until no parameter moves by a thousandth of its u."""
+        """Make Gauss-Newton steps, one line after the other, until no parameter moves by a thousandth of its u."""
         r, n, T = self.padded[: self.n], self.n, self.n * self.dt
         for sweep in range(SWEEPS):
             mean, slope = float(r.mean()), 12.0 * float(self.time @ r) / n
             r -= mean + slope * self.time
             moved = 0.0
             for line in self.lines:
-                s0, s1 = self.model.sums(self.padded, line.f)
+                s0, s1 = self.sums(line.f)
                 step = 2.0 * s0 / n
                 df = 0.0
                 if abs(line.c) > 0.0:
                     gradient = -2.0 * math.pi * (s1.conjugate() * line.c).imag
                     df = gradient / (n / 2.0 * (2.0 * math.pi * abs(line.c)) ** 2 * T * T / 12.0)
                     df = max(-0.3 / T, min(0.3 / T, df))
-                self.model.add(self.padded, line.f, line.c)
+                self.add(self.padded, line, 1.0)
                 line.f, line.c = line.f + df, line.c + step
-                self.model.add(self.padded, line.f, -line.c)
+                self.add(self.padded, line, -1.0)
                 variance = max(line.density / T, 1e-300)  # of its amplitude
                 moved = max(moved, abs(step) ** 2 / variance, (abs(line.c) * df * T) ** 2 / variance)
             if not self.lines or (sweep > 1 and moved < 1e-6):
@@ -145,7 +133,7 @@ class _Removal:
 
 
 def _periodogram(r: Array, dt: float) -> Array:
-    """One-sided density at j/(n dt), j = 0..n/2."""
+    """Return the one-sided density at j/(n dt), j = 0..n/2."""
     power = np.abs(fft.rfft(r)) ** 2
     power *= 2.0 * dt / r.size
     out: Array = power
@@ -174,7 +162,7 @@ def local_level(density: Array) -> tuple[Array, Array]:
 
 @functools.cache
 def _low_bins(n: int) -> tuple[tuple[int, NDArray[np.int_], Array, float], ...]:
-    """Bin, neighbours, weights of the straight line over log f at the bin, degrees; degrees 0: too few neighbours."""
+    """Return bin, neighbours, weights of the line over log f at the bin, degrees (0: too few neighbours)."""
     out = []
     for j in range(1, min(n, 2 * HALF) + 1):
         rows = np.arange(max(1, j // 2, j - HALF), min(n, 2 * j, j + HALF) + 1)
@@ -191,7 +179,7 @@ def _low_bins(n: int) -> tuple[tuple[int, NDArray[np.int_], Array, float], ...]:
 
 @functools.cache
 def _gamma_degrees(share: float) -> float:
-    """k with trigamma(k) = share pi^2/6."""
+    """Return k with trigamma(k) = share pi^2/6."""
     target, k = share * math.pi**2 / 6.0, 1.0 / (share * math.pi**2 / 6.0) + 0.5
     for _ in range(20):
         k -= (float(special.polygamma(1, k)) - target) / float(special.polygamma(2, k))
@@ -203,7 +191,7 @@ def _one_bin(ratio: Array, k: Array) -> Array:
     return out
 
 
-def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lines:
+def find_lines(x: Any, dt: float, level: float = LEVEL) -> Lines:
     """Find the lines of a record (n,) sampled every ``dt`` s, with the false-alarm probability ``level`` of the record.
 
     Raises SeriesError for fewer than 64 samples and a level outside 0..0.5.
@@ -214,7 +202,7 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
     removal, n = _Removal(x, dt), x.size
     removal.fit()
     complete = False
-    for _ in range(most):
+    for _ in range(MOST):
         density = _periodogram(removal.padded[:n], dt)
         around, k = local_level(density)
         tested = np.flatnonzero(k > 0.0)
@@ -235,68 +223,42 @@ def find_lines(x: Any, dt: float, level: float = LEVEL, most: int = MOST) -> Lin
             if len(beside) >= 2:
                 for line in beside:
                     line.steady = False
-            elif len(removal.lines) < most:
+            elif len(removal.lines) < MOST:
                 taken.append(bin_)
-                removal.start(_interpolated(removal.padded[:n], bin_, dt), float(around[bin_]), chance)
-        complete = not taken and len(removal.lines) < most
+                f = _interpolated(removal, bin_)
+                removal.lines.append(_Fitted(f, float(around[bin_]), chance))
+        complete = not taken and len(removal.lines) < MOST
         removal.fit()
-        if not taken or len(removal.lines) >= most:
+        if not taken or len(removal.lines) >= MOST:
             break
-    return _finished(x, dt, removal, level, complete)
+    return _finished(x, removal, level, complete)
 
 
-def _interpolated(r: Array, bin_: int, dt: float) -> float:
-    """Frequency between the bins: of three transforms about the peak, as of a single line."""
-    n = r.size
-    model = _Model(n, dt)
-    padded = np.zeros(model.rows * model.block)
-    padded[:n] = r
+def _interpolated(removal: _Removal, bin_: int) -> float:
+    """Return the frequency between the bins: of three transforms about the peak, as of a single line."""
+    T = removal.n * removal.dt
+    sums = (removal.sums((bin_ + d) / T)[0] for d in (-1, 0, 1))
     # shifted by half a record from bin to bin: the sums are about the middle, where neighbours have opposite signs
-    low, mid, high = (model.sums(padded, (bin_ + d) / (n * dt))[0] * s for d, s in ((-1, -1.0), (0, 1.0), (1, -1.0)))
+    low, mid, high = (s * sign for s, sign in zip(sums, (-1.0, 1.0, -1.0), strict=True))
     bottom = 2.0 * mid - low - high
     shift = float(np.real((low - high) / bottom)) if abs(bottom) > 0.0 else 0.0
-    return (bin_ + max(-0.6, min(0.6, shift))) / (n * dt)
+    return (bin_ + max(-0.6, min(0.6, shift))) / T
 
 
-def _finished(x: Array, dt: float, removal: _Removal, level: float, complete: bool) -> Lines:
-    n, T = x.size, x.size * dt
+def _finished(x: Array, removal: _Removal, level: float, complete: bool) -> Lines:
+    n, dt = removal.n, removal.dt
+    T = n * dt
     around, _ = local_level(_periodogram(removal.padded[:n], dt))
-    lines, residual = [], np.zeros(removal.padded.size)
-    residual[:n] = x
-    for fitted, chance in zip(removal.lines, removal.tests, strict=True):
-        removal.model.add(residual, fitted.f, -fitted.c)
-        S = float(around[min(max(round(fitted.f * T), 1), around.size - 2)])
-        A = abs(fitted.c)
+    lines, residual = [], removal.pad(x)
+    for line in removal.lines:
+        removal.add(residual, line, -1.0)
+        S = float(around[min(max(round(line.f * T), 1), around.size - 2)])
+        A = abs(line.c)
         u = math.sqrt(S / T)
-        b, a = fitted.c.real, -fitted.c.imag
-        phase = math.atan2(b, a) - 2.0 * math.pi * fitted.f * dt * (n - 1) / 2.0
+        b, a = line.c.real, -line.c.imag
+        phase = math.atan2(b, a) - 2.0 * math.pi * line.f * dt * (n - 1) / 2.0
         phase = (phase + math.pi) % (2.0 * math.pi) - math.pi
-        lines.append(
-            Line(fitted.f, math.sqrt(3.0) * u / (math.pi * A * T), A, u, phase, 2.0 * u / A, S, chance, fitted.steady)
-        )
+        u_f = math.sqrt(3.0) * u / (math.pi * A * T)
+        lines.append(SpectralLine(line.f, u_f, A, u, phase, line.false_alarm, line.steady))
     lines.sort(key=lambda line: -line.amplitude)
     return Lines(tuple(lines), residual[:n].copy(), level, complete)
-
-
-def fit_line(x: Any, dt: float, frequency: float) -> Line:
-    """Fit one line near ``frequency`` (Hz), to within half a bin, by least squares; nothing is tested.
-
-    Raises SeriesError below two cycles in the record, at or beyond half the sampling rate, and where the fit leaves the
-    frequency or the amplitude does not exceed twice its interval.
-    """
-    x, dt = checked(x, 64), checked_step(dt)
-    T = x.size * dt
-    if not 2.0 / T <= frequency < 0.5 / dt:
-        raise SeriesError(
-            f"line at {frequency:.4g} Hz: a record of {T:.4g} s sampled every {dt:.4g} s shows "
-            f"{2.0 / T:.4g} to {0.5 / dt:.4g} Hz"
-        )
-    removal = _Removal(x, dt)
-    removal.fit()
-    around, _ = local_level(_periodogram(removal.padded[: x.size], dt))
-    removal.start(frequency, float(around[min(max(round(frequency * T), 1), around.size - 2)]), math.nan)
-    removal.fit()
-    line = _finished(x, dt, removal, math.nan, False).lines[0]
-    if abs(line.frequency - frequency) > 1.0 / T or line.amplitude < 2.0 * NORMAL * line.u_amplitude:
-        raise SeriesError(f"line at {frequency:.4g} Hz: none stands out of the noise within {1.0 / T:.3g} Hz of it")
-    return line

@@ -2,9 +2,9 @@
 
     x_t - m = sum phi_i (x_{t-i} - m) + e_t + sum theta_j e_{t-j}
 
-as in statsmodels; Hu 1981 writes theta(B) = 1 - theta_1 B - .., minus these (:attr:`Arma.theta_hu`).  A Gauss-Markov
-drift with white reading noise is ARMA(1,1): an AR(1) fitted to it has its coefficient too low.  The likelihood is
-that of statsmodels (innovations algorithm), the covariance sigma^2 (J'J)^-1 with the derivatives J of the residuals.
+as in statsmodels; Hu 1981 writes theta(B) = 1 - theta_1 B - .., minus these.  A Gauss-Markov drift with white reading
+noise is ARMA(1,1): an AR(1) fitted to it has its coefficient too low.  The likelihood is that of statsmodels
+(innovations algorithm), which gives no covariance with it: sigma^2 (J'J)^-1 with the derivatives J of the residuals.
 Up to 10^5 values; longer records are to be averaged in blocks first.
 [RED-ARMA; Hu 1981, eq. 4-113..4-126; Xia 2008, eq. 3.4.18]
 """
@@ -21,6 +21,7 @@ from scipy import signal
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.series.autoregression import spectral_radius
 from gyrobench.reduction.series.checks import SeriesError, checked
 
 LONGEST = 100_000
@@ -30,7 +31,10 @@ AT_THE_CIRCLE = 10.0  # over n: the distance at which maximum likelihood piles u
 
 @dataclass(frozen=True)
 class Arma:
-    """A fitted model; ``u``, ``low``, ``high`` follow (phi, theta)."""
+    """A fitted model; ``u``, ``low``, ``high`` follow (phi, theta).
+
+    theta has no u and no interval (NaN) where a root of it lies within 10/n of the circle: over-differenced.
+    """
 
     phi: Array
     theta: Array
@@ -38,44 +42,7 @@ class Arma:
     low: Array
     high: Array
     variance: float  # of e
-    mean: float
-    n: int
-    log_likelihood: float
     residual: Array  # of the record, without the start that the first errors (taken as zero) still affect
-    invertible: bool  # False: a root of theta within 10/n of the circle: over-differenced, and theta has no interval
-
-    @property
-    def theta_hu(self) -> Array:
-        """The moving-average coefficients with the sign of Hu 1981."""
-        out: Array = -self.theta
-        return out
-
-    @property
-    def order(self) -> tuple[int, int]:
-        return self.phi.size, self.theta.size
-
-    def weights(self, n: int) -> Array:
-        """Return psi_0 .. psi_{n-1} of x_t - m = sum psi_j e_{t-j}."""
-        impulse = np.zeros(n)
-        impulse[0] = 1.0
-        ma, ar = np.concatenate([[1.0], self.theta]), np.concatenate([[1.0], -self.phi])
-        out: Array = signal.lfilter(ma, ar, impulse)
-        return out
-
-    def autocovariance(self, lags: int) -> Array:
-        """Return the model's autocovariances at lags 0..lags, unit^2 (statsmodels)."""
-        from statsmodels.tsa.arima_process import arma_acovf
-
-        ma, ar = np.concatenate([[1.0], self.theta]), np.concatenate([[1.0], -self.phi])
-        out: Array = np.asarray(arma_acovf(ar, ma, nobs=lags + 1, sigma2=self.variance))
-        return out
-
-    def density(self, frequency: Array, dt: float) -> Array:
-        """Return the one-sided density at frequencies (Hz), unit^2/Hz."""
-        w = 2.0 * np.pi * np.asarray(frequency) * dt
-        _, h = signal.freqz(np.concatenate([[1.0], self.theta]), np.concatenate([[1.0], -self.phi]), worN=w)
-        out: Array = 2.0 * dt * self.variance * np.abs(h) ** 2
-        return out
 
 
 def fit_arma(x: Any, p: int, q: int) -> Arma:
@@ -90,21 +57,17 @@ def fit_arma(x: Any, p: int, q: int) -> Arma:
     x = checked(x, FEWEST * max(p, q))
     if x.size > LONGEST:
         raise SeriesError(f"ARMA({p},{q}) of {x.size} values: at most {LONGEST}; average blocks first")
-    centre, scale = float(x.mean()), float(x.std())
-    y = (x - centre) / scale
+    scale = float(x.std())
+    y = (x - x.mean()) / scale
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a start outside the region is replaced, and the result is judged below
         model = ARIMA(y, order=(p, 0, q), trend="c")
         fit = model.fit(method="innovations_mle", low_memory=True, cov_type="none")
-    mean, phi, theta = (
-        float(fit.params[0]),
-        np.asarray(fit.params[1 : 1 + p]),
-        np.asarray(fit.params[1 + p : 1 + p + q]),
-    )
-    variance = float(fit.params[-1])
-    if np.abs(np.roots(np.concatenate([[1.0], -phi]))).max(initial=0.0) >= 1.0:
+    mean, variance = float(fit.params[0]), float(fit.params[-1])
+    phi, theta = np.split(np.asarray(fit.params[1:-1]), [p])
+    if spectral_radius(phi) >= 1.0:
         raise SeriesError(f"ARMA({p},{q}): the fit is not stationary; difference first, or remove the trend")
-    radius = float(np.abs(np.roots(np.concatenate([[1.0], theta]))).max(initial=0.0))
+    radius = spectral_radius(-theta)
     ar, ma = np.concatenate([[1.0], -phi]), np.concatenate([[1.0], theta])
     e = signal.lfilter(ar, ma, y - mean)
     settled = min(x.size // 4, max(p, q) + int(7.0 / max(1.0 - radius, 1e-6)) if q else p)
@@ -117,10 +80,6 @@ def fit_arma(x: Any, p: int, q: int) -> Arma:
     else:  # a root of phi is one of theta: of white noise any such pair fits
         u = np.full(p + q, math.inf)
     value = np.concatenate([phi, theta])
-    invertible = 1.0 - radius > AT_THE_CIRCLE / x.size
-    if not invertible:
+    if 1.0 - radius <= AT_THE_CIRCLE / x.size:
         u = np.where(np.arange(p + q) < p, u, math.nan)
-    return Arma(
-        phi, theta, u, value - NORMAL * u, value + NORMAL * u, variance * scale**2, centre + scale * mean, x.size,
-        float(fit.llf) - x.size * math.log(scale), e[settled:] * scale, invertible,
-    )  # fmt: skip
+    return Arma(phi, theta, u, value - NORMAL * u, value + NORMAL * u, variance * scale**2, e[settled:] * scale)

@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.noise_coefficients import JUST, fit
-from gyrobench.result import DriftTestResult
+from gyrobench.result import DriftTestResult, Table
 from gyrobench.units import DPH
 
 LEAST = 400  # windows of a long test
@@ -32,7 +31,7 @@ RESIDUAL = (
 )
 
 
-def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[dict[str, Any]]:
+def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[Table]:
     """Return the table, or none where a test has fewer than LEAST windows, or windows that do not stand end to end.
 
     Of the drift rate itself, or of its residuals.  Each series of the result is a stretch of its own; missing windows,
@@ -67,21 +66,19 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         caption = f"{departs}. {caption}"
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     title = "Noise coefficients"
-    return [{"title": title, "caption": f"{caption}. {RESIDUAL}" if residual else caption, "columns": columns,
-             "rows": rows}]  # fmt: skip
+    caption = f"{caption}. {RESIDUAL}" if residual else caption
+    return [Table("noise_coefficients", title, caption, columns, rows)]
 
 
 def on_grid(t: Array, x: Array, step: float) -> Array:
-    """Return values in the order of their times, NaN where one is missing; a time off the grid begins a gap."""
+    """Return values in the order of their times, NaN where one is missing.
+
+    A time that does not follow the one before by a step, within a hundredth of it, begins a gap.
+    """
     order = np.argsort(t, kind="stable")
     t, x = t[order], x[order]
-    places = np.concatenate([[0], np.cumsum(np.where(_next(t, step), 1, 2))])
+    follows = np.abs(np.diff(t) - step) < 0.01 * step
+    places = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
     out = np.full(int(places[-1]) + 1, math.nan)
     out[places] = x
     return out
-
-
-def _next(t: Array, step: float) -> NDArray[np.bool_]:
-    """True where a time follows the one before by a step, within a hundredth of it."""
-    found: NDArray[np.bool_] = np.abs(np.diff(t) - step) < 0.01 * step
-    return found

@@ -1,11 +1,15 @@
-"""Order of an autoregressive model by three criteria together.
+"""Order of an autoregressive model by three criteria together, and whiteness of what a model leaves.
 
-    AIC = n ln s_p^2 + 2 (p + q + 1)     SBC = n ln s_p^2 + (p + q + 1) ln n     FPE = s_p^2 (n + p + 1)/(n - p - 1)
+    AIC = n ln s_p^2 + 2 (p + 1)     SBC = n ln s_p^2 + (p + 1) ln n     FPE = s_p^2 (n + p + 1)/(n - p - 1)
 
 (FPE with estimated mean.)  AIC and FPE pick too high an order now and then, whatever the length; SBC finds the true
 one of a long record.  A minimum at the highest order tried is no minimum: then the series is no short autoregression,
-and ARMA(1,1), ARIMA(0,1,1) or a local level is to be tried.   [DRIFT-ORDER; Xia 2008, eq. 3.4.15..3.4.17, table
-3.4.2]
+and ARMA(1,1), ARIMA(0,1,1) or a local level is to be tried.
+
+    LB = n(n + 2) sum_{k<=m} r_k^2/(n - k),   chi-squared of m - f, f coefficients fitted to the series (p + q of an
+    ARMA)
+
+[DRIFT-ORDER, DRIFT-WHITENESS-LB; Xia 2008, eq. 3.4.13..3.4.17, table 3.4.2 with EX15, EX16]
 """
 
 from __future__ import annotations
@@ -17,16 +21,13 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.checks import SeriesError, checked
+from gyrobench.reduction.series.checks import SeriesError, checked, checked_order
 
 
-def criteria(variance: float, n: int, p: int, q: int = 0) -> tuple[float, float, float]:
-    """Return AIC, SBC, FPE of innovation variance ``variance`` on ``n`` values; FPE for q = 0 only, else NaN."""
-    if not (variance > 0.0 and n > p + 1):
-        raise SeriesError(f"order criteria: variance {variance:.4g} on {n} values with order {p}")
-    base, k = n * math.log(variance), p + q + 1
-    fpe = variance * (n + p + 1.0) / (n - p - 1.0) if q == 0 else math.nan
-    return base + 2.0 * k, base + k * math.log(n), fpe
+def criteria(variance: float, n: int, p: int) -> tuple[float, float, float]:
+    """Return AIC, SBC, FPE of an autoregression of order ``p`` with this innovation variance on ``n`` values."""
+    base = n * math.log(variance)
+    return base + 2.0 * (p + 1), base + (p + 1) * math.log(n), variance * (n + p + 1.0) / (n - p - 1.0)
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,12 @@ class OrderTable:
 
     @property
     def chosen(self) -> dict[str, int]:
-        """Order of the least value of each criterion."""
+        """Return the order of the least value of each criterion."""
         return {name: int(np.argmin(getattr(self, name))) for name in ("aic", "sbc", "fpe")}
 
     @property
     def at_limit(self) -> bool:
-        """SBC is least at the highest order tried: no autoregression of these orders."""
+        """Return whether SBC is least at the highest order tried: no autoregression of these orders."""
         return self.chosen["sbc"] == self.order[-1]
 
 
@@ -55,9 +56,31 @@ def order_table(x: Any, highest: int = 12) -> OrderTable:
     from statsmodels.tsa.stattools import pacf_burg
 
     x = checked(x)
-    n = x.size
-    if highest < 1 or 3 * highest >= n:
-        raise SeriesError(f"orders up to {highest} on {n} values: 1 to {max((n - 1) // 3, 0)} are possible")
+    checked_order(highest, x.size)
     variance = np.asarray(pacf_burg(x, nlags=highest, demean=True)[1])
-    table = np.array([criteria(float(v), n, p) for p, v in enumerate(variance)])
-    return OrderTable(tuple(range(highest + 1)), variance, table[:, 0], table[:, 1], table[:, 2])
+    table = np.array([criteria(float(v), x.size, p) for p, v in enumerate(variance)])
+    return OrderTable(tuple(range(highest + 1)), variance, *table.T)
+
+
+@dataclass(frozen=True)
+class LjungBox:
+    lags: int
+    q: float
+    dof: int
+    p: float
+
+    @property
+    def white(self) -> bool:
+        """Return whether whiteness is accepted at 5 %."""
+        return self.p >= 0.05
+
+
+def ljung_box(x: Any, lags: int, fitted: int = 0) -> LjungBox:
+    """Test a series, or residuals of a model with ``fitted`` coefficients.  Raises SeriesError for lags <= fitted."""
+    from statsmodels.stats.diagnostic import acorr_ljungbox
+
+    x = checked(x, 4)
+    if lags <= fitted:
+        raise SeriesError(f"Ljung-Box over {lags} lags of residuals with {fitted} fitted coefficients: take more lags")
+    q, p = acorr_ljungbox(x, lags=[lags], model_df=fitted).iloc[0]
+    return LjungBox(lags, float(q), lags - fitted, float(p))

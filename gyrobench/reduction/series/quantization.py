@@ -1,6 +1,6 @@
-"""Quantization and range of a record, and the aliasing of a sampling interval.
+"""Quantization of a record, and the aliasing of a sampling interval.
 
-    quantization(x)        step of the converter found in the values, noise over step, values at the ends of the range
+    quantization(x)        step of the converter found in the values, noise over step
     angle_quantization(d)  the same of a cumulative angle, from its increments
     folded(dt, cutoff)     what a sampling interval folds into the record behind a low-pass of that cutoff
 
@@ -28,53 +28,42 @@ from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
 LOOKED_AT = 100_000  # values the step is found from
 DITHER = 0.5  # noise of a sample over the step from which on rounding is a white error
 ANGLE_DITHER = 0.4  # of the change of an angle within a sample
-SATURATED = 3  # equal values in a row at an end of the range
 
 
 @dataclass(frozen=True)
-class Quantization:
+class Rounding:
     step: float  # unit; 0: none found
     noise: float  # rms of a sample without the rounding, from successive differences, unit
-    saturated: float = 0.0  # share of values in rows of three or more at the lowest or highest value
     dither: float = DITHER  # noise over step from which on rounding is a white error
 
     @property
-    def error(self) -> float:
-        """Standard deviation of the rounding, q/sqrt 12."""
-        return self.step / math.sqrt(12.0)
-
-    @property
     def white(self) -> bool:
-        """Whether rounding acts as a white error."""
+        """Return whether rounding acts as a white error."""
         return self.step == 0.0 or self.noise >= self.dither * self.step
 
 
-def quantization(x: Any) -> Quantization:
-    """Return what rounding and the range of a converter did to a record (n,)."""
+def quantization(x: Any) -> Rounding:
+    """Return what rounding did to a record (n,)."""
     x = checked(x, 16)
-    step, few, levels = _step(x)
+    step = _step(x)
     # two levels in turn at a boundary, whatever makes them, have a variance of q^2/4: q^2/6 without that of rounding
     variance = float(np.mean(np.diff(x[:LOOKED_AT]) ** 2)) / 2.0 - step * step / 12.0
-    at_end = (x == x.max()) | (x == x.min())
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_end, [False]]).astype(int)))
-    rows = edges[1::2] - edges[::2]
-    saturated = float(rows[rows >= SATURATED].sum()) / x.size if few and levels > 8 else 0.0
-    return Quantization(step, math.sqrt(max(variance, 0.0)), saturated)
+    return Rounding(step, math.sqrt(max(variance, 0.0)))
 
 
-def angle_quantization(d: Any, step: float = 0.0) -> Quantization:
+def angle_quantization(d: Any, step: float = 0.0) -> Rounding:
     """Return what rounding did to an angle of these increments (n,), gaps left out; step: of the angle, 0: is found.
 
     The difference of two increments has three errors of q^2/12: six times that in all.
     """
     d = checked(d, 16)
-    step = step or _step(d)[0]
+    step = step or _step(d)
     variance = float(np.mean(np.diff(d[:LOOKED_AT]) ** 2)) / 2.0 - step * step / 4.0
-    return Quantization(step, math.sqrt(max(variance, 0.0)), dither=ANGLE_DITHER)
+    return Rounding(step, math.sqrt(max(variance, 0.0)), dither=ANGLE_DITHER)
 
 
-def _step(x: Array) -> tuple[float, bool, int]:
-    """Return the step of the values, 0 where there is none, whether few of them differ, and how many do."""
+def _step(x: Array) -> float:
+    """Return the step of the values, 0 where there is none."""
     values = np.unique(x[:LOOKED_AT])
     apart = np.diff(values)
     # decimals of a file differ from each other by rounding of the computer
@@ -86,7 +75,7 @@ def _step(x: Array) -> tuple[float, bool, int]:
     times = np.maximum(np.round(apart / step), 1.0)
     regular = bool(np.all(np.abs(apart / step - times) < 0.01 * times))
     few = values.size < 0.5 * min(x.size, LOOKED_AT)
-    return (step if regular and few else 0.0), few, int(values.size)
+    return step if regular and few else 0.0
 
 
 @dataclass(frozen=True)

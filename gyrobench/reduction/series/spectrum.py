@@ -19,8 +19,9 @@ import numpy as np
 from scipy import fft, special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.checks import SeriesError, checked, checked_step
+from gyrobench.reduction.series.checks import checked, checked_step
 
+PER_DECADE = 10  # bins
 FIRST = 3  # bin: below it, the straight line has taken its share
 
 
@@ -32,14 +33,11 @@ class Spectrum:
     density: Array
     low: Array
     high: Array
-    dof: Array
 
 
-def spectrum(x: Any, dt: float, per_decade: int = 10) -> Spectrum:
-    """Return the density of ``x`` (n,) sampled every ``dt`` s in ``per_decade`` bins a decade."""
+def spectrum(x: Any, dt: float) -> Spectrum:
+    """Return the density of ``x`` (n,) sampled every ``dt`` s."""
     x, dt = checked(x, 64), checked_step(dt)
-    if per_decade < 1:
-        raise SeriesError(f"{per_decade} bins a decade: at least 1 is needed")
     n = x.size
     t = (np.arange(n) - (n - 1) / 2.0) / n
     taper = 0.5 + 0.5 * np.cos(2.0 * np.pi * t)
@@ -47,7 +45,7 @@ def spectrum(x: Any, dt: float, per_decade: int = 10) -> Spectrum:
     power = np.abs(fft.rfft(y)) ** 2
     power *= 2.0 * dt / float(taper @ taper)
     last = power.size - 1 - (n % 2 == 0)  # the highest of an even n has one degree of freedom
-    edges = FIRST * 10.0 ** (np.arange(1 + int(np.ceil(per_decade * np.log10(last / FIRST)))) / per_decade)
+    edges = FIRST * 10.0 ** (np.arange(1 + int(np.ceil(PER_DECADE * np.log10(last / FIRST)))) / PER_DECADE)
     index = np.unique(np.append(np.minimum(np.ceil(edges).astype(int), last + 1), last + 1))
     m = np.diff(index).astype(float)
     sums = np.add.reduceat(power[: last + 1], index[:-1])
@@ -55,4 +53,4 @@ def spectrum(x: Any, dt: float, per_decade: int = 10) -> Spectrum:
     frequency = np.sqrt((index[:-1] - 0.5) * (index[1:] - 0.5)) / (n * dt)
     dof = 2.0 * m / (1.0 + 2.0 * (1.0 - 1.0 / m) * 4.0 / 9.0 + 2.0 * np.maximum(1.0 - 2.0 / m, 0.0) / 36.0)
     low, high = density * dof / special.chdtri(dof, 0.025), density * dof / special.chdtri(dof, 0.975)
-    return Spectrum(frequency, density, low, high, dof)
+    return Spectrum(frequency, density, low, high)

@@ -2,13 +2,13 @@
 
     block_runs(x, m)    runs of block means and of block variances about their mean    [DRIFT-STATS-RUNS]
     up_down_runs(y)     runs of the signs of successive differences                    [DRIFT-STATS-TREND]
-    trend(x, dt)        slope with an interval, Kendall's tau
+    trend(x, dt)        slope with an interval
     unit_root(x)        augmented Dickey-Fuller and KPSS tests
 
 The two counts of runs test the **independence** of block statistics, not stationarity: a stationary Gauss-Markov
 process slower than a block fails (too few runs), a differenced white one, too (too many).  Up-and-down runs are blind
 to slow trends.  Trends are decided by :func:`trend`, whose slope has an interval under estimated white and
-Gauss-Markov noise.
+Gauss-Markov noise.  statsmodels counts runs in its sandbox only, and gives no number of them.
 [Xia 2008, eq. 3.1.1..3.1.5 with EX7, EX8]
 """
 
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 
 from gyrobench.reduction.estimation import noise_mixture_fit
 from gyrobench.reduction.estimation.uncertainty import NORMAL
@@ -40,23 +40,14 @@ class RunsTest:
     """Number of runs against that of independent values."""
 
     statistic: str
-    count: int  # symbols, or observations of up-and-down runs
     runs: int
-    expected: float
-    z: float  # (runs - expected)/standard deviation; negative: slow variation, positive: alternation
+    z: float  # less those expected, over their standard deviation; negative: slow variation, positive: alternation
     p: float  # two-sided
 
     @property
     def independent(self) -> bool:
-        """Accepted at 5 %."""
+        """Return whether independence is accepted at 5 %."""
         return abs(self.z) < NORMAL
-
-    @property
-    def reading(self) -> str:
-        """What the sign of z means."""
-        if self.independent:
-            return "consistent with independent values"
-        return "too few runs: slow variation" if self.z < 0.0 else "too many runs: over-differencing or alternation"
 
 
 def runs_test(above: NDArray[np.bool_], statistic: str = "values") -> RunsTest:
@@ -72,16 +63,14 @@ def runs_test(above: NDArray[np.bool_], statistic: str = "values") -> RunsTest:
         raise SeriesError(f"runs of {statistic}: {n} symbols; more than 20 are needed, take shorter blocks")
     if n1 == 0 or n2 == 0:
         raise SeriesError(f"runs of {statistic}: all symbols are equal; there is nothing to count")
-    runs = 1 + int(np.count_nonzero(above[1:] != above[:-1]))
     product = 2.0 * n1 * n2
-    expected = product / n + 1.0
-    sd = math.sqrt(product * (product - n) / (n * n * (n - 1.0)))
-    return _tested(statistic, n, runs, expected, sd)
+    return _tested(statistic, above, product / n + 1.0, math.sqrt(product * (product - n) / (n * n * (n - 1.0))))
 
 
-def _tested(statistic: str, n: int, runs: int, expected: float, sd: float) -> RunsTest:
+def _tested(statistic: str, symbols: NDArray[Any], expected: float, sd: float) -> RunsTest:
+    runs = 1 + int(np.count_nonzero(symbols[1:] != symbols[:-1]))
     z = (runs - expected) / sd
-    return RunsTest(statistic, n, runs, expected, z, float(2.0 * special.ndtr(-abs(z))))
+    return RunsTest(statistic, runs, z, float(2.0 * special.ndtr(-abs(z))))
 
 
 def block_runs(x: Any, block: int) -> tuple[RunsTest, RunsTest]:
@@ -90,10 +79,9 @@ def block_runs(x: Any, block: int) -> tuple[RunsTest, RunsTest]:
         raise SeriesError(f"block of {block} samples: at least 2 are needed for a variance")
     x = checked(x, LEAST_BLOCKS * block)
     parts = x[: x.size // block * block].reshape(-1, block)
-    out = []
-    for name, value in (("block means", parts.mean(axis=1)), ("block variances", parts.var(axis=1, ddof=1))):
-        out.append(runs_test(value >= value.mean(), name))
-    return out[0], out[1]
+    means, variances = parts.mean(axis=1), parts.var(axis=1, ddof=1)
+    return (runs_test(means >= means.mean(), "block means"),
+            runs_test(variances >= variances.mean(), "block variances"))  # fmt: skip
 
 
 def up_down_runs(y: Any) -> RunsTest:
@@ -107,8 +95,7 @@ def up_down_runs(y: Any) -> RunsTest:
     n = signs.size + 1
     if n < LEAST_OBSERVATIONS:
         raise SeriesError(f"up-and-down runs: {n} observations without ties; at least {LEAST_OBSERVATIONS} are needed")
-    runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
-    return _tested("up and down", n, runs, (2.0 * n - 1.0) / 3.0, math.sqrt((16.0 * n - 29.0) / 90.0))
+    return _tested("up and down", signs, (2.0 * n - 1.0) / 3.0, math.sqrt((16.0 * n - 29.0) / 90.0))
 
 
 @dataclass(frozen=True)
@@ -120,14 +107,11 @@ class Trend:
     low: float  # 95 % interval under estimated white and Gauss-Markov noise
     high: float
     p: float  # two-sided probability of no slope
-    tau: float  # Kendall's, of the block means
-    p_independent: float  # of Kendall's tau; block means are taken as independent, too small where they are not
-    blocks: int
     bounded: bool  # the correlation time of the noise about the slope is bounded; over a random walk no interval covers
 
     @property
     def significant(self) -> bool:
-        """At 5 %, with the interval of the estimated noise; never where the noise may be a random walk."""
+        """Return whether the slope differs from zero at 5 %; never where the noise may be a random walk."""
         return self.bounded and not self.low <= 0.0 <= self.high
 
 
@@ -148,14 +132,10 @@ def trend(x: Any, dt: float) -> Trend:
     columns = np.column_stack([np.ones(y.size), middle])
     fit = noise_mixture_fit.fit(columns, (y - y.mean()) / scale, ("level", "slope"), start, start + m * dt)
     unit = scale / span
-    slope, half = float(fit.beta[1]) * unit, float(fit.half_width[1]) * unit
-    kendall = stats.kendalltau(start, y)
+    slope, u, half = (float(v[1]) * unit for v in (fit.beta, fit.u, fit.half_width))
     about = gauss_markov((y - columns @ fit.beta[:2] * scale - y.mean()), m * dt)
     bounded = about.high < SLOWEST * span or not about.determined
-    return Trend(
-        slope, float(fit.u[1]) * unit, slope - half, slope + half, float(fit.p[1]), float(kendall.statistic),
-        float(kendall.pvalue), y.size, bounded,
-    )  # fmt: skip
+    return Trend(slope, u, slope - half, slope + half, float(fit.p[1]), bounded)
 
 
 @dataclass(frozen=True)
@@ -170,11 +150,10 @@ class UnitRoot:
     p_adf: float  # small: no unit root
     kpss: float
     p_kpss: float  # small: not stationary about a level; tabulated between 0.01 and 0.1
-    blocks: int
 
     @property
     def reading(self) -> str:
-        """What both say together, at 5 %."""
+        """Return the finding of both together, at 5 %."""
         rooted, moving = self.p_adf >= 0.05, self.p_kpss < 0.05
         if rooted and moving:
             return "random walk or slower: not stationary"
@@ -192,4 +171,4 @@ def unit_root(x: Any) -> UnitRoot:
         # p outside the table of KPSS (the bound is returned), and announcements of what the library will return
         warnings.simplefilter("ignore")
         unit, level = adfuller(y, maxlag=min(20, y.size // 4), autolag="BIC"), kpss(y, nlags="auto")
-    return UnitRoot(float(unit[0]), float(unit[1]), float(level[0]), float(level[1]), y.size)
+    return UnitRoot(float(unit[0]), float(unit[1]), float(level[0]), float(level[1]))

@@ -3,7 +3,6 @@
 site = Site.of(record.run)
 k = number(record.run, "k", "gyro.k")             # the option, else the parameter of the part
 truth = truth_of(record.run, drift.NAMES)         # None for measured data
-return finish(result, record)
 """
 
 from __future__ import annotations
@@ -11,31 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from gyrobench import frames, units
-from gyrobench.record.record import Record
+from gyrobench import frames
 from gyrobench.record.run_document import PlanRow, RunDocument
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.effects import Remount
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, Result
 
-R = TypeVar("R", bound=Result)
-#: estimates that belong to the mean temperature of the record -> their change per kelvin in the gyro, and its sign
-WARMED = {
-    "D_F": ("D_T", 1.0),
-    "ω_d": ("D_T", 1.0),
-    "Dx_0": ("Dx_T", 1.0),
-    "Dy_0": ("Dy_T", 1.0),
-    "R_x": ("Dy_T", 1.0),
-    "R_y": ("Dx_T", -1.0),
-}
-NO_TYPE_B = (
-    "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare type_b = none."
-)
+
+class Remount(NamedTuple):
+    """Standard uncertainty (rad/s) of the drift from mount to mount; stated: given, declared absent, or simulated."""
+
+    size: float = 0.0
+    stated: bool = True
 
 
 @dataclass(frozen=True)
@@ -97,7 +83,7 @@ def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
 def remount_of(run: RunDocument) -> Remount:
     """Return the option u_remount, and whether drift from mount to mount is stated or declared absent.
 
-    Where nothing of type B is stated, :func:`finish` says so, of all sources together.
+    Where nothing of type B is stated, conditions.py says so, of all sources together.
     """
     size = float(run.options.get("u_remount", 0.0))
     return Remount(size, not run.measured or run.type_b == "none" or size > 0.0 or not run.type_b_stated)
@@ -110,51 +96,3 @@ def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[
     if unknown:
         raise ReductionError(f"{what} {', '.join(unknown)} unknown; there are {', '.join(known)}")
     return {row.phase: row for row in run.plan}
-
-
-def finish(result: R, record: Record) -> R:
-    """Return ``result`` with the run.json of a record as provenance, and a warning if the run is not complete.
-
-    Measured data without a statement of type B pass nothing: u is of type A alone.  What was left out of measured time
-    series is a warning too.
-    """
-    result.provenance = record.run.as_dict()
-    _at_mean_temperature(result, record)
-    if record.run.measured:
-        result.warnings[:0] = record.run.notes
-        if not record.run.type_b_stated:
-            uncertainty.withhold(result, [NO_TYPE_B], ["pass"])
-    if not record.run.complete:
-        stopped = record.run.stopped_at or 0.0
-        result.warnings.insert(0, f"The run stopped at {stopped:.6g} s, before the end of its plan.")
-    return result
-
-
-def _at_mean_temperature(result: Result, record: Record) -> None:
-    """Say that constant drift belongs to the mean temperature of the record, and take the simulated truth from there.
-
-    The temperatures in a record are weighed as deviations from their mean (gyrobench.reduction.estimation.nuisances).
-    """
-    read = [np.asarray(v, dtype=float) for n, v in record.windows.items() if n.startswith("temperature")]
-    if not read:
-        return
-    mean = float(np.mean(read))
-    simulated = any(name.startswith("surroundings.") for name in record.run.parameters)
-    shown = f"{mean:.3g} K above that of the gyro's coefficients" if simulated else f"{mean - 273.15:.2f} °C"
-    sentences = getattr(result, "conventions", None)
-    if sentences is not None:
-        sentences.append(f"Constant drift belongs to the mean temperature of the record, {shown}.")
-    if not simulated:
-        return
-    for c in result.coefficients:
-        name, sign = WARMED.get(c.name, ("", 0.0))
-        per_kelvin = float(record.run.parameters.get(f"gyro.{name}", 0.0)) * sign
-        if c.truth is not None and per_kelvin:
-            _set_truth(c, c.truth + per_kelvin * mean / units.factor(c.unit))
-        if c.name == "temperature" and "gyro.D_T" in record.run.parameters:
-            _set_truth(c, float(record.run.parameters["gyro.D_T"]) / units.factor(c.unit))
-
-
-def _set_truth(c: Coefficient, truth: float) -> None:
-    c.truth = truth
-    c.z = (c.estimate - truth) / c.u if c.u > 0.0 else None

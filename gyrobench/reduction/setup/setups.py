@@ -4,7 +4,7 @@
 class TwoAxisSetup(RebalanceSetup):
     k: float
     m: int = 5
-setup = TwoAxisSetup.of(record.run, specification, k=..., m=...)
+setup = TwoAxisSetup.of(record.run, k=..., m=...)
 """
 
 from __future__ import annotations
@@ -19,71 +19,69 @@ import numpy as np
 from gyrobench import drift, frames, units
 from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
+from gyrobench.component.set_up import Errors
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.estimation.effects import Remount
-from gyrobench.reduction.setup.run_metadata import Site, phases, remount_of, sizes
+from gyrobench.reduction.setup.run_metadata import Remount, Site, phases, remount_of, sizes
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Specification
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """truth: simulated values, SI (of coefficients rad/s per g0^n).  specification: name -> limits in the printed unit.
+    """truth: simulated values, SI (of coefficients rad/s per g0^n).  errors: of a simulated set-up, by source.
+    corrections: measured errors of the set-up (estimation.effects).  robust: a robust fit is shown beside.
 
     u_* of all setups: standard uncertainties of type B, SI, the options of the same names.
     """
 
     truth: Mapping[str, float] | None = None
-    specification: Specification | None = None
     instrument: str = ""
-    errors: Mapping[str, float] | None = None  # of a simulated set-up, see gyrobench.reduction.setup.simulated_errors
-    corrections: str = ""  # measured errors of the set-up, see gyrobench.reduction.estimation.effects
+    errors: Errors = field(default_factory=dict)
+    corrections: str = ""
+    robust: bool = False
+    site: Mapping[str, Any] = field(default_factory=dict)  # as printed
+    remount: Remount | None = None  # drift from mount to mount; None: the test has no mounts
 
     @classmethod
-    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+    def of(cls, run: RunDocument, **own: Any) -> Self:
         """Return the setup that a run.json describes; ``own``: the fields that are the test's own."""
-        corrections = run.options.get("corrections", "")
-        shared = {"specification": specification, "instrument": run.instrument, "corrections": corrections}
+        shared: dict[str, Any] = {"instrument": run.instrument, "corrections": run.options.get("corrections", "")}
         shared["errors"] = simulated_errors(run)
+        shared["robust"] = bool(run.options.get("robust", False))
         sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
         return cls(**{**shared, **sources, **own})
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """Return the site as a report prints it."""
+        return dict(self.site)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SiteSetup(Setup):
     """A test at a site: latitude rad, gravity m/s2, earth_rate rad/s.  nuisances: set-up effects that may be in the
-    data are weighed (gyrobench.reduction.estimation.nuisances).  robust: a robust fit is shown beside the plain one.
+    data are weighed (gyrobench.reduction.estimation.nuisances).
     """
 
     latitude: float
     gravity: float
     earth_rate: float = frames.EARTH_RATE
     nuisances: bool = True
-    robust: bool = False
 
     @classmethod
-    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+    def of(cls, run: RunDocument, **own: Any) -> Self:
         site = Site.of(run)
         place: dict[str, Any] = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
-        place["robust"] = bool(run.options.get("robust", False))
         place["nuisances"] = weighed(run)
-        return super().of(run, specification, **{**place, **own})
+        return super().of(run, **{**place, **own})
 
     @property
-    def site(self) -> Site:
+    def place(self) -> Site:
         return Site(self.latitude, self.gravity, self.earth_rate)
 
-    def reported(self) -> dict[str, Any]:
-        """Return what linear_result() is told of every test at a site."""
-        return {
-            "specification": self.specification,
-            "site": self.site.shown(),
-            "instrument": self.instrument,
-            "simulated": self.truth is not None,
-            "robust": self.robust,
-            "errors": self.errors,
-        }
+    @property
+    def shown(self) -> dict[str, Any]:
+        return self.place.shown()
 
     @property
     def gamma(self) -> float:
@@ -101,7 +99,7 @@ class RebalanceSetup(SiteSetup):
 
     fold: bool = False
     polarity: str = "project"
-    remount: Remount = field(default_factory=Remount)  # drift from mount to mount
+    remount: Remount | None = field(default_factory=Remount)
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_scale_factor: float = 0.0
@@ -109,10 +107,10 @@ class RebalanceSetup(SiteSetup):
     u_current: float = 0.0
 
     @classmethod
-    def of(cls, run: RunDocument, specification: Specification | None, **own: Any) -> Self:
+    def of(cls, run: RunDocument, **own: Any) -> Self:
         options: dict[str, Any] = {"fold": bool(run.options.get("fold", False)), "polarity": run.polarity or "project"}
         options["remount"] = remount_of(run)
-        return super().of(run, specification, **{**options, **own})
+        return super().of(run, **{**options, **own})
 
     def problems(self, folding: bool = True) -> list[str]:
         """Return what is wrong with gravity and polarity, and, with ``folding``, with squares that are simulated."""
@@ -135,7 +133,7 @@ class RebalanceSetup(SiteSetup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TumbleSetup(RebalanceSetup):
+class TurningSetup(RebalanceSetup):
     """A tumble on a table whose axis lies along the pole; matrices with rows = axes.
 
     base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate" or
@@ -157,9 +155,7 @@ class TumbleSetup(RebalanceSetup):
             object.__setattr__(self, "base", frames.polar_base(self.latitude))
 
     @classmethod
-    def of_plan(
-        cls, run: RunDocument, specification: Specification | None, faces: Mapping[str, Array], **own: Any
-    ) -> Self:
+    def of_plan(cls, run: RunDocument, faces: Mapping[str, Array], **own: Any) -> Self:
         """Return the setup with the plan of run.json; faces: its mounts by name."""
         plan = phases(run, faces)
         of_run = {
@@ -168,7 +164,7 @@ class TumbleSetup(RebalanceSetup):
             "modes": {p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
             "tilt": TILTS[choice(run, "tilt", tuple(TILTS), "auto")],
         }
-        return cls.of(run, specification, **of_run, **own)
+        return cls.of(run, **of_run, **own)
 
     def label(self, phase: int) -> str:
         return self.labels.get(phase, f"phase {phase}")
@@ -221,7 +217,7 @@ class TumbleSetup(RebalanceSetup):
         return problems
 
 
-#: option tilt -> TumbleSetup.tilt
+#: option tilt -> TurningSetup.tilt
 TILTS = {"auto": None, "yes": True, "no": False, "true": True, "false": False}
 
 

@@ -1,4 +1,4 @@
-"""Whether several tests agree about the same quantity: normalized errors, weighted mean, consistency test.
+"""Consistency of what several tests say of one quantity: normalized errors, weighted mean, consistency test.
 
     a, b: values with standard uncertainties of type A (t, dof degrees of freedom) and type B
     E_n = |a - b| / sqrt(U_a^2 + U_b^2)         U: expanded uncertainties, 95 %      agree when E_n <= 1
@@ -9,7 +9,7 @@
 An error that two tests share (the scale factor of the one torquer, the latitude of the one site) is not counted as
 independent: it stands in C off the diagonal, and what is the same in both drops out of U of the difference.
 Sources: E_n, ISO 13528; Birge, Phys. Rev. 40 (1932) 207; Welch, Biometrika 38 (1951) 330; Meier, Biometrics 9 (1953)
-59 (weights that are estimated); Holm, Scand. J. Stat. 6 (1979) 65.
+59 (weights that are estimated).
 
 Not modelled: tests that share a part of their random error, as two reductions of the same record do.
 """
@@ -32,7 +32,7 @@ LEVEL = 0.05  # of the consistency test
 
 @dataclass(frozen=True)
 class MethodValue:
-    """What one test says about a quantity, in its printed unit.
+    """Value of a quantity by one test, in its printed unit.
 
     u_a: standard uncertainty of type A with ``dof`` degrees of freedom.  u_b: of type B, of this test alone.  shared:
     source -> standard uncertainties, with sign, of the errors (m,) that other tests have too.
@@ -81,8 +81,10 @@ class Pair:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of two tests or more about one quantity.  weights: in the order of the values; they may be negative where tests
-    share an error of different size.  p: of the consistency test.
+    """Weighted mean of two tests or more, and their consistency.
+
+    weights: in the order of the values; they may be negative where tests share an error of different size.  p: of the
+    consistency test.
     """
 
     mean: float
@@ -98,7 +100,7 @@ class Agreement:
 
 
 def normalized_error(a: MethodValue, b: MethodValue) -> Pair:
-    """E_n of two values; a source that both share counts with the difference of what it does to them."""
+    """Return E_n of two values; a source that both share counts with the difference of what it does to them."""
     square = (a.k_a * a.u_a) ** 2 + (b.k_a * b.u_a) ** 2 + NORMAL**2 * (a.u_b**2 + b.u_b**2)
     for source in {**a.shared, **b.shared}:
         one, other = a.shared.get(source), b.shared.get(source)
@@ -111,7 +113,7 @@ def normalized_error(a: MethodValue, b: MethodValue) -> Pair:
 
 
 def covariance(values: Sequence[MethodValue]) -> Array:
-    """(M, M) of the values, shared errors off the diagonal."""
+    """Return the covariance (M, M) of the values, shared errors off the diagonal."""
     C = np.diag([v.own for v in values])
     for source in dict.fromkeys(s for v in values for s in v.shared):
         size = max(v.shared[source].size for v in values if source in v.shared)
@@ -121,7 +123,7 @@ def covariance(values: Sequence[MethodValue]) -> Array:
 
 
 def combine_values(values: Sequence[MethodValue]) -> Agreement:
-    """Weighted mean and consistency of two values or more.  Raises ValueError for fewer, or for one without own u."""
+    """Return weighted mean and consistency of values.  Raises ValueError for fewer than two and one without own u."""
     if len(values) < 2:
         raise ValueError(f"{len(values)} value: at least two are needed to compare")
     without_u = [v.label for v in values if not v.own > 0.0]
@@ -152,7 +154,7 @@ def combine_values(values: Sequence[MethodValue]) -> Agreement:
 
 
 def probability(Q: float, m: int, few: Array, w: Array) -> float:
-    """p of Q from m values; few: 1 / degrees of freedom of each.  Without any it is chi^2, for two it is Welch's t."""
+    """Return p of Q from m values; few: 1/degrees of freedom of each.  Without any it is chi^2, for two Welch's t."""
     spread = float(np.sum(few * (1.0 - w) ** 2))
     if spread == 0.0:
         return float(special.chdtrc(m - 1, Q))
@@ -160,19 +162,10 @@ def probability(Q: float, m: int, few: Array, w: Array) -> float:
     return float(special.fdtrc(m - 1, (m * m - 1) / (3.0 * spread), F))
 
 
-def holm(p: Sequence[float]) -> list[float]:
-    """p of several tests so adjusted that all together raise a false alarm with the level of one at most."""
-    order = np.argsort(p)
-    out, worst = [1.0] * len(p), 0.0
-    for rank, j in enumerate(order.tolist()):
-        worst = max(worst, min(1.0, (len(p) - rank) * p[j]))
-        out[j] = worst
-    return out
-
-
 def outlier(values: Sequence[MethodValue], level: float = LEVEL) -> tuple[str, float] | None:
-    """The one test without which the others agree, and their p then; None for fewer than three, or where there is none
-    or more than one.
+    """Return the one test without which the others agree, and their p then.
+
+    None for fewer than three, or where there is none or more than one.
     """
     if len(values) < 3:
         return None

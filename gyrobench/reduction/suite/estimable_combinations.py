@@ -1,4 +1,4 @@
-"""The same quantity in several results: which combinations of coefficients each test sees, and what it says of them.
+"""The same quantity in several results: the combinations of coefficients that each test determines, and their values.
 
 A test reports b = A theta with the combinations A of :attr:`Coefficient.combination`; another quantity a' theta can be
 had from it when a lies in the row space of A: a = A' c, value c' b, u^2 = c' V c.  Where |f| is the same in all
@@ -37,7 +37,7 @@ class Measurand:
 
 
 def combination(c: Coefficient) -> dict[str, float]:
-    """Of an estimate; one that is outside the drift models is its own symbol, with its unit."""
+    """Return the combination of an estimate; one outside the drift models is its own symbol, with its unit."""
     given = c.combination or {c.name: 1.0}
     return {n if n in MODEL else f"{n} / {c.unit}": float(x) for n, x in given.items() if x != 0.0}
 
@@ -55,7 +55,7 @@ def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
 
 
 def _shown(c: Coefficient) -> Measurand:
-    """Under the model's name where it is one coefficient: u_zx = -gamma Dy_y is compared as Dy_y."""
+    """Return an estimate under the model's name where it is one coefficient: u_zx = -gamma Dy_y is compared as Dy_y."""
     made_of = combination(c)
     name = next(iter(made_of))
     if len(made_of) == 1 and name in MODEL:
@@ -64,7 +64,7 @@ def _shown(c: Coefficient) -> Measurand:
 
 
 def quantities(results: Mapping[str, DriftTestResult]) -> list[Measurand]:
-    """All that the tests report, each once; in the order of the model's coefficients, what is mixed of them after."""
+    """Return all that the tests report, each once: in the order of the model's coefficients, then what mixes them."""
     reported: list[tuple[Measurand, str]] = []
     for label, result in results.items():
         for c in result.coefficients:
@@ -86,7 +86,7 @@ def quantities(results: Mapping[str, DriftTestResult]) -> list[Measurand]:
 
 
 def weights(quantity: Measurand, result: DriftTestResult) -> Array | None:
-    """c (q,) of quantity = c' estimates; None where the test does not see it."""
+    """Return c (q,) of quantity = c' estimates; None where the test does not determine it."""
     made_of = [combination(c) for c in result.coefficients]
     for j, own in enumerate(made_of):
         if _same(own, quantity.combination):  # as it was reported, whatever else could be put together
@@ -104,32 +104,25 @@ def weights(quantity: Measurand, result: DriftTestResult) -> Array | None:
 
 
 def value(label: str, quantity: Measurand, result: DriftTestResult, shared: Collection[str]) -> MethodValue | None:
-    """What the test says of the quantity; None where it does not see it.  shared: sources of type B of all tests."""
+    """Return the quantity by a test, None where it does not determine it.  shared: sources of type B of all tests."""
     c = weights(quantity, result)
     if c is None:
         return None
     coefficients = result.coefficients
     used = np.flatnonzero(c)
     u_a = np.array([e.u if e.u_a is None else e.u_a for e in coefficients])
-    rho = (
-        np.array(result.correlation, dtype=float)
-        if len(result.correlation) == len(coefficients)
-        else np.eye(len(coefficients))
-    )
+    known = len(result.correlation) == len(coefficients)
+    rho = np.array(result.correlation, dtype=float) if known else np.eye(len(coefficients))
     v = c * u_a
-    square = float(v @ rho @ v)
-    u_b = 0.0
-    common: dict[str, Array] = {}
+    square, u_b, common = float(v @ rho @ v), 0.0, dict[str, Array]()
     for b in result.type_b:
-        change = np.array(b["changes"], dtype=float) @ c
-        if b["source"] in shared:
-            common[b["source"]] = np.append(common.get(b["source"], np.zeros(0)), change)
+        change = np.array(b.changes, dtype=float) @ c
+        if b.id in shared:
+            common[b.id] = np.append(common.get(b.id, np.zeros(0)), change)
         else:
             u_b = math.hypot(u_b, float(np.linalg.norm(change)))
-    known = [coefficients[j].truth for j in used]
-    truth = None
-    if all(t is not None for t in known):
-        truth = sum(float(c[j]) * float(coefficients[j].truth or 0.0) for j in used)
+    truths = [float(c[j]) * t for j in used if (t := coefficients[j].truth) is not None]
+    truth = sum(truths) if len(truths) == used.size else None
     dof = min((coefficients[j].dof or math.inf for j in used), default=math.inf)
     name = coefficients[used[0]].name if used.size == 1 else ""
     estimate = float(c @ np.array([e.estimate for e in coefficients]))
@@ -137,5 +130,5 @@ def value(label: str, quantity: Measurand, result: DriftTestResult, shared: Coll
 
 
 def ideal(result: DriftTestResult) -> bool:
-    """Noise was off: residuals are rounding and u means nothing."""
+    """Return whether noise was off: residuals are rounding and u means nothing."""
     return all(c.truth is not None and c.z is None for c in result.coefficients) and bool(result.coefficients)

@@ -11,25 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gyrobench import drift
 from gyrobench.record.run_document import RunDocument, SuiteTestRun
-from gyrobench.reduction.estimation import uncertainty
-from gyrobench.reduction.estimation.uncertainty import NORMAL, p_text
+from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
 from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
-from gyrobench.result import (
-    Coefficient,
-    DriftTestResult,
-    Specification,
-    SuiteComparison,
-    SuiteResult,
-    Test,
-)
+from gyrobench.reduction.suite.ranking import adjusted
+from gyrobench.result import Coefficient, DriftTestResult, Reason, SuiteComparison, SuiteResult, Test
 
 FAMILIES = {
     "single-degree-of-freedom gyro": drift.NAMES,
@@ -53,7 +47,7 @@ class Member:
 
 @dataclass(frozen=True)
 class MeasurandComparison:
-    """What all methods say of one quantity.  found: None where one alone sees it, or nothing can be weighed."""
+    """Values of one quantity by all methods.  found: None where one alone sees it, or nothing can be weighed."""
 
     quantity: Measurand
     values: tuple[MethodValue, ...]
@@ -73,7 +67,7 @@ class MeasurandComparison:
         return low if high - low <= 1e-6 * max(abs(low), abs(high), 1e-3) else None
 
     def words(self) -> str:
-        """Which methods disagree, and by how much."""
+        """Return which methods disagree, and by how much."""
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
         significant = [
@@ -93,7 +87,7 @@ class MeasurandComparison:
 
 
 def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[MeasurandComparison]:
-    """Every quantity that the results report, by every one that sees it."""
+    """Return every quantity that the results report, by every one that determines it."""
     shared = common(results, shared)
     noisy = {label: not estimable_combinations.ideal(r) for label, r in results.items()}
     out = []
@@ -103,15 +97,14 @@ def compare(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> 
         weighed = len(values) > 1 and all(v.own > 0.0 and noisy[v.label] for v in values)
         out.append(MeasurandComparison(q, values, consistency.combine_values(values) if weighed else None))
     tested = [k for k, c in enumerate(out) if c.found is not None]
-    adjusted = consistency.holm([out[k].found.p for k in tested])  # type: ignore[union-attr]
-    for k, p in zip(tested, adjusted, strict=True):
-        out[k] = MeasurandComparison(out[k].quantity, out[k].values, out[k].found, p)
+    for k, p in zip(tested, adjusted([out[k].found.p for k in tested]), strict=True):  # type: ignore[union-attr]
+        out[k] = replace(out[k], p=p)
     return out
 
 
 def common(results: Mapping[str, DriftTestResult], shared: Collection[str]) -> list[str]:
-    """Return those of the sources ``shared`` that two results or more name."""
-    named = [{b["source"] for b in r.type_b} for r in results.values()]
+    """Return those of the sources ``shared`` (ids) that two results or more name."""
+    named = [{b.id for b in r.type_b} for r in results.values()]
     return sorted(s for s in set(shared) if sum(s in sources for sources in named) > 1)
 
 
@@ -165,10 +158,10 @@ def differences(results: Mapping[str, DriftTestResult], slots: Sequence[str] = (
 
 def combine_methods(
     members: Mapping[str, Member], *, system: str, title: str, method: str, sources: Sequence[str],
-    conventions: Sequence[str] = (), shared: Collection[str] = (), specification: Specification | None = None,
-    failed: Mapping[str, str] | None = None, provenance: Mapping[str, Any] | None = None,
+    conventions: Sequence[str] = (), shared: Collection[str] = (), failed: Mapping[str, str] | None = None,
+    provenance: Mapping[str, Any] | None = None,
 ) -> SuiteResult:  # fmt: skip
-    """One result of several tests.  shared: sources of type B that are one and the same error in all tests.
+    """Return one result of several tests.  shared: ids of sources of type B that are one error in all tests.
 
     failed: tests that gave no result -> why.  Raises ReductionError when the tests are not of one instrument.
     """
@@ -178,49 +171,48 @@ def combine_methods(
     if reasons := problems(results):
         raise ReductionError(reasons)
     compared = compare(results, shared)
-    coefficients = [_coefficient(c, specification or {}) for c in compared]
-    first = next(iter(results.values()))
-    tests = [
-        Test(
-            f"consistency, {c.quantity.name}",
-            c.found.Q,
-            c.found.p,
-            "differences beyond the u of the methods",
-            c.words(),
-        )
-        for c in compared
-        if c.found is not None
-    ]
-    sites = [r.site for r in results.values()]
+    alike = common(results, shared)
     comparison = SuiteComparison(
         rule=RULE,
-        shared=common(results, shared),
+        shared=list(dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in alike)),
         members=[_member(label, m) for label, m in members.items()],
         failed=[{"label": n, "reason": why} for n, why in (failed or {}).items()],
         quantities=[_row(c) for c in compared],
         pairs=[
-            {"quantity": c.quantity.name, "unit": c.quantity.unit, "a": p.a, "b": p.b, "difference": p.difference,
-             "U": p.U, "E_n": p.E_n}
+            {"quantity": c.quantity.name, "unit": c.quantity.unit,
+             **{n: getattr(p, n) for n in ("a", "b", "difference", "U", "E_n")}}
             for c in compared if c.found is not None for p in c.found.pairs
         ],
         **_consistency(compared),
     )  # fmt: skip
-    result = SuiteResult(
+    first, *others = results.values()
+    said_alike = [s for s in first.conventions if all(s in r.conventions for r in others)]
+    found = SuiteResult(
         system=system, title=title, method=method, sources=list(sources),
-        conventions=list(dict.fromkeys([*conventions, *(s for r in results.values() for s in _shared(r, results))])),
-        coefficients=coefficients, tests=tests, decision_rule=uncertainty.DECISION_RULE,
-        verdict=uncertainty.worst_verdict(c.verdict for c in coefficients),
-        site=dict(first.site) if all(s == sites[0] for s in sites) else {},
-        instrument=", ".join(dict.fromkeys(r.instrument for r in results.values() if r.instrument)),
-        simulated=first.simulated, provenance=dict(provenance or {}), suite=comparison,
-        summary=_summary(comparison, compared), warnings=_warnings(results, compared, failed or {}),
+        conventions=list(dict.fromkeys([*conventions, *said_alike])), coefficients=[_coefficient(c) for c in compared],
+        provenance=dict(provenance or {}), suite=comparison, **_facts(results),
     )  # fmt: skip
-    return uncertainty.withhold(result, [f"{label}: {text}" for label, r in results.items() for text in r.withheld])
+    return replace(
+        found, tests=[_test(c, c.found) for c in compared if c.found is not None],
+        summary=_summary(comparison, compared), reasons=_reasons(results, compared, failed or {}),
+    )  # fmt: skip
 
 
-def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
+def _facts(results: Mapping[str, DriftTestResult]) -> dict[str, Any]:
+    """Return the site of all tests ({} where it differs), the names of the instruments, whether they are simulated."""
+    first, *others = results.values()
+    names = dict.fromkeys(r.instrument for r in results.values() if r.instrument)
+    site = dict(first.site) if all(r.site == first.site for r in others) else {}
+    return {"site": site, "instrument": ", ".join(names), "simulated": first.simulated}
+
+
+def _test(c: MeasurandComparison, found: consistency.Agreement) -> Test:
+    name, what = c.quantity.name, "differences beyond the u of the methods"
+    return Test(f"consistency:{name}", f"consistency, {name}", found.Q, found.p, what, c.words())
+
+
+def _coefficient(c: MeasurandComparison) -> Coefficient:
     q, a = c.quantity, c.found
-    limit = limits.get(q.name)
     if a is not None:
         wide = max(1.0, a.birge) if c.disagree else 1.0
         estimate, u, U, u_a, dof = a.mean, a.u * wide, a.U * wide, a.u_a * wide, a.dof
@@ -230,13 +222,11 @@ def _coefficient(c: MeasurandComparison, limits: Specification) -> Coefficient:
         estimate, u, U, u_a, dof = v.estimate, v.u, v.U, v.u_a, v.dof
         meaning = f"{q.meaning}; {v.label} only" if len(c.values) == 1 else q.meaning
     truth = c.truth
-    verdict = uncertainty.assess_conformity(estimate, U, limit)
-    return Coefficient(
-        name=q.name, meaning=meaning, unit=q.unit, estimate=estimate, u=u, k=U / u if u > 0.0 else NORMAL,
-        interval=(estimate - U, estimate + U), u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth,
-        z=(estimate - truth) / u if truth is not None and u > 0.0 and (a is not None or len(c.values) == 1) else None,
-        limit=limit, verdict="inconclusive" if c.disagree and limit else verdict, combination=dict(q.combination),
-    )  # fmt: skip
+    k, interval = U / u if u > 0.0 else NORMAL, (estimate - U, estimate + U)
+    measured = Coefficient(q.name, meaning, q.unit, estimate, u, k, interval, combination=dict(q.combination))
+    one = a is not None or len(c.values) == 1
+    z = (estimate - truth) / u if truth is not None and u > 0.0 and one else None
+    return replace(measured, u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth, z=z)
 
 
 def _row(c: MeasurandComparison) -> dict[str, Any]:
@@ -307,32 +297,35 @@ def _summary(suite: SuiteComparison, compared: Sequence[MeasurandComparison]) ->
     ]
 
 
-def _warnings(
+def _reasons(
     results: Mapping[str, DriftTestResult], compared: Sequence[MeasurandComparison], failed: Mapping[str, str]
-) -> list[str]:
-    out = [f"{label} gave no result: {why}" for label, why in failed.items()]
-    out += differences(results)
+) -> list[Reason]:
+    """Return what a reader must know of the comparison, and the doubts of its tests."""
+    said = [("suite.failed", f"{label} gave no result: {why}") for label, why in failed.items()]
+    said += [("suite.instruments", text) for text in differences(results)]
     sites = {label: str(r.site) for label, r in results.items()}
     if len(set(sites.values())) > 1:
-        out.append(
-            "The tests were made at different site values, stated with each test. Where gravity differs, the "
-            "contribution of D_OO to the combinations differs too."
+        said.append(
+            (
+                "suite.sites",
+                "The tests were made at different site values, stated with each test. Where gravity differs, "
+                "the contribution of D_OO to the combinations differs too.",
+            )
         )
     counts = [f"{label} {len(r.warnings)}" for label, r in results.items() if r.warnings]
     if counts:
-        out.append(f"Tests with warnings, stated with each test: {', '.join(counts)}.")
+        said.append(("suite.warned", f"Tests with warnings, stated with each test: {', '.join(counts)}."))
     single = [c.quantity.name for c in compared if len(c.values) == 1]
     if single:
-        out.append(f"Determined by one method only and not confirmed by another: {', '.join(single)}.")
+        text = f"Determined by one method only and not confirmed by another: {', '.join(single)}."
+        said.append(("suite.single", text))
     negative = [c.quantity.name for c in compared if c.found is not None and min(c.found.weights) < 0.0]
     if negative:
-        out.append(
-            f"{', '.join(negative)}: a weight in the mean is negative, because methods share an error of different "
-            "size."
-        )
-    return out
-
-
-def _shared(result: DriftTestResult, results: Mapping[str, DriftTestResult]) -> list[str]:
-    """Conventions that all tests state alike."""
-    return [s for s in result.conventions if all(s in r.conventions for r in results.values())]
+        text = "a weight in the mean is negative, because methods share an error of different size."
+        said.append(("suite.negative_weight", f"{', '.join(negative)}: {text}"))
+    both = ("pass", "fail")
+    doubts = [replace(r, text=f"{label}: {r.text}", blocks=both, names=()) for label, result in results.items()
+              for r in result.reasons if r.severity == "doubt"]  # fmt: skip
+    if apart := tuple(c.quantity.name for c in compared if c.disagree):
+        doubts.append(Reason("suite.inconsistent", "The methods are inconsistent.", both, apart, severity="condition"))
+    return [*doubts, *(Reason(*one) for one in said)]

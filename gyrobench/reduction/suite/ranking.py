@@ -26,7 +26,7 @@ LEVEL = 0.05  # largest chance of a false rank among equal candidates
 
 
 @dataclass(frozen=True)
-class Candidate:
+class RankedValue:
     """Value of a measure with its standard uncertainty (None: not known) and coverage factor of 95 %.
 
     draws: seed -> value in the run with it; {} for a single run.
@@ -39,7 +39,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Place:
+class RankedPlace:
     """index: which candidate.  place: from 1, shared by candidates that cannot be told apart.
 
     probability: that it is truly behind the first of its rank, for the first of a rank behind that of the rank before;
@@ -61,7 +61,7 @@ class Difference:
     p: float | None
 
 
-def difference(a: Candidate, b: Candidate) -> Difference:
+def difference(a: RankedValue, b: RankedValue) -> Difference:
     """Return b - a: from the seeds that both have where these are two or more, else as of independent values."""
     common = sorted(set(a.draws) & set(b.draws))
     if len(common) >= 2:
@@ -96,21 +96,21 @@ def adjusted(p: Sequence[float]) -> list[float]:
     return found
 
 
-def rank(candidates: Sequence[Candidate]) -> list[Place]:
+def rank(candidates: Sequence[RankedValue]) -> list[RankedPlace]:
     """Return the candidates in their order, the smallest value first."""
     pairs = {(i, j): difference(candidates[i], candidates[j]) for i, j in combinations(range(len(candidates)), 2)}
     known = {pair: d.p for pair, d in pairs.items() if d.p is not None}
     p = dict(zip(known, adjusted(list(known.values())), strict=True))
     order = sorted(range(len(candidates)), key=lambda i: (candidates[i].value, i))
-    places: list[Place] = []
+    places: list[RankedPlace] = []
     leader, place = order[0], 1
     for count, i in enumerate(order, 1):
         if count == 1:
-            places.append(Place(i, 1, None))
+            places.append(RankedPlace(i, 1, None))
             continue
         chance = p.get((min(i, leader), max(i, leader)))
         told = candidates[i].value > candidates[leader].value if chance is None else chance < LEVEL
         if told:
             leader, place = i, count
-        places.append(Place(i, place, None if chance is None else 1.0 - 0.5 * chance))
+        places.append(RankedPlace(i, place, None if chance is None else 1.0 - 0.5 * chance))
     return places

@@ -15,7 +15,7 @@ user is told before the run, with what was set or swapped.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,6 +23,7 @@ from gyrobench.record.motion_profile import read_profile
 from gyrobench.system.families.option_groups import GYRO_NOISES
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import LIMIT
 from gyrobench.system.system import Option, Slot, System
 
 AXES = ("pitch", "roll", "azimuth")  # motor axes in A order
@@ -62,6 +63,21 @@ def torquer(name: str, decimals: int | None = None) -> Callable[[PartValues], fl
     return factor
 
 
+def by_phase(
+    labels: Sequence[str], signals: Sequence[str], rows: Mapping[str, Mapping[str, float]]
+) -> dict[str, list[float]]:
+    """Return signals of a motion, each with its value in every phase, 0 where it has none.
+
+    labels: of the phases in their order; those beyond LIMIT, which a plan refuses, are left out.  rows: label -> signal
+    -> value.
+    """
+    table = {name: [0.0] * LIMIT for name in signals}
+    for k, label in enumerate(labels[:LIMIT]):
+        for name, value in rows.get(label, {}).items():
+            table[name][k] = value
+    return table
+
+
 def stabilizer(part: str = "", signal: str = "angle") -> Slot:
     """Return the slot of a stabilizer; signal: "angle" or "rate", what the gyro tells it."""
     return Slot("Stabilizer", part, {"u": signal})
@@ -87,7 +103,7 @@ class LoopTest(System):
         return {}
 
     def plan(self) -> LoopPlan:
-        """The phases, or a ride by the recorded motion."""
+        """Return the phases, or a ride by the recorded motion."""
         return LoopPlan([LoopPhase("ride", dwell=self["hold"])] if self.values.get("profile") else self.phases())
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
@@ -95,8 +111,16 @@ class LoopTest(System):
         motion = read_profile(Path(profile)) if profile else {}
         return {**self.plan().parameters(), **motion, **self.owned(), **self.design(parts)}
 
+    def asked(self) -> list[str]:
+        """Return the labels in the option phases."""
+        return [str(p) for p in self["phases"].replace(",", " ").split()]
+
+    def not_offered(self, labels: Sequence[str]) -> list[str]:
+        """Return a sentence for each phase that is asked for and is none of these."""
+        return [f"phases: '{p}' is none of {', '.join(labels)}" for p in self.asked() if p not in labels]
+
     def crossovers(self) -> dict[str, float]:
-        """The option crossover, for all loops, where a system has one."""
+        """Return the option crossover, for all loops, where a system has one."""
         return dict.fromkeys(self.loops, self["crossover"]) if "crossover" in self.options else {}
 
     def not_positive(self, *names: str) -> list[str]:
@@ -185,7 +209,7 @@ class TwoGyroTest(ThreeAxisTest):
 
     @property
     def wait(self) -> float:
-        """s: 7 / feedback lets the loops settle, twice."""
+        """Return the time, s, of which 7 / feedback lets the loops settle, twice."""
         return 14.0 / float(self["feedback"])
 
     def steps(self) -> list[LoopPhase]:
@@ -204,7 +228,7 @@ class TwoGyroTest(ThreeAxisTest):
         return LoopPhase("drift", "hold", settle=2 * self.wait, dwell=self["hold"])
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        """Pickoffs for +-0.1 rad, a resolver whose secant grows to 10, and channels of ``feedback``."""
+        """Return pickoffs for +-0.1 rad, a resolver whose secant grows to 10, and channels of ``feedback``."""
         found: dict[str, Any] = {
             "motion.earth_rate?": 0.0,
             "platform.rate_max": self["rate_max"],
@@ -220,7 +244,7 @@ class TwoGyroTest(ThreeAxisTest):
         return found
 
     def crossovers(self) -> dict[str, float]:
-        """|L| = 1 at the feedback, the lag of the servos left out."""
+        """Return where |L| = 1, at the feedback, the lag of the servos left out."""
         return dict.fromkeys(AXES, self["feedback"] / (2.0 * math.pi))
 
     def check(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a stand at a site is on: rest, or ground that moves, as parameters of ground_motion in the slot site."""
+"""Base of a stand at a site: at rest, or ground that moves, as parameters of ground_motion in the slot site."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from gyrobench.system.configurable import Option
+from gyrobench.units import DEG
 
 #: noise ports of a gyro, of each channel
 GYRO_NOISES = ("turn_on", "markov", "white", "pickoff", "flicker", "walk", "quantization")
@@ -14,6 +15,17 @@ SITE = {
     ),
     "height": Option(0.0, "m", "height above the ellipsoid", sets="site.height"),
     "gravity": Option(0.0, "m/s2", "measured gravity of the site; 0: WGS84 normal gravity", sets="site.gravity"),
+}
+#: of a table that stands still on its vertical axis
+VERTICAL_AXIS = {
+    "latitude": Option(
+        "45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2, sets="site.latitude"
+    ),
+}
+#: of a vehicle that moves on the turning Earth
+MOVING = {
+    "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
+    "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
 }
 TORQUER = {
     "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),

@@ -1,4 +1,4 @@
-"""How a table that a gyro holds is expected to turn: rate at an angle, time of a turn, angle at which it stays.
+"""Expected motion of a table that a gyro controls: rate at an angle, time of a turn, angle at which it stays.
 
     theta' = omega_d - omega_E,x        omega_d = drift(X, Y, Z) at the angle theta      [MEAS-SERVO; Hu 1981, eq. 3-59]
 

@@ -1,0 +1,1 @@
+"""Execution of a campaign: definition, plan, workers, store of the results."""

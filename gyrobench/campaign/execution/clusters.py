@@ -1,0 +1,124 @@
+"""Clusters that a campaign runs on: a given dask client, the scheduler at an address, or local processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from gyrobench.bench import UsageError
+from gyrobench.campaign.execution.store import CampaignError
+from gyrobench.files import cores, temporary_folder
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+@contextlib.contextmanager
+def connect(
+    client: Client | None, scheduler: str | None, workers: int | None, runs: int,
+    notes: Callable[[Iterable[str]], None],
+) -> Iterator[Client]:  # fmt: skip
+    """Yield a client: the given one, that of a scheduler, that of the notebook, else one of local processes."""
+    from distributed import Client, default_client
+
+    if client is None and scheduler is None and workers is None:
+        with contextlib.suppress(ValueError):
+            client = default_client()
+    if client is not None:
+        if client.asynchronous:
+            raise UsageError("the dask client is asynchronous; a campaign needs Client(..., asynchronous=False)")
+        yield client
+        return
+    if scheduler is not None:
+        try:
+            connected = Client(scheduler, timeout="20s", set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise CampaignError(f"no scheduler at {scheduler}: {error}") from None
+        with connected:
+            notes([f"dashboard: {connected.dashboard_link}"])
+            yield connected
+        return
+    with local_cluster(min(workers or cores(), runs)) as local:
+        notes([f"dashboard: {local.dashboard_link}{_without_bokeh()}"])
+        yield local
+
+
+def _without_bokeh() -> str:
+    import importlib.util
+
+    return "" if importlib.util.find_spec("bokeh") else " (its pages need bokeh: pip install bokeh)"
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int) -> Iterator[Client]:
+    """Yield a client of that many local processes, which end with this one.
+
+    On Linux a process that has imported what a worker needs stays, and the workers are its forks: the next cluster, and
+    a worker in place of one that a run has ended, need not import it again for a second.
+    """
+    import logging
+
+    import dask
+    from distributed import Client, LocalCluster
+    from distributed.utils import get_mp_context
+
+    settings = {
+        "distributed.scheduler.allowed-failures": 0,  # the campaign decides what is repeated
+        # without dask's MALLOC_TRIM_THRESHOLD_: memory given back after each array is asked for again, a tenth of a run
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(ONE_THREAD, 1),
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.admin.system-monitor.interval": "5s",
+        "distributed.admin.tick.interval": "500ms",  # of every loop of every process, 20 ms by default
+        "distributed.comm.timeouts.connect": "30s",
+    }
+    if sys.platform == "linux":
+        settings["distributed.worker.multiprocessing-method"] = "forkserver"
+    with dask.config.set(settings), _without_main():
+        if sys.platform == "linux":
+            # in place of dask's
+            loaded = ["distributed", "gyrobench.campaign.execution.worker", "scipy.stats", "scipy.signal"]
+            get_mp_context().set_forkserver_preload(loaded)
+        with (
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address="127.0.0.1:0",
+                local_directory=str(temporary_folder()),
+                env=dict(os.environ),  # as it is now, not as it was when the first cluster began
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster, set_as_default=False) as client,
+        ):
+            yield client
+
+
+@contextlib.contextmanager
+def _without_main() -> Iterator[None]:
+    """Let processes start without the user's script, which has no need to be imported there, nor a guard."""
+    main = sys.modules["__main__"]
+    held = {n: getattr(main, n) for n in ("__file__", "__spec__") if hasattr(main, n)}
+    main.__spec__ = None
+    if "__file__" in held:
+        del main.__file__
+    try:
+        yield
+    finally:
+        for name, value in held.items():
+            setattr(main, name, value)
+
+
+def has_own_processes(client: Client) -> bool:
+    """Return whether the workers are processes of their own, which a run may end."""
+    return os.getpid() not in client.run(os.getpid).values()
+
+
+def is_local(client: Client) -> bool:
+    """Return whether the workers are on this machine."""
+    return all("127.0.0.1" in a or "inproc" in a or "localhost" in a for a in client.nthreads())

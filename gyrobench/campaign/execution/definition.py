@@ -1,0 +1,302 @@
+"""The definition of a campaign: what is run, from a TOML file, the command line or Python.
+
+    name = "latitudes"                      # default: the name of the file
+    question = "Up to which latitude does the tumble determine D_I?"
+    system = "..."                          # a system or a suite
+    seeds = 20                              # seeds 1 to 20 at each point; or a list
+    keep = "failures"                       # records and reports: all, failures, extremes, none
+
+    [set]                                   # values of all runs, as of gyrobench run --set @FILE
+    latitude = "45.75deg"
+
+    [over]                                  # axes, see gyrobench.campaign.execution.axes
+    latitude = "0deg..80deg:9"
+    "gyro.D_I" = "uniform(-1, 1) deg/h/g"
+
+    [parts]                                 # a list is an axis
+    gyro = ["floated", "vendor.fmu"]
+
+Every point of an axis is combined with every point of the others.  Distributions are drawn together, ``runs`` points by
+``design`` ("random", "lhs", "sobol") and ``design_seed``.  ``table``: a CSV file, one row a point, columns
+"name [unit]", and "seed" if it is given; or "FILE.py:function", which returns such rows as dictionaries (values in SI
+or texts), called with the ``arguments``.  ``data``: pattern of measured files, one run a file.
+
+Noise: at the points of grids and lists each seed is used once a point, so that points are compared under equal noise;
+points that are drawn, and rows of a table, have seeds of their own.
+"""
+
+from __future__ import annotations
+
+import csv
+import glob
+import importlib.util
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from gyrobench import units
+from gyrobench.bench import UsageError, suggest_names
+from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
+from gyrobench.system.values import parse
+
+KEEP = ("all", "failures", "extremes", "none")
+HOUR = 3600.0
+
+
+@dataclass
+class Definition:
+    """A campaign as it is asked for; see the module for the keys of a file.
+
+    folder: that relative paths start from.  time_limit: s of one run.  memory_limit: bytes of a worker.  retries: how
+    often a run is repeated whose worker ended.
+    """
+
+    system: str
+    name: str = ""
+    question: str = ""
+    set: dict[str, Any] = field(default_factory=dict)
+    over: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Any] = field(default_factory=dict)
+    maps: dict[str, str] = field(default_factory=dict)
+    seeds: Any = 1
+    runs: int = 0
+    design: str = "random"
+    design_seed: int = 1
+    table: Any = None
+    arguments: dict[str, Any] = field(default_factory=dict)
+    data: Any = None
+    step: Any = None
+    check_step: bool | None = None
+    spec: str | None = None
+    keep: str = "failures"
+    time_limit: Any = "1h"
+    memory_limit: Any = None
+    retries: int = 2
+    out: str | None = None
+    folder: Path = field(default_factory=Path.cwd)
+
+    def __post_init__(self) -> None:
+        if self.keep not in KEEP:
+            raise UsageError(f"keep = {self.keep}: {suggest_names(str(self.keep), KEEP)}")
+        if self.design not in DESIGNS:
+            raise UsageError(f"design = {self.design}: {suggest_names(str(self.design), DESIGNS)}")
+        if not isinstance(self.retries, int) or self.retries < 0:
+            raise UsageError(f"retries = {self.retries}: a whole number from 0 on is expected")
+        self.time_limit = float(parse("time_limit", self.time_limit, "s"))
+        self.memory_limit = None if self.memory_limit is None else memory(self.memory_limit)
+        self.step = None if self.step is None else float(parse("step", self.step, "s"))
+        self.set, self.over = flat(self.set), flat(self.over)
+        self.name = self.name or self.system
+
+    def path(self, name: str | Path) -> Path:
+        """Return a path as it is meant in the file of the campaign."""
+        return self.folder / name
+
+    def as_given(self) -> dict[str, Any]:
+        """Return what was given, as plain JSON."""
+        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("folder", "out")}
+        if isinstance(self.table, list | tuple):
+            own["table"] = f"{len(self.table)} rows"
+        standard = {f.name: f.default for f in fields(self)}
+        return {k: plain(v) for k, v in own.items() if v != standard[k] and v not in ({}, None)}
+
+    # ------------------------------------------------------------------------------------------ points
+    def axes(self, slots: Sequence[str]) -> tuple[list[Axis], list[Distribution]]:
+        """Return the axes and the distributions; a name of ``over`` that is a slot is an axis of parts."""
+        found = [parse_axis(name, given) for name, given in self.over.items() if name not in slots]
+        swapped = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
+        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in swapped.items()}
+        parts = [
+            Axis(slot, "part", "", tuple(AxisValue(p.strip(), p.strip()) for p in names))
+            for slot, names in lists.items()
+            if len(names) > 1
+        ]
+        axes = [a for a in found if isinstance(a, Axis)]
+        if clash := {a.name for a in axes} & set(self.set):
+            raise UsageError(f"{sorted(clash)[0]}: both in [set] and in [over]; leave out one")
+        return [*axes, *parts], [a for a in found if isinstance(a, Distribution)]
+
+    def fixed_parts(self, slots: Sequence[str]) -> dict[str, str]:
+        """Return the part of each slot that has one for all runs."""
+        given = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
+        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in given.items()}
+        return {slot: names[0].strip() for slot, names in lists.items() if len(names) == 1}
+
+    def drawn(self, axes: Sequence[Distribution]) -> list[Mapping[str, AxisValue]]:
+        """Return the points of all distributions; one without values where there is none."""
+        if not axes:
+            if self.runs:
+                raise UsageError(f"runs = {self.runs}: nothing is drawn; write a distribution: uniform(0, 1) deg/h")
+            return [{}]
+        if self.runs < 1:
+            raise UsageError(f"{axes[0].name}: how many points are drawn?  runs = 100 (--runs 100)")
+        return draw(axes, self.runs, self.design, self.design_seed)
+
+    def seed_list(self) -> list[int]:
+        """Return the seeds of a point."""
+        if isinstance(self.seeds, int) and not isinstance(self.seeds, bool) and self.seeds > 0:
+            return list(range(1, self.seeds + 1))
+        if isinstance(self.seeds, list | tuple | range) and self.seeds:
+            seeds = list(self.seeds)
+            if all(type(s) is int and s >= 0 for s in seeds) and len(set(seeds)) == len(seeds):
+                return seeds
+        raise UsageError(f"seeds = {self.seeds}: a number of seeds from 1 on, or a list of different ones, is expected")
+
+    def files(self) -> list[Path]:
+        """Return the measured files, in the order of their names.  Raises UsageError where there are none."""
+        if self.data is None:
+            return []
+        patterns = [self.data] if isinstance(self.data, str | Path) else list(self.data)
+        found: list[Path] = []
+        for pattern in patterns:
+            names = sorted(glob.glob(str(self.path(pattern)), recursive=True))
+            if not names:
+                raise UsageError(f"data = {pattern}: no such file")
+            found += [Path(n) for n in names]
+        return list(dict.fromkeys(found))
+
+    def rows(self) -> tuple[list[Axis], list[tuple[Mapping[str, AxisValue], int | None]]]:
+        """Return the columns of the table as axes without points, and its rows with their seeds."""
+        if self.table is None:
+            return [], [({}, None)]
+        if isinstance(self.table, str | Path) and ".py:" in str(self.table):
+            content = self._called(str(self.table))
+        elif isinstance(self.table, str | Path):
+            content = read_table(self.path(self.table))
+        else:
+            content = [dict(row) for row in self.table]
+        if not content:
+            raise UsageError(f"table = {self.table}: has no rows")
+        seeds = [row.pop("seed", None) for row in content]
+        names = list(dict.fromkeys(name for row in content for name in row))
+        axes = {}
+        for name in names:
+            axis = parse_axis(name, [row[name] for row in content if row.get(name) is not None])
+            assert isinstance(axis, Axis)
+            axes[name] = iter(axis.points), Axis(name, "table", axis.unit, ())
+        rows: list[tuple[Mapping[str, AxisValue], int | None]] = [
+            ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, None if s is None else int(s))
+            for row, s in zip(content, seeds, strict=True)
+        ]
+        return [axis for _, axis in axes.values()], rows
+
+    def _called(self, where: str) -> list[dict[str, Any]]:
+        """Return the rows that a function of a Python file makes."""
+        name, _, function = where.rpartition(":")
+        file = self.path(name)
+        if not file.is_file():
+            raise UsageError(f"table = {where}: no such file {file}")
+        import sys
+
+        spec = importlib.util.spec_from_file_location(f"gyrobench_table_{file.stem}", file)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module  # its dataclasses look for it
+        spec.loader.exec_module(module)
+        if not hasattr(module, function):
+            raise UsageError(f"table = {where}: no function {function} in {file}")
+        return [dict(row) for row in getattr(module, function)(**self.arguments)]
+
+
+def read_definition(file: Path) -> Definition:
+    """Return the definition in a TOML file.  Raises UsageError."""
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{file}: not a TOML file: {error}") from None
+    content.setdefault("name", file.stem)
+    for table in {"set", "over"} & content.keys():
+        content[table] = _texts(content[table])
+    return from_mapping(content, file.parent, str(file))
+
+
+def from_mapping(content: Mapping[str, Any], folder: Path | None = None, where: str = "campaign") -> Definition:
+    """Return the definition in a dictionary with the keys of a file.  Raises UsageError."""
+    known = [f.name for f in fields(Definition) if f.name != "folder"]
+    content = dict(content)
+    if "suite" in content:
+        content["system"] = content.pop("suite")
+    for key in content:
+        if key not in known:
+            raise UsageError(f"{where}: unknown key '{key}'; {suggest_names(key, known)}")
+    if not isinstance(content.get("system"), str):
+        raise UsageError(f'{where}: what is run?  system = "NAME", see gyrobench list')
+    try:
+        return Definition(**content, folder=folder or Path.cwd())
+    except UsageError as error:
+        raise UsageError(f"{where}: {error}") from None
+
+
+def read_table(file: Path) -> list[dict[str, Any]]:
+    """Return the rows of a CSV file, each value with the unit of its column "name [unit]".  Raises UsageError."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as text:
+            lines = [r for r in csv.reader(text) if any(x.strip() for x in r) and not r[0].startswith("#")]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UsageError(f"{file}: not a readable table: {getattr(error, 'strerror', None) or error}") from None
+    if len(lines) < 2:
+        raise UsageError(f"{file}: a header and at least one row are expected")
+    head = [h.strip() for h in lines[0]]
+    names, unit = [], []
+    for column in head:
+        name, bracket, rest = column.rpartition(" [")
+        names.append(name.strip() if bracket else column)
+        unit.append(rest.rstrip("] ") if bracket else "")
+        if unit[-1]:
+            units.unit(unit[-1])
+    rows = []
+    for k, cells in enumerate(lines[1:], 2):
+        if len(cells) != len(names):
+            raise UsageError(f"{file}, row {k}: {len(cells)} values, expected {len(names)}")
+        values = {}
+        for name, u, cell in zip(names, unit, cells, strict=True):
+            if value := cell.strip():
+                values[name] = f"{value} {u}" if u else value
+        rows.append(values)
+    return rows
+
+
+def _texts(value: Any) -> Any:
+    """Return numbers of a file as texts: the size of one without a unit is questioned, as on the command line."""
+    if isinstance(value, dict):
+        return {k: _texts(v) for k, v in value.items()}
+    if isinstance(value, list) and not any(isinstance(v, list | dict) for v in value):
+        return [_texts(v) for v in value]
+    return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def memory(given: Any) -> int:
+    """Return bytes: "1.5GB", "500 MiB" or a number."""
+    text = str(given).replace(" ", "")
+    sizes = {"": 1, "B": 1, "kB": 1e3, "MB": 1e6, "GB": 1e9, "KiB": 1 << 10, "MiB": 1 << 20, "GiB": 1 << 30}
+    number = text.rstrip("BkMGKi")
+    try:
+        size = float(number) * sizes[text[len(number) :]]
+    except (KeyError, ValueError):
+        raise UsageError(f"memory_limit = {given}: write for example 500MB or 1.5GB") from None
+    if not size >= 1e6:
+        raise UsageError(f"memory_limit = {given}: no worker fits into that")
+    return int(size)
+
+
+def flat(content: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Return nested tables as dotted names: {"gyro": {"D_I": 1}} -> {"gyro.D_I": 1}."""
+    found: dict[str, Any] = {}
+    for name, value in content.items():
+        found.update(flat(value, f"{before}{name}.") if isinstance(value, Mapping) else {f"{before}{name}": value})
+    return found
+
+
+def plain(value: Any) -> Any:
+    """Return JSON values: paths and what else there is as text."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,145 @@
+"""What tests share in which the gyro holds its table: setup, windows, set-up effects, composite drift of each phase.
+
+    class Reduction(HeldTest[HeldSetup]):
+        attitudes = VERTICAL
+        def columns(self, held): ...           # design matrix
+        def record_problems(self): ...
+
+[MEAS-SERVO; gyrobench.reduction.drift.servo_regression]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench import drift, frames
+from gyrobench.arrays import Array
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift import composite, drift_terms, servo_regression
+from gyrobench.reduction.estimation.drift_test import DriftTest
+from gyrobench.reduction.estimation.effects import Effect
+from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
+from gyrobench.reduction.setup.run_metadata import remount_of, truth_of
+from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.result import DriftTestResult, Table
+from gyrobench.units import DPH
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldSetup(SiteSetup):
+    """labels: phase -> attitude, of the phases in which the gyro holds the table.  tracking: largest angle of the table
+    against the gyro, rad.  gain: of the pickoff, V/rad of the case (0: unknown).
+    """
+
+    labels: Mapping[int, str]
+    tracking: float = servo_regression.TRACKING
+    gain: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_wobble: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+    u_unbalance: float = 0.0
+    u_time: float = 0.0
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        p = run.parameters
+        known: dict[str, Any] = {
+            "labels": {row.phase: row.label for row in run.plan if row.mode == "servo"},
+            "tracking": float(run.options.get("tracking", servo_regression.TRACKING)),
+            "gain": p.get("gyro.K_sg", 0.0) * p.get("gyro.H", 0.0) / (p.get("gyro.C") or 1.0),
+            "truth": truth_of(run, drift.NAMES),
+            "remount": remount_of(run),
+        }
+        return super().of(run, **{**known, **own})
+
+    def name(self, phase: int) -> str:
+        """Return the attitude of a phase, with its number where the attitude comes back."""
+        label = self.labels[phase]
+        return label if list(self.labels.values()).count(label) == 1 else f"{label}, phase {phase}"
+
+    def earth(self, axes: Array) -> float:
+        """Return the Earth rate along the first of axes (rows, in ENU), rad/s."""
+        return float((axes @ (self.earth_rate * frames.pole(self.latitude)))[0])
+
+
+H = TypeVar("H", bound=HeldSetup)
+
+
+class HeldTest(DriftTest[H]):
+    """A floated gyro that holds a table with one axis; see the module.  attitudes: that a phase may have."""
+
+    handling = staticmethod(handling_candidates.servo)
+    attitudes: ClassVar[Collection[str]]
+
+    def columns(self, held: servo_regression.HeldWindows) -> Array:
+        """Return the design matrix (n, p) of windows."""
+        raise NotImplementedError
+
+    def record_problems(self) -> list[str]:
+        """Return what is wrong with the windows ``self.held`` of the phases ``self.phase``, as sentences."""
+        return []
+
+    def problems(self) -> list[str]:
+        s = self.setup
+        self.held, self.phase, rows = servo_regression.held_windows(self.windows, s.labels, self.attitudes, s.latitude)
+        tracking = servo_regression.tracking_problems(self.windows, rows, s.gain, s.tracking)
+        self.of_held = {n: np.asarray(v)[rows] for n, v in self.windows.items()}
+        return [*self.record_problems(), *tracking]
+
+    def drift_rates(self, quantities: list[Quantity], groups: list[Group]) -> Regression:
+        """Return the regression of the drift rates of all windows, neighbours of which share an angle reading."""
+        s, h = self.setup, self.held
+        y, X = servo_regression.drift_rate(h, s.place), self.columns(h)
+        weighed = servo_regression.candidates(h, s.place, self.columns, self.phase, self.of_held) if s.nuisances else []
+        return Regression(quantities, X, y, h.t_start, h.t_end, groups, noise="readings", candidates=weighed)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        return servo_regression.effects(self.held, self.setup.place, found, self.columns, self.phase, self.setup)
+
+    def mine(self, phase: int) -> NDArray[np.bool_]:
+        """Return the rows (n,) of a phase."""
+        return np.equal(self.phase, phase)
+
+    def dwell(self, phase: int) -> Group:
+        """Return the windows of a phase against the time in it."""
+        h, mine = self.held, self.mine(phase)
+        middle = (h.t_start + h.t_end) / 2.0
+        return Group(self.setup.labels[phase], mine, middle[mine] - h.t_start[mine][0], "time in the dwell", "s")
+
+    def composites(self, d: Array) -> dict[str, composite.Composite | str]:
+        """Return the statistics of each phase of drift rates (n,) less what goes with the angle, or why it has none."""
+        found: dict[str, composite.Composite | str] = {}
+        for p in self.setup.labels:
+            mine = self.mine(p)
+            rates, times = d[mine], (self.held.t_start[mine], self.held.t_end[mine])
+            earth = self.setup.earth(self.held.axes[mine][0])
+            wrong = composite.problems(rates, *times, earth)
+            found[self.setup.name(p)] = "; ".join(wrong) if wrong else composite.composite(rates, *times, earth)
+        return found
+
+    @staticmethod
+    def composite_tables(statistics: Mapping[str, composite.Composite | str]) -> list[Table]:
+        return composite.tables(statistics, DPH, "°/h")
+
+    @staticmethod
+    def equation(names: tuple[str, ...]) -> str:
+        """Return the measurement equation with the terms ``names``, Typst math."""
+        return drift_terms.equation('dot(theta) + omega_"E,x" = omega_d, quad omega_d = ', names)
+
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says; a long one has a table of its noise coefficients."""
+        result = super().from_record(record)
+        return replace(result, tables=[*result.tables, *noise_coefficients_table(result, record, residual=True)])

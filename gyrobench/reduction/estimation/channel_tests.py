@@ -1,0 +1,65 @@
+"""The skeleton of a test with two channels: each is a drift test of its own, and both are reported as one.
+
+    class MyChannel(DriftTest[MySetup]): ...            # made with windows, setup, "x" or "y"
+    class Reduction(ChannelTests[MySetup]):
+        channel = MyChannel
+
+The noise of both is taken as uncorrelated, errors of the set-up that both name are one (merge_channels).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
+
+from gyrobench.reduction.estimation.drift_test import DriftTest
+from gyrobench.reduction.estimation.merge_channels import merge
+from gyrobench.reduction.estimation.sentences import told
+from gyrobench.reduction.setup.setups import Setup
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
+
+S = TypeVar("S", bound=Setup)
+
+
+class ChannelTests(DriftTest[S]):
+    """Both channels of a gyro of two degrees of freedom; see the module.  label: of a channel in the report."""
+
+    channel: ClassVar[Any]  # windows, setup, "x" or "y" -> the test of a channel
+    label: ClassVar[str] = "{} channel"
+
+    def of_channel(self, name: str) -> DriftTest[S]:
+        """Return the test of a channel, "x" or "y"."""
+        test: DriftTest[S] = type(self).channel(self.windows, self.setup, name)
+        return test
+
+    def equation(self) -> str | None:
+        """Return the equation of both channels, Typst math; None: those of the channels below one another."""
+        return None
+
+    def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
+        """Return tables of both channels together."""
+        return []
+
+    def reasons(self) -> list[Reason]:
+        """Return what limits both channels."""
+        return []
+
+    def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
+        """Return the numbers that matter, as sentences: the first coefficients, the largest drift per g."""
+        first = [r.coefficients[0].name for r in results.values()]
+        every = [c for r in results.values() for c in r.coefficients]
+        linear = max((c for c in every if c.unit == "°/h/g"), key=lambda c: abs(c.estimate)).name
+        constant = " and ".join(f"{n} = {{{n}}}" for n in first)
+        return told(every, f"Constant drift {constant}.", f"Largest drift per g: {linear} = {{{linear}}}.")
+
+    def result(self) -> DriftTestResult:
+        """Return what both channels say, without the checks of :meth:`problems`."""
+        self.each = {c: self.of_channel(c) for c in "xy"}
+        results = {self.label.format(c): test.result() for c, test in self.each.items()}
+        noise = " ".join(f"{name}: {r.summary[0]}" for name, r in results.items())
+        others = [f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]]
+        coefficients = [c for r in results.values() for c in r.coefficients]
+        return merge(
+            results, equation=self.equation(), summary=[*self.overview(results), noise, *others],
+            tables=self.tables(coefficients), reasons=self.reasons(),
+        )  # fmt: skip

@@ -1,0 +1,75 @@
+"""Sentences with coefficients in them, whose numbers are those of the result in the end.
+
+    Sentence("Constant drift D_F = {D_F}.", coefficients)
+
+A name in braces is printed with its expanded uncertainty; what the communication step does to u is found after the
+reduction, so :func:`gyrobench.reduction.estimation.verdict.conclude` puts the numbers in once more.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gyrobench.result import Coefficient, Result
+
+ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
+FIELD = re.compile(r"\{(-?)([^{}]+)\}")
+
+
+def p_text(p: float) -> str:
+    """Return a probability as the tables write it: "p < 0.001" or "p = 0.23"."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def plus_minus(c: Coefficient) -> str:
+    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits.
+
+    Six digits of an estimate whose uncertainty is rounding.
+    """
+    U = c.k * c.u
+    if not ROUNDING * abs(c.estimate) < U or not math.isfinite(U):
+        return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
+    digits = 1 - math.floor(math.log10(U))
+    shown = max(0, digits)
+    return f"{round(c.estimate, digits):.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
+
+
+class Sentence(str):
+    """A sentence with numbers, and the template that they were put in; a copy is plain text."""
+
+    template: str
+
+    def __reduce__(self) -> tuple[type[str], tuple[str]]:
+        return str, (str(self),)
+
+    def __new__(cls, template: str, coefficients: Sequence[Coefficient]) -> Sentence:
+        """Put coefficients into a template: {name}, or {-name} for the value with the other sign."""
+        known = {c.name: c for c in coefficients}
+        texts = {m[0]: with_u(known[m[2]], negated=bool(m[1])) for m in FIELD.finditer(template)}
+        uncertain = [field for field, text in texts.items() if "±" in text]
+        if uncertain:  # said once, behind the last of them
+            texts[uncertain[-1]] += " (95 %)"
+        made = super().__new__(cls, FIELD.sub(lambda m: texts[m[0]], template))
+        made.template = template
+        return made
+
+
+def with_u(c: Coefficient, negated: bool = False) -> str:
+    """Return "10.151 ± 0.046 Hz"; six digits of an estimate without u; whether it may be zero."""
+    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
+    text = plus_minus(replace(c, estimate=-c.estimate) if negated else c).removesuffix(" (95 %)")
+    return re.sub(r" (?=[°″′]$)| 1$", "", text) + zero
+
+
+def told(coefficients: Sequence[Coefficient], *templates: str) -> list[str]:
+    """Return the sentences of whose coefficients all have a value; none of ""."""
+    measured = {c.name for c in coefficients if not c.no_value}
+    return [Sentence(t, coefficients) for t in templates if t and measured >= {name for _, name in FIELD.findall(t)}]
+
+
+def renewed(result: Result) -> list[str]:
+    """Return the summary of a result with its present estimates and uncertainties in the sentences."""
+    return [Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else s for s in result.summary]

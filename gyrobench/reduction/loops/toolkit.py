@@ -1,0 +1,52 @@
+"""Names that the reduction of a loop test needs: ``from gyrobench.reduction.loops.toolkit import ...``."""
+
+from gyrobench.arrays import Array
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.fit_result import Account
+from gyrobench.reduction.estimation.sentences import Sentence, told
+from gyrobench.reduction.loops.loop_curves import line, over_time, thinned, trace
+from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift, wrapped
+from gyrobench.reduction.loops.loop_result import LoopFindings
+from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins
+from gyrobench.reduction.loops.loop_test import LoopTest, MeasureTest
+from gyrobench.reduction.loops.measure_findings import MeasureFindings
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import Coefficient, LoopResult, Reason, Response, Table, Test
+from gyrobench.units import ARCMIN, ARCSEC, DEG, DPH
+
+__all__ = [
+    "ARCMIN",
+    "ARCSEC",
+    "DEG",
+    "DPH",
+    "DRIFTS",
+    "Account",
+    "Array",
+    "Coefficient",
+    "Drift",
+    "Gate",
+    "LoopFindings",
+    "LoopResult",
+    "LoopTest",
+    "MeasureFindings",
+    "MeasureTest",
+    "Point",
+    "Reason",
+    "Record",
+    "ReductionError",
+    "Response",
+    "RunDocument",
+    "Sentence",
+    "Table",
+    "Test",
+    "drift",
+    "isolation",
+    "line",
+    "margins",
+    "over_time",
+    "thinned",
+    "told",
+    "trace",
+    "wrapped",
+]

@@ -1,0 +1,76 @@
+"""What the record itself says of its figures: their temperature, what was left out, what was not stated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.record.record import Record
+from gyrobench.result import Coefficient, Reason, Result
+
+R = TypeVar("R", bound=Result)
+TYPE_B_UNSTATED = "type_b.unstated"
+#: estimates that belong to the mean temperature of the record -> their change per kelvin in the gyro, and its sign
+WARMED = {
+    "D_F": ("D_T", 1.0),
+    "ω_d": ("D_T", 1.0),
+    "Dx_0": ("Dx_T", 1.0),
+    "Dy_0": ("Dy_T", 1.0),
+    "R_x": ("Dy_T", 1.0),
+    "R_y": ("Dx_T", -1.0),
+}
+
+
+def applied(result: R, record: Record) -> R:
+    """Return the result at the mean temperature of its record: constant drift belongs to it, and so does its truth.
+
+    The temperatures in a record are weighed as deviations from their mean (gyrobench.reduction.estimation.nuisances).
+    """
+    read = [np.asarray(v, dtype=float) for n, v in record.windows.items() if n.startswith("temperature")]
+    if not read:
+        return result
+    mean, parameters = float(np.mean(read)), record.run.parameters
+    simulated = any(name.startswith("surroundings.") for name in parameters)
+    shown = f"{mean:.3g} K above that of the gyro's coefficients" if simulated else f"{mean - 273.15:.2f} °C"
+    sentence = f"Constant drift belongs to the mean temperature of the record, {shown}."
+    coefficients = [_warmed(c, parameters, mean) if simulated else c for c in result.coefficients]
+    return replace(result, conventions=[*result.conventions, sentence], coefficients=coefficients)
+
+
+def _warmed(c: Coefficient, parameters: Mapping[str, Any], mean: float) -> Coefficient:
+    """Return a coefficient with its simulated truth at a temperature ``mean``, K."""
+    name, sign = WARMED.get(c.name, ("", 0.0))
+    per_kelvin = float(parameters.get(f"gyro.{name}", 0.0)) * sign
+    truth = c.truth
+    if truth is not None and per_kelvin:
+        truth += per_kelvin * mean / units.factor(c.unit)
+    elif c.name == "temperature" and "gyro.D_T" in parameters:
+        truth = float(parameters["gyro.D_T"]) / units.factor(c.unit)
+    else:
+        return c
+    return replace(c, truth=truth, z=(c.estimate - truth) / c.u if c.u > 0.0 else None)
+
+
+def reasons(record: Record) -> list[Reason]:
+    """Return what a reader must know of the record: a plan that was not finished, rows left out, type B not stated.
+
+    Measured data without a statement of type B pass nothing: u is of type A alone.
+    """
+    run = record.run
+    found = [Reason("part.external", text) for text in run.external]
+    if run.measured:
+        found += [Reason("record.note", text) for text in run.notes]
+    if run.measured and not run.type_b_stated:
+        text = (
+            "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
+            "type_b = none."
+        )
+        found.append(Reason(TYPE_B_UNSTATED, text, blocks=("pass",), severity="doubt"))
+    if not run.complete:
+        text = f"The run stopped at {run.stopped_at or 0.0:.6g} s, before the end of its plan."
+        found.append(Reason("record.incomplete", text, severity="error"))
+    return found

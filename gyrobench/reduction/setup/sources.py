@@ -1,0 +1,134 @@
+"""Sources of error of the set-up: each is declared once, with all that the bench knows of it.
+
+    TORQUER_SCALE.effect(setup, fit.error(-k * current))        # in a test: what an error of one unit does to its data
+
+A source has an id; a name and a unit for the reader; the sign (note) of an error of one unit; the option that states
+its standard uncertainty; and the handling errors that are its large form (gyrobench.reduction.diagnosis).  A part that
+simulates it names its id (gyrobench.component.set_up).  From these follow, for every test that names the source: the
+lines of the budget, the correction of a measured error, the weights of the fit, and the predicted shift of a simulated
+error.  docs/guides/errors_of_the_set_up.md explains them to a metrologist.
+
+A system has sources of its own by declaring them in its folder, in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from gyrobench.component.set_up import SINES
+
+if TYPE_CHECKING:
+    from gyrobench.arrays import Array
+    from gyrobench.reduction.estimation.effects import Effect
+
+PHASES = ("phase 0°", "phase 90°")  # of a wobble
+#: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
+#: of the data, which a covariance would take for information about it
+RELATIVE = "1"
+STATED = "positive where the stated one is too large"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of error of the set-up.
+
+    id, name, note: may hold fields in braces, of several sources that are alike (:meth:`of`).  option: whose value, SI,
+    is the standard uncertainty; "" where the test states it.  parts: of several independent errors of one size.  large:
+    handling errors (diagnosis.handling_candidates) that are its large form.
+    """
+
+    id: str
+    name: str
+    unit: str
+    option: str = ""
+    note: str = ""
+    parts: tuple[str, ...] = ()
+    large: tuple[str, ...] = ()
+
+    def of(self, **named: str) -> Source:
+        """Return one of several sources that are alike: its fields filled in."""
+        return replace(self, **{n: getattr(self, n).format(**named) for n in ("id", "name", "note")})
+
+    def effect(self, sizes: Any, error: Array | None = None, **more: Any) -> Effect:
+        """Return the source with what it does to the data of a test; see gyrobench.reduction.estimation.effects.
+
+        sizes: the setup of the test, a mapping of its options, or the standard uncertainty itself, SI.
+        """
+        from gyrobench.reduction.estimation.effects import Effect
+
+        return Effect(self, self.size(sizes), error, **{"note": self.note, "parts": self.parts, **more})
+
+    def size(self, sizes: Any) -> float:
+        """Return the standard uncertainty that is stated, SI; 0 where none is."""
+        if isinstance(sizes, (int, float)):
+            return float(sizes)
+        if isinstance(sizes, Mapping):
+            return float(sizes.get(self.option, 0.0))
+        return float(getattr(sizes, self.option))
+
+
+# ------------------------------------------------------------------------------------------------ the table
+AXIS_POLE_EAST = Source("table.axis.pole.east", "table axis off the pole, about east", "rad", "u_axis")
+AXIS_POLE_NORMAL = Source("table.axis.pole.normal", "table axis off the pole, about p × east", "rad", "u_axis")
+AXIS_VERTICAL_EAST = Source("table.axis.vertical.east", "table axis off the vertical, about east", "rad", "u_axis")
+AXIS_VERTICAL_NORTH = Source("table.axis.vertical.north", "table axis off the vertical, about north", "rad", "u_axis")
+AXIS_LEVEL_POLE = Source("table.axis.level.pole", "table axis towards the pole", "rad", "u_axis")
+AXIS_SERVO = Source("table.axis.servo.{axis}", "table axis about {axis}", "rad", "u_axis")  # of each phase
+ATTITUDE_SERVO = Source("table.attitude", "attitude about the table axis", "rad", "u_axis")
+OUTER_POLE_EAST = Source("outer.axis.pole.east", "outer axis off the pole, about east", "rad", "u_axis")
+OUTER_POLE_NORMAL = Source("outer.axis.pole.normal", "outer axis off the pole, about p × east", "rad", "u_axis")
+SQUARE = Source("table.square", "table axes out of the right angle", "rad", "u_square")
+INNER_SQUARE = Source("inner.axis.square", "right angle of the table axes", "rad", "u_square")
+WOBBLE = Source("table.wobble", "wobble of the table axis, twice a turn", "rad", "u_wobble", parts=PHASES)
+WOBBLE_OF = Source(
+    "{axis}.wobble", "wobble of the {axis} axis, twice a turn", "rad", "u_wobble", "unknown phase", PHASES
+)
+ROTATION = ("rotation", "angle_unit")
+ANGLE_ONCE = Source("angle.once", "angle error, once a turn", "rad", "u_angle1", "encoder", SINES, ROTATION)
+ANGLE_TWICE = Source("angle.twice", "angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
+ANGLE_ONCE_OF = Source("{axis}.angle.once", "{axis} angle error, once a turn", "rad", "u_angle1", "encoder", SINES)
+ANGLE_TWICE_OF = Source("{axis}.angle.twice", "{axis} angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
+ANGLE_OF = {"once": ANGLE_ONCE_OF, "twice": ANGLE_TWICE_OF}
+UNBALANCE = Source(
+    "servo.unbalance", "unbalance over stiffness", "rad", "u_unbalance", "angle at 1 g across the axis",
+    ("mass along z", "mass along y"),
+)  # fmt: skip
+TIME_BASE = Source("time_base", "time base", RELATIVE, "u_time", "relative", large=("time_unit",))
+
+# ------------------------------------------------------------------------------------------------ the instrument on it
+INPUT_TO_OUTPUT = Source("mount.3", "input axis towards output axis", "rad", "u_mount")
+INPUT_TO_SPIN = Source("mount.input_to_spin", "input axis towards spin axis", "rad", "u_mount")
+TURNED = {
+    axis: Source(f"mount.{k}", f"gyro turned about its {axis} axis", "rad", "u_mount")
+    for axes in (("input", "output", "spin"), ("x", "y", "z"))
+    for k, axis in enumerate(axes, 1)
+}
+REMOUNT = Source("mount.scatter", "drift from mount to mount", "rad/s", "u_remount", "of each mount by itself")
+LATITUDE = Source("latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",))
+GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity")
+
+# ------------------------------------------------------------------------------------------------ current and readings
+TORQUER_SCALE = Source(
+    "torquer.scale_factor", "torquer scale factor", RELATIVE, "u_scale_factor", f"relative, {STATED}",
+    large=("current_unit",),
+)  # fmt: skip
+TORQUER_NONLINEARITY = Source(
+    "torquer.nonlinearity", "torquer nonlinearity", RELATIVE, "u_nonlinearity",
+    "relative departure from proportionality at {full}",
+)  # fmt: skip
+CURRENT_OFFSET = Source("current.offset", "offset of the current reading", "A", "u_current", large=("current_sign",))
+CURRENT_RESOLUTION = Source("current.resolution", "resolution of the current reading", "A", note="as if never dithered")
+#: of a gyro with two channels: the torquer about an axis, and the meter of its current
+TORQUER_SCALE_OF = replace(
+    TORQUER_SCALE, id="torquer.{axis}.scale_factor", name="scale factor of the torquer about {axis}"
+)
+TORQUER_NONLINEARITY_OF = replace(
+    TORQUER_NONLINEARITY, id="torquer.{axis}.nonlinearity", name="nonlinearity of the torquer about {axis}"
+)
+CURRENT_OFFSET_OF = replace(CURRENT_OFFSET, id="current.{axis}.offset", name="zero of the {axis} current meter")
+CURRENT_RESOLUTION_OF = replace(
+    CURRENT_RESOLUTION, id="current.{axis}.resolution", name="resolution of the {axis} current meter"
+)
+VOLTMETER = Source("voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative")

@@ -1,0 +1,163 @@
+"""Entries of a result: coefficients, tests, tables, budget lines, reasons, figures.
+
+Numbers are in surface units, the unit beside them.  What logic looks for has an ``id``; names, titles and sentences are
+for readers alone and may be reworded or translated.  Nothing here computes, and nothing is changed after it is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+NO_VERDICT = "no specification given"
+Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
+Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One estimated quantity, or one inseparable combination under the combination's name."""
+
+    name: str  # "D_I"; a combination: "D_F + D_OO·X²"
+    meaning: str
+    unit: str  # "°/h/g"
+    estimate: float
+    u: float  # combined standard uncertainty
+    k: float  # coverage factor of the 95 % interval
+    interval: tuple[float, float]
+    t: float | None = None  # estimate / u of type A
+    p: float | None = None  # two-sided p of t
+    u_a: float | None = None  # type A part of u
+    dof: float | None = None
+    closed: float | None = None  # the source's closed formula (corrected), same unit
+    truth: float | None = None  # simulated runs only
+    z: float | None = None  # (estimate - truth) / u
+    limit: Limit | None = None
+    verdict: str = NO_VERDICT  # pass | fail | inconclusive | void | no specification given
+    no_value: str = ""  # why there is none: estimate and u are then NaN, and the interval where it has no bound
+    combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
+    stands_for: str = ""  # the coefficient whose name a limit may have, too; "": no other name
+
+
+@dataclass(frozen=True)
+class Series:
+    """A measured quantity against a position or a time, with its fit."""
+
+    label: str  # "mount 1: output axis along the pole"
+    x: list[float]
+    x_name: str  # "table angle"
+    x_unit: str  # "°"
+    y: list[float]
+    fit: list[float]
+    residual: list[float]
+    y_name: str  # "drift rate"
+    y_unit: str  # "°/h"
+    t: list[float] = field(default_factory=list)  # mid time of each window, s
+    shown_fit_x: list[float] = field(default_factory=list)  # dense curve for the plot
+    shown_fit_y: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Test:
+    """A statistical test of the residuals or of repeatability."""
+
+    __test__: ClassVar[bool] = False  # pytest: not a class of tests
+
+    id: str  # "ljung_box.raw"
+    name: str
+    statistic: float
+    p: float | None
+    what: str  # what it looks for, in words
+    finding: str  # what it says here, in words
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the method's own.  id: "budget.predicted"; several alike: with what each belongs to, after a colon."""
+
+    id: str
+    title: str
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+    @property
+    def kind(self) -> str:
+        """The id without what the table belongs to."""
+        return self.id.partition(":")[0]
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What limits a result: a sentence for the reader, and the verdicts that it takes away.
+
+    blocks: these verdicts of the coefficients ``names`` (none named: all) become ``becomes``.  intervals: a verdict
+    stands only where it holds for these too (name -> low, high, printed unit).  severity: "error" (not to be used as it
+    is; said first), "doubt" (listed; said first where it takes a verdict away), "warning", "condition" (said only where
+    it takes a verdict away).
+    """
+
+    id: str  # "type_b.unstated"
+    text: str
+    blocks: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    becomes: str = "inconclusive"
+    severity: str = "warning"
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
+
+
+@dataclass(frozen=True)
+class BudgetLine:
+    """One line of the error budget; contribution = |sensitivity| * size, all as standard uncertainties.
+
+    sensitivity: the change of the estimate for one unit by which the set-up is off, with its sign; a source of several
+    independent errors has none.
+    """
+
+    id: str  # of its source, "torquer.scale_factor"
+    source: str
+    size: float
+    size_unit: str
+    sensitivity: float
+    sensitivity_unit: str
+    contribution: float
+    unit: str
+    coefficient: str  # which coefficient it touches
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class TypeB:
+    """What one standard uncertainty of a source does to all estimates: a row for each of its independent parts."""
+
+    id: str  # of the source
+    source: str
+    changes: list[list[float]]
+
+
+@dataclass(frozen=True)
+class Response:
+    """A measured response of a loop, with the curves of its linear models laid over it.
+
+    kind: "loop" (open loop gain: Bode plot with margins), "ratio" (a gain against frequency), "step" (against time),
+    "time" (several quantities against time: all of them in curves, y is the one that runs are compared by).
+    x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
+    of a gain (u rad of its phase too), in y_unit of a step; None: not known.  counts: false for a point too noisy to be
+    used, []: all count.  curves: {"label", "x", "y", "phase"}.
+    """
+
+    name: str
+    kind: str
+    caption: str
+    x: list[float]
+    x_name: str
+    x_unit: str
+    y: list[float]
+    y_name: str
+    y_unit: str
+    phase: list[float] = field(default_factory=list)
+    u: list[float | None] = field(default_factory=list)
+    coherence: list[float] = field(default_factory=list)
+    counts: list[bool] = field(default_factory=list)
+    curves: list[dict[str, Any]] = field(default_factory=list)
