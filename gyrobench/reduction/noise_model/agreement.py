@@ -21,16 +21,33 @@ NARROW, POINTS = 512, 1 << 15  # averaging time up to which the spectrum decides
 
 @dataclass(frozen=True)
 class Agreement:
-    """Averaging times tau (k,) in units of the sampling interval, from SHORTEST samples to PART of the record.
+    """Averaging times of m (k,) samples, from SHORTEST to PART of the record; tau0: of a sample, s.
 
     deviation, low, high (k,): of the record with its interval of 95 %; implied (k,): of the model.
     """
 
-    tau: Array
+    m: Array
     deviation: Array
     low: Array
     high: Array
     implied: Array
+    tau0: float = 1.0
+
+    @property
+    def tau(self) -> Array:
+        return self.m * self.tau0
+
+    def scaled(self, size: float, tau0: float) -> Agreement:
+        """Return the agreement in another unit of the rate, for samples of tau0 s."""
+        return Agreement(
+            self.m, self.deviation * size, self.low * size, self.high * size, self.implied * size, tau0
+        )  # fmt: skip
+
+    @property
+    def octave(self) -> NDArray[np.bool_]:
+        """Return which averaging times are 2, 4, 8 ... samples."""
+        out: NDArray[np.bool_] = np.log2(self.m) % 1.0 == 0.0
+        return out
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -40,13 +57,12 @@ class Agreement:
     @property
     def share(self) -> float:
         """Return the part of the averaging times at which the implied deviation lies in the interval."""
-        return float(np.mean(self.inside)) if self.tau.size else 1.0
+        return float(np.mean(self.inside)) if self.m.size else 1.0
 
     @property
     def octaves(self) -> float:
         """Return that part of the averaging times 2, 4, 8 ... samples alone."""
-        k = np.log2(self.tau) % 1.0 == 0.0
-        return float(np.mean(self.inside[k])) if k.any() else 1.0
+        return float(np.mean(self.inside[self.octave])) if self.octave.any() else 1.0
 
     @property
     def holds(self) -> bool:

@@ -87,11 +87,11 @@ def fit_noise(
     unit = {"N": size * math.sqrt(tau0), "B": size, "K": size / math.sqrt(tau0), "Q": size * tau0}
     with_wild = _with_wild(treated, at, found, means)
     return NoiseModel(
-        tau0, size, means, terms, p,
+        tau0, size, level, means, terms, p,
         *(times(of[n], unit[n]) for n in ("N", "B", "K")), times(ramp, size / tau0), times(of["Q"], unit["Q"]),
         tuple(_process(i, at, clouds, size, tau0) for i in range(sum(t.name == "gauss_markov" for t in at.model))),
         _minimum(at, clouds, ramp, treated.samples, means, size, tau0), treated,
-        _in_units(own, size, tau0), _in_units(clean, size, tau0), scaled.removed * size**2, agreement, agreement_clean,
+        _in_units(own, size, tau0), _in_units(clean, size, tau0), scaled.removed * size**2, agreement.scaled(size, tau0), agreement_clean.scaled(size, tau0),
         {n: v * unit[n] for n, v in with_wild.items()}, len(found.seen),
     )  # fmt: skip
 
@@ -313,8 +313,8 @@ def _minimum(
     reached = k < m.size - 1 and bool(np.mean(place == m.size - 1) < 0.025)
     value = float(own[k])
     return Minimum(
-        Estimate(value * size, min(low, value) * size, max(high, value) * size, reached),
-        Estimate(m[k] * tau0, min(early, m[k]) * tau0, max(late, m[k]) * tau0, reached), reached,
+        Estimate(value * size, min(float(low), value) * size, max(float(high), value) * size, reached),
+        times(Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached), tau0), reached,
     )  # fmt: skip
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import Agreement
-from gyrobench.reduction.noise_model.ordinates import Model, allan, joined, spectrum, split
+from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.prior import PEAKS
-from gyrobench.reduction.noise_model.terms import Grid, Term
+from gyrobench.reduction.noise_model.steps import Step
+from gyrobench.reduction.noise_model.terms import Grid
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.deviations import Deviation
+from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 
@@ -53,12 +55,13 @@ class NoiseModel:
     """Noise model of a rate record; see :func:`gyrobench.reduction.noise_model.fit.fit_noise`.
 
     N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  terms, p: in units of the sampling
-    interval tau0 (s) and of ``size`` (unit of the rate).  own: Allan deviation of the record as it was; clean: of the
+    interval tau0 (s) and of ``size`` (unit of the rate), as the treatment is, less ``level``.  own: Allan deviation of the record as it was; clean: of the
     record without what was taken out; removed (k,): Allan variance of that, at own.tau.
     """
 
     tau0: float
     size: float
+    level: float
     means: bool
     terms: Model
     p: Array
@@ -78,8 +81,38 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
 
-    def _broad(self) -> tuple[Model, Array]:
-        return joined([(t, q) for t, q in split(self.terms, self.p) if t.name not in PEAKS])
+    @property
+    def agrees(self) -> bool:
+        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned."""
+        return self.agreement.holds and self.agreement_clean.holds
+
+    @property
+    def cleaned(self) -> Array:
+        """Return the record (n,) without lines, steps and wild samples, NaN where nothing is or was taken out."""
+        return self.size * self.treatment.cleaned() + self.level
+
+    @property
+    def longest(self) -> tuple[int, Array]:
+        """Return the first index and the samples of the longest stretch, cleaned and without a gap: what was missing or
+        wild is drawn from the noise around.
+        """
+        s = max(self.treatment.stretches, key=lambda s: s.own.size)
+        x = s.clean if s.done.noise is None else s.clean + s.done.noise
+        return s.start, self.size * x + self.level
+
+    @property
+    def lines(self) -> list[SpectralLine]:
+        """Return the lines that were taken out, frequencies in Hz, amplitudes in the unit of the rate."""
+        return [
+            replace(x, frequency=x.frequency / self.tau0, u_frequency=x.u_frequency / self.tau0,
+                    amplitude=x.amplitude * self.size, u_amplitude=x.u_amplitude * self.size)
+            for x in self.treatment.lines
+        ]  # fmt: skip
+
+    @property
+    def steps(self) -> list[Step]:
+        """Return the steps of the level that were taken out, in the unit of the rate."""
+        return [replace(s, size=s.size * self.size, u=s.u * self.size) for s in self.treatment.steps]
 
     def allan(self, tau: Array) -> Array:
         """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""
@@ -93,11 +126,6 @@ class NoiseModel:
         omega = 2.0 * math.pi * f * self.tau0
         out: Array = self.size**2 * self.tau0 * spectrum(self.terms, self.p, Grid(omega, self.means))
         return out
-
-    @property
-    def filter(self) -> Term | None:
-        """Return the term of the white noise, with its filter."""
-        return next((t for t in self.terms if t.name == "white"), None)
 
     def filter_words(self) -> str:
         """Return what the sensor's filter is, in words; "" where the record shows none."""
