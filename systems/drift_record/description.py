@@ -18,7 +18,6 @@ from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
-from gyrobench.report.numbers import write_number
 from gyrobench.result import Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
@@ -128,7 +127,7 @@ def slope_readings(noise: NoiseModel, allan: Deviation) -> Table:
     rows = []
     for term, (unit, si, _) in TERMS.items():
         row: list[Any] = [term, unit]
-        for e in (getattr(noise, term), getattr(read, term)):
+        for e in (noise[term], getattr(read, term)):
             row += [e.value / si if e.determined else None, e.low / si if e.determined else None, abs(e.high) / si]
         rows.append(row)
     head = ["coefficient", "unit", "model", "95 % from", "95 % to", "slopes", "from (slopes)", "to (slopes)"]
@@ -262,13 +261,13 @@ def _flat(p: Prepared, run: RunDocument) -> bool:
 def conventions(run: RunDocument) -> list[str]:
     return [
         "N, B, K, R, Q as in IEEE 952 with S two-sided; N in °/√h is the density in °/h/√Hz over 60, towards frequency "
-        "0. B is flicker without cutoff, its floor in the Allan deviation 0.664 B; B_min is the least Allan deviation of "
-        "the whole model, whatever makes it.",
+        "0. B is flicker without cutoff, its floor in the Allan deviation 0.664 B; B_min is the least Allan deviation "
+        "of the whole model, whatever makes it.",
         "Gauss-Markov process: dx/dt = −x/τ + w, variance σ², density of w two-sided, q = 2 σ²/τ.",
         "Spectrum figures are one-sided: 2 S.",
         "Not determined: the 95 % interval of the coefficient holds zero; its upper end is stated.",
-        "Lines, columns that the rate follows significantly, wild samples and steps of the level are taken out of it before "
-        "coefficients and deviations; the deviation of the record as it was judges the model.",
+        "Lines, columns that the rate follows significantly, wild samples and steps of the level are taken out of it "
+        "before coefficients and deviations; the deviation of the record as it was judges the model.",
     ]
 
 
@@ -278,7 +277,7 @@ def summary(name: str, noise: NoiseModel, several: bool) -> list[str]:
         return [f"{of}{noise_tables.agreement_text(noise)} No coefficient is stated."]
     known, lacking = [], []
     for term, (unit, si, _) in TERMS.items():
-        e = getattr(noise, term)
+        e = noise[term]
         if e.determined:
             known.append(f"{term} = {noise_tables.range_text(e, si)} {unit}")
         else:

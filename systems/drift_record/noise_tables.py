@@ -46,7 +46,7 @@ def contradicted(noise: NoiseModel) -> str:
 
 
 def _disagreement(noise: NoiseModel) -> str:
-    a = min((noise.agreement, noise.agreement_clean), key=lambda a: min(a.share, a.octaves))
+    a = min(noise.agreements, key=lambda a: min(a.share, a.octaves))
     tau, ratio = a.worst
     of = "record" if a is noise.agreement else "record without lines, steps and wild samples"
     return (
@@ -76,7 +76,9 @@ def agreement(noise: NoiseModel) -> Table:
     a = noise.agreement
     rows: list[list[Any]] = [
         [float(t), *(float(v) / DPH for v in values), "inside" if inside else "outside"]
-        for t, *values, inside, shown in zip(a.tau, a.deviation, a.low, a.high, a.implied, a.inside, a.octave, strict=True)
+        for t, *values, inside, shown in zip(
+            a.tau, a.deviation, a.low, a.high, a.implied, a.inside, a.octave, strict=True
+        )
         if shown
     ]
     head = ["averaging time / s", "record / (°/h)", "95 % from", "95 % to", "model / (°/h)", "finding"]
@@ -90,7 +92,7 @@ def agreement(noise: NoiseModel) -> Table:
 def bias_instability(noise: NoiseModel) -> Table:
     """Return the bias instability in its two senses."""
     least, floor = noise.minimum, 2.0 * math.log(2.0) / math.pi
-    b = noise.B
+    b = noise["B"]
     rows: list[list[Any]] = [
         ["coefficient of the flicker, B", *_range(b, DPH), None, None, None,
          f"floor of the deviation {number(math.sqrt(floor) * b.value / DPH)} °/h" if b.determined else "not determined"],
@@ -110,7 +112,7 @@ def gauss_markov(noise: NoiseModel) -> list[Table]:
     """Return the Gauss-Markov processes as a Kalman filter takes them."""
     rows: list[list[Any]] = []
     for k, g in enumerate(noise.processes, 1):
-        phi, w = g.discrete(noise.tau0)
+        phi, w = g.discrete(noise.scale.tau0)
         found = "determined" if g.tau.determined else f"in {_percent(g.present)} of the models"
         ends = [v / si for e, si in ((g.sigma, DPH), (g.tau, 1.0)) for v in (e.value, e.low, e.high)]
         rows.append([k, (g.sigma.value / DPH) ** 2, *ends, g.density / DPH, phi, w / DPH, found])
@@ -118,7 +120,7 @@ def gauss_markov(noise: NoiseModel) -> list[Table]:
             "√q / (°/h/√s)", "φ", "σ(w) / (°/h)", "finding"]  # fmt: skip
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
-        f"{noise.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model that is reported has them all"
+        f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model that is reported has them all"
     )
     return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
 
@@ -133,12 +135,12 @@ def resonances(noise: NoiseModel) -> list[Table]:
 
 def terms_text(noise: NoiseModel) -> str:
     """Return of which terms the model is, and the filter of the sensor."""
-    words = [NAMES[t.name] for t in noise.terms if t.name in NAMES]
+    words = [NAMES[t.name] for t in noise.shape[0] if t.name in NAMES]
     if count := len(noise.processes):
         words.append(f"{count} Gauss-Markov process{'es' if count > 1 else ''}")
     if count := len(noise.peaks()):
         words.append(f"{count} band{'s' if count > 1 else ''} of noise")
-    if noise.R.determined:
+    if noise["R"].determined:
         words.append("a ramp")
     shape = noise.filter_words()
     passed = f" The white noise has passed a filter: {shape}." if shape else " No filter of the white noise is seen."
@@ -153,9 +155,9 @@ def wild_text(noise: NoiseModel, time: Array) -> str:
     many = f"{at.size} samples are wild" if at.size > 1 else "A sample is wild"
     first = ", ".join(f"{number(time[k])} s" for k in at[:SHOWN])
     both = [
-        f"{term} {number(getattr(noise, term).value / si)} {unit} without them, {number(with_them / si)} with them"
+        f"{term} {number(noise[term].value / si)} {unit} without them, {number(with_them / si)} with them"
         for term, (unit, si, _) in TERMS.items()
-        if (with_them := noise.with_wild.get(term, 0.0)) and getattr(noise, term).determined
+        if (with_them := noise.with_wild.get(term, 0.0)) and noise[term].determined
     ]
     told = f" {'; '.join(both)}." if both else ""
     return (

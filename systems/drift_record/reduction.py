@@ -2,11 +2,12 @@
 
 The rate without what other columns explain goes to gyrobench.reduction.noise_model: white noise through the filter of
 the sensor, angle noise, Gauss-Markov processes, flicker, random walk, ramp; lines, wild samples and steps taken out and
-told.  A coefficient is printed where the deviation implied by the whole model is the record's own.  Beside it the slopes
-of the Allan deviation, deviations, spectrum, stationarity, distribution and an autoregressive model.
+told.  A coefficient is printed where the deviation implied by the whole model is the record's own.  Beside it the
+slopes of the Allan deviation, deviations, spectrum, stationarity, distribution and an autoregressive model.
 [DRIFT-NOISE-MODEL, DRIFT-ALLAN, DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; IEEE 952, annex C; Xia 2008, ch. 3]
 
-Not modelled: drift of the scale factor; temperature that acts with a lag; noise whose level changes (said, not modelled).
+Not modelled: drift of the scale factor; temperature that acts with a lag; noise whose level changes (said, not
+modelled).
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
@@ -130,7 +130,7 @@ def _coefficients(a: Analysed, run: RunDocument, several: bool) -> list[Coeffici
 
 def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
     unit, si, meaning = TERMS[term]
-    e: Estimate = getattr(a.noise, term)
+    e: Estimate = a.noise[term]
     why = "" if e.determined else noise_tables.absent(term, a.noise)
     return _stated(a, name, meaning, unit, e, si, why, truth, relative)
 
@@ -139,7 +139,8 @@ def _stated(
     a: Analysed, name: str, meaning: str, unit: str, e: Estimate, si: float, why: str, truth: float | None,
     relative: float,
 ) -> Coefficient:  # fmt: skip
-    """Return a coefficient with its interval; without a value where there is none, ``why``, or the model is not right."""
+    """Return a coefficient with its interval; without a value where there is none, ``why``, or the model is not right.
+    """
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not a.noise.agrees:

@@ -29,7 +29,7 @@ def reduce(file: Path, columns: dict[str, np.ndarray], **values: str) -> DriftRe
 
 
 def rows(result: DriftRecordResult, table: int = 0) -> dict[Any, list[Any]]:
-    return {row[0]: row for row in result.columns[0].tables["regression"][table]["rows"]}
+    return {row[0]: row for row in result.columns[0].tables["regression"][table].rows}
 
 
 def regress(y: np.ndarray, **others: np.ndarray) -> dict[str, Any]:

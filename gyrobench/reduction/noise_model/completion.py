@@ -1,10 +1,11 @@
 """Samples of a stretch that are missing or wild, completed by what its own noise says of them.
 
 The precision of the noise is diagonal in the cosine transform, P = C' diag(1/S) C.  A sample x_t differs from what all
-others say of it by (P x)_t/P_tt, of standard deviation P_tt^(-1/2): wild is what exceeds WILD of them, the largest of
-its neighbourhood first; where many are, the limit falls as long as few of what exceeds it are the noise's own.  Missing and wild samples x_m get their conditional mean -P_mm^-1 P_mo x_o (conjugate gradients),
-and the powers of the ordinates the expectation of what is left, by a draw P_mm^-1 (P u)_m of u from the same noise.  S is
-a smoothed spectrum of the completed stretch, so both are repeated.  [DRIFT-NOISE-MODEL; own derivation]
+others say of it by (P x)_t/P_tt, of standard deviation P_tt^(-1/2): wild is what exceeds a limit, the largest of
+its neighbourhood first; where many are, the limit falls as long as few of what exceeds it are the noise's own.  Missing
+and wild samples x_m get their conditional mean -P_mm^-1 P_mo x_o (conjugate gradients), and the powers of the ordinates
+the expectation of what is left, by a draw P_mm^-1 (P u)_m of u from the same noise.  S is a smoothed spectrum of the
+completed stretch, so both are repeated.  [DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations
@@ -48,6 +49,11 @@ class Completed:
     missing: int
     white: Array
     noise: Array | None
+
+    @property
+    def drawn(self) -> Array:
+        """Return the stretch (n,) with what was missing or wild drawn from the noise around."""
+        return self.x if self.noise is None else self.x + self.noise
 
 
 def smooth_spectrum(power: Array) -> Array:
@@ -126,7 +132,8 @@ def level(x: Array) -> Array:
 
 
 def local_scale(z: Array, gone: NDArray[np.bool_]) -> Array:
-    """Return the scatter of a series (n,), by the size that BULK of all samples do not exceed, wild ones among the others.
+    """Return the scatter of a series (n,), by the size that BULK of all samples do not exceed, wild ones among the
+    others.
 
     By parts of the series: where its noise changes slowly, no sample is wild for it.  1 for a normal series of unit
     variance.  Heavy tails that more than 1 - BULK of the samples are in are the noise's own.
@@ -174,7 +181,14 @@ def core_excess(z: Array) -> float:
 
     def squares(s: float) -> float:
         c = CORE / s
-        return s * s * (1.0 - 2.0 * c * math.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi) / float(special.erf(c / math.sqrt(2.0))))
+        return (
+            s
+            * s
+            * (
+                1.0
+                - 2.0 * c * math.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi) / float(special.erf(c / math.sqrt(2.0)))
+            )
+        )
 
     s = math.sqrt(m2)
     for _ in range(30):
@@ -195,6 +209,8 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     noise: Array | None = None
     z = np.zeros(x.size)
     for k in range(ROUNDS):
+        if k == 1:  # what was wild beside a wilder one may be none under its own spectrum
+            wild[:] = False
         P = _Precision(smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost))
         y = _filled(x, missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
@@ -217,7 +233,9 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         excess = core_excess((z / local_scale(z, missing | wild))[~(missing | wild)]) / P.diagonal
     white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
-    return Completed(y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise)
+    return Completed(
+        y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise
+    )
 
 
 def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:

@@ -23,11 +23,11 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import Agreement, compare, with_spectrum
-from gyrobench.reduction.noise_model.model import Minimum, NoiseModel, Process
+from gyrobench.reduction.noise_model.model import Minimum, NoiseModel, Process, Scale
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
 from gyrobench.reduction.noise_model.prior import PEAKS
-from gyrobench.reduction.noise_model.search import Fitted, Search, maximize, search, search_again
+from gyrobench.reduction.noise_model.search import GM, Fitted, Search, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
 from gyrobench.reduction.noise_model.terms import Grid, Term
 from gyrobench.reduction.noise_model.treatment import Treated, treat
@@ -56,7 +56,12 @@ class _Scaled:
 
 
 def fit_noise(
-    rate: Array, tau0: float, means: bool = True, remove_lines: bool = True, find_wild: bool = True, raw: Array | None = None
+    rate: Array,
+    tau0: float,
+    means: bool = True,
+    remove_lines: bool = True,
+    find_wild: bool = True,
+    raw: Array | None = None,
 ) -> NoiseModel:
     """Return the noise model of a rate (n,), NaN where a sample is missing.
 
@@ -67,42 +72,41 @@ def fit_noise(
     if not tau0 > 0.0:
         raise ValueError(f"tau0 = {tau0} s; it must be positive")
     rate = np.asarray(rate, dtype=float)
+    scale = scale_of(rate, tau0, means)
+    raw = rate if raw is None else np.asarray(raw, dtype=float)
+    treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
+    treated, found = _without_steps(treated, means)
+    clouds = posterior.draw(found)
+    judge = _Judge(found, _deviations(raw / scale.size, treated), treated.samples)
+    at = judge.choose(clouds)
+    ramp = _ramp(found, clouds)
+    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
+    whole, clean = judge.both(allan(at.model, at.p, judge.own.tau, means) + slow)
+    of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
+    return NoiseModel(
+        scale=scale,
+        shape=joined([*split(at.model, at.p), *found.resonances]),
+        coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
+        processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
+        minimum=_minimum(at, clouds, ramp, treated.samples, scale),
+        treatment=treated,
+        agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
+        with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
+        models=len(found.seen),
+    )
+
+
+def scale_of(rate: Array, tau0: float, means: bool) -> Scale:
+    """Return the units in which a rate (n,) is fitted: its level, and the rms of its differences over sqrt 2."""
     level = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
     difference = np.diff(rate)
     size = math.sqrt(0.5 * float(np.nanmean(difference**2))) if np.isfinite(difference).any() else 1.0
-    size = size or 1.0
-    raw = rate if raw is None else np.asarray(raw, dtype=float)
-    treated = treat((rate - level) / size, remove_lines, find_wild)
-    treated, found = _without_steps(treated, means)
-    clouds = posterior.draw(found)
-    scaled = _deviations(raw / size, treated)
-    judge = _Judge(found, scaled, treated.samples)
-    at = judge.choose(clouds)
-    terms, p = joined([*split(at.model, at.p), *found.resonances])
-    ramp = _ramp(found, clouds)
-    variance = allan(at.model, at.p, judge.own.tau, means)
-    agreement, agreement_clean = judge.both(variance + (0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0))
-    own, clean = judge.own, judge.clean
-    of = {name: _coefficient(name, at, found, clouds) for name in CALLED}
-    unit = {"N": size * math.sqrt(tau0), "B": size, "K": size / math.sqrt(tau0), "Q": size * tau0}
-    with_wild = _with_wild(treated, at, found, means)
-    return NoiseModel(
-        tau0, size, level, means, terms, p,
-        *(times(of[n], unit[n]) for n in ("N", "B", "K")), times(ramp, size / tau0), times(of["Q"], unit["Q"]),
-        tuple(_process(i, at, clouds, size, tau0) for i in range(sum(t.name == "gauss_markov" for t in at.model))),
-        _minimum(at, clouds, ramp, treated.samples, means, size, tau0), treated,
-        _in_units(own, size, tau0), _in_units(clean, size, tau0), scaled.removed * size**2, agreement.scaled(size, tau0), agreement_clean.scaled(size, tau0),
-        {n: v * unit[n] for n, v in with_wild.items()}, len(found.seen),
-    )  # fmt: skip
+    return Scale(tau0, size or 1.0, level, means)
 
 
 def times(e: Estimate, unit: float) -> Estimate:
     """Return an estimate in another unit."""
     return Estimate(e.value * unit, e.low * unit, e.high * unit, e.determined)
-
-
-def _in_units(d: Deviation, size: float, tau0: float) -> Deviation:
-    return replace(d, tau=d.tau * tau0, deviation=d.deviation * size, low=d.low * size, high=d.high * size)
 
 
 # ------------------------------------------------------------------ steps
@@ -120,8 +124,8 @@ def _without_steps(treated: Treated, means: bool) -> tuple[Treated, Search]:
 def _one_step(treated: Treated, found: Search, means: bool) -> tuple[Treated, Search] | None:
     """Return the record without one step more, and its models, or None where the likelihood does not ask for it.
 
-    Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift; the
-    model is fitted again without each of them.
+    Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift;
+    the model is fitted again without each of them.
     """
     at = found.best
     bound = 2.0 * math.log(treated.samples) + RATIO
@@ -197,7 +201,8 @@ class _Judge:
         return 1.0 if all(a.holds for a in both) else min(min(a.share, a.octaves) for a in both)
 
     def choose(self, clouds: Sequence[Cloud]) -> Fitted:
-        """Return the model to be reported: of greatest evidence, terms paid for, among those that agree with the record.
+        """Return the model to be reported: of greatest evidence, terms paid for, among those that agree with the
+        record.
 
         Where no maximum agrees the draws are tried, the most probable ones first; where none does, the closest one.
         """
@@ -227,7 +232,8 @@ class _Judge:
 
 # ------------------------------------------------------------------ figures of the draws
 def _coefficient(name: str, at: Fitted, found: Search, clouds: Sequence[Cloud]) -> Estimate:
-    """Return a coefficient in units of the record: value of the model that is reported, interval of all draws with it."""
+    """Return a coefficient in units of the record: value of the model that is reported, interval of all draws with it.
+    """
     figure = size_of(CALLED[name])
     values, weights = weighted(clouds, figure)
     if not values.size:
@@ -243,7 +249,7 @@ def _coefficient(name: str, at: Fitted, found: Search, clouds: Sequence[Cloud]) 
     return Estimate(value, min(low, value), max(high, value), True)
 
 
-def _process(i: int, at: Fitted, clouds: Sequence[Cloud], size: float, tau0: float) -> Process:
+def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:
     """Return the i-th Gauss-Markov process of a model; intervals are of those in the draws that are nearest to it."""
     own = np.array([q for t, q in split(at.model, at.p) if t.name == "gauss_markov"])
     sigma, tau, weight = [np.empty(0)], [np.empty(0)], [np.empty(0)]
@@ -265,8 +271,10 @@ def _process(i: int, at: Fitted, clouds: Sequence[Cloud], size: float, tau0: flo
     ends = [[math.exp(f * quantile(x, w, q)) for q in (0.025, 0.975)] if w.size else [0.0, math.inf]
             for x, f in ((v, 0.5), (t, 1.0))]  # fmt: skip
     value = math.exp(0.5 * own[i, 0]), math.exp(own[i, 1])
-    estimates = [Estimate(x, min(e[0], x), max(e[1], x), present > 1.0 - ABSENT) for x, e in zip(value, ends, strict=True)]
-    return Process(times(estimates[0], size), times(estimates[1], tau0), present)
+    estimates = [
+        Estimate(x, min(e[0], x), max(e[1], x), present > 1.0 - ABSENT) for x, e in zip(value, ends, strict=True)
+    ]
+    return Process(times(estimates[0], scale.size), times(estimates[1], scale.tau0), present)
 
 
 def _resampled(clouds: Sequence[Cloud], count: int) -> list[tuple[Model, Array]]:
@@ -283,39 +291,42 @@ def _resampled(clouds: Sequence[Cloud], count: int) -> list[tuple[Model, Array]]
 
 
 def _ramp(found: Search, clouds: Sequence[Cloud]) -> Estimate:
-    """Return the ramp per sample: its normal distribution for given parameters, over the draws."""
+    """Return the ramp per sample: its normal distribution for given parameters, over the draws.
+
+    The interval holds that of the models with a random walk too: beside a free ramp, slow drift looks more like one
+    that comes back than it is.
+    """
     z = np.sqrt(2.0) * np.array([-2.35, -1.33, -0.436, 0.436, 1.33, 2.35])  # nodes and weights of Gauss-Hermite
     share = np.array([0.00453, 0.157067, 0.724629, 0.724629, 0.157067, 0.00453]) / math.sqrt(math.pi)
-    values, weights, means = [], [], []
-    for model, p in _resampled(clouds, SAMPLE):
-        mean, sd = found.data.ramp_of(model, p)
-        values.append((mean[:, None] + sd[:, None] * z).ravel())
-        weights.append(np.tile(share, mean.size))
-        means.append(mean)
-    v, w = np.concatenate(values), np.concatenate(weights)
-    low, high = quantile(v, w, 0.025), quantile(v, w, 0.975)
-    return Estimate(float(np.median(np.concatenate(means))), low, high, low * high > 0.0)
+    walks = [c for c in clouds if any(t.name == "walk" for t in c.model)]
+    total = sum(float(c.weight.sum()) for c in walks)
+    walks = [replace(c, weight=c.weight / total) for c in walks] if total > 0.0 else []
+    ends, value = [], 0.0
+    for some in (walks, clouds):
+        rows = [(model, *found.data.ramp_of(model, p)) for model, p in _resampled(some, SAMPLE)]
+        if rows:
+            mean, sd = (np.concatenate([row[i] for row in rows]) for i in (1, 2))
+            v, w = (mean[:, None] + sd[:, None] * z).ravel(), np.tile(share, mean.size)
+            ends += [quantile(v, w, 0.025), quantile(v, w, 0.975)]
+            value = float(np.median(mean))
+    return Estimate(value, min(ends), max(ends), min(ends) * max(ends) > 0.0)
 
 
-def _minimum(
-    at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, means: bool, size: float, tau0: float
-) -> Minimum:
+def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, scale: Scale) -> Minimum:
     """Return the least deviation of the model without resonances, up to a quarter of the record."""
     m = np.unique(np.rint(np.geomspace(1.0, max(samples / 4.0, 2.0), AVERAGES)))
     slow = 0.5 * (ramp.value * m) ** 2 if ramp.determined else 0.0
-    rows = [np.sqrt(allan(model, p, m, means) + slow) for model, p in _resampled(clouds, SAMPLE)]
+    rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in _resampled(clouds, SAMPLE)]
     curves = np.concatenate(rows)
     place = np.argmin(curves, axis=1)
-    own = np.sqrt(allan(at.model, at.p[None], m, means)[0] + slow)
+    own = np.sqrt(allan(at.model, at.p[None], m, scale.means)[0] + slow)
     k = int(np.argmin(own))
     low, high = np.quantile(np.min(curves, axis=1), [0.025, 0.975])
     early, late = np.quantile(m[place], [0.025, 0.975])
     reached = k < m.size - 1 and bool(np.mean(place == m.size - 1) < 0.025)
-    value = float(own[k])
-    return Minimum(
-        Estimate(value * size, min(float(low), value) * size, max(float(high), value) * size, reached),
-        times(Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached), tau0), reached,
-    )  # fmt: skip
+    least = Estimate(float(own[k]), min(float(low), float(own[k])), max(float(high), float(own[k])), reached)
+    when = Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached)
+    return Minimum(times(least, scale.size), times(when, scale.tau0), reached)
 
 
 def _with_wild(treated: Treated, at: Fitted, found: Search, means: bool) -> dict[str, float]:

@@ -14,7 +14,6 @@ from gyrobench.reduction.noise_model.prior import PEAKS
 from gyrobench.reduction.noise_model.steps import Step
 from gyrobench.reduction.noise_model.terms import Grid
 from gyrobench.reduction.noise_model.treatment import Treated
-from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
@@ -43,7 +42,8 @@ class Process:
 
 @dataclass(frozen=True)
 class Minimum:
-    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end ``tau``."""
+    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end ``tau``.
+    """
 
     deviation: Estimate
     tau: Estimate
@@ -51,45 +51,59 @@ class Minimum:
 
 
 @dataclass(frozen=True)
-class NoiseModel:
-    """Noise model of a rate record; see :func:`gyrobench.reduction.noise_model.fit.fit_noise`.
-
-    N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  terms, p: in units of the sampling
-    interval tau0 (s) and of ``size`` (unit of the rate), as the treatment is, less ``level``.  own: Allan deviation of the record as it was; clean: of the
-    record without what was taken out; removed (k,): Allan variance of that, at own.tau.
+class Scale:
+    """Units of a fit: the interval tau0 of a sample, s, size and level of the rate; means: a sample is one over tau0.
     """
 
     tau0: float
     size: float
     level: float
     means: bool
-    terms: Model
-    p: Array
-    N: Estimate
-    B: Estimate
-    K: Estimate
-    R: Estimate
-    Q: Estimate
+
+    @property
+    def units(self) -> dict[str, float]:
+        """Return the units of N, B, K, R, Q."""
+        root = math.sqrt(self.tau0)
+        return {"N": self.size * root, "B": self.size, "K": self.size / root, "R": self.size / self.tau0,
+                "Q": self.size * self.tau0}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseModel:
+    """Noise model of a rate record; see :func:`gyrobench.reduction.noise_model.fit.fit_noise`.
+
+    coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
+    parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
+    taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
+    """
+
+    scale: Scale
+    shape: tuple[Model, Array]
+    coefficients: dict[str, Estimate]
     processes: tuple[Process, ...]
     minimum: Minimum
     treatment: Treated
-    own: Deviation
-    clean: Deviation
-    removed: Array
-    agreement: Agreement
-    agreement_clean: Agreement
+    agreements: tuple[Agreement, Agreement]
     with_wild: dict[str, float]
     models: int
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return a coefficient."""
+        return self.coefficients[name]
+
+    @property
+    def agreement(self) -> Agreement:
+        return self.agreements[0]
 
     @property
     def agrees(self) -> bool:
         """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned."""
-        return self.agreement.holds and self.agreement_clean.holds
+        return all(a.holds for a in self.agreements)
 
     @property
     def cleaned(self) -> Array:
         """Return the record (n,) without lines, steps and wild samples, NaN where nothing is or was taken out."""
-        return self.size * self.treatment.cleaned() + self.level
+        return self.scale.size * self.treatment.cleaned() + self.scale.level
 
     @property
     def longest(self) -> tuple[int, Array]:
@@ -97,49 +111,48 @@ class NoiseModel:
         wild is drawn from the noise around.
         """
         s = max(self.treatment.stretches, key=lambda s: s.own.size)
-        x = s.clean if s.done.noise is None else s.clean + s.done.noise
-        return s.start, self.size * x + self.level
+        return s.start, self.scale.size * (s.clean + s.done.drawn - s.done.x) + self.scale.level
 
     @property
     def lines(self) -> list[SpectralLine]:
         """Return the lines that were taken out, frequencies in Hz, amplitudes in the unit of the rate."""
         return [
-            replace(x, frequency=x.frequency / self.tau0, u_frequency=x.u_frequency / self.tau0,
-                    amplitude=x.amplitude * self.size, u_amplitude=x.u_amplitude * self.size)
+            replace(x, frequency=x.frequency / self.scale.tau0, u_frequency=x.u_frequency / self.scale.tau0,
+                    amplitude=x.amplitude * self.scale.size, u_amplitude=x.u_amplitude * self.scale.size)
             for x in self.treatment.lines
         ]  # fmt: skip
 
     @property
     def steps(self) -> list[Step]:
         """Return the steps of the level that were taken out, in the unit of the rate."""
-        return [replace(s, size=s.size * self.size, u=s.u * self.size) for s in self.treatment.steps]
+        return [replace(s, size=s.size * self.scale.size, u=s.u * self.scale.size) for s in self.treatment.steps]
 
     def allan(self, tau: Array) -> Array:
         """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""
-        m = np.maximum(np.rint(tau / self.tau0), 1.0)
-        ramp = self.R.value * tau if self.R.determined else np.zeros_like(tau)
-        out: Array = np.sqrt(self.size**2 * allan(self.terms, self.p, m, self.means) + 0.5 * ramp**2)
+        m = np.maximum(np.rint(tau / self.scale.tau0), 1.0)
+        ramp = self["R"].value * tau if self["R"].determined else np.zeros_like(tau)
+        out: Array = np.sqrt(self.scale.size**2 * allan(*self.shape, m, self.scale.means) + 0.5 * ramp**2)
         return out
 
     def spectrum(self, f: Array) -> Array:
         """Return the two-sided spectrum (k,) of the samples, 0 < f <= 1/(2 tau0) in Hz, aliasing included."""
-        omega = 2.0 * math.pi * f * self.tau0
-        out: Array = self.size**2 * self.tau0 * spectrum(self.terms, self.p, Grid(omega, self.means))
+        omega = 2.0 * math.pi * f * self.scale.tau0
+        out: Array = self.scale.size**2 * self.scale.tau0 * spectrum(*self.shape, Grid(omega, self.scale.means))
         return out
 
     def filter_words(self) -> str:
         """Return what the sensor's filter is, in words; "" where the record shows none."""
-        found = next(((t, q) for t, q in split(self.terms, self.p) if t.name == "white" and t.filter != "none"), None)
+        found = next(((t, q) for t, q in split(*self.shape) if t.name == "white" and t.filter != "none"), None)
         if found is None:
             return ""
         t, q = found
         if t.filter == "first":
-            return f"low-pass of first order, time constant {1e3 * self.tau0 * math.exp(q[1]):.3g} ms"
+            return f"low-pass of first order, time constant {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
         if t.filter == "second":
-            f = math.exp(q[1]) / (2.0 * math.pi * self.tau0)
+            f = math.exp(q[1]) / (2.0 * math.pi * self.scale.tau0)
             return f"low-pass of second order, {f:.3g} Hz, damping {math.exp(q[2]):.2g}"
         if t.filter == "average":
-            return f"mean over {1e3 * self.tau0 * math.exp(q[1]):.3g} ms"
+            return f"mean over {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
         if t.filter.startswith("mean"):
             return f"mean over {t.filter[4:]} samples"
         level = float(np.exp(-2.0 * np.sum(q[1::2])))
@@ -148,9 +161,9 @@ class NoiseModel:
     def peaks(self) -> list[tuple[float, float, float]]:
         """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
         out = []
-        for t, q in split(self.terms, self.p):
+        for t, q in split(*self.shape):
             if t.name in PEAKS:
                 width = 1.0 / math.pi if t.name == "resonance" else math.sqrt(2.0 * math.log(2.0)) / math.pi
-                out.append((math.exp(q[2]) / (2.0 * math.pi * self.tau0), width / (math.exp(q[1]) * self.tau0),
-                            self.size * math.exp(0.5 * q[0])))  # fmt: skip
+                out.append((math.exp(q[2]) / (2.0 * math.pi * self.scale.tau0), width / (math.exp(q[1]) * self.scale.tau0),
+                            self.scale.size * math.exp(0.5 * q[0])))  # fmt: skip
         return out

@@ -9,16 +9,16 @@ out.  Under the model their covariance is
     flicker         correlated among the first ones, from its generalized covariance
     others          diag S(omega): their memory is short against a stretch
 
-The first LOW of each parity are kept singly with all of this (of Gauss-Markov drift a rank that matters is in them); the
-others are summed up in bins of equal logarithmic width.  The errors of the end angles are kept in all of them.  A ramp
-common to the stretches, a mean of the odd ordinates, is eliminated as in restricted maximum likelihood; it is taken off
-by least squares before, so that what is left of it is in the first ordinates alone.  [DRIFT-NOISE-MODEL; own derivation]
+The first LOW of each parity are kept singly with all of this (of Gauss-Markov drift a rank that matters is in them);
+the others are summed up in bins of equal logarithmic width.  The errors of the end angles are kept in all of them.  A
+ramp common to the stretches, a mean of the odd ordinates, is eliminated as in restricted maximum likelihood; it is
+taken off by least squares before, so that what is left of it is in the first ordinates alone.  [DRIFT-NOISE-MODEL; own
+derivation]
 """
 
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -142,7 +142,7 @@ class Ordinates:
             full = self._flicker * size[..., :, None] * size[..., None, :]
             diagonal = np.arange(LOW)
             full[..., diagonal, diagonal] -= S
-            return full
+            return np.asarray(full)
         z, amplitude, _ = markov_parts(np.exp(p[..., 1]), self.grid.means)
         z, v = z[..., None], np.exp(p[..., 0]) * amplitude
         sign = np.where(self.odd, -1.0, 1.0) * z ** (self.n - 1.0)
@@ -286,9 +286,9 @@ def parameters(model: Model) -> int:
 
 def spectrum(model: Model, p: Array, grid: Grid) -> Array:
     """Return S (..., b) of a model."""
-    return np.sum([term.spectrum(q, grid) for term, q in split(model, p)], axis=0)
+    return np.asarray(np.sum([term.spectrum(q, grid) for term, q in split(model, p)], axis=0))
 
 
 def allan(model: Model, p: Array, m: Array, means: bool = False) -> Array:
     """Return the Allan variance (..., k) of means over m samples, of the terms of a model."""
-    return np.sum([term.allan(q, m, means) for term, q in split(model, p)], axis=0)
+    return np.asarray(np.sum([term.allan(q, m, means) for term, q in split(model, p)], axis=0))

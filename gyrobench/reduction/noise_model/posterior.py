@@ -56,7 +56,11 @@ def sample(found: Fitted, data: Ordinates, prior: Prior, count: int, rng: np.ran
     w = np.minimum(w, np.sqrt(count) * w.mean())
     evidence = top + math.log(float(w.mean()))
     full = -0.5 * found.value + float(prior.log(found.model, found.p[None])[0])
-    laplace = full + 0.5 * q * math.log(2.0 * math.pi) - 0.5 * float(np.linalg.slogdet(found.information + 1e-3 * np.eye(q))[1])
+    laplace = (
+        full
+        + 0.5 * q * math.log(2.0 * math.pi)
+        - 0.5 * float(np.linalg.slogdet(found.information + 1e-3 * np.eye(q))[1])
+    )
     return Cloud(found.model, p, w / w.sum(), log_p), evidence - laplace
 
 

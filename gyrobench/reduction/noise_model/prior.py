@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from scipy import special
@@ -107,6 +108,7 @@ class Prior:
             if term.name == "gauss_markov":
                 taus.append(q[..., 1])
                 out = out - math.log(self.longest - math.log(SHORTEST_TAU))
-        for a, b in zip(taus[:-1], taus[1:], strict=True):  # in their order
+        for a, b in pairwise(taus):  # in their order
             out = out - HARD * np.maximum(APART - (b - a), 0.0) ** 2
-        return out + float(special.gammaln(len(taus) + 1.0))
+        density: Array = out + float(special.gammaln(len(taus) + 1.0))
+        return density

@@ -20,7 +20,7 @@ MOST_MARKOV, MOST_RESONANCES = 3, 12
 N, W, Q, B, K, GM = (Term(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
-STARTS = {
+STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
     "first": [[math.log(0.5)], [math.log(5.0)]],
     "second": [[0.0, -0.3], [-2.0, -0.3]],
@@ -185,7 +185,11 @@ class Search:
         if parts[0][0].name != "white":
             return
         (term, q), rest = parts[0], parts[1:]
-        if term.filter == "average" and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02 and whole > 1:
+        if (
+            term.filter == "average"
+            and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02
+            and whole > 1
+        ):
             names = (*names, f"mean{whole}")
         for name in names:
             if name == term.filter or (name == "none" and W in at.model):
@@ -217,7 +221,7 @@ class Search:
         """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear."""
         data = self.data
         order = np.argsort(data.grid.omega[: data.b])
-        S, excess = self.excess(at)
+        S, _ = self.excess(at)
         omega, count = data.grid.omega[order], data.count[order]
         ratio = data.power[order] / S[order]
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
@@ -236,7 +240,8 @@ class Search:
         return found
 
     def add_resonances(self) -> None:
-        """Add resonances while the powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
+        """Add resonances while the powers stand out of the fit; each is fitted with the broadband terms, then frozen.
+        """
         while len(self.resonances) < MOST_RESONANCES:
             at = self.best
             start = self.peak(at)

@@ -1,8 +1,8 @@
 """Steps of the level of a stretch: the likelihood ratio of one at every sample, under a noise of known spectrum.
 
 In the cosine transform a step at s has the ordinates -sqrt(2/n) sin(omega_k s)/(2 sin(omega_k/2)); with b(s) the sum of
-P x over the samples from s on, its size is b/d and the ratio b^2/d, d(s) = sum of sin^2(omega_k s)/(2 n sin^2 S_k).  The
-level itself is free.  [DRIFT-NOISE-MODEL; own derivation]
+P x over the samples from s on, its size is b/d and the ratio b^2/d, d(s) = sum of sin^2(omega_k s)/(2 n sin^2 S_k).
+The level itself is free.  [DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations

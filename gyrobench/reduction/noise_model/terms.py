@@ -14,9 +14,10 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
     band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
 
 Filters: "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them; "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).  N^2 is the level of the
-sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T (``means``: Gauss-Markov
-drift and random walk; faster terms are those of the samples as they are).  [DRIFT-NOISE-MODEL; own derivation]
+"mean4" over 4 of them; "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
+(``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
+[DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ def markov_parts(tau: Array, means: bool) -> tuple[Array, Array, Array]:
     return z, amplitude, nugget
 
 
-# ------------------------------------------------------------------ filters: |H|^2 with |H(0)| = 1, covariance of unit N^2
+# ------------------------------------------------------------------ filters: |H|^2, |H(0)| = 1, covariance of unit N^2
 def _second_poles(p: Array) -> tuple[Any, Any, Any]:
     """Return z1, z2 and the share a: covariance Re(a z1^h + (1 - a) z2^h) of a second-order low-pass, p: log omega_n,
     log zeta.
@@ -120,7 +121,7 @@ def _second(p: Array, grid: Grid) -> Array:
 def _average_parts(p: Array) -> tuple[Array, Array, Array]:
     """Return m = floor(w) and the shares of the triangles over m and m + 1 in max(0, 1 - |h|/w), h whole, p: log w."""
     w = np.exp(p[..., 0:1])
-    m = np.floor(w)
+    m = np.maximum(np.floor(w), 1.0)
     upper = (m + 1.0) * (1.0 - m / w)
     return m, 1.0 - upper, upper
 
@@ -222,20 +223,20 @@ class Term:
             return v * m / 3.0 * (1.0 if means else 1.0 + 0.5 / m**2)
         if self.name == "gauss_markov":
             z, amplitude, nugget = markov_parts(np.exp(p[..., 1:2]), means)
-            return v * (amplitude * _allan_pole(z, m) - nugget / m)
+            return np.asarray(v * (amplitude * _allan_pole(z, m) - nugget / m))
         if self.name == "band":
             lag = np.arange(math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0)
             gamma = np.exp(-0.5 * (lag * np.exp(-p[..., 1:2])) ** 2) * np.cos(lag * np.exp(p[..., 2:3]))
             return v * _allan_covariance(gamma, m)
         z = np.exp(-np.exp(-p[..., 1:2]) + 1j * np.exp(p[..., 2:3]))
-        return v * np.real(_allan_pole(z, m))
+        return np.asarray(v * np.real(_allan_pole(z, m)))
 
 
 def _resonance(p: Array, grid: Grid) -> Array:
     """Mean of Re P over each bin: of the antiderivative 2 arctan((1 + r)/(1 - r) tan(x/2)) where a bin has a width."""
     r, centre = np.exp(-np.exp(-p[..., 0:1])), np.exp(p[..., 1:2])
     if not grid.half_width.any():
-        return 0.5 * (poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre)))
+        return np.asarray(0.5 * (poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre))))
     h = np.maximum(grid.half_width, 1e-9)
     out: Array = np.zeros(np.broadcast_shapes(centre.shape, grid.omega.shape))
     for shift in (-centre, centre):
@@ -277,11 +278,11 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         return 1.0 / m * np.ones((*p.shape[:-1], 1))
     if name == "first":
         z = np.exp(-np.exp(-p[..., 0:1]))
-        return (1.0 - z) / (1.0 + z) * _allan_pole(z, m)
+        return np.asarray((1.0 - z) / (1.0 + z) * _allan_pole(z, m))
     if name == "second":
         z1, z2, share = _second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
-        return np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level
+        return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
     if name.startswith("mean"):
         count = int(name[4:])
         lag = np.arange(count + 1.0)

@@ -2,13 +2,15 @@
 
 A gap of more than LONG samples ends a stretch; what is missing in shorter ones, and wild samples, is completed by what
 the noise around says of it (:mod:`completion`).  Lines are found in the longest stretch and taken off the samples that
-are there, in each stretch with an amplitude and phase of its own, by least squares.  [DRIFT-NOISE-MODEL, DRIFT-PERIODIC]
+are there, in each stretch with an amplitude and phase of its own, by least squares.  [DRIFT-NOISE-MODEL,
+DRIFT-PERIODIC]
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +54,8 @@ class Treated:
     """Stretches of a record of ``samples`` samples on the grid, and what was taken out of it.
 
     spread: variance of the mean square of the noise over that of even normal noise, 1 where the level is even; levels
-    (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of them.
+    (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of
+    them.
     """
 
     samples: int
@@ -107,7 +110,8 @@ class Treated:
 
 
 def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
-    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long`` samples."""
+    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long`` samples.
+    """
     there = np.flatnonzero(np.isfinite(rate))
     if not there.size:
         return []
@@ -134,11 +138,11 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
     full = True
     own = [rate[s].copy() for s in parts]
     if remove_lines:
-        found = find_lines(done[longest].x + (0.0 if done[longest].noise is None else done[longest].noise), 1.0)
+        found = find_lines(done[longest].drawn, 1.0)
         lines, full = found.lines, found.complete
     if lines:
         frequencies = np.array([x.frequency for x in lines])
-        for k, (y, d) in enumerate(zip(own, done, strict=True)):
+        for y, d in zip(own, done, strict=True):
             used = np.isfinite(y)
             used[d.wild] = False
             y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
@@ -148,7 +152,8 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
-    """Return the sines (n,) of the frequencies (per sample) of least squares in the samples used, with level and slope."""
+    """Return the sines (n,) of the frequencies (per sample) of least squares in the samples used, with level and slope.
+    """
     n, count = y.size, frequencies.size
     if not count:
         return np.zeros(n)
@@ -186,6 +191,8 @@ def _levels(z: Array) -> tuple[float, Array, float]:
     mean = np.add.reduceat(square, edges[:-1]) / np.diff(edges)
     # of the part's own noise: heavy tails do not look like a change
     u = np.sqrt(max(spread, 1.0) * 2.0 / np.diff(edges))
-    inner = np.sqrt(np.maximum([np.var(square[a:b]) / (b - a) for a, b in zip(edges[:-1], edges[1:], strict=True)], 1e-12))
+    inner = np.sqrt(
+        np.maximum([np.var(square[a:b]) / (b - a) for a, b in pairwise(edges.tolist())], 1e-12)
+    )
     p = float(special.chdtrc(parts - 1, np.sum(((mean - 1.0) / np.minimum(np.maximum(inner, 0.3 * u), u)) ** 2)))
     return spread, np.sqrt(mean), p
