@@ -20,10 +20,11 @@ LOCK = ".lock"
 TEMPORARY = "gyrobench-temporary-"  # no user names a folder so
 
 
-def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
+def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: bool = True) -> None:
     """Write a file under a temporary name beside ``path`` and rename it; a failure leaves the old file as it was.
 
-    content: of the file, or a function that writes it to the path it is given.
+    content: of the file, or a function that writes it to the path it is given.  durable: the content is on the disk
+    before its name, and both are when this returns, whatever happens to the machine; not for what is made again.
     """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     os.close(handle)
@@ -34,22 +35,53 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
         else:
             content(temporary)
         os.chmod(temporary, 0o644)
+        if durable:
+            to_disk(temporary)
         os.replace(temporary, path)
+        if durable and os.name != "nt":  # there a folder cannot be opened
+            to_disk(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def to_disk(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk; some file systems cannot say."""
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+    finally:
+        os.close(handle)
 
 
 def make_once(path: Path, make: Callable[[Path], object]) -> Path:
     """Return ``path``; where there is no such file, ``make(path)`` writes it whole, in one process at a time.
 
-    The others that want the same file wait for it.  For files of a cache, whose names say what they hold.
+    The others that want the same file wait for it.  For files of a cache, whose names say what they hold.  Its digest
+    lies beside it and is checked each time; a file that does not have it any more is made again.
     """
-    if not path.exists():
+    if not is_intact(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with _turn(path.with_name(path.name + LOCK)):
-            if not path.exists():
+            if not is_intact(path):
                 make(path)
+                digest = sha256(path).encode("ascii")
+                write_whole(_digest_of(path), digest, durable=False)
     return path
+
+
+def _digest_of(path: Path) -> Path:
+    return path.with_name(path.name + ".sha256")
+
+
+def is_intact(path: Path) -> bool:
+    """Return whether a file of a cache is there as it was made."""
+    try:
+        return _digest_of(path).read_bytes() == sha256(path).encode("ascii")
+    except OSError:
+        return False
 
 
 @contextlib.contextmanager

@@ -7,16 +7,19 @@ float holds: what they mean is checked where they are used.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
 LARGEST = 1 << 28  # bytes: the run.json of a long run with its linear models has some 10 MB
 DEEPEST = 200  # levels; Python's own readers give up at about a thousand
+SEAL = "sha256"
+SHORTEST = 10  # digits of a digest, those of a report_id
 Raise = Callable[[str], Exception]
 
 
@@ -54,6 +57,35 @@ def json_object(text: str, name: object, error: Raise) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise error(f"{name}: not a JSON object {{...}}")
     return data
+
+
+def digest(content: Any) -> str:
+    """Return the SHA-256 of JSON values: of their text with sorted keys.  Raises ValueError for NaN and infinities."""
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a document that is stored: with the digest of all its other keys as ``sha256``."""
+    return {**content, SEAL: digest(content)}
+
+
+def opened(data: Mapping[str, Any], name: object, error: Raise) -> tuple[dict[str, Any], bool]:
+    """Return the content of a stored document without its digest, and whether it has one: that of 0.1.0 has none."""
+    content = {key: value for key, value in data.items() if key != SEAL}
+    if SEAL in data:
+        check_digest(content, data[SEAL], name, error)
+    return content, SEAL in data
+
+
+def check_digest(content: Mapping[str, Any], expected: object, name: object, error: Raise) -> None:
+    """Raise the error where the digest of the content does not begin with what was stored beside it."""
+    try:
+        found = digest(content)
+    except ValueError:  # a number that JSON lacks, which nothing here writes
+        found = ""
+    if not isinstance(expected, str) or len(expected) < SHORTEST or not found.startswith(expected):
+        raise error(f"{name}: changed after it was saved (its SHA-256 is not the one in it)")
 
 
 def xml(data: bytes, name: object, error: Raise) -> ET.Element:

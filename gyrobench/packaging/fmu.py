@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
-from gyrobench.files import make_once, write_whole
+from gyrobench.files import make_once, sha256, write_whole
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
@@ -57,7 +57,7 @@ def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
     return guid_of(_content(cls, name, "native", fmi))
 
 
-def write_archive(path: Path, entries: dict[str, bytes]) -> None:
+def write_archive(path: Path, entries: dict[str, bytes], durable: bool = True) -> None:
     """Write a zip archive; the same entries give the same file."""
 
     def write(temporary: Path) -> None:
@@ -69,7 +69,7 @@ def write_archive(path: Path, entries: dict[str, bytes]) -> None:
                 z.writestr(info, entries[name])
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, write)  # a build that is stopped leaves no half file
+    write_whole(path, write, durable)  # a build that is stopped leaves no half file
 
 
 def native_entries(files: dict[str, str], name: str, platforms: tuple[str, ...], fmi: int) -> dict[str, bytes]:
@@ -154,19 +154,11 @@ def build(
         entries |= index_page(name, summary(cls), cls.__doc__ or "", cls.layout) | licences(target == "python")
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
-        write_archive(path, entries)
+        write_archive(path, entries, durable=False)
 
     make_once(cached, write)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
-    if not _is_copy(path, cached):
+    if not path.exists() or sha256(path) != sha256(cached):
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda temporary: shutil.copy2(cached, temporary))
+        write_whole(path, lambda temporary: shutil.copyfile(cached, temporary))
     return path
-
-
-def _is_copy(path: Path, of: Path) -> bool:
-    """Return whether a file has the size and the time of another, as its copy has until something writes to it."""
-    if not path.exists():
-        return False
-    one, other = path.stat(), of.stat()
-    return (one.st_size, one.st_mtime_ns) == (other.st_size, other.st_mtime_ns)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.notebook import data_frame
 from gyrobench.report import FORMATS, ResultError
@@ -96,9 +97,9 @@ def read_result(folder: Path) -> Result:
     if not file.is_file():
         raise UsageError(f"{folder}: no result.json; write it by gyrobench report {folder}")
     try:
-        return load(file.read_text(encoding="utf-8"))
+        return load(reading.read_text(file, ResultError), file)
     except ResultError as error:
-        raise UsageError(f"{file}: {error}") from None
+        raise UsageError(str(error)) from None
 
 
 def _require_two(runs: int) -> None:

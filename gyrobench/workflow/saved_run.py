@@ -15,6 +15,7 @@ from gyrobench.record.run_document import RecordError
 from gyrobench.reduction.diagnosis.truth_check import check_truth, set_values
 from gyrobench.reduction.loops.loop_summary import renew
 from gyrobench.report import FORMATS, NAMES
+from gyrobench.report.result_json import read_document
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_limits
@@ -83,8 +84,7 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
     limits = load_limits(spec)
     with record_kept(folder, record):
         old = folder / "result.json"  # the step check needs further runs and is kept
-        check = (reading.json_object(reading.read_text(old, RecordError), old, RecordError).get("step_check") or {}
-                 ) if old.exists() else {}  # fmt: skip
+        check = _stored(old).get("step_check") or {} if old.exists() else {}
         try:
             result = reduce_run(system, record, limits, check if "other" in check else None)
         except GyrobenchError:
@@ -93,6 +93,10 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
             missing = missing_windows(record)
             raise PostRunError(f"{folder}: the record is not complete, so there is no report\n{missing}") from None
         return RunOutcome(record, result, folder, write_report(result, folder, record, spec, formats))
+
+
+def _stored(file: Path) -> dict[str, Any]:
+    return read_document(reading.read_text(file, RecordError), file, RecordError)
 
 
 def missing_windows(record: Record) -> str:

@@ -19,6 +19,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
@@ -87,7 +88,10 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
 
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
-    every = (_csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp, _other)
+    every = (
+        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _fmu, _ssp,
+        _other,
+    )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
 
@@ -307,6 +311,96 @@ def _result(folder: Path) -> Callable[[random.Random], object]:
         result_json.load(changed(text, rng).decode("utf-8", "replace"))
 
     return one
+
+
+def _stored(folder: Path) -> Callable[[random.Random], object]:
+    """One bit of a stored file of each kind: what is read is what was written, or an error or a note says it."""
+    homes = stored_files(folder)
+    pristine = {home: (read(), {f: f.read_bytes() for f in fs}) for home, (read, fs) in homes.items()}
+
+    def one(rng: random.Random) -> None:
+        home = rng.choice(list(homes))
+        before, contents = pristine[home]
+        file = rng.choice(list(contents))
+        at, bit = rng.randrange(len(contents[file])), 1 << rng.randrange(8)
+        file.write_bytes(contents[file][:at] + bytes([contents[file][at] ^ bit]) + contents[file][at + 1 :])
+        try:
+            after = homes[home][0]()
+        finally:
+            for f, content in contents.items():
+                f.write_bytes(content)
+        assert after == before or "no SHA-256 of its own" in after, f"{file.name}, byte {at}, bit {bit}: silent"
+
+    return one
+
+
+def stored_files(folder: Path) -> dict[str, tuple[Callable[[], str], list[Path]]]:
+    """Write one of everything that is stored; return for each kind how it is read, as text, and its files."""
+    import numpy as np
+
+    from gyrobench import files
+    from gyrobench.campaign.execution.store import Campaign, CampaignStore
+    from gyrobench.engine.checkpoint import FILE, _read
+    from gyrobench.engine.checkpoint import store as save_checkpoint
+    from gyrobench.record import record as tables
+    from gyrobench.record.record import Record
+    from gyrobench.record.run_document import SuiteDocument, read_run
+    from gyrobench.report.report_files import write
+    from gyrobench.system.system import load_system
+    from gyrobench.workflow.run_comparison import read_result
+
+    def texts(columns: Mapping[str, Any]) -> str:
+        return repr({n: c.tolist() for n, c in columns.items()})
+
+    def loaded(home: Path) -> str:
+        record = Record.load(home)
+        return texts(record.windows) + texts(record.channels) + json.dumps(record.run.as_dict())
+
+    def campaign() -> str:
+        stored = Campaign.open(folder / "store")
+        log = stored.log().to_csv()
+        return f"{stored.arrow().to_pydict()}{stored.units}{json.dumps(stored.definition)}{log}{stored.notes}"
+
+    def checkpoint() -> str:
+        head, arrays = _read(folder / FILE)
+        return json.dumps(head) + texts(arrays)
+
+    def cached() -> str:
+        return files.make_once(folder / "library.so", lambda path: path.write_bytes(b"library" * 99)).read_text("utf-8")
+
+    system = load_system("fixed_position")
+    (folder / "base.csv").write_bytes(CORPUS["fixed_position"])
+    record = system.read_measured(folder / "base.csv", {})
+    record.channels = {"time": np.arange(50.0), "gyro.u": np.sin(np.arange(50.0))}
+    record.save(folder / "run")
+    write(system.reduce(record, None), folder / "run", ("json",))
+    (folder / "text").mkdir()
+    tables._write_csv(list(record.windows), list(record.windows.values()), folder / "text" / "record.csv")
+    record.run.tables = {"record.csv": files.sha256(folder / "text" / "record.csv")}
+    record.run.write(folder / "text")
+    (folder / "suite").mkdir()
+    SuiteDocument(system="drift_test_suite", runs=["a", "b"], options={"latitude": 0.8}).write(folder / "suite")
+    rows = [
+        {"run": f"{k:016x}", "index": k, "system": "toy", "seed": k, "state": "done", "in.T": 300.0 + k,
+         "a.estimate": 0.1 * k - 0.396, "a.u": 0.01, "verdict": "pass", "warnings": ["one"]}
+        for k in range(20)
+    ]  # fmt: skip
+    with CampaignStore(folder / "store") as store:
+        units = {"in.T": "K", "a.estimate": "°/h", "a.u": "°/h"}
+        store.begin({"name": "lot", "axes": [{"name": "T"}]}, {r["run"]: {"index": r["index"]} for r in rows}, units)
+        store.append(rows, units, [{"run": r["run"], "worker": "w", "attempts": 1, "seconds": 0.5} for r in rows])
+    save_checkpoint(folder / FILE, {"job": {"seed": 3}, "k": 7}, {"out": np.arange(40.0), "last": np.zeros(1)})
+    cached()
+    runs = [f for f in (folder / "run").iterdir() if f.name != "result.json"]
+    return {
+        "record": (lambda: loaded(folder / "run"), runs),
+        "record as text": (lambda: loaded(folder / "text"), list((folder / "text").iterdir())),
+        "result": (lambda: json.dumps(read_result(folder / "run").as_dict()), [folder / "run" / "result.json"]),
+        "suite": (lambda: json.dumps(read_run(folder / "suite").as_dict()), [folder / "suite" / "run.json"]),
+        "campaign": (campaign, [f for f in (folder / "store").rglob("*") if f.is_file()]),
+        "checkpoint": (checkpoint, [folder / FILE]),
+        "cache": (cached, [folder / "library.so", folder / "library.so.sha256"]),
+    }
 
 
 def _other(folder: Path) -> Callable[[random.Random], object]:
