@@ -10,6 +10,7 @@ import os
 import shutil
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator
 from multiprocessing.util import Finalize
 from pathlib import Path
@@ -129,13 +130,47 @@ FOREIGN = [f"binaries/{n}/" for system, names in BINARIES.items() if not sys.pla
 NOT_RUN = ("sources/", "documentation/", *FOREIGN)
 
 
+#: limits of an archive that is unzipped: files, bytes, and how many times its size where it gives more than SMALL bytes
+MEMBERS = 10_000
+UNZIPPED = 1 << 31
+RATIO = 100
+SMALL = 1 << 26
+
+
+class OversizedArchiveError(GyrobenchError):
+    """An archive that would fill disk or memory if it were unzipped."""
+
+
+def check_size(path: Path) -> None:
+    """Raise OversizedArchiveError for a zip archive beyond the limits, before anything of it is unzipped.
+
+    What cannot be read as one passes: its reader says why.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile):
+        return
+    size, total = path.stat().st_size, sum(m.file_size for m in members)
+    problem = ""
+    if len(members) > MEMBERS:
+        problem = f"{len(members):,} files in the archive; the limit is {MEMBERS:,}"
+    elif total > UNZIPPED:
+        problem = f"{total / 1e6:,.0f} MB when unzipped; the limit is {UNZIPPED / 1e6:,.0f} MB"
+    elif total > max(SMALL, RATIO * size):
+        problem = f"{total / 1e6:,.0f} MB when unzipped, {total / size:,.0f} times its size; the limit is {RATIO} times"
+    if problem:
+        raise OversizedArchiveError(f"{path}: not unzipped: {problem}")
+
+
 def unzip_fmu(path: Path, folder: Path) -> None:
     """Unzip what a run needs of an FMU: all but sources, documentation and binaries of other operating systems.
 
-    Raises DamagedFmuError, and OSError for a failure of the machine.
+    Raises DamagedFmuError and OversizedArchiveError, and OSError for a failure of the machine.
     """
     from fmpy import extract
 
+    check_size(path)
     try:
         extract(str(path), str(folder), include=lambda name: not name.startswith(NOT_RUN))
     except Exception as error:  # of the zip archive, of names and compressed data in it, or FMPy's own

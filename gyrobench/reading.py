@@ -17,10 +17,20 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 LARGEST = 1 << 28  # bytes: the run.json of a long run with its linear models has some 10 MB
+LARGEST_XML = 1 << 26  # bytes: its elements take 20 times as much memory
 DEEPEST = 200  # levels; Python's own readers give up at about a thousand
 SEAL = "sha256"
 SHORTEST = 10  # digits of a digest, those of a report_id
 Raise = Callable[[str], Exception]
+
+
+#: characters that a terminal or a page obeys instead of showing them: control characters, directions of writing
+UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
+def visible(text: str) -> str:
+    """Return a text of others for people: characters that would be obeyed as their code, ⟨U+202E⟩."""
+    return UNSEEN.sub(lambda found: f"⟨U+{ord(found[0]):04X}⟩", text)
 
 
 def shorten(text: str, most: int = 60) -> str:
@@ -90,10 +100,7 @@ def check_digest(content: Mapping[str, Any], expected: object, name: object, err
 
 def xml(data: bytes, name: object, error: Raise) -> ET.Element:
     """Return the root of an XML document."""
-    if b"\0" in data:  # text of two bytes a letter, in which a document type would not be seen
-        raise error(f"{name}: not UTF-8 text (a byte of 0)")
-    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data, re.I):
-        raise error(f"{name}: XML with a document type (<!DOCTYPE>), which is not read; remove it")
+    check_xml(data, name, error)
     root: ET.Element = _within(ET.fromstring, data, name, "XML", error)
     level = [root]
     for _ in range(DEEPEST):
@@ -101,6 +108,16 @@ def xml(data: bytes, name: object, error: Raise) -> ET.Element:
         if not level:
             return root
     raise error(f"{name}: XML of more than {DEEPEST} levels")
+
+
+def check_xml(data: bytes, name: object, error: Raise) -> None:
+    """Raise the error for an XML document that could grow without end when it is read."""
+    if len(data) > LARGEST_XML:
+        raise error(f"{name}: XML of {len(data) >> 20} MB; the limit is {LARGEST_XML >> 20} MB")
+    if b"\0" in data:  # text of two bytes a letter, in which a document type would not be seen
+        raise error(f"{name}: not UTF-8 text (a byte of 0)")
+    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data, re.I):
+        raise error(f"{name}: XML with a document type (<!DOCTYPE>), which is not read; remove it")
 
 
 def _within(read: Callable[[Any], Any], text: Any, name: object, kind: str, error: Raise) -> Any:

@@ -54,7 +54,6 @@ def test_a_result_that_was_changed_is_refused(tmp_path: Path, gyrobench: Command
     Path("m.csv").write_bytes(CORPUS["fixed_position"])
     gyrobench("reduce", "fixed_position", "--data", "m.csv", "--out", "r")
     result = read_result(Path("r"))
-    text = Path("r/result.json").read_bytes()
     estimate = repr(result.coefficients[0].estimate).encode()
     flip(Path("r/result.json"), estimate, estimate[:-1] + (b"2" if estimate[-1:] != b"2" else b"3"))
     shutil.copytree("r", "other")
@@ -63,7 +62,7 @@ def test_a_result_that_was_changed_is_refused(tmp_path: Path, gyrobench: Command
         assert code == end and "r/result.json: changed after it was saved (its SHA-256 is not the one in it)" in err
     Path("r/result.json").unlink()
     gyrobench("report", "r", figures=False)
-    assert Path("r/result.json").read_bytes() == text
+    assert read_result(Path("r")).coefficients == result.coefficients
 
 
 def test_rows_and_description_of_a_campaign_that_were_changed_are_refused(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import sys
 import traceback
 
 from gyrobench.commands.app import app
+from gyrobench.reading import visible
 from gyrobench.workflow.user_errors import exit_code, user_message
 
 for module in ("bench", "run", "campaign", "exchange"):  # each adds its own, in the order of the help
@@ -31,7 +32,7 @@ def main() -> None:
             raise
         if os.environ.get("GYROBENCH_TRACEBACK"):
             traceback.print_exception(error)
-        print(f"gyrobench: {user_message(error)}", file=sys.stderr)
+        print(f"gyrobench: {visible(user_message(error))}", file=sys.stderr)
         sys.exit(code)
 
 

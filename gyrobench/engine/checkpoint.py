@@ -112,7 +112,8 @@ def store(file: Path, head: Mapping[str, Any], arrays: Mapping[str, Array]) -> N
 
     def save(path: Path) -> None:
         with path.open("wb") as f:
-            np.savez(f, head=np.frombuffer(json.dumps(stored).encode("utf-8"), np.uint8), **arrays)
+            everything: dict[str, Any] = {"head": np.frombuffer(json.dumps(stored).encode("utf-8"), np.uint8), **arrays}
+            np.savez(f, **everything)
 
     write_whole(file, save)
 

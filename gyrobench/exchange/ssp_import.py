@@ -30,7 +30,9 @@ from gyrobench.bench import Bench
 from gyrobench.exchange.gains import is_gain
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_values import NS, ArchiveError, SspValue, Units, as_kind, bound_values, transformation
+from gyrobench.files import check_size
 from gyrobench.system.binding import Binding, Bound, fit
+from gyrobench.system.fmu_variables import read_description
 from gyrobench.system.sockets import Socket
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
 
@@ -108,8 +110,6 @@ class _Structure:
                 self.system_connectors[node] = c.get("kind", "")
 
     def component(self, element: ET.Element, place: Place) -> None:
-        from fmpy import read_model_description
-
         where = ".".join(place)
         if element.get("type", FMU) != FMU:
             self.problems.append(f"component '{where}': {element.get('type')} is not read, only FMUs are")
@@ -122,7 +122,7 @@ class _Structure:
         while slot in self.files:
             slot += "_"
         try:
-            description = read_model_description(str(file), validate=False)
+            description = read_description(file)
         except Exception as error:  # of the zip archive, of the XML, or FMPy's own
             self.problems.append(f"component '{where}': {file.name} is not a readable FMU: {error}")
             return
@@ -253,6 +253,7 @@ class _Structure:
 
 def _unpack(path: Path) -> Path:
     """Return the folder of the unzipped archive in the user's cache, keyed by content."""
+    check_size(path)
     key = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
     folder = Bench.find().cache / f"ssp-{key}"
     if folder.is_dir() and not _is_intact(folder, path):

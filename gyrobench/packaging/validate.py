@@ -13,6 +13,7 @@ from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
 from gyrobench.packaging.reference import Reference, compare, outdated, read_reference
+from gyrobench.system.fmu_variables import check_description
 from gyrobench.units import UnitError, unit
 
 #: A name of the naming convention "structured", by the grammar of FMI 2.0 (2.2.9), which is that of FMI 3.0 too.  It is
@@ -93,6 +94,7 @@ def _described(path: Path) -> tuple[Any, list[str]]:
     """Return the model description and its problems: FMPy's checks but for that of the names, which is made here."""
     from fmpy import read_model_description
 
+    check_description(path)
     with zipfile.ZipFile(path) as archive:
         names = [f.orig_filename for f in archive.filelist if "\\" in f.orig_filename]
     problems = [f'The file path "{n}" contains a backslash.' for n in names]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.component.declarations import element_names
-from gyrobench.files import sha256
+from gyrobench.files import check_size, sha256
 
 #: type of an FMU variable -> family: what can be connected with what, and how values are given as text
 FAMILIES = {
@@ -48,7 +50,8 @@ class Variable:
 def read_description(path: Path) -> Any:
     """Return the model description of an FMU as FMPy reads it, without validation.
 
-    A process reads a file of the same content once: what is returned is not to be changed.
+    A process reads a file of the same content once: what is returned is not to be changed.  Raises
+    OversizedArchiveError, and what the zip archive, the XML and FMPy raise.
     """
     return _read_description(path, sha256(path))
 
@@ -57,7 +60,15 @@ def read_description(path: Path) -> Any:
 def _read_description(path: Path, _digest: str) -> Any:
     from fmpy import read_model_description
 
+    check_description(path)
     return read_model_description(str(path), validate=False)
+
+
+def check_description(path: Path) -> None:
+    """Raise OversizedArchiveError or ValueError for an FMU that would fill disk or memory when it is read."""
+    check_size(path)
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        reading.check_xml(file.read(reading.LARGEST_XML + 1), "modelDescription.xml", ValueError)
 
 
 def variables(description: Any) -> dict[str, Variable]:
