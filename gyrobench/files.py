@@ -41,6 +41,9 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: 
         os.replace(temporary, path)
         if durable and os.name != "nt":  # there a folder cannot be opened
             to_disk(path.parent)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # for the message: a full disk, a limit of the size
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

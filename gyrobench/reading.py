@@ -24,8 +24,8 @@ SHORTEST = 10  # digits of a digest, those of a report_id
 Raise = Callable[[str], Exception]
 
 
-#: characters that a terminal or a page obeys instead of showing them: control characters, directions of writing
-UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+#: characters that a terminal or a page obeys or cannot show: control characters, directions of writing, bytes of paths
+UNSEEN = re.compile("[\ud800-\udfff\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
 def visible(text: str) -> str:
@@ -38,8 +38,16 @@ def shorten(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
+def require_regular(file: Path, error: Raise) -> Path:
+    """Return a file, a folder or what does not exist; raise the error for a pipe or a device, which may never end."""
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise error("a pipe or a device, which cannot be read twice: write it to a file first")
+    return file
+
+
 def read_text(file: Path, error: Raise) -> str:
     """Return the text of a file, UTF-8."""
+    require_regular(file, lambda text: error(f"{file}: {text}"))
     try:
         if file.stat().st_size > LARGEST:
             raise error(f"{file}: larger than {LARGEST >> 20} MB; such a file cannot hold what is asked for")

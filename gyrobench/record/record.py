@@ -48,7 +48,12 @@ def write_table(stem: Path, columns: dict[str, AnyArray]) -> Path:
         import pyarrow.parquet as pq
 
         table = pa.table([_arrow(c) for c in columns.values()], names=list(columns))
-        write_whole(parquet, lambda p: pq.write_table(table, p))
+
+        def save(path: Path) -> None:
+            with path.open("wb") as file:  # not by its name, which may not be UTF-8
+                pq.write_table(table, file)
+
+        write_whole(parquet, save)
         text.unlink(missing_ok=True)
         return parquet
 
@@ -95,7 +100,7 @@ def read_table(stem: Path) -> dict[str, AnyArray] | None:
     if parquet.exists():
         import pyarrow.parquet as pq
 
-        with pq.ParquetFile(parquet) as file:
+        with parquet.open("rb") as data, pq.ParquetFile(data) as file:
             table = file.read()
         return {name: _numpy(table.column(name)) for name in table.column_names}
     if text.exists():

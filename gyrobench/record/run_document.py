@@ -201,7 +201,7 @@ class Document(Entry):
     def write(self, folder: Path) -> None:
         """Write run.json into a folder."""
         text = json.dumps(reading.sealed(self.as_dict()), indent=1, ensure_ascii=False, allow_nan=False)
-        write_whole(Path(folder) / FILE, (text + "\n").encode())
+        write_whole(Path(folder) / FILE, (text + "\n").encode("utf-8", "backslashreplace"))
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with changed entries."""

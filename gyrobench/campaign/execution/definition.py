@@ -30,13 +30,13 @@ from __future__ import annotations
 import csv
 import glob
 import importlib.util
-import tomllib
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
 from gyrobench.system.values import parse
@@ -202,12 +202,7 @@ class Definition:
 
 def read_definition(file: Path) -> Definition:
     """Return the definition in a TOML file.  Raises UsageError."""
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: not a TOML file: {error}") from None
+    content = reading.toml(reading.read_text(file, UsageError), file, UsageError)
     content.setdefault("name", file.stem)
     for table in {"set", "over"} & content.keys():
         content[table] = _texts(content[table])
@@ -233,11 +228,12 @@ def from_mapping(content: Mapping[str, Any], folder: Path | None = None, where: 
 
 def read_table(file: Path) -> list[dict[str, Any]]:
     """Return the rows of a CSV file, each value with the unit of its column "name [unit]".  Raises UsageError."""
+    text = reading.read_text(file, UsageError)
     try:
-        with file.open(newline="", encoding="utf-8-sig") as text:
-            lines = [r for r in csv.reader(text) if any(x.strip() for x in r) and not r[0].startswith("#")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{file}: not a readable table: {getattr(error, 'strerror', None) or error}") from None
+        rows = csv.reader(io.StringIO(text, newline=""))
+        lines = [r for r in rows if any(x.strip() for x in r) and not r[0].startswith("#")]
+    except csv.Error as error:
+        raise UsageError(f"{file}: not a readable table: {error}") from None
     if len(lines) < 2:
         raise UsageError(f"{file}: a header and at least one row are expected")
     head = [h.strip() for h in lines[0]]

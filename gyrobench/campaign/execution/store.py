@@ -217,7 +217,7 @@ class CampaignStore(Campaign):
             raise CampaignError(f"{self.url}: holds other files; name a new folder")
         self.definition = json.loads(json.dumps({"schema": SCHEMA, **document}, allow_nan=False))
         text = json.dumps(reading.sealed(self.definition), indent=1, ensure_ascii=False) + "\n"
-        self._write(FILE, text.encode())
+        self._write(FILE, text.encode("utf-8", "backslashreplace"))
         table = self._arrange(plan, units or {})
         self.units = {**_units(table), **(units or {})}
         return dict(zip(table.column("run").to_pylist(), table.column("state").to_pylist(), strict=True))
@@ -336,7 +336,7 @@ def _plain(value: Any, kind: pa.DataType) -> Any:
     if value is None or (isinstance(value, float) and value != value):
         return None
     if kind == pa.string():
-        return str(value)
+        return str(value).encode("utf-8", "backslashreplace").decode()  # bytes of a path
     return float(value) if kind == pa.float64() else value
 
 
