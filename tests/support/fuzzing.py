@@ -9,6 +9,7 @@ turned, cut out, doubled, tokens put in that programs trip over, lines exchanged
 
 from __future__ import annotations
 
+import datetime
 import io
 import json
 import random
@@ -20,6 +21,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
@@ -35,6 +38,13 @@ NASTY = [
     b"[" * 3000, b'{"a":' * 2000, b'"', b"'", b"#", b"=", b",", b";", b"|", b"/", b"..", b"../../etc/passwd", b"%s%n",
     b"deg", b"deg/h", b"K^99", b"m2" * 200, b"1deg/0s", b"<", b">", b"&", b"<![CDATA[",
     b"<!DOCTYPE a [<!ENTITY b 'c'>]>", b"a" * 20000, b"\xed\xa0\x80",
+]  # fmt: skip
+#: values of every type, for what takes some of them
+ODD: list[Any] = [
+    None, True, 0, -1, 3, 10**30, 2.5, float("nan"), float("inf"), 1e308, "", "x", "\0", "a" * 5000, "45.75deg", "../x",
+    b"x", [], [1, 2], ["a", 3], [[[]]], {}, {"a": 1}, {1: 2}, {"gyro": 3}, {"latitude": "0deg..80deg:999999999"},
+    (1, 2), {1, 2}, 3 + 4j, object(), print, int, range(3), datetime.date(2026, 1, 1), Path("nothing"), np.float64(3.0),
+    np.arange(3), np.array(["a"]), 10_000_000_000,
 ]  # fmt: skip
 Attack = Callable[[int], str | None]
 
@@ -89,8 +99,8 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
     every = (
-        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _fmu, _ssp,
-        _other,
+        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _campaign,
+        _fmu, _ssp, _other,
     )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
@@ -313,6 +323,43 @@ def _result(folder: Path) -> Callable[[random.Random], object]:
     return one
 
 
+def _campaign(folder: Path) -> Callable[[random.Random], object]:
+    """Definitions of campaigns: bytes and tokens of the file, and values of other types."""
+    from gyrobench.campaign.execution.campaign_plan import make_plan
+    from gyrobench.campaign.execution.definition import from_mapping, read_definition
+
+    text = (
+        b'name = "lot"\nquestion = "why"\nsystem = "fixed_position"\nseeds = 2\nkeep = "failures"\nruns = 4\n'
+        b'design = "lhs"\ndesign_seed = 3\ntime_limit = "1h"\nmemory_limit = "500MB"\nretries = 1\nstep = "1ms"\n'
+        b'check_step = false\ntable = "t.csv"\n[set]\nlatitude = "45.75deg"\nheight = 12.5\n[set.gyro]\n'
+        b'white = [1e-9, 2e-9]\n[over]\ndwell = "10s..60s:3"\n"gyro.D_I" = "uniform(-1, 1) deg/h/g"\n'
+        b'"gyro.D_O" = [0.1, "0.3 deg/h/g"]\nearth_rate = "0.1,0.3,1 deg/h"\n[parts]\ngyro = ["floated_gyro"]\n'
+        b'[maps]\ngyro = "m.toml"\n[arguments]\nn = 3\n'
+    )
+    (folder / "t.csv").write_text("gyro.D_F [deg/h],seed\n0.1,1\n0.2,2\n")
+    keys = [line.split(b"=")[0].strip().decode() for line in text.splitlines()[:14]]
+    file = folder / "campaign.toml"
+
+    def one(rng: random.Random) -> None:
+        if rng.random() < 0.7:
+            file.write_bytes(changed(text, rng))
+            asked = read_definition(file)
+        else:
+            content = {"system": "fixed_position", "over": {"dwell": "10s..60s:3"}}
+            for _ in range(rng.randint(1, 3)):
+                content[rng.choice([*keys, "set", "over", "parts", "maps", "data"])] = rng.choice(ODD)
+            asked = from_mapping(content, folder)
+        asked.as_given()
+        if rng.random() < REDUCED:
+            make_plan(asked)
+            return
+        axes, distributions = asked.axes(["gyro", "table"])
+        [a.as_dict() for a in axes], asked.fixed_parts(["gyro"]), asked.seed_list(), asked.files(), asked.rows()
+        asked.drawn(distributions)
+
+    return one
+
+
 def _stored(folder: Path) -> Callable[[random.Random], object]:
     """One bit of a stored file of each kind: what is read is what was written, or an error or a note says it."""
     homes = stored_files(folder)
@@ -336,8 +383,6 @@ def _stored(folder: Path) -> Callable[[random.Random], object]:
 
 def stored_files(folder: Path) -> dict[str, tuple[Callable[[], str], list[Path]]]:
     """Write one of everything that is stored; return for each kind how it is read, as text, and its files."""
-    import numpy as np
-
     from gyrobench import files
     from gyrobench.campaign.execution.store import Campaign, CampaignStore
     from gyrobench.engine.checkpoint import FILE, _read
@@ -405,7 +450,6 @@ def stored_files(folder: Path) -> dict[str, tuple[Callable[[], str], list[Path]]
 
 def _other(folder: Path) -> Callable[[random.Random], object]:
     """Result files of other tools, of each format."""
-    import numpy as np
     import pyarrow as pa
     import pyarrow.parquet as pq
     from scipy.io import savemat
