@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.errors import GyrobenchError
 from gyrobench.library.experiment import Experiment, File, Run, open_run
 from gyrobench.library.many_runs import campaign, site, sweep
@@ -60,6 +61,7 @@ __all__ = [
 ]
 
 
+@checked
 def load(
     name: File,
     values: Mapping[str, Any] | None = None,
@@ -82,6 +84,7 @@ def load(
     return experiment
 
 
+@checked
 def load_suite(
     name: str,
     values: Mapping[str, Any] | None = None,
@@ -100,6 +103,7 @@ def load_suite(
     return suite
 
 
+@checked
 def reduce(
     name: str, data: File, *, spec: File | None = None, out: File | None = None, force: bool = False, **values: str
 ) -> Run:
@@ -110,6 +114,7 @@ def reduce(
     return load(name).reduce(data, spec=spec, out=out, force=force, **values)
 
 
+@checked
 def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparison:
     """Return runs, or folders of runs, side by side; the first is the baseline.
 
@@ -128,6 +133,7 @@ def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparis
     return compare_results(list(zip(named, results, strict=True)))
 
 
+@checked
 def design(
     name: str,
     wants: Mapping[str, str | float],

@@ -21,6 +21,7 @@ import numpy as np
 
 from gyrobench.arrays import AnyArray
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.files import sha256, write_whole
 from gyrobench.notebook import Displayed, data_frame
 from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocument, read_run
@@ -127,6 +128,7 @@ class Record(Displayed):
     run: RunDocument = field(default_factory=lambda: RunDocument())
     folder: Path | None = None
 
+    @checked
     def save(self, folder: Path) -> Path:
         """Write the folder (see the module) and return it."""
         folder = Path(folder)
@@ -142,6 +144,7 @@ class Record(Displayed):
         return folder
 
     @classmethod
+    @checked
     def load(cls, folder: Path) -> Record:
         """Read a folder.  Raises RecordError when it is not a record, or when a table is not the one that was saved."""
         folder = Path(folder)
@@ -166,6 +169,7 @@ class Record(Displayed):
         state = "" if self.complete else ", incomplete"
         return f"<Record of {self.run.system}: {windows} windows, {signals} channels of {samples} samples{state}>"
 
+    @checked
     def table(self, name: str) -> tuple[dict[str, AnyArray], dict[str, str]]:
         """Return the columns of "windows" or "channels" and their SI units, "" where not known.  Raises UsageError."""
         tables = {"windows": (self.windows, self.run.window_units), "channels": (self.channels, self.run.units)}
@@ -174,6 +178,7 @@ class Record(Displayed):
         columns, units = tables[name]
         return columns, {c: "s" if c == "time" else units.get(c, "") for c in columns}
 
+    @checked
     def frame(self, table: str = "windows") -> pandas.DataFrame:
         """Return "windows" or "channels" as a data frame, SI; its ``attrs["units"]`` says the units.
 
@@ -181,6 +186,7 @@ class Record(Displayed):
         """
         return data_frame(*self.table(table))
 
+    @checked
     def to_csv(self, folder: Path) -> list[Path]:
         """Write windows.csv and channels.csv into a folder, those that have rows; return the files.
 

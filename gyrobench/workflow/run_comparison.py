@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
+from gyrobench.boundary import checked
 from gyrobench.notebook import data_frame
 from gyrobench.report import FORMATS, ResultError
 from gyrobench.result import Result
@@ -54,6 +55,7 @@ class Comparison:
                 rows.append(row | {"U": d.get("U"), "significant": d.get("significant")})
         return data_frame({key: [row[key] for row in rows] for key in rows[0]}, {})
 
+    @checked
     def write(self, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
         """Write comparison.json, .html and .pdf into a folder; return their paths."""
         from gyrobench.report import compare

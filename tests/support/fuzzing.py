@@ -99,7 +99,7 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
     every = (
-        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _campaign,
+        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _campaign, _api,
         _fmu, _ssp, _other,
     )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
@@ -356,6 +356,48 @@ def _campaign(folder: Path) -> Callable[[random.Random], object]:
         axes, distributions = asked.axes(["gyro", "table"])
         [a.as_dict() for a in axes], asked.fixed_parts(["gyro"]), asked.seed_list(), asked.files(), asked.rows()
         asked.drawn(distributions)
+
+    return one
+
+
+def _api(folder: Path) -> Callable[[random.Random], object]:
+    """Calls of the Python face with one to three arguments of other types."""
+    import gyrobench as gb
+    from gyrobench.files import DamagedFmuError  # noqa: F401  what runs need is imported before the first is timed
+
+    data = folder / "m.csv"
+    data.write_bytes(CORPUS["fixed_position"])
+    test = gb.load("fixed_position", dwell="20s")
+    run = gb.reduce("fixed_position", data, out=folder / "run")
+    suite = gb.load_suite("drift_test_suite")
+    calls: list[tuple[Callable[..., object], dict[str, Any]]] = [
+        (gb.load, {"name": "fixed_position", "values": {}, "parts": {}, "maps": {}, "latitude": 0.8}),
+        (gb.load_suite, {"name": "drift_test_suite", "values": {}, "parts": {}, "maps": {}}),
+        (gb.reduce, {"name": "fixed_position", "data": data, "spec": None, "out": None, "force": False, "k": "1mA"}),
+        (lambda **a: gb.compare(a["a"], a["b"], names=a["names"]), {"a": run, "b": folder / "run", "names": ()}),
+        (gb.design, {"name": "fixed_position", "wants": {"x": "1deg/h"}, "time": "1h", "criterion": "A", "count": 0}),
+        (gb.sweep, {"system": "no", "over": {}, "seeds": 1, "out": None, "workers": 1, "set": {}, "data": None}),
+        (gb.campaign, {"definition": {}, "out": None, "scheduler": None, "workers": 1, "retry": False}),
+        (gb.site, {"campaign": folder, "out": None, "publish": None}),
+        (gb.open_run, {"folder": folder / "run"}),
+        (test.set, {"name": "dwell", "value": "20s"}),
+        (test.run, {"engine": "none", "seed": 1, "step": "1ms", "timeout": 10.0, "spec": None, "out": None}),
+        (test.reduce, {"data": data, "spec": None, "out": None, "force": False, "instrument": "one"}),
+        (test.reduce_result, {"result": data, "spec": None, "out": None, "force": False}),
+        (run.report, {"folder": None, "force": False}),
+        (run.record.frame, {"table": "windows"}),
+        (run.record.to_csv, {"folder": folder / "csv"}),
+        (suite.set, {"name": "latitude", "value": "45deg"}),
+        (suite.reduce, {"runs": [run], "out": folder / "suite", "spec": None, "force": False}),
+        (gb.Record.load, {"folder": folder / "run"}),
+    ]  # fmt: skip
+
+    def one(rng: random.Random) -> None:
+        call, arguments = rng.choice(calls)
+        arguments = dict(arguments)
+        for _ in range(rng.randint(1, 3)):
+            arguments[rng.choice([*arguments, *arguments, "no_such"])] = rng.choice(ODD)
+        call(**arguments)
 
     return one
 
