@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from multiprocessing.util import Finalize
 from pathlib import Path
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 
 LOCK = ".lock"
@@ -164,6 +165,13 @@ def check_size(path: Path) -> None:
         problem = f"{total / 1e6:,.0f} MB when unzipped, {total / size:,.0f} times its size; the limit is {RATIO} times"
     if problem:
         raise OversizedArchiveError(f"{path}: not unzipped: {problem}")
+
+
+def check_description(path: Path) -> None:
+    """Raise OversizedArchiveError or ValueError for an FMU that would fill disk or memory when it is read."""
+    check_size(path)
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        reading.check_xml(file.read(reading.LARGEST_XML + 1), "modelDescription.xml", ValueError)
 
 
 def unzip_fmu(path: Path, folder: Path) -> None:

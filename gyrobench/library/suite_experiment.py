@@ -94,6 +94,8 @@ class SuiteExperiment:
         """Write the report of the suite from runs that exist, each in a folder.  Raises UsageError."""
         folders = []
         for number, run in enumerate(runs, 1):
+            if not isinstance(run, Run | str | Path):
+                raise UsageError(f"run {number} of the suite = {run!r}: a run or the folder of one is expected")
             folder = run.folder if isinstance(run, Run) else Path(run)
             if folder is None:
                 raise UsageError(

@@ -19,6 +19,7 @@ from gyrobench.packaging.description3 import build_description, model_descriptio
 from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
 from gyrobench.packaging.loading import BuildError, load_part, sources
 from gyrobench.packaging.native_library import make_library
+from gyrobench.user_code import blamed
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
@@ -127,7 +128,8 @@ def build(
     cls = load_part(part, bench) if isinstance(part, str) else part
     name = part if isinstance(part, str) else sources(cls)["model"].parent.name
     identifier = name
-    what = _content(cls, name, target, fmi)
+    with blamed(sources(cls)["model"]):
+        what = _content(cls, name, target, fmi)
     readme = sources(cls)["model"].parent / "README.md"
     documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
     if target == "native":
@@ -156,7 +158,8 @@ def build(
             entries["documentation/README.md"] = documentation.encode()
         write_archive(path, entries, durable=False)
 
-    make_once(cached, write)
+    with blamed(sources(cls)["model"]):
+        make_once(cached, write)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
     if not path.exists() or sha256(path) != sha256(cached):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, BenchError
+from gyrobench.files import check_description
 from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
 from gyrobench.packaging.reference import Reference, compare, outdated, read_reference
-from gyrobench.system.fmu_variables import check_description
 from gyrobench.units import UnitError, unit
 
 #: A name of the naming convention "structured", by the grammar of FMI 2.0 (2.2.9), which is that of FMI 3.0 too.  It is

@@ -9,7 +9,6 @@ turned, cut out, doubled, tokens put in that programs trip over, lines exchanged
 
 from __future__ import annotations
 
-import datetime
 import io
 import json
 import random
@@ -20,10 +19,10 @@ import zipfile
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from gyrobench import reading
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 
@@ -38,13 +37,6 @@ NASTY = [
     b"[" * 3000, b'{"a":' * 2000, b'"', b"'", b"#", b"=", b",", b";", b"|", b"/", b"..", b"../../etc/passwd", b"%s%n",
     b"deg", b"deg/h", b"K^99", b"m2" * 200, b"1deg/0s", b"<", b">", b"&", b"<![CDATA[",
     b"<!DOCTYPE a [<!ENTITY b 'c'>]>", b"a" * 20000, b"\xed\xa0\x80",
-]  # fmt: skip
-#: values of every type, for what takes some of them
-ODD: list[Any] = [
-    None, True, 0, -1, 3, 10**30, 2.5, float("nan"), float("inf"), 1e308, "", "x", "\0", "a" * 5000, "45.75deg", "../x",
-    b"x", [], [1, 2], ["a", 3], [[[]]], {}, {"a": 1}, {1: 2}, {"gyro": 3}, {"latitude": "0deg..80deg:999999999"},
-    (1, 2), {1, 2}, 3 + 4j, object(), print, int, range(3), datetime.date(2026, 1, 1), Path("nothing"), np.float64(3.0),
-    np.arange(3), np.array(["a"]), 10_000_000_000,
 ]  # fmt: skip
 Attack = Callable[[int], str | None]
 
@@ -96,11 +88,25 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
     return None
 
 
+def sealed_again(content: bytes) -> bytes:
+    """Return a stored document with the digests of what it holds now, so that a reader takes it; else the bytes."""
+    try:
+        document = json.loads(content)
+        if "report_id" in document:
+            rest = {k: v for k, v in document.items() if k not in ("schema", "report_id")}
+            return json.dumps({**document, "report_id": reading.digest(rest)[: reading.SHORTEST]}).encode()
+        return json.dumps(reading.sealed({k: v for k, v in document.items() if k != reading.SEAL})).encode()
+    except (ValueError, AttributeError, TypeError, RecursionError):
+        return content
+
+
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
+    from fuzzing_of_uses import OF_USES
+
     every = (
-        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _stored, _campaign, _api,
-        _fmu, _ssp, _other,
+        _csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp, _other,
+        *OF_USES,
     )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
@@ -289,7 +295,8 @@ def _record(folder: Path) -> Callable[[random.Random], object]:
         columns.unlink(missing_ok=True)
         what = rng.choice(["run.json", table, "honest", "csv"])
         if what in files:
-            (home / what).write_bytes(changed(files[what], rng))
+            content = changed(files[what], rng)
+            (home / what).write_bytes(sealed_again(content) if what == "run.json" and rng.random() < 0.7 else content)
         else:
             document = json.loads(files["run.json"])
             if what == "csv":
@@ -300,7 +307,8 @@ def _record(folder: Path) -> Callable[[random.Random], object]:
             else:
                 (home / table).write_bytes(changed(files[table], rng))
                 document["tables"] = {table: sha256(home / table)}
-            (home / "run.json").write_text(json.dumps(document), encoding="utf-8")
+            del document[reading.SEAL]
+            (home / "run.json").write_text(json.dumps(reading.sealed(document)), encoding="utf-8")
         record = Record.load(home)
         if rng.random() < REDUCED:
             system.reduce(record, None)
@@ -318,176 +326,12 @@ def _result(folder: Path) -> Callable[[random.Random], object]:
     text = json.dumps(result_json.document(system.reduce(system.read_measured(file, {}), None))).encode()
 
     def one(rng: random.Random) -> None:
-        result_json.load(changed(text, rng).decode("utf-8", "replace"))
-
-    return one
-
-
-def _campaign(folder: Path) -> Callable[[random.Random], object]:
-    """Definitions of campaigns: bytes and tokens of the file, and values of other types."""
-    from gyrobench.campaign.execution.campaign_plan import make_plan
-    from gyrobench.campaign.execution.definition import from_mapping, read_definition
-
-    text = (
-        b'name = "lot"\nquestion = "why"\nsystem = "fixed_position"\nseeds = 2\nkeep = "failures"\nruns = 4\n'
-        b'design = "lhs"\ndesign_seed = 3\ntime_limit = "1h"\nmemory_limit = "500MB"\nretries = 1\nstep = "1ms"\n'
-        b'check_step = false\ntable = "t.csv"\n[set]\nlatitude = "45.75deg"\nheight = 12.5\n[set.gyro]\n'
-        b'white = [1e-9, 2e-9]\n[over]\ndwell = "10s..60s:3"\n"gyro.D_I" = "uniform(-1, 1) deg/h/g"\n'
-        b'"gyro.D_O" = [0.1, "0.3 deg/h/g"]\nearth_rate = "0.1,0.3,1 deg/h"\n[parts]\ngyro = ["floated_gyro"]\n'
-        b'[maps]\ngyro = "m.toml"\n[arguments]\nn = 3\n'
-    )
-    (folder / "t.csv").write_text("gyro.D_F [deg/h],seed\n0.1,1\n0.2,2\n")
-    keys = [line.split(b"=")[0].strip().decode() for line in text.splitlines()[:14]]
-    file = folder / "campaign.toml"
-
-    def one(rng: random.Random) -> None:
+        content = changed(text, rng)
         if rng.random() < 0.7:
-            file.write_bytes(changed(text, rng))
-            asked = read_definition(file)
-        else:
-            content = {"system": "fixed_position", "over": {"dwell": "10s..60s:3"}}
-            for _ in range(rng.randint(1, 3)):
-                content[rng.choice([*keys, "set", "over", "parts", "maps", "data"])] = rng.choice(ODD)
-            asked = from_mapping(content, folder)
-        asked.as_given()
-        if rng.random() < REDUCED:
-            make_plan(asked)
-            return
-        axes, distributions = asked.axes(["gyro", "table"])
-        [a.as_dict() for a in axes], asked.fixed_parts(["gyro"]), asked.seed_list(), asked.files(), asked.rows()
-        asked.drawn(distributions)
+            content = sealed_again(content)
+        result_json.load(content.decode("utf-8", "replace"))
 
     return one
-
-
-def _api(folder: Path) -> Callable[[random.Random], object]:
-    """Calls of the Python face with one to three arguments of other types."""
-    import gyrobench as gb
-    from gyrobench.files import DamagedFmuError  # noqa: F401  what runs need is imported before the first is timed
-
-    data = folder / "m.csv"
-    data.write_bytes(CORPUS["fixed_position"])
-    test = gb.load("fixed_position", dwell="20s")
-    run = gb.reduce("fixed_position", data, out=folder / "run")
-    suite = gb.load_suite("drift_test_suite")
-    calls: list[tuple[Callable[..., object], dict[str, Any]]] = [
-        (gb.load, {"name": "fixed_position", "values": {}, "parts": {}, "maps": {}, "latitude": 0.8}),
-        (gb.load_suite, {"name": "drift_test_suite", "values": {}, "parts": {}, "maps": {}}),
-        (gb.reduce, {"name": "fixed_position", "data": data, "spec": None, "out": None, "force": False, "k": "1mA"}),
-        (lambda **a: gb.compare(a["a"], a["b"], names=a["names"]), {"a": run, "b": folder / "run", "names": ()}),
-        (gb.design, {"name": "fixed_position", "wants": {"x": "1deg/h"}, "time": "1h", "criterion": "A", "count": 0}),
-        (gb.sweep, {"system": "no", "over": {}, "seeds": 1, "out": None, "workers": 1, "set": {}, "data": None}),
-        (gb.campaign, {"definition": {}, "out": None, "scheduler": None, "workers": 1, "retry": False}),
-        (gb.site, {"campaign": folder, "out": None, "publish": None}),
-        (gb.open_run, {"folder": folder / "run"}),
-        (test.set, {"name": "dwell", "value": "20s"}),
-        (test.run, {"engine": "none", "seed": 1, "step": "1ms", "timeout": 10.0, "spec": None, "out": None}),
-        (test.reduce, {"data": data, "spec": None, "out": None, "force": False, "instrument": "one"}),
-        (test.reduce_result, {"result": data, "spec": None, "out": None, "force": False}),
-        (run.report, {"folder": None, "force": False}),
-        (run.record.frame, {"table": "windows"}),
-        (run.record.to_csv, {"folder": folder / "csv"}),
-        (suite.set, {"name": "latitude", "value": "45deg"}),
-        (suite.reduce, {"runs": [run], "out": folder / "suite", "spec": None, "force": False}),
-        (gb.Record.load, {"folder": folder / "run"}),
-    ]  # fmt: skip
-
-    def one(rng: random.Random) -> None:
-        call, arguments = rng.choice(calls)
-        arguments = dict(arguments)
-        for _ in range(rng.randint(1, 3)):
-            arguments[rng.choice([*arguments, *arguments, "no_such"])] = rng.choice(ODD)
-        call(**arguments)
-
-    return one
-
-
-def _stored(folder: Path) -> Callable[[random.Random], object]:
-    """One bit of a stored file of each kind: what is read is what was written, or an error or a note says it."""
-    homes = stored_files(folder)
-    pristine = {home: (read(), {f: f.read_bytes() for f in fs}) for home, (read, fs) in homes.items()}
-
-    def one(rng: random.Random) -> None:
-        home = rng.choice(list(homes))
-        before, contents = pristine[home]
-        file = rng.choice(list(contents))
-        at, bit = rng.randrange(len(contents[file])), 1 << rng.randrange(8)
-        file.write_bytes(contents[file][:at] + bytes([contents[file][at] ^ bit]) + contents[file][at + 1 :])
-        try:
-            after = homes[home][0]()
-        finally:
-            for f, content in contents.items():
-                f.write_bytes(content)
-        assert after == before or "no SHA-256 of its own" in after, f"{file.name}, byte {at}, bit {bit}: silent"
-
-    return one
-
-
-def stored_files(folder: Path) -> dict[str, tuple[Callable[[], str], list[Path]]]:
-    """Write one of everything that is stored; return for each kind how it is read, as text, and its files."""
-    from gyrobench import files
-    from gyrobench.campaign.execution.store import Campaign, CampaignStore
-    from gyrobench.engine.checkpoint import FILE, _read
-    from gyrobench.engine.checkpoint import store as save_checkpoint
-    from gyrobench.record import record as tables
-    from gyrobench.record.record import Record
-    from gyrobench.record.run_document import SuiteDocument, read_run
-    from gyrobench.report.report_files import write
-    from gyrobench.system.system import load_system
-    from gyrobench.workflow.run_comparison import read_result
-
-    def texts(columns: Mapping[str, Any]) -> str:
-        return repr({n: c.tolist() for n, c in columns.items()})
-
-    def loaded(home: Path) -> str:
-        record = Record.load(home)
-        return texts(record.windows) + texts(record.channels) + json.dumps(record.run.as_dict())
-
-    def campaign() -> str:
-        stored = Campaign.open(folder / "store")
-        log = stored.log().to_csv()
-        return f"{stored.arrow().to_pydict()}{stored.units}{json.dumps(stored.definition)}{log}{stored.notes}"
-
-    def checkpoint() -> str:
-        head, arrays = _read(folder / FILE)
-        return json.dumps(head) + texts(arrays)
-
-    def cached() -> str:
-        return files.make_once(folder / "library.so", lambda path: path.write_bytes(b"library" * 99)).read_text("utf-8")
-
-    system = load_system("fixed_position")
-    (folder / "base.csv").write_bytes(CORPUS["fixed_position"])
-    record = system.read_measured(folder / "base.csv", {})
-    record.channels = {"time": np.arange(50.0), "gyro.u": np.sin(np.arange(50.0))}
-    record.save(folder / "run")
-    write(system.reduce(record, None), folder / "run", ("json",))
-    (folder / "text").mkdir()
-    tables._write_csv(list(record.windows), list(record.windows.values()), folder / "text" / "record.csv")
-    record.run.tables = {"record.csv": files.sha256(folder / "text" / "record.csv")}
-    record.run.write(folder / "text")
-    (folder / "suite").mkdir()
-    SuiteDocument(system="drift_test_suite", runs=["a", "b"], options={"latitude": 0.8}).write(folder / "suite")
-    rows = [
-        {"run": f"{k:016x}", "index": k, "system": "toy", "seed": k, "state": "done", "in.T": 300.0 + k,
-         "a.estimate": 0.1 * k - 0.396, "a.u": 0.01, "verdict": "pass", "warnings": ["one"]}
-        for k in range(20)
-    ]  # fmt: skip
-    with CampaignStore(folder / "store") as store:
-        units = {"in.T": "K", "a.estimate": "°/h", "a.u": "°/h"}
-        store.begin({"name": "lot", "axes": [{"name": "T"}]}, {r["run"]: {"index": r["index"]} for r in rows}, units)
-        store.append(rows, units, [{"run": r["run"], "worker": "w", "attempts": 1, "seconds": 0.5} for r in rows])
-    save_checkpoint(folder / FILE, {"job": {"seed": 3}, "k": 7}, {"out": np.arange(40.0), "last": np.zeros(1)})
-    cached()
-    runs = [f for f in (folder / "run").iterdir() if f.name != "result.json"]
-    return {
-        "record": (lambda: loaded(folder / "run"), runs),
-        "record as text": (lambda: loaded(folder / "text"), list((folder / "text").iterdir())),
-        "result": (lambda: json.dumps(read_result(folder / "run").as_dict()), [folder / "run" / "result.json"]),
-        "suite": (lambda: json.dumps(read_run(folder / "suite").as_dict()), [folder / "suite" / "run.json"]),
-        "campaign": (campaign, [f for f in (folder / "store").rglob("*") if f.is_file()]),
-        "checkpoint": (checkpoint, [folder / FILE]),
-        "cache": (cached, [folder / "library.so", folder / "library.so.sha256"]),
-    }
 
 
 def _other(folder: Path) -> Callable[[random.Random], object]:
