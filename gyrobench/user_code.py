@@ -50,7 +50,7 @@ def blamed(file: Path) -> Iterator[None]:
         raise UserCodeError(f"{file}: cannot be used: {type(error).__name__}: {error}{many}") from error
 
 
-class _Late(BaseException):
+class _Late(GyrobenchError):
     """The file has taken too long."""
 
 
@@ -64,7 +64,6 @@ def _deadline(file: Path) -> Iterator[None]:
         while not ended.wait(wait):
             if _place(sys._current_frames().get(thread), file):  # not while the bench compiles, however long that takes
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_Late))
-                return
             wait = 1.0
 
     watching = threading.Thread(target=watch, daemon=True)

@@ -3,10 +3,11 @@
 ``record.parquet``   one row for each completed window (columns in SI, see the Sampler socket)
 ``channels.parquet`` decimated signals: ``time`` and "slot.variable" columns
 ``run.json``         system, parts with SHA-256, parameters, seed, versions, order, step, complete, stopped_at,
-                     SHA-256 of the tables: :mod:`gyrobench.record.run_document`
+                     SHA-256 of the tables and of itself: :mod:`gyrobench.record.run_document`
 
 Without pyarrow the tables are CSV files of the same names; numbers are written so that they read back bit for bit.
-Every file is written under a temporary name and renamed, run.json last: a folder with run.json is complete.
+Every file is written under a temporary name and renamed once it is on the disk, run.json last: a folder with it is
+complete.  The digests are checked whenever a record is read.
 """
 
 from __future__ import annotations
