@@ -50,7 +50,7 @@ def blamed(file: Path) -> Iterator[None]:
         raise UserCodeError(f"{file}: cannot be used: {type(error).__name__}: {error}{many}") from error
 
 
-class _Late(GyrobenchError):
+class _DeadlineError(GyrobenchError):
     """The file has taken too long."""
 
 
@@ -63,14 +63,14 @@ def _deadline(file: Path) -> Iterator[None]:
         wait = LONGEST
         while not ended.wait(wait):
             if _place(sys._current_frames().get(thread), file):  # not while the bench compiles, however long that takes
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_Late))
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_DeadlineError))
             wait = 1.0
 
     watching = threading.Thread(target=watch, daemon=True)
     watching.start()
     try:
         yield
-    except _Late as late:
+    except _DeadlineError as late:
         frames = [f"{f.filename}:{f.lineno}" for f in traceback.extract_tb(late.__traceback__)]
         place = [f for f in frames if f.startswith(str(file.parent))][-1:] or [str(file)]
         raise UserCodeError(f"{place[0]}: still running after {LONGEST:g} s: a loop without an end?") from None
