@@ -150,11 +150,11 @@ class Definition:
 
     def as_given(self) -> dict[str, Any]:
         """Return what was given, as plain JSON."""
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("folder", "out")}
+        own = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.name not in ("folder", "out")}
         if isinstance(self.table, list | tuple):
             own["table"] = f"{len(self.table)} rows"
         standard = {f.name: f.default for f in fields(self)}
-        return {k: plain(v) for k, v in own.items() if v != standard[k] and v not in ({}, None)}
+        return {k: v for k, v in own.items() if v != standard[k] and v not in ({}, None)}
 
     # ------------------------------------------------------------------------------------------ points
     def axes(self, slots: Sequence[str]) -> tuple[list[Axis], list[Distribution]]:
