@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import json
 import os
@@ -101,7 +102,8 @@ def _api(folder: Path) -> Callable[[random.Random], object]:
         arguments = dict(arguments)
         for _ in range(rng.randint(1, 3)):
             arguments[rng.choice([*arguments, *arguments, "no_such"])] = rng.choice(ODD)
-        call(**arguments)
+        with contextlib.chdir(folder):  # where names that are taken go
+            call(**arguments)
 
     return one
 
