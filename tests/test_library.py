@@ -217,7 +217,7 @@ MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
     "parameter": (lambda r: gb.load(NAME, TINY).set("gyro.D_J", 1).run(), "D_J"),
     "part": (lambda r: gb.load(NAME, parts={"gyro": "no.fmu"}).run(), "slot gyro: no.fmu: .* no such file"),
     "map": (lambda r: gb.load(NAME, maps={"gyro": "no.toml"}), "slot gyro: no.toml: no such mapping file"),
-    "seed": (lambda r: gb.load(NAME).run(seed=1.5), "seed 1.5: a whole number"),  # type: ignore[arg-type]
+    "seed": (lambda r: gb.load(NAME).run(seed=1.5), "seed = 1.5: a whole number"),  # type: ignore[arg-type]
     "engine": (lambda r: gb.load(NAME).run(engine="fast"), "engine 'fast': one of native"),
     "specification": (lambda r: gb.load(NAME).run(spec="gyro"), "no such file or acceptance specification"),
     "resume": (lambda r: gb.load(NAME).run(resume=True), "name the folder of the run in out"),

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from gyrobench.commands import cli
+from gyrobench.report.result_json import content_hash
 
 Call = Callable[..., tuple[int, str, str]]
 BENCH = ["run", "estimator_bench", "--set", "samples=13000"]
@@ -98,7 +99,9 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     for folder, system, rename in (("b", "vertical_gyro", "of b: "), ("c", "other", "")):
         changed = [{**c, "name": rename + c["name"]} for c in document["coefficients"]]
         Path(folder).mkdir()
-        text = json.dumps({**document, "system": system, "coefficients": changed})
+        other = {**document, "system": system, "coefficients": changed}
+        digest = content_hash({k: v for k, v in other.items() if k not in ("schema", "report_id")})
+        text = json.dumps({**other, "report_id": digest})
         Path(folder, "result.json").write_text(text, encoding="utf-8")
     code, _, err = gyrobench("compare", "a", "b")
     assert code == 2

@@ -41,14 +41,13 @@ def _parameters(slot: str, description: Any) -> list[str]:
 
 def write_mapping(fmu: Path, slot: str, out: Path | None) -> tuple[str, list[str]]:
     """Return a first mapping file of the FMU, written to ``out`` where given, and what it still lacks."""
-    from fmpy import read_model_description
-
     from gyrobench.system.binding import SocketMismatchError, fit, parse_mapping
+    from gyrobench.system.fmu_variables import read_description
     from gyrobench.system.mapping_proposal import mapping_text
 
     check_fmu_files({slot: fmu})
     wanted = find_socket(slot)
-    description: Any = read_model_description(str(fmu), validate=False)
+    description: Any = read_description(fmu)
     head = f"# Mapping of {description.modelName} ({fmu.name}) into the socket {wanted.name}."
     text = mapping_text(wanted, description, head, parameters=_parameters(slot, description))
     if out is not None:

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from gyrobench.engine.engine_library import SOURCE, library_path, make_library
 from gyrobench.engine.program import PartProgram, Program, VariableGroup
+from gyrobench.files import is_intact
 from gyrobench.packaging import load_part
 from gyrobench.packaging.fmu import native_guid
 
@@ -130,6 +131,6 @@ def linked_library(program: Program, steps: float | None) -> Path | None:
     engine = SOURCE.read_text(encoding="utf-8")
     source = "#define LINKED\n" + engine.replace('#include "system.h"\n', system_text(program))
     path = library_path("linked", source)
-    if steps is not None and steps * len(program.parts) * SAVED < COMPILATION and not path.exists():
+    if steps is not None and steps * len(program.parts) * SAVED < COMPILATION and not is_intact(path):
         return None
     return make_library(path, source)

@@ -15,8 +15,10 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import shutil
 import tempfile
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -26,6 +28,7 @@ from gyrobench.bench import Bench
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_structure import ANY, Structure
 from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, bound_values, schema_errors
+from gyrobench.files import check_size
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
 
 STRUCTURE = "SystemStructure.ssd"
@@ -35,8 +38,11 @@ ROWS = 1000  # of the channels, about
 
 def _unpack(path: Path) -> Path:
     """Return the folder of the unzipped archive in the user's cache, keyed by content."""
+    check_size(path)
     key = hashlib.sha256(path.read_bytes()).hexdigest()[:20]
     folder = Bench.find().cache / f"ssp-{key}"
+    if folder.is_dir() and not _is_intact(folder, path):
+        shutil.rmtree(folder)
     if not folder.is_dir():
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as name:
@@ -49,6 +55,16 @@ def _unpack(path: Path) -> Path:
             if not folder.is_dir():
                 os.replace(unpacked, folder)
     return folder
+
+
+def _is_intact(folder: Path, path: Path) -> bool:
+    """Return whether the files of an unzipped archive are those in it, by their checksums."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            files = [(folder / info.filename, info.CRC) for info in archive.infolist() if not info.is_dir()]
+        return all(zlib.crc32(file.read_bytes()) == checksum for file, checksum in files)
+    except OSError:
+        return False
 
 
 def open_archive(path: Path) -> tuple[Path, ET.Element]:

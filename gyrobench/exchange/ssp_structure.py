@@ -15,6 +15,7 @@ from xml.etree import ElementTree as ET
 from gyrobench.exchange.gains import is_gain
 from gyrobench.exchange.ssp_values import NS, ArchiveError, SspValue, Units, as_kind, transformation
 from gyrobench.system.binding import Binding, Bound, fit
+from gyrobench.system.fmu_variables import read_description
 from gyrobench.system.sockets import Socket
 
 ANY = Socket("FMU", "any FMU: its own inputs and outputs", ())
@@ -27,10 +28,8 @@ Node = tuple[Place, str]  # connector of a component or of a system
 
 def _described(file: Path) -> Any:
     """Return the description of an FMU.  Raises ArchiveError."""
-    from fmpy import read_model_description
-
     try:
-        return read_model_description(str(file), validate=False)
+        return read_description(file)
     except Exception as error:  # of the zip archive, of the XML, or FMPy's own
         raise ArchiveError(f"{file.name} is not a readable FMU: {error}") from None
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.errors import GyrobenchError
 from gyrobench.library.experiment import Experiment, File, Run, open_run
 from gyrobench.library.many_runs import campaign, site, sweep
@@ -60,6 +61,7 @@ __all__ = [
 ]
 
 
+@checked
 def load(
     name: File,
     values: Mapping[str, Any] | None = None,
@@ -87,6 +89,7 @@ def load(
     return experiment
 
 
+@checked
 def load_suite(
     name: str,
     values: Mapping[str, Any] | None = None,
@@ -105,6 +108,7 @@ def load_suite(
     return suite
 
 
+@checked
 def reduce(
     name: str, data: File, *, spec: File | None = None, out: File | None = None, force: bool = False, **values: str
 ) -> Run:
@@ -115,6 +119,7 @@ def reduce(
     return load(name).reduce(data, spec=spec, out=out, force=force, **values)
 
 
+@checked
 def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparison:
     """Return runs, or folders of runs, side by side; the first is the baseline.
 
@@ -133,6 +138,7 @@ def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparis
     return compare_results(list(zip(named, results, strict=True)))
 
 
+@checked
 def design(
     name: str,
     wants: Mapping[str, str | float],

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, BenchError
+from gyrobench.files import check_description
 from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
@@ -93,6 +94,7 @@ def _described(path: Path) -> tuple[Any, list[str]]:
     """Return the model description and its problems: FMPy's checks but for that of the names, which is made here."""
     from fmpy import read_model_description
 
+    check_description(path)
     with zipfile.ZipFile(path) as archive:
         names = [f.orig_filename for f in archive.filelist if "\\" in f.orig_filename]
     problems = [f'The file path "{n}" contains a backslash.' for n in names]

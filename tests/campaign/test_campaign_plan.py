@@ -158,11 +158,11 @@ def test_files(tmp_path: Path) -> None:
         ({"system": "weighing", "over": {"sauce.offset": "1,2"}}, "no slot 'sauce'"),
         ({"system": "weighing", "over": {"temperature": "uniform(1, 2) K"}}, "how many points are drawn"),
         ({"system": "weighing", "runs": 5}, "nothing is drawn"),
-        ({"system": "weighing", "seeds": 0}, "a number of seeds from 1 on"),
+        ({"system": "weighing", "seeds": 0}, "a number of seeds from 1 to"),
         ({"system": "weighing", "data": "none/*.csv"}, "no such file"),
         ({"system": "weighing", "memory_limit": "lots"}, "500MB or 1.5GB"),
         ({"system": "weighing", "set": {"temperature": "3K"}, "over": {"temperature": "1,2 K"}}, "leave out one"),
-        ({"system": "weighing", "table": "none.csv"}, "none.csv: not a readable table: No such file"),
+        ({"system": "weighing", "table": "none.csv"}, "none.csv: No such file"),
     ],
 )
 def test_what_is_refused_before_anything_runs(asked: dict[str, Any], problem: str) -> None:

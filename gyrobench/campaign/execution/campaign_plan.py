@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.campaign.execution.axes import QUANTITY, Axis, AxisValue, Distribution
+from gyrobench.campaign.execution.axes import MOST, QUANTITY, Axis, AxisValue, Distribution
 from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, tool_digest
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
@@ -168,6 +169,9 @@ class _Planner:
         drawn = d.drawn(distributions)
         if any(seed is not None for _, seed in rows) and (d.seeds != 1 or distributions):
             raise UsageError("the table has seeds of its own: leave out seeds, and distributions")
+        count = math.prod(len(a.points) for a in axes) * len(drawn) * len(rows) * max(len(files), 1) * len(seeds)
+        if count > MOST:
+            raise UsageError(f"{count} runs; a campaign has up to {MOST}: fewer points or seeds, or draw them (runs)")
         grid = list(itertools.product(*(a.points for a in axes)))
         settings = dict(d.set)
         own = bool(distributions or d.table is not None)  # each point has noise of its own

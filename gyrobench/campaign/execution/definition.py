@@ -30,20 +30,74 @@ from __future__ import annotations
 import csv
 import glob
 import importlib.util
-import math
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
+from gyrobench.campaign.execution.axes import (
+    DESIGNS,
+    MOST,
+    Axis,
+    AxisValue,
+    Distribution,
+    check_value,
+    draw,
+    parse_axis,
+)
+from gyrobench.errors import GyrobenchError
 from gyrobench.reading import shorten
 from gyrobench.system.values import parse_number
 
 KEEP = ("all", "failures", "extremes", "none")
 HOUR = 3600.0
+
+
+def _plain_text(value: str | Path) -> str | Path:
+    if "\0" in str(value):
+        raise ValueError("a null character, which no name has")
+    return value
+
+
+Text = Annotated[str, AfterValidator(_plain_text)]
+File = Annotated[str | Path, AfterValidator(_plain_text)]
+#: a value, or a table of them: what it means is found when the test is known
+Values = dict[str, Annotated[Any, AfterValidator(check_value)]]
+Count = Annotated[int, Field(ge=0, le=MOST)]
+
+
+class CampaignFile(BaseModel):
+    """The keys of a definition and the types of their values."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    system: Text
+    name: Text = ""
+    question: str = ""
+    set: Values = {}
+    over: Values = {}
+    parts: dict[str, Text | list[Text]] = {}
+    maps: dict[str, File] = {}
+    seeds: Any = 1  # a number of seeds, or a list: see Definition.seed_list
+    runs: Count = 0
+    design: Text = "random"
+    design_seed: Annotated[int, Field(ge=0, lt=1 << 32)] = 1
+    table: File | list[dict[str, Any]] | tuple[dict[str, Any], ...] | None = None
+    arguments: dict[str, Any] = {}
+    data: File | list[File] | None = None
+    step: float | str | None = None
+    check_step: bool | None = None
+    spec: File | None = None
+    keep: Text = "failures"
+    time_limit: float | str = "1h"
+    memory_limit: float | str | None = None
+    retries: Count = 2
+    out: File | None = None
 
 
 @dataclass
@@ -97,11 +151,11 @@ class Definition:
 
     def as_given(self) -> dict[str, Any]:
         """Return what was given, as plain JSON."""
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("folder", "out")}
+        own = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.name not in ("folder", "out")}
         if isinstance(self.table, list | tuple):
             own["table"] = f"{len(self.table)} rows"
         standard = {f.name: f.default for f in fields(self)}
-        return {k: plain(v) for k, v in own.items() if v != standard[k] and v not in ({}, None)}
+        return {k: v for k, v in own.items() if v != standard[k] and v not in ({}, None)}
 
     # ------------------------------------------------------------------------------------------ points
     def axes(self, slots: Sequence[str]) -> tuple[list[Axis], list[Distribution]]:
@@ -137,13 +191,16 @@ class Definition:
 
     def seed_list(self) -> list[int]:
         """Return the seeds of a point."""
-        if isinstance(self.seeds, int) and not isinstance(self.seeds, bool) and self.seeds > 0:
+        if isinstance(self.seeds, int) and not isinstance(self.seeds, bool) and 0 < self.seeds <= MOST:
             return list(range(1, self.seeds + 1))
         if isinstance(self.seeds, list | tuple | range) and self.seeds:
             seeds = list(self.seeds)
-            if all(type(s) is int and s >= 0 for s in seeds) and len(set(seeds)) == len(seeds):
+            if all(type(s) is int and 0 <= s < 1 << 63 for s in seeds) and len(set(seeds)) == len(seeds):
                 return seeds
-        raise UsageError(f"seeds = {self.seeds}: a number of seeds from 1 on, or a list of different ones, is expected")
+        given = shorten(str(self.seeds))
+        raise UsageError(
+            f"seeds = {given}: a number of seeds from 1 to {MOST}, or a list of different ones, is expected"
+        )
 
     def files(self) -> list[Path]:
         """Return the measured files, in the order of their names.  Raises UsageError where there are none."""
@@ -173,7 +230,7 @@ class Definition:
                 raise UsageError(f"table = {shorten(str(self.table))}: rows of names and values are expected") from None
         if not content:
             raise UsageError(f"table = {self.table}: has no rows")
-        seeds = [row.pop("seed", None) for row in content]
+        seeds = [_row_seed(k, row.pop("seed", None)) for k, row in enumerate(content, 1)]
         names = list(dict.fromkeys(name for row in content for name in row))
         axes = {}
         for name in names:
@@ -181,7 +238,7 @@ class Definition:
             assert isinstance(axis, Axis)
             axes[name] = iter(axis.points), Axis(name, "table", axis.unit, ())
         rows: list[tuple[Mapping[str, AxisValue], int | None]] = [
-            ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, None if s is None else int(s))
+            ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, s)
             for row, s in zip(content, seeds, strict=True)
         ]
         return [axis for _, axis in axes.values()], rows
@@ -198,10 +255,35 @@ class Definition:
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[spec.name] = module  # its dataclasses look for it
-        spec.loader.exec_module(module)
-        if not hasattr(module, function):
-            raise UsageError(f"table = {where}: no function {function} in {file}")
-        return [dict(row) for row in getattr(module, function)(**self.arguments)]
+        try:
+            spec.loader.exec_module(module)
+            if not hasattr(module, function):
+                raise UsageError(f"table = {where}: no function {function} in {file}")
+            return [dict(row) for row in getattr(module, function)(**self.arguments)]
+        except GyrobenchError:
+            raise
+        except (Exception, SystemExit) as error:  # of the user's code
+            raise UsageError(f"table = {where}: {type(error).__name__}: {error}") from error
+
+
+def _names(slot: str, given: Any) -> list[str]:
+    """Return the parts of a slot.  Raises UsageError for anything but names."""
+    names = given.split(",") if isinstance(given, str) else given
+    if not isinstance(names, list | tuple) or not names or not all(isinstance(n, str) for n in names):
+        raise UsageError(f"{slot} = {shorten(repr(given))}: the name of a part or the file of an FMU is expected")
+    return list(names)
+
+
+def _row_seed(row: int, given: Any) -> int | None:
+    if given is None:
+        return None
+    try:
+        seed = int(given)
+    except (TypeError, ValueError):
+        seed = -1
+    if not 0 <= seed < 1 << 63:
+        raise UsageError(f"row {row} of the table: seed = {shorten(str(given))}: a whole number from 0 is expected")
+    return seed
 
 
 def read_definition(file: Path) -> Definition:
@@ -221,22 +303,34 @@ def from_mapping(content: Mapping[str, Any], folder: Path | None = None, where: 
         content["system"] = content.pop("suite")
     for key in content:
         if key not in known:
-            raise UsageError(f"{where}: unknown key '{key}'; {suggest_names(key, known)}")
+            raise UsageError(f"{where}: unknown key '{key}'; {suggest_names(str(key), known)}")
     if not isinstance(content.get("system"), str):
         raise UsageError(f'{where}: what is run?  system = "NAME", see gyrobench list')
     try:
-        return Definition(**content, folder=folder or Path.cwd())
+        typed = CampaignFile.model_validate(content).model_dump(exclude_unset=True)
+        return Definition(**typed, folder=folder or Path.cwd())
+    except ValidationError as error:
+        raise UsageError(f"{where}: {problem_of(error)}") from None
     except UsageError as error:
         raise UsageError(f"{where}: {error}") from None
 
 
+def problem_of(error: ValidationError) -> str:
+    """Return the first problem of a definition: key, what is wrong with its value, and the value."""
+    first = error.errors()[0]
+    own = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
+    given = shorten(repr(first["input"]))
+    return f"{'.'.join(map(str, first['loc'][:2]))} = {given}: {own[:1].lower()}{own[1:]}"
+
+
 def read_table(file: Path) -> list[dict[str, Any]]:
     """Return the rows of a CSV file, each value with the unit of its column "name [unit]".  Raises UsageError."""
+    text = reading.read_text(file, UsageError)
     try:
-        with file.open(newline="", encoding="utf-8-sig") as text:
-            lines = [r for r in csv.reader(text) if any(x.strip() for x in r) and not r[0].startswith("#")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{file}: not a readable table: {getattr(error, 'strerror', None) or error}") from None
+        cells_of = csv.reader(io.StringIO(text, newline=""))
+        lines = [r for r in cells_of if any(x.strip() for x in r) and not r[0].startswith("#")]
+    except csv.Error as error:
+        raise UsageError(f"{file}: not a readable table: {error}") from None
     if len(lines) < 2:
         raise UsageError(f"{file}: a header and at least one row are expected")
     head = [h.strip() for h in lines[0]]
@@ -259,14 +353,6 @@ def read_table(file: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _names(slot: str, given: Any) -> list[str]:
-    """Return the parts of a slot: a text with commas between, or a list."""
-    names = given.split(",") if isinstance(given, str) else given
-    if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
-        raise UsageError(f"{slot} = {shorten(str(given))}: names of parts or FMU files are expected")
-    return list(names)
-
-
 def _texts(value: Any) -> Any:
     """Return numbers of a file as texts: the size of one without a unit is questioned, as on the command line."""
     if isinstance(value, dict):
@@ -285,7 +371,7 @@ def memory(given: Any) -> int:
         size = float(number) * sizes[text[len(number) :]]
     except (KeyError, ValueError):
         raise UsageError(f"memory_limit = {given}: write for example 500MB or 1.5GB") from None
-    if not 1e6 <= size < math.inf:
+    if not 1e6 <= size < 1e18:
         raise UsageError(f"memory_limit = {shorten(text)}: no worker fits into that")
     return int(size)
 
