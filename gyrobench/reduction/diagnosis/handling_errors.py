@@ -88,11 +88,14 @@ class _Tried:
 
 
 def examined(
-    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]] | None
-) -> DriftTestResult:
-    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary.
+    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]] | None,
+    regression_of: Callable[[Record], Any] | None = None,
+) -> DriftTestResult:  # fmt: skip
+    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what no
+    residual shows where it is, and does not state that it was checked.
 
-    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  Raises ReductionError.
+    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  regression_of: as of
+    :func:`unshown.unshown`.  Raises ReductionError.
     """
     if candidates is None or not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
         return reduce(record)
@@ -106,10 +109,22 @@ def examined(
     if "latitude" in record.run.options:
         near = plausibility.earth_rate_warnings(result, Site.of(record.run))
         result = replace(result, reasons=[*result.reasons, *near])
+    found = _with_diagnosis(record, result, reduce, candidates)
+    if record.run.arrangement == "checked" or any(r.id == HANDLING for r in found.reasons):
+        return found
+    from gyrobench.reduction.diagnosis.unshown import unshown
+
+    return replace(found, reasons=[*found.reasons, *unshown(record, result, reduce, regression_of)])
+
+
+def _with_diagnosis(
+    record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]]
+) -> DriftTestResult:
+    """Return the result with the mistake that explains its residuals named, where they are not ordinary."""
     reference, plain = result, record
     if _hides(result, record):
         plain = with_options(record, PLAIN)
-        reference = _undone(reduce, plain) or result
+        reference = undone(reduce, plain) or result
     if not _suspicious(reference):
         return result
     return _diagnosed(result, reference, reduce, list(candidates(plain)))
@@ -141,7 +156,7 @@ def _correlated(result: DriftTestResult) -> bool:
     return any(t.id.partition(":")[0] in (RAW, WHITENED) and t.p is not None and t.p < 1e-3 for t in result.tests)
 
 
-def _undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
+def undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
     """Return the residuals of a record with a mistake undone (asked); None where that makes nonsense of it."""
     with warnings.catch_warnings(), asked.residuals_alone():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -170,7 +185,7 @@ def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
     """
     words = []
     for c in candidates:
-        found = _undone(reduce, c.record)
+        found = undone(reduce, c.record)
         if found is not None and not _contradicted(found) and found.dof >= FEW:
             words.append(c.words)
     return " or ".join(words) if len(words) <= 3 else ""
@@ -185,7 +200,7 @@ def _diagnosed(
     """
     tried = []
     for c in candidates:
-        found = _undone(reduce, c.record)
+        found = undone(reduce, c.record)
         if found is None:
             continue
         scatter = found.residual_std / c.scale

@@ -131,4 +131,9 @@ class DriftReduction(Generic[S]):
         """
         from gyrobench.reduction.diagnosis.handling_errors import examined
 
-        return examined(record, cls.of_record, cls.handling)
+        return examined(record, cls.of_record, cls.handling, cls.regression_of)
+
+    @classmethod
+    def regression_of(cls, record: Record) -> Regression:
+        """Return the data of a record with their linear model.  May raise ReductionError."""
+        return cls(record.windows, cls.setup_of(record.run)).regression()
