@@ -173,8 +173,8 @@ def test_positions_that_come_back_are_asked_for_where_the_plan_does_not_show_the
 
 
 def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
-    """k5 X Z in mount a is -k5 sin cos, k4 X Y in mount b +k4 sin cos: exchanged, k4 is -k5 and k5 is -k4, and no residual
-    shows it.  Twelve of twelve are inconclusive, and name it; stated as checked they pass.
+    """k5 X Z in mount a is -k5 sin cos, k4 X Y in mount b +k4 sin cos: exchanged, k4 is -k5 and k5 is -k4, and no
+    residual shows it.  Twelve of twelve are inconclusive, and name it; stated as checked they pass.
     """
     for seed in range(12):
         rng = np.random.default_rng(seed)

@@ -91,8 +91,8 @@ def examined(
     record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]] | None,
     regression_of: Callable[[Record], Any] | None = None,
 ) -> DriftTestResult:  # fmt: skip
-    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what no
-    residual shows where it is, and does not state that it was checked.
+    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what
+    no residual shows where it does not state that it was checked.
 
     candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  regression_of: as of
     :func:`unshown.unshown`.  Raises ReductionError.

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.result import Coefficient, Reason, Result
 
@@ -82,8 +83,9 @@ def reasons(record: Record) -> list[Reason]:
 def identical_phases(record: Record) -> list[Reason]:
     """Return which phases hold the same numbers, bit for bit: data of one that were copied into another.
 
-    Of the readings (columns mean...), and of the angles that a held table turns by.  n rows of a column with D different
-    values are equal by chance in 1 of D^n; a counter at rest, which reads one or two values, says nothing.
+    Of the readings (columns mean...), and of the angles that a held table turns by.  n rows are equal by chance in 1 of
+    D^n, D of two readings of the phase; a counter at rest, with D = 2, needs 17 rows.  Where no two readings of the
+    other phases are alike, none is a counter's.
     """
     w = record.windows
     if "phase" not in w:
@@ -99,8 +101,7 @@ def identical_phases(record: Record) -> list[Reason]:
     for p in dict.fromkeys(phase.tolist()):
         for name, values in data.items():
             own = values[phase == p]
-            levels, different = np.unique(own).size, np.unique(values).size
-            if levels < min(own.size, 3) or levels < 2 or own.size * math.log10(different) < CHANCE:
+            if own.size * math.log10(max(_rarity(own), _rarity(values[phase != p], 0))) < CHANCE:
                 continue
             first = seen.setdefault((name, own.tobytes()), p)
             if first != p and f"{first} and {p}" not in same:
@@ -112,3 +113,12 @@ def identical_phases(record: Record) -> list[Reason]:
         "The coefficients are wrong until the record is corrected."
     )
     return [Reason("record.identical_phases", text, blocks=("pass", "fail"), severity="error")]
+
+
+def _rarity(values: Array, most: int | None = None) -> float:
+    """Return in how many pairs of values one is equal, at least; 1 where more than ``most`` are."""
+    n, counts = values.size, np.unique(values, return_counts=True)[1]
+    equal = float(np.sum(counts * (counts - 1.0))) / 2.0
+    if n < 2 or (most is not None and equal > most):
+        return 1.0
+    return n * (n - 1) / 2.0 / max(equal, 1.0)
