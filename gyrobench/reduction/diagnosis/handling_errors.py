@@ -20,7 +20,8 @@ A true record is fitted by the true design up to noise; a wrong design adds to i
 keeps this so where slow noise leaves few independent residuals.  Mistakes whose scatter is not larger than the least
 by an F test are named with it: a tumble with its mounts exchanged has the residuals of one with its dwells exchanged.
 
-Not seen: mistakes that leave the residuals as they are and change the estimates alone.  Such are reversed current or
+Not seen: mistakes that leave the residuals as they are and change the estimates alone; what a record does not show is
+asked for (unshown.py).  Such are reversed current or
 rotation throughout a tumble, or a wrong unit of its current, where the input axis sees no rate (coefficients reversed
 or scaled); positions 5 to 8 among themselves with six terms of the eight positions; attitudes that are taken once each
 and are as many as the coefficients (vertical and level servo test: coefficients of the size of the Earth rate); sign,

@@ -9,7 +9,8 @@ rests on that mistake not having been made, and passes only where it states so: 
 redundancy shows a mistake is not asked about it.
 
 The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
-mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced.
+mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
+and these only where a coefficient is no unknown of the regression.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
@@ -30,10 +32,14 @@ from gyrobench.reduction.diagnosis.handling_candidates import (
     changed,
     exchanged_labels,
     relabelled,
+    reversed_columns,
+    wrong_hemisphere,
 )
 from gyrobench.reduction.diagnosis.handling_errors import IMPOSSIBLE, LEVEL, Candidate, Reduce, undone, with_options
 from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.fit_result import UNSTATED
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
 
@@ -43,21 +49,25 @@ if TYPE_CHECKING:
 ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
-MOST = 4  # named
+NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
 UNITY = 1.0  # u, least change of an estimate that counts
 
 
 def mistakes(record: Record) -> Iterator[Candidate]:
-    """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, latitude, scale factors
-    and the zero of the angles in an attitude off - but for what a standard uncertainty is stated of.
+    """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
+    readings reversed, latitude, scale factors and the zero of the angles in an attitude off - but for what a standard
+    uncertainty is stated of.
     """
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
+    yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
+    yield from reversed_columns(record, [n for n in record.windows if n.startswith("mean")], "the reading", False)
     options = record.run.options
     latitude = float(options.get("latitude", 0.0))
     if "latitude" in options and not options.get("u_latitude"):
         moved = latitude + math.copysign(OFF, -latitude)
         yield Candidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
+        yield from wrong_hemisphere(record)
     for name, stated in SCALES.items():
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
@@ -86,7 +96,7 @@ def _two_pairs(record: Record) -> Iterator[Candidate]:
 
 
 def unshown(
-    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Any] | None = None
+    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Regression] | None = None
 ) -> list[Reason]:
     """Return that the record does not state what its residuals do not show; nothing where there is no such mistake.
 
@@ -96,8 +106,8 @@ def unshown(
     found = _not_shown(record, result, reduce, regression_of)
     if not found:
         return []
-    said = "; ".join(f"{words} ({_largest(moved)})" for words, moved in found[:MOST])
-    more = f"; {len(found) - MOST} more" if len(found) > MOST else ""
+    said = "; ".join(f"{words} ({_largest(moved)})" for words, moved in found[:NAMED])
+    more = f"; {len(found) - NAMED} more" if len(found) > NAMED else ""
     names = tuple(n for n in result.names if any(n in moved for _, moved in found))
     text = (
         f"No residual of this record would show: {said}{more}. State that attitudes, angles and values were checked "
@@ -117,67 +127,86 @@ def of_plan(system: System, record: Record) -> list[str]:
 
 
 def _not_shown(
-    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Any] | None
+    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Regression] | None
 ) -> list[tuple[str, dict[str, float]]]:
     """Return the mistakes that leave the residuals as they are, each with by how many u it moves estimates."""
     if result.ideal:
         return []
-    reference = _scatter(record, regression_of)
+    reference = None if regression_of is None else _Plain.of(record, regression_of)
     found: list[tuple[str, dict[str, float]]] = []
     for c in mistakes(record):
-        if regression_of is not None and _shows(reference, _scatter(c.record, regression_of)):
+        plain = None if regression_of is None else _Plain.of(c.record, regression_of)
+        if regression_of is not None and (plain is None or (reference and _shows(reference.fit, plain.fit))):
             continue
-        other = undone(reduce, c.record)
-        if other is None or _shows((result.residual_std, result.dof), (other.residual_std, other.dof)):
-            continue
-        if moved := _moved(result, other):
+        moved = _moved_plainly(result, reference, plain)
+        if moved is None:
+            other = undone(reduce, c.record)
+            if other is None or _shows((result.residual_std, result.dof), (other.residual_std, other.dof)):
+                continue
+            moved = _moved(result, {x.name: x.estimate for x in other.coefficients})
+        if moved:
             found.append((c.words, moved))
     return sorted(found, key=lambda f: -max(f[1].values()))
 
 
 def _largest(moved: dict[str, float]) -> str:
-    first = sorted(moved, key=lambda n: -moved[n])[:MOST]
+    first = sorted(moved, key=lambda n: -moved[n])[:LARGEST]
     return ", ".join(f"{name} by {moved[name]:.2g} u" for name in first)
 
 
-def _moved(result: DriftTestResult, other: DriftTestResult) -> dict[str, float]:
+def _moved_plainly(result: DriftTestResult, reference: _Plain | None, plain: _Plain | None) -> dict[str, float] | None:
+    """Return the same of what least squares makes of both; None where a coefficient is no unknown of the regression."""
+    if (
+        reference is None
+        or plain is None
+        or any(n not in reference.values or n not in plain.values for n in result.names)
+    ):
+        return None
+    moved = {n: plain.values[n] - reference.values[n] for n in result.names}
+    return _moved(result, {c.name: c.estimate + moved[c.name] for c in result.coefficients})
+
+
+def _moved(result: DriftTestResult, there: dict[str, float]) -> dict[str, float]:
     """Return by how many u the estimates differ, of those that differ by more than UNITY."""
-    there = {c.name: c.estimate for c in other.coefficients}
     each = {c.name: abs(there[c.name] - c.estimate) / c.u for c in result.coefficients if c.name in there and c.u > 0.0}
     return {n: v for n, v in each.items() if v > UNITY}
 
 
-def _shows(reference: tuple[float, float] | None, other: tuple[float, float] | None) -> bool:
-    """Return whether the scatter of a record with a mistake, and its degrees of freedom, is beyond that of the record;
-    None: it cannot be fitted.
-    """
-    if other is None:
-        return True
-    if reference is None or not reference[0] > 0.0:
+def _shows(reference: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether the scatter of a record with a mistake, and its degrees of freedom, is beyond the record's."""
+    if not reference[0] > 0.0:
         return False
     (scatter, dof), (without, before) = other, reference
     return float(special.fdtrc(max(dof, 1.0), max(before, 1.0), (scatter / without) ** 2)) < LEVEL
 
 
-def _scatter(record: Record, regression_of: Callable[[Record], Any] | None) -> tuple[float, float] | None:
-    """Return the residual standard deviation of least squares and its degrees of freedom; None where the record cannot
-    be fitted.
+@dataclass(frozen=True)
+class _Plain:
+    """Least squares of a test's regression: residual standard deviation with its degrees of freedom, and the unknowns
+    that are coefficients, in their printed units.
     """
-    if regression_of is None:
-        return None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        try:
-            data = regression_of(record)
-        except IMPOSSIBLE:
+
+    fit: tuple[float, float]
+    values: dict[str, float]
+
+    @classmethod
+    def of(cls, record: Record, regression_of: Callable[[Record], Regression]) -> _Plain | None:
+        """Return None where the record cannot be fitted."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            try:
+                data = regression_of(record)
+            except IMPOSSIBLE:
+                return None
+        weight = np.ones_like(data.y) if data.weights is None else np.sqrt(data.weights)
+        X, y = data.X * weight[:, None], data.y * weight
+        dof = y.size - X.shape[1]
+        if not (np.all(np.isfinite(X)) and np.all(np.isfinite(y))) or dof < 1:
             return None
-    size = np.linalg.norm(data.X, axis=0)
-    X = data.X[:, size > 0.0] / size[size > 0.0]
-    if not (np.all(np.isfinite(X)) and np.all(np.isfinite(data.y))):
-        return None
-    weight = np.ones_like(data.y) if data.weights is None else np.sqrt(data.weights)
-    basis, s, _ = np.linalg.svd(X * weight[:, None], full_matrices=False)
-    basis = basis[:, s > 1e-9 * s[0]]
-    y = data.y * weight
-    left, dof = y - basis @ (basis.T @ y), y.size - basis.shape[1]
-    return (math.sqrt(float(left @ left) / dof), float(dof)) if dof > 0 else (0.0, 0.0)
+        size = np.linalg.norm(X, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        found = np.linalg.lstsq(X / size, y, rcond=None)[0]
+        left = y - X / size @ found
+        units = [(q.title, q.scale) for q in data.quantities if isinstance(q, Quantity)]
+        values = {n: float(b) / s for (n, s), b in zip(units, found / size, strict=False)}
+        return cls((math.sqrt(float(left @ left) / dof), float(dof)), values)
