@@ -122,7 +122,7 @@ def of_plan(system: System, record: Record) -> list[str]:
     if not (isinstance(reduction, type) and issubclass(reduction, DriftReduction)) or reduction.handling is None:
         return []
     result = reduction.of_record(record)
-    found = _not_shown(record, result, reduction.of_record, reduction.regression_of)
+    found = _not_shown(record, result, reduction.of_record, reduction.regression_of())
     return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found]
 
 
