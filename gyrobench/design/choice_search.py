@@ -71,7 +71,7 @@ def search_choices(
         bench.system.name, dict(bench.given), options, ((choice.label, length),), trial.time,
         trial.time if time is not None else own_time, math.nan, math.nan, time is not None, criterion,
         designed_values(trial, own, wanted, frozenset(wanted)),
-        tuple(dict.fromkeys([*protocol.unseen, *trial.hidden])), bench.count(options, list(trial.values), count),
+        bench.unseen([*protocol.unseen, *trial.hidden], options), bench.count(options, list(trial.values), count),
         tuple((c.label, t.time if time is None else math.sqrt(v)) for v, c, _, t in sorted(found, key=lambda f: f[0])),
     )  # fmt: skip
 

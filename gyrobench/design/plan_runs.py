@@ -19,6 +19,7 @@ from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
+from gyrobench.reduction.diagnosis.unshown import of_plan
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.system import System
@@ -91,6 +92,10 @@ class Workbench:
     def trial(self, values: Mapping[str, Any], covariances: Covariances, draws: int) -> Trial:
         """Run a plan and predict its values."""
         return trial_of(*self.run(values), covariances, draws)
+
+    def unseen(self, known: Sequence[str], values: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return what a plan does not determine or show: known, and mistakes in taking it (diagnosis.unshown)."""
+        return tuple(dict.fromkeys([*known, *of_plan(self.system.with_values(values), self.run(values)[0])]))
 
     def count(self, values: Mapping[str, Any], names: Sequence[str], count: int) -> dict[str, tuple[float, float, int]]:
         """Return mean u and standard deviation of the estimates over ``count`` runs of a plan, and their number."""

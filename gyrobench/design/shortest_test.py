@@ -152,7 +152,7 @@ def _searched(
     return DesignedTest(
         bench.system.name, dict(bench.given), options, tuple((protocol.labels[j], t) for j, t in plan.visits),
         trial.time, book.duration, bound, _efficiency(ideal, optimum, plan), time is not None, criterion,
-        designed_values(trial, own, sizes, asked), tuple(dict.fromkeys([*protocol.unseen, *trial.hidden])),
+        designed_values(trial, own, sizes, asked), bench.unseen([*protocol.unseen, *trial.hidden], options),
         bench.count(options, list(trial.values), count),
     )  # fmt: skip
 

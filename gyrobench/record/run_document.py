@@ -242,6 +242,7 @@ class RunDocument(Document):
     days: list[Day] = Field(default_factory=list, description="of a record of several days")
     polarity: str = Field(default="", description="sign convention of measured data")
     type_b: str = Field(default="", description="of measured data, none: no uncertainty of type B is declared")
+    arrangement: str = Field(default="", description="of measured data, checked: what no residual shows was checked")
     report: str = Field(default="", description="number of the laboratory's report")
     source: str = Field(default="", description="where measured data were published")
     made: str = ""

@@ -32,7 +32,7 @@ Time series may stand here instead of windows: columns `time [s]`, `current` for
 #   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length.
 #   Samples that may be aliased are warned of: say what they are by # samples = means (each since the one before) or
 #   points, and how far the signal reaches by # bandwidth = 14Hz."""
-TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b")
+TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b", "arrangement")
 
 
 def explained(template: str, options: Iterable[str] = ()) -> str:
@@ -47,7 +47,13 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
         f"type B: {names} (standard uncertainties; gyrobench show has their meanings): those that apply, a comment "
         "each or by --set; where there is none, 'type_b = none'. Without a statement no verdict is pass."
     )
+    checked = (
+        "arrangement: attitudes, signs, zeros of the angles, latitude and scale factors may be mistaken without a sign "
+        "in the residuals; the report names such mistakes.  'arrangement = checked': they were looked at once more; "
+        "without this statement nothing that rests on them passes."
+    )
     notes = [
+        *(wrap(checked, 116, subsequent_indent="  ") if names and "phase" in lines[-1] else []),
         *(wrap(text, 116, subsequent_indent="  ") if names else []),
         f"{', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them.",
     ]
@@ -89,6 +95,8 @@ def read_record(
                 f"'{name}' is not given: write '# {name} = {example}' in the file or --set {name}={example}"
             )
     problems += _type_b_problems(system, said.get("type_b", ""))
+    if said.get("arrangement", "checked") != "checked":
+        problems.append(f"arrangement = {said['arrangement']}: 'checked' or nothing is expected")
     if series and not problems:
         named = attitudes(system) if attitudes else None
         windows, said, notes = windows_of_series(system, data, head, columns, said, named)

@@ -247,6 +247,15 @@ class System(Configurable):
         """Return what the user should know about these values, as sentences."""
         return []
 
+    def reduction_object(self) -> Any:
+        """Return what reduces a record (``from_record``): a class Reduction, or a module."""
+        reduction: Any = self.reduction
+        if not isinstance(reduction, str):
+            return reduction
+        owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
+        module = importlib.import_module(f".{reduction}", owner.__module__)
+        return getattr(module, "Reduction", module)
+
     def findings(self, record: Record) -> Result:
         """Return what a record says, without limits and verdict: estimates, and the reasons against them.
 
@@ -255,13 +264,8 @@ class System(Configurable):
         """
         if not self.reduction:
             raise UsageError(f"{self.name} has no reduction")
-        reduction: Any = self.reduction
-        if isinstance(reduction, str):
-            owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
-            module = importlib.import_module(f".{reduction}", owner.__module__)
-            reduction = getattr(module, "Reduction", module)
         try:
-            found: Result = reduction.from_record(record)
+            found: Result = self.reduction_object().from_record(record)
         except KeyError as error:
             if error.args[0] in record.windows or error.args[0] not in {c.name for c in WINDOW_COLUMNS}:
                 raise

@@ -25,5 +25,5 @@ COLUMNS = (
     CsvColumn("range_plus", "rad", "angle range with positive current", required=False),
     CsvColumn("range_minus", "rad", "angle range with negative current", required=False),
 )
-TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b")
+TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement")
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None, texts=TEXTS))

@@ -46,7 +46,7 @@ class Sheet:
         run = record.run
         w = {n: np.asarray(v, dtype=float) for n, v in record.windows.items()}
         p, o = run.parameters, run.options
-        comments = {"latitude": f"{o['latitude']!r} rad", "type_b": "none"}
+        comments = {"latitude": f"{o['latitude']!r} rad", "type_b": "none", "arrangement": "checked"}
         servo = run.system.startswith("servo")
         rows = [row for row in run.plan if not servo or row.mode == "servo"]
         here = np.isin(w["phase"], [row.phase for row in rows])
@@ -86,10 +86,15 @@ class Sheet:
                 }
             case "pickoff_scale_factor":
                 names += ["mean"]
-                comments = {"type_b": "none", "drift": "2deg/h", "gain": repr(p["gyro.H"] / p["gyro.C"])}
+                comments = {
+                    "type_b": "none",
+                    "arrangement": "checked",
+                    "drift": "2deg/h",
+                    "gain": repr(p["gyro.H"] / p["gyro.C"]),
+                }
             case "torquer_scale_factor":
                 w = import_module(".marks", type(load_system(run.system)).__module__).rows(record.windows, run.plan)
-                names, comments = list(w), {"type_b": "none"}
+                names, comments = list(w), {"type_b": "none", "arrangement": "checked"}
         parameters = {EARTH: float(p[EARTH])} if servo and EARTH in p else {}
         return cls(run.system, comments, {n: np.array(w[n], dtype=float) for n in names}, parameters)
 

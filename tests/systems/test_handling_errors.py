@@ -176,3 +176,73 @@ def test_coefficients_of_the_size_of_the_earth_rate(command: Command, tmp_path: 
         text = "\n".join([head + "t_start [s],t_end [s],mean [mA]", *rows, ""])
         _, found = strict(command, tmp_path, "fixed_position", text, ("ω_d", "deg/h"))
         assert any("twice the vertical component" in w for w in found["warnings"]) == warned, found["warnings"]
+
+
+MISTAKEN: dict[str, Callable[[str], str]] = {
+    "mounts and dwells exchanged": lambda t: exchanged(exchanged(t, "mount 1", "mount 2"), "static 3", "static 4"),
+    "latitude of another city": lambda t: t.replace("latitude = 45.75deg", "latitude = 40.75deg"),
+    "k off by 2 %": lambda t: t.replace("k = 17.2 deg", "k = 17.544 deg"),
+    "nothing": lambda t: t,
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKEN)
+def test_what_no_residual_shows_is_asked_for(command: Command, text: str, tmp_path: Path, mistake: str) -> None:
+    """Each is fitted as well as the truth (D_S off by hundreds of u, D_I by 0.98 of 15 deg/h cos and sin ...): a record
+    that does not state that they were looked for passes nothing, and names them; one that does passes.
+    """
+    make, judged = MISTAKEN[mistake], ("D_S", "deg/h/g")
+    unstated = make(text.replace("# arrangement = checked\n", ""))
+    assert "arrangement" not in unstated
+    code, found = strict(command, tmp_path, NAME, unstated, judged)
+    assert code == 1 and found["verdict"] == "inconclusive"
+    (asked,) = [r for r in found["reasons"] if r["id"] == "arrangement.unstated"]
+    for words in (
+        "exchanged (D_S",
+        "the latitude wrong by 1°",
+        "the scale factor k wrong by 2 %",
+        "arrangement = checked",
+    ):
+        assert words in asked["text"], asked["text"]
+    assert "D_S" in asked["names"]
+    code, found = strict(command, tmp_path, NAME, make(text), judged)
+    assert (code, found["verdict"]) == (0, "pass")
+    assert not [r for r in found["reasons"] if r["id"] == "arrangement.unstated"]
+
+
+def test_a_stated_uncertainty_is_not_asked_for(command: Command, text: str, tmp_path: Path) -> None:
+    bare = text.replace("# arrangement = checked\n", "").replace("# type_b = none\n", "")
+    sizes = ("u_scale_factor=1e-4", "u_mount=20arcsec", "u_remount=1e-4deg/h")
+    more = [word for size in sizes for word in ("--set", size)]
+    _, found = strict(command, tmp_path, NAME, bare, ("D_S", "deg/h/g"), *more)
+    (asked,) = [r["text"] for r in found["reasons"] if r["id"] == "arrangement.unstated"]
+    assert "scale factor" not in asked and "zero of the angles" not in asked and "latitude" in asked
+
+
+def test_a_word_that_is_no_statement_is_refused(command: Command, text: str, tmp_path: Path) -> None:
+    (tmp_path / "lab.csv").write_text(text.replace("arrangement = checked", "arrangement = perhaps"), "utf-8")
+    code, _, err = command("reduce", NAME, "--data", tmp_path / "lab.csv", "--out", tmp_path / "out")
+    assert code == 2 and "arrangement = perhaps: 'checked' or nothing is expected" in err
+
+
+def test_data_of_one_dwell_in_the_other_are_named(command: Command, text: str, tmp_path: Path) -> None:
+    """Readings of static 3 copied into static 4, bit for bit; the same with one digit changed is no copy."""
+    head, _, rest = text.partition("remark,")
+    rows = [line.split(",") for line in ("remark," + rest).splitlines() if line and line[0] != "#"]
+    names = [n.split(" ")[0] for n in rows[0]]
+    place, mean = names.index("phase"), names.index("mean")
+    number = {face: n for n, face in re.findall(r"# phase (\d) = (static \d)", text)}
+    one, two = ([r for r in rows[1:] if r[place] == number[f"static {k}"]] for k in (3, 4))
+    for a, b in zip(one, two, strict=True):
+        b[mean] = a[mean]
+    for wrong in (True, False):
+        if not wrong:
+            two[1][mean] = repr(float(two[1][mean]) * (1.0 + 1e-9))
+        lines = head + "\n".join(",".join(r) for r in rows) + "\n# type_b = none\n"
+        code, found = strict(command, tmp_path, NAME, lines, ("D_S", "deg/h/g"))
+        named = [r for r in found["reasons"] if r["id"] == "record.identical_phases"]
+        assert bool(named) == wrong
+        if wrong:
+            assert code == 1 and found["verdict"] == "inconclusive"
+            pair = " and ".join(sorted((number["static 3"], number["static 4"])))
+            assert f"Phases {pair} hold the same readings" in named[0]["text"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -169,3 +170,26 @@ def test_positions_that_come_back_are_asked_for_where_the_plan_does_not_show_the
         assert bool(asked) == (not stated and not u) and all("State u_angle" in r.text for r in asked)
     result, _ = made(np.random.default_rng(2), 24, 1.0, places_stated=False)
     assert conclude(result, None, limits).verdict == "pass" and "σ_position" in result.names
+
+
+def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
+    """k5 X Z in mount a is -k5 sin cos, k4 X Y in mount b +k4 sin cos: exchanged, k4 is -k5 and k5 is -k4, and no
+    residual shows it.  Twelve of twelve are inconclusive, and name it; stated as checked they pass.
+    """
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        k, gamma = polynomial(rng), 1.0003
+        data = windows(k, {"a": 1e-4, "b": -2e-4}, gamma, 24, sigma=5e-7, rng=rng)
+        for said, verdict in (("", "inconclusive"), ("# arrangement = checked\n", "pass")):
+            lines = [f"# gravity = {gamma * G0!r}m/s2", "# scale = 9806.65m/s2/A", "# u_scale = 1e-9", "# phase 1 = b"]
+            lines += ["# phase 2 = a", "phase,t_start [s],t_end [s],angle_start [rad],angle_end [rad],mean [A]"]
+            lines += [",".join(repr(float(v[j])) for v in data.values()) for j in range(len(data["mean"]))]
+            (tmp_path / "lab.csv").write_text(said + "\n".join(lines) + "\n", encoding="utf-8")
+            system = load()
+            record = system.read_measured(tmp_path / "lab.csv", {})
+            result = system.reduce(record, {"k4": (-1e9, 1e9), "k5": (-1e9, 1e9)})
+            assert result.verdict == verdict, result.warnings
+            found = estimates(result)
+            assert found["k4"] == pytest.approx(-k["k5"], abs=5e-6) and found["k5"] == pytest.approx(-k["k4"], abs=5e-6)
+            asked = [r.text for r in result.reasons if r.id == "arrangement.unstated"]
+            assert bool(asked) == (not said) and all("a and b exchanged" in text for text in asked)

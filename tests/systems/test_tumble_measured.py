@@ -40,6 +40,7 @@ def laboratory(record: Record, scale: str = "laboratory", polarity: str | None =
     units = SCALES[scale]
     out = io.StringIO()
     out.write("# latitude = -33.9deg\n# k = 17.2 deg/h/mA\n# instrument = RIG 17\n# operator = A. Tester\n")
+    out.write("# arrangement = checked\n")
     if polarity:
         out.write(f"# polarity = {polarity}\n")
     for p in record.run.plan:

@@ -59,7 +59,7 @@ def changed(record: Record, **columns: NDArray[np.generic]) -> Record:
     return Record({**record.windows, **columns}, {}, record.run)
 
 
-def _attitude(row: PlanRow) -> str:
+def attitude_name(row: PlanRow) -> str:
     """Return what names the attitude of a phase: the face, in a servo phase the label."""
     return row.label if row.mode == "servo" else row.face
 
@@ -67,7 +67,7 @@ def _attitude(row: PlanRow) -> str:
 def _renamed(row: PlanRow, name: str) -> PlanRow:
     if not name:
         return row
-    old = _attitude(row)
+    old = attitude_name(row)
     return row.model_copy(update={n: getattr(row, n).replace(old, name) for n in ("label", "face")})
 
 
@@ -75,22 +75,23 @@ def exchanged_labels(record: Record) -> Iterator[HandlingCandidate]:
     """Two attitudes of the plan exchanged, each pair of those with the same mode; where attitudes come back, two
     phases, too.
     """
-    modes = {_attitude(row): row.mode for row in record.run.plan if _attitude(row)}
+    modes = {attitude_name(row): row.mode for row in record.run.plan if attitude_name(row)}
     for a, b in combinations(sorted(modes), 2):
         if modes[a] == modes[b]:
-            names = {row.phase: {a: b, b: a}.get(_attitude(row), "") for row in record.run.plan}
-            yield HandlingCandidate(f"{a} and {b} exchanged", _relabelled(record, names))
-    rows = [row for row in record.run.plan if _attitude(row)]
+            names = {row.phase: {a: b, b: a}.get(attitude_name(row), "") for row in record.run.plan}
+            yield HandlingCandidate(f"{a} and {b} exchanged", relabelled(record, names))
+    rows = [row for row in record.run.plan if attitude_name(row)]
     if not len(modes) < len(rows) <= MOST_PHASES:
         return
     for x, y in combinations(rows, 2):
-        a, b = _attitude(x), _attitude(y)
+        a, b = attitude_name(x), attitude_name(y)
         if a != b and x.mode == y.mode:
             words = f"phases {x.phase} and {y.phase} ({a}, {b}) exchanged"
-            yield HandlingCandidate(words, _relabelled(record, {x.phase: b, y.phase: a}))
+            yield HandlingCandidate(words, relabelled(record, {x.phase: b, y.phase: a}))
 
 
-def _relabelled(record: Record, names: Mapping[int, str]) -> Record:
+def relabelled(record: Record, names: Mapping[int, str]) -> Record:
+    """Return the record with other attitudes of some phases; "": as it is."""
     plan = [_renamed(row, names.get(row.phase, "")) for row in record.run.plan]
     return Record(record.windows, {}, record.run.model_copy(update={"plan": plan}))
 
@@ -120,8 +121,8 @@ def reversed_columns(
     phase = np.asarray(w["phase"]).astype(int)
     places: dict[str, list[int]] = {}
     for row in record.run.plan:
-        if _attitude(row) and row.phase in phase:
-            places.setdefault(_attitude(row), []).append(row.phase)
+        if attitude_name(row) and row.phase in phase:
+            places.setdefault(attitude_name(row), []).append(row.phase)
     for name, numbers in places.items() if len(places) > 1 else ():
         yield HandlingCandidate(f"{words} reversed in {name}", reversed_in(np.isin(phase, numbers)))
     single = [(p, name) for name, numbers in places.items() for p in numbers if len(numbers) > 1]
@@ -141,10 +142,10 @@ def scaled_in_attitudes(
     record: Record, columns: Sequence[str], factors: Mapping[str, float]
 ) -> Iterator[HandlingCandidate]:
     """Columns in another unit, or in another range of the meter, in one of a few attitudes."""
-    names = list(dict.fromkeys(_attitude(row) for row in record.run.plan if _attitude(row)))
+    names = list(dict.fromkeys(attitude_name(row) for row in record.run.plan if attitude_name(row)))
     phase = np.asarray(record.windows["phase"]).astype(int)
     for name in names if 1 < len(names) <= MOST_SCALED else ():
-        here = np.isin(phase, [row.phase for row in record.run.plan if _attitude(row) == name])
+        here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         for words, f in factors.items():
             columns_there = {n: np.where(here, record.windows[n] * f, record.windows[n]) for n in columns}
             yield HandlingCandidate(f"{words}, in {name}", changed(record, **columns_there))

@@ -20,7 +20,8 @@ A true record is fitted by the true design up to noise; a wrong design adds to i
 keeps this so where slow noise leaves few independent residuals.  Mistakes whose scatter is not larger than the least
 by an F test are named with it: a tumble with its mounts exchanged has the residuals of one with its dwells exchanged.
 
-Not seen: mistakes that leave the residuals as they are and change the estimates alone.  Such are reversed current or
+Not seen: mistakes that leave the residuals as they are and change the estimates alone; what a record does not show is
+asked for (unshown.py).  Such are reversed current or
 rotation throughout a tumble, or a wrong unit of its current, where the input axis sees no rate (coefficients reversed
 or scaled); positions 5 to 8 among themselves with six terms of the eight positions; attitudes that are taken once each
 and are as many as the coefficients (vertical and level servo test: coefficients of the size of the Earth rate); sign,
@@ -88,11 +89,14 @@ class _Tried:
 
 
 def examined(
-    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]] | None
-) -> DriftTestResult:
-    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary.
+    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]] | None,
+    regression_of: Callable[[Record], Any] | None = None,
+) -> DriftTestResult:  # fmt: skip
+    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what
+    no residual shows where it does not state that it was checked.
 
-    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  Raises ReductionError.
+    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  regression_of: as of
+    :func:`unshown.unshown`.  Raises ReductionError.
     """
     if candidates is None or not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
         return reduce(record)
@@ -106,10 +110,22 @@ def examined(
     if "latitude" in record.run.options:
         near = plausibility.earth_rate_warnings(result, Site.of(record.run))
         result = replace(result, reasons=[*result.reasons, *near])
+    found = _with_diagnosis(record, result, reduce, candidates)
+    if record.run.arrangement == "checked" or any(r.id == HANDLING for r in found.reasons):
+        return found
+    from gyrobench.reduction.diagnosis.unshown import unshown
+
+    return replace(found, reasons=[*found.reasons, *unshown(record, result, reduce, regression_of)])
+
+
+def _with_diagnosis(
+    record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]]
+) -> DriftTestResult:
+    """Return the result with the mistake that explains its residuals named, where they are not ordinary."""
     reference, plain = result, record
     if _hides(result, record):
         plain = with_options(record, PLAIN)
-        reference = _undone(reduce, plain) or result
+        reference = undone(reduce, plain) or result
     if not _suspicious(reference):
         return result
     return _diagnosed(result, reference, reduce, list(candidates(plain)))
@@ -141,7 +157,7 @@ def _correlated(result: DriftTestResult) -> bool:
     return any(t.id.partition(":")[0] in (RAW, WHITENED) and t.p is not None and t.p < 1e-3 for t in result.tests)
 
 
-def _undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
+def undone(reduce: Reduce, record: Record) -> DriftTestResult | None:
     """Return the residuals of a record with a mistake undone (asked); None where that makes nonsense of it."""
     with warnings.catch_warnings(), asked.residuals_alone():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -170,7 +186,7 @@ def _cures(reduce: Reduce, candidates: Iterable[HandlingCandidate]) -> str:
     """
     words = []
     for c in candidates:
-        found = _undone(reduce, c.record)
+        found = undone(reduce, c.record)
         if found is not None and not _contradicted(found) and found.dof >= FEW:
             words.append(c.words)
     return " or ".join(words) if len(words) <= 3 else ""
@@ -185,7 +201,7 @@ def _diagnosed(
     """
     tried = []
     for c in candidates:
-        found = _undone(reduce, c.record)
+        found = undone(reduce, c.record)
         if found is None:
             continue
         scatter = found.residual_std / c.scale

@@ -17,7 +17,7 @@ handling errors in a measured record, and the reasons that withhold a verdict.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -131,4 +131,11 @@ class DriftReduction(Generic[S]):
         """
         from gyrobench.reduction.diagnosis.handling_errors import examined
 
-        return examined(record, cls.of_record, cls.handling)
+        return examined(record, cls.of_record, cls.handling, cls.regression_of())
+
+    @classmethod
+    def regression_of(cls) -> Callable[[Record], Regression] | None:
+        """Return record -> its data with their linear model; None where it is not one setup and one fit."""
+        if cls.of_record.__func__ is not DriftReduction.of_record.__func__:  # type: ignore[attr-defined]
+            return None
+        return lambda record: cls(record.windows, cls.setup_of(record.run)).regression()

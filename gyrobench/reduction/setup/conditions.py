@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -9,10 +10,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.result import Coefficient, Reason, Result
 
 R = TypeVar("R", bound=Result)
+CHANCE = 5.0  # decades by which rows that are equal are no chance
 TYPE_B_UNSTATED = "type_b.unstated"
 #: estimates that belong to the mean temperature of the record -> their change per kelvin in the gyro, and its sign
 WARMED = {
@@ -64,6 +67,7 @@ def reasons(record: Record) -> list[Reason]:
     found = [Reason("part.external", text) for text in run.external]
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
+        found += identical_phases(record)
     if run.measured and not run.type_b_stated:
         text = (
             "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
@@ -74,3 +78,47 @@ def reasons(record: Record) -> list[Reason]:
         text = f"The run stopped at {run.stopped_at or 0.0:.6g} s, before the end of its plan."
         found.append(Reason("record.incomplete", text, severity="error"))
     return found
+
+
+def identical_phases(record: Record) -> list[Reason]:
+    """Return which phases hold the same numbers, bit for bit: data of one that were copied into another.
+
+    Of the readings (columns mean...), and of the angles that a held table turns by.  n rows are equal by chance in 1 of
+    D^n, D of two readings of the phase; a counter at rest, with D = 2, needs 17 rows.  Where no two readings of the
+    other phases are alike, none is a counter's.
+    """
+    w = record.windows
+    if "phase" not in w:
+        return []
+    phase = np.asarray(w["phase"]).astype(int)
+    data = {n: np.asarray(v, dtype=float) for n, v in w.items() if n.startswith("mean")}
+    servo = [row.phase for row in record.run.plan if row.mode == "servo"]
+    if not data and servo:
+        data = {a: np.asarray(w[f"{a}_end"]) - np.asarray(w[f"{a}_start"])
+                for a in ("angle", "outer", "inner") if f"{a}_start" in w}  # fmt: skip
+    seen: dict[tuple[str, bytes], int] = {}
+    same: list[str] = []
+    for p in dict.fromkeys(phase.tolist()):
+        for name, values in data.items():
+            own = values[phase == p]
+            if own.size * math.log10(max(_rarity(own), _rarity(values[phase != p], 0))) < CHANCE:
+                continue
+            first = seen.setdefault((name, own.tobytes()), p)
+            if first != p and f"{first} and {p}" not in same:
+                same.append(f"{first} and {p}")
+    if not same:
+        return []
+    text = (
+        f"Phases {', '.join(same)} hold the same readings, bit for bit: the data of one were copied into the other. "
+        "The coefficients are wrong until the record is corrected."
+    )
+    return [Reason("record.identical_phases", text, blocks=("pass", "fail"), severity="error")]
+
+
+def _rarity(values: Array, most: int | None = None) -> float:
+    """Return in how many pairs of values one is equal, at least; 1 where more than ``most`` are."""
+    n, counts = values.size, np.unique(values, return_counts=True)[1]
+    equal = float(np.sum(counts * (counts - 1.0))) / 2.0
+    if n < 2 or (most is not None and equal > most):
+        return 1.0
+    return n * (n - 1) / 2.0 / max(equal, 1.0)

@@ -1,0 +1,219 @@
+"""Mistakes that no residual of a measured record would show, and that change its estimates: they must be asked for.
+
+    reasons = unshown(record, result, reduce, regression_of)       # of a record that does not state that it was checked
+
+A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another city
+are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of the record.  Where the copy can be
+fitted as well - no F test of the two scatters with p < LEVEL - and an estimate changes by more than its u, the record
+rests on that mistake not having been made, and passes only where it states so: ``arrangement = checked``.  A plan whose
+redundancy shows a mistake is not asked about it.
+
+The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
+mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
+and these only where a coefficient is no unknown of the regression.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import special
+
+from gyrobench.record.record import Record
+from gyrobench.reduction.diagnosis.handling_candidates import (
+    ANGLES,
+    attitude_name,
+    changed,
+    exchanged_labels,
+    relabelled,
+    reversed_columns,
+    wrong_hemisphere,
+)
+from gyrobench.reduction.diagnosis.handling_errors import (
+    IMPOSSIBLE,
+    LEVEL,
+    HandlingCandidate,
+    Reduce,
+    undone,
+    with_options,
+)
+from gyrobench.reduction.estimation.drift_test import DriftReduction
+from gyrobench.reduction.estimation.fit_result import UNSTATED
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.result import DriftTestResult, Reason
+from gyrobench.units import DEG
+
+if TYPE_CHECKING:
+    from gyrobench.system.system import System
+
+ARRANGEMENT = f"arrangement{UNSTATED}"
+SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
+OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
+NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
+UNITY = 1.0  # u, least change of an estimate that counts
+
+
+def mistakes(record: Record) -> Iterator[HandlingCandidate]:
+    """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
+    readings reversed, latitude, scale factors and the zero of the angles in an attitude off - but for what a standard
+    uncertainty is stated of.
+    """
+    yield from exchanged_labels(record)
+    yield from _two_pairs(record)
+    yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
+    yield from reversed_columns(record, [n for n in record.windows if n.startswith("mean")], "the reading", False)
+    options = record.run.options
+    latitude = float(options.get("latitude", 0.0))
+    if "latitude" in options and not options.get("u_latitude"):
+        moved = latitude + math.copysign(OFF, -latitude)
+        yield HandlingCandidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
+        yield from wrong_hemisphere(record)
+    for name, stated in SCALES.items():
+        if options.get(name) and not options.get(stated):
+            other = with_options(record, {name: float(options[name]) * TOO_LARGE})
+            yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
+    if options.get("u_mount") or not all(n in record.windows for n in ANGLES):
+        return
+    phase = np.asarray(record.windows["phase"]).astype(int)
+    places = dict.fromkeys(attitude_name(row) for row in record.run.plan if attitude_name(row))
+    for name in places:
+        here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
+        columns = {n: np.where(here, record.windows[n] + OFF, record.windows[n]) for n in ANGLES}
+        yield HandlingCandidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
+
+
+def _two_pairs(record: Record) -> Iterator[HandlingCandidate]:
+    """Two pairs of attitudes exchanged at once, where a mode has two alone: mounts and dwells of a tumble."""
+    modes: dict[str, list[str]] = {}
+    for row in record.run.plan:
+        if attitude_name(row) and attitude_name(row) not in modes.setdefault(row.mode, []):
+            modes[row.mode].append(attitude_name(row))
+    pairs = [names for names in modes.values() if len(names) == 2]
+    for (a, b), (c, d) in combinations(pairs, 2):
+        other = {a: b, b: a, c: d, d: c}
+        names = {row.phase: other.get(attitude_name(row), "") for row in record.run.plan}
+        yield HandlingCandidate(f"{a} and {b}, {c} and {d} exchanged", relabelled(record, names))
+
+
+def unshown(
+    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Regression] | None = None
+) -> list[Reason]:
+    """Return that the record does not state what its residuals do not show; nothing where there is no such mistake.
+
+    regression_of: record -> the :class:`~gyrobench.reduction.estimation.linear_fit.Regression` of a test with one; None
+    where the reduction has several.
+    """
+    found = _not_shown(record, result, reduce, regression_of)
+    if not found:
+        return []
+    said = "; ".join(f"{words} ({_largest(moved)})" for words, moved in found[:NAMED])
+    more = f"; {len(found) - NAMED} more" if len(found) > NAMED else ""
+    names = tuple(n for n in result.names if any(n in moved for _, moved in found))
+    text = (
+        f"No residual of this record would show: {said}{more}. State that attitudes, angles and values were checked "
+        "(arrangement = checked), or add positions that show them."
+    )
+    return [Reason(ARRANGEMENT, text, ("pass",), names, severity="doubt")]
+
+
+def of_plan(system: System, record: Record) -> list[str]:
+    """Return the mistakes that the record of a simulated plan would not show, as sentences: before it is measured."""
+    reduction = system.reduction_object()
+    if not (isinstance(reduction, type) and issubclass(reduction, DriftReduction)) or reduction.handling is None:
+        return []
+    result = reduction.of_record(record)
+    found = _not_shown(record, result, reduction.of_record, reduction.regression_of())
+    return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found]
+
+
+def _not_shown(
+    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Regression] | None
+) -> list[tuple[str, dict[str, float]]]:
+    """Return the mistakes that leave the residuals as they are, each with by how many u it moves estimates."""
+    if result.ideal:
+        return []
+    reference = None if regression_of is None else _Plain.of(record, regression_of)
+    found: list[tuple[str, dict[str, float]]] = []
+    for c in mistakes(record):
+        plain = None if regression_of is None else _Plain.of(c.record, regression_of)
+        if regression_of is not None and (plain is None or (reference and _shows(reference.fit, plain.fit))):
+            continue
+        moved = _moved_plainly(result, reference, plain)
+        if moved is None:
+            other = undone(reduce, c.record)
+            if other is None or _shows((result.residual_std, result.dof), (other.residual_std, other.dof)):
+                continue
+            moved = _moved(result, {x.name: x.estimate for x in other.coefficients})
+        if moved:
+            found.append((c.words, moved))
+    return sorted(found, key=lambda f: -max(f[1].values()))
+
+
+def _largest(moved: dict[str, float]) -> str:
+    first = sorted(moved, key=lambda n: -moved[n])[:LARGEST]
+    return ", ".join(f"{name} by {moved[name]:.2g} u" for name in first)
+
+
+def _moved_plainly(result: DriftTestResult, reference: _Plain | None, plain: _Plain | None) -> dict[str, float] | None:
+    """Return the same of what least squares makes of both; None where a coefficient is no unknown of the regression."""
+    if (
+        reference is None
+        or plain is None
+        or any(n not in reference.values or n not in plain.values for n in result.names)
+    ):
+        return None
+    moved = {n: plain.values[n] - reference.values[n] for n in result.names}
+    return _moved(result, {c.name: c.estimate + moved[c.name] for c in result.coefficients})
+
+
+def _moved(result: DriftTestResult, there: dict[str, float]) -> dict[str, float]:
+    """Return by how many u the estimates differ, of those that differ by more than UNITY."""
+    each = {c.name: abs(there[c.name] - c.estimate) / c.u for c in result.coefficients if c.name in there and c.u > 0.0}
+    return {n: v for n, v in each.items() if v > UNITY}
+
+
+def _shows(reference: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether the scatter of a record with a mistake, and its degrees of freedom, is beyond the record's."""
+    if not reference[0] > 0.0:
+        return False
+    (scatter, dof), (without, before) = other, reference
+    return float(special.fdtrc(max(dof, 1.0), max(before, 1.0), (scatter / without) ** 2)) < LEVEL
+
+
+@dataclass(frozen=True)
+class _Plain:
+    """Least squares of a test's regression: residual standard deviation with its degrees of freedom, and the unknowns
+    that are coefficients, in their printed units.
+    """
+
+    fit: tuple[float, float]
+    values: dict[str, float]
+
+    @classmethod
+    def of(cls, record: Record, regression_of: Callable[[Record], Regression]) -> _Plain | None:
+        """Return None where the record cannot be fitted."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            try:
+                data = regression_of(record)
+            except IMPOSSIBLE:
+                return None
+        weight = np.ones_like(data.y) if data.weights is None else np.sqrt(data.weights)
+        X, y = data.X * weight[:, None], data.y * weight
+        dof = y.size - X.shape[1]
+        if not (np.all(np.isfinite(X)) and np.all(np.isfinite(y))) or dof < 1:
+            return None
+        size = np.linalg.norm(X, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        found = np.linalg.lstsq(X / size, y, rcond=None)[0]
+        left = y - X / size @ found
+        units = [(q.title, q.scale) for q in data.quantities if isinstance(q, Quantity)]
+        values = {n: float(b) / s for (n, s), b in zip(units, found / size, strict=False)}
+        return cls((math.sqrt(float(left @ left) / dof), float(dof)), values)
