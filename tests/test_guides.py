@@ -118,6 +118,21 @@ def test_the_notebook_runs_and_shows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert {f.name for f in (tmp_path / "first_report").iterdir()} >= {"report.html", "report.pdf", "run.json"}
 
 
+def test_the_first_runs_of_a_reader_can_be_used(command: Callable[[str], None], tmp_path: Path) -> None:
+    """The first run of the guide, and the one it judges: nothing speaks against the coefficients, they pass."""
+    page = (GUIDES / "run_a_test.md").read_text(encoding="utf-8")
+    blocks = BLOCK.findall(page)
+    (tmp_path / "values").mkdir()
+    (tmp_path / "values" / "short.toml").write_text(next(t for _, f, t in blocks if f == "values/short.toml"))
+    lines = [line for language, _, text in blocks if language == "sh" for line in text.splitlines()]
+    for folder in ("first", "judged"):
+        command(next(line for line in lines if line.split("#")[0].strip().endswith(f"--out {folder}")) + " --no-report")
+        found = json.loads((tmp_path / folder / "result.json").read_text(encoding="utf-8"))
+        assert not [r["text"] for r in found["reasons"] if r["severity"] == "error"], folder
+        assert all(abs(c["z"]) < 4.0 for c in found["coefficients"])
+    assert found["verdict"] == "pass"
+
+
 def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -> None:
     """The worked file, its commands, and the figures that the page prints of it."""
     page = (GUIDES / "reduce_a_drift_record.md").read_text(encoding="utf-8")
@@ -136,7 +151,7 @@ def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -
         assert printed == pytest.approx(list(c.interval), rel=0.006)
         assert c.no_value or float(estimate) == pytest.approx(c.estimate, rel=0.006)
         assert printed[0] <= float(truth) <= printed[1], "the interval holds the true value"
-    (slope,) = result.columns[0].tables["regression"][0]["rows"]
+    (slope,) = result.columns[0].tables["regression"][0].rows
     assert f"explains {slope[1]:.4f}".rstrip("0") in page and abs(slope[1] - 0.05) < 2.0 * slope[2]
     assert (GUIDES / "drift_record" / "gyro.csv").stat().st_size < 300_000
     values = tomllib.loads((tmp_path / "fitted" / "floated_gyro.toml").read_text(encoding="utf-8"))["gyro"]
