@@ -161,6 +161,8 @@ class System(Configurable):
     def __init__(self) -> None:
         super().__init__()
         self.overrides: dict[str, Any] = {}  # "slot.parameter" -> value as given
+        #: the same as designs see it, of a design that is held at nominal values; None: it follows the parts
+        self.nominal: dict[str, Any] | None = None
 
     def set(self, name: str, value: Any) -> None:
         """Set an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""

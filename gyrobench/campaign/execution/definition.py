@@ -21,6 +21,9 @@ Every point of an axis is combined with every point of the others.  Distribution
 "name [unit]", and "seed" if it is given; or "FILE.py:function", which returns such rows as dictionaries (values in SI
 or texts), called with the ``arguments``.  ``data``: pattern of measured files, one run a file.
 
+fixed_design: what a system derives from its parts (the gain of a loop from an inertia) is derived once, at the values
+of ``set`` and of the parts; else it follows the parts to every point, which is then a design of its own.
+
 Noise: at the points of grids and lists each seed is used once a point, so that points are compared under equal noise;
 points that are drawn, and rows of a table, have seeds of their own.
 """
@@ -124,6 +127,7 @@ class Definition:
     data: Any = None
     step: Any = None
     check_step: bool | None = None
+    fixed_design: bool = False
     spec: str | None = None
     keep: str = "failures"
     time_limit: Any = "1h"
@@ -137,6 +141,8 @@ class Definition:
             raise UsageError(f"keep = {self.keep}: {suggest_names(str(self.keep), KEEP)}")
         if self.design not in DESIGNS:
             raise UsageError(f"design = {self.design}: {suggest_names(str(self.design), DESIGNS)}")
+        if not isinstance(self.fixed_design, bool):
+            raise UsageError(f"fixed_design = {self.fixed_design}: true or false is expected")
         if not isinstance(self.retries, int) or self.retries < 0:
             raise UsageError(f"retries = {self.retries}: a whole number from 0 on is expected")
         self.time_limit = parse_number("time_limit", self.time_limit, "s")

@@ -171,6 +171,15 @@ def corrected(reader: Reader, done: Done) -> None:
     assert last["u"] < 0.3 * stated["u"]
 
 
+def usable(reader: Reader, done: Done) -> None:
+    """Nothing speaks against the first runs of a reader: no error, estimates near their truth; judged, they pass."""
+    folder = reader.here / done.step.text.split("#")[0].rpartition("--out ")[2].split()[0]
+    found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    assert not [r["text"] for r in found["reasons"] if r["severity"] == "error"]
+    assert all(abs(c["z"]) < 4.0 for c in found["coefficients"])
+    assert found["verdict"] == "pass" or folder.name != "judged"
+
+
 #: pattern of a command -> check of what it leaves and says
 AFTER: dict[str, Callable[[Reader, Done], None]] = {
     r"build warm_gyro$": part_of_blocks,
@@ -182,4 +191,5 @@ AFTER: dict[str, Callable[[Reader, Done], None]] = {
     r"site CAMPAIGN": site,
     r"run tumble\.ssp": archive,
     r"compare alone stated corrected": corrected,
+    r"--out (first|judged)$": usable,
 }
