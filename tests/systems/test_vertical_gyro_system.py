@@ -109,8 +109,8 @@ def test_whole_flight(session):
     figures = {r.name: r for r in result.responses}
     for name, largest in (("tilt", "max"), ("error", "shown max")):
         (line,) = figures[name].curves
-        assert line["x"][0] == pytest.approx(60.1) and "from 60.1 s on, after the erection" in figures[name].caption
-        assert 0.97 * known[largest].estimate < max(line["y"]) <= known[largest].estimate
+        assert line.x[0] == pytest.approx(60.1) and "from 60.1 s on, after the erection" in figures[name].caption
+        assert 0.97 * known[largest].estimate < max(line.y) <= known[largest].estimate
     assert "not distinguishable from zero" in result.summary[1] and "0.0005 ± 0.0011°" in result.summary[1]
     assert "23.668 ± 0.045 arcmin" in result.summary[2] and "130.362 ± 0.045 arcmin" in result.summary[2]
 
