@@ -128,7 +128,7 @@ def of_plan(system: System, record: Record) -> list[str]:
     if regression_of is None:
         return []  # each mistake would be a reduction of its own
     found = _not_shown(record, reduction.of_record(record), reduction.of_record, regression_of)
-    return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found]
+    return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found[:NAMED]]
 
 
 def _not_shown(
