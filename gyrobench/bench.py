@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import errno
+import functools
 import hashlib
 import os
+import sys
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench.errors import GyrobenchError
+from gyrobench.files import temporary_folder
 
 ROOMS = ("components", "systems", "reports")
 
@@ -37,8 +42,35 @@ def suggest_names(name: str, known: Iterable[str]) -> str:
 
 def display_path(path: Path) -> str:
     """Return a path from the working folder, where it lies in it."""
-    path = path.resolve()
-    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+    path, here = path.resolve(), working_folder()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+def working_folder() -> Path:
+    """Return the working folder.  Raises UsageError where it was removed."""
+    try:
+        return Path.cwd()
+    except FileNotFoundError:
+        raise UsageError("the working folder does not exist any more: change into one that does") from None
+
+
+@functools.cache
+def _writable(folder: Path) -> Path:
+    """Return a folder of files that can be made again, and can be written to: this one, else one of the process."""
+    try:
+        if folder.parts[:1] == ("~",):  # which nothing could expand
+            raise FileNotFoundError(errno.ENOENT, "no home folder")
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        instead = temporary_folder()
+        print(
+            f"note: {folder}: {error.strerror}: what is built is kept until this command ends; "
+            "GYROBENCH_CACHE names a folder that stays",
+            file=sys.stderr,
+        )
+        return instead
 
 
 def standard_folder() -> Path:
@@ -64,7 +96,7 @@ class Bench:
             if not (folder / "components").is_dir():
                 raise BenchError(f"{folder} is no bench: it has no folder components/ (make one: gyrobench init NAME)")
             return Bench(folder.resolve())
-        for here in (Path.cwd(), *Path.cwd().parents):
+        for here in (working_folder(), *working_folder().parents):
             if all((here / room).is_dir() for room in ROOMS):
                 return Bench(here.resolve())
         return Bench(standard_folder())
@@ -77,7 +109,7 @@ class Bench:
     @property
     def home(self) -> Path:
         """Return the folder for results: the bench the user stands in, else the working folder."""
-        here = Path.cwd()
+        here = working_folder()
         return self.folder if not self.packed and here.is_relative_to(self.folder) else here
 
     @property
@@ -94,8 +126,9 @@ class Bench:
 
     @property
     def cache(self) -> Path:
+        """Return the user's folder of built files; one of this process where that cannot be written to."""
         base = os.environ.get("GYROBENCH_CACHE") or os.environ.get("XDG_CACHE_HOME")
-        return Path(base) / "gyrobench" if base else Path.home() / ".cache" / "gyrobench"
+        return _writable(Path(base or os.path.expanduser("~/.cache")) / "gyrobench")
 
     @property
     def out(self) -> Path:
@@ -121,6 +154,11 @@ class Bench:
         for root in (standard_folder(), self.folder):
             found.update({f.stem: f for f in sorted((root / "reports" / "specs").glob("*.toml"))})
         return found
+
+    def existing(self, file: Path) -> Path:
+        """Return a file as the user names it where it is there, else of that path in the bench (systems/X/FILE)."""
+        candidates = (root / file for root in (Path(), self.folder, standard_folder()))
+        return next((f for f in candidates if f.exists()), file)
 
     def part_folder(self, name: str) -> Path:
         """Raises BenchError, naming the parts that are like it."""

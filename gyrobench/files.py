@@ -10,20 +10,23 @@ import os
 import shutil
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator
 from multiprocessing.util import Finalize
 from pathlib import Path
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 
 LOCK = ".lock"
 TEMPORARY = "gyrobench-temporary-"  # no user names a folder so
 
 
-def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
+def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: bool = True) -> None:
     """Write a file under a temporary name beside ``path`` and rename it; a failure leaves the old file as it was.
 
-    content: of the file, or a function that writes it to the path it is given.
+    content: of the file, or a function that writes it to the path it is given.  durable: the content is on the disk
+    before its name, and both are when this returns, whatever happens to the machine; not for what is made again.
     """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     os.close(handle)
@@ -34,22 +37,56 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
         else:
             content(temporary)
         os.chmod(temporary, 0o644)
+        if durable:
+            to_disk(temporary)
         os.replace(temporary, path)
+        if durable and os.name != "nt":  # there a folder cannot be opened
+            to_disk(path.parent)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # for the message: a full disk, a limit of the size
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def to_disk(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk; some file systems cannot say."""
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+    finally:
+        os.close(handle)
 
 
 def make_once(path: Path, make: Callable[[Path], object]) -> Path:
     """Return ``path``; where there is no such file, ``make(path)`` writes it whole, in one process at a time.
 
-    The others that want the same file wait for it.  For files of a cache, whose names say what they hold.
+    The others that want the same file wait for it.  For files of a cache, whose names say what they hold.  Its digest
+    lies beside it and is checked each time; a file that does not have it any more is made again.
     """
-    if not path.exists():
+    if not is_intact(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with _turn(path.with_name(path.name + LOCK)):
-            if not path.exists():
+            if not is_intact(path):
                 make(path)
+                digest = sha256(path).encode("ascii")
+                write_whole(_digest_of(path), digest, durable=False)
     return path
+
+
+def _digest_of(path: Path) -> Path:
+    return path.with_name(path.name + ".sha256")
+
+
+def is_intact(path: Path) -> bool:
+    """Return whether a file of a cache is there as it was made."""
+    try:
+        return _digest_of(path).read_bytes() == sha256(path).encode("ascii")
+    except OSError:
+        return False
 
 
 @contextlib.contextmanager
@@ -97,13 +134,54 @@ FOREIGN = [f"binaries/{n}/" for system, names in BINARIES.items() if not sys.pla
 NOT_RUN = ("sources/", "documentation/", *FOREIGN)
 
 
+#: limits of an archive that is unzipped: files, bytes, and how many times its size where it gives more than SMALL bytes
+MEMBERS = 10_000
+UNZIPPED = 1 << 31
+RATIO = 100
+SMALL = 1 << 26
+
+
+class OversizedArchiveError(GyrobenchError):
+    """An archive that would fill disk or memory if it were unzipped."""
+
+
+def check_size(path: Path) -> None:
+    """Raise OversizedArchiveError for a zip archive beyond the limits, before anything of it is unzipped.
+
+    What cannot be read as one passes: its reader says why.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile):
+        return
+    size, total = path.stat().st_size, sum(m.file_size for m in members)
+    problem = ""
+    if len(members) > MEMBERS:
+        problem = f"{len(members):,} files in the archive; the limit is {MEMBERS:,}"
+    elif total > UNZIPPED:
+        problem = f"{total / 1e6:,.0f} MB when unzipped; the limit is {UNZIPPED / 1e6:,.0f} MB"
+    elif total > max(SMALL, RATIO * size):
+        problem = f"{total / 1e6:,.0f} MB when unzipped, {total / size:,.0f} times its size; the limit is {RATIO} times"
+    if problem:
+        raise OversizedArchiveError(f"{path}: not unzipped: {problem}")
+
+
+def check_description(path: Path) -> None:
+    """Raise OversizedArchiveError or ValueError for an FMU that would fill disk or memory when it is read."""
+    check_size(path)
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        reading.check_xml(file.read(reading.LARGEST_XML + 1), "modelDescription.xml", ValueError)
+
+
 def unzip_fmu(path: Path, folder: Path) -> None:
     """Unzip what a run needs of an FMU: all but sources, documentation and binaries of other operating systems.
 
-    Raises DamagedFmuError, and OSError for a failure of the machine.
+    Raises DamagedFmuError and OversizedArchiveError, and OSError for a failure of the machine.
     """
     from fmpy import extract
 
+    check_size(path)
     try:
         extract(str(path), str(folder), include=lambda name: not name.startswith(NOT_RUN))
     except Exception as error:  # of the zip archive, of names and compressed data in it, or FMPy's own

@@ -92,7 +92,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Reason:
-    """What limits a result: a sentence for the reader, and the verdicts that it takes away.
+    """A limit to a result: a sentence for the reader, and the verdicts that it takes away.
 
     blocks: these verdicts of the coefficients ``names`` (none named: all) become ``becomes``.  intervals: a verdict
     stands only where it holds for these too (name -> low, high, printed unit).  severity: "error" (not to be used as it

@@ -23,6 +23,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from gyrobench.errors import GyrobenchError
+from gyrobench.reading import shorten
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  #: base units in the order of FMI's BaseUnit attributes
 G0 = 9.80665  #: standard acceleration, m/s2; "per g" means per this
@@ -121,11 +122,14 @@ def _clean(name: str) -> str:
 
 
 LARGEST_POWER = 9
+LONGEST = 100  # letters of a unit: brackets within brackets have no other bound
 
 
 @lru_cache(maxsize=1024)
 def unit(name: str) -> Unit:
     """The unit called ``name``; raises :class:`UnitError` with the offending symbol when it is not one."""
+    if len(name) > LONGEST:
+        raise UnitError(f"unit '{shorten(name)}': {len(name)} letters; a unit has at most {LONGEST}")
     text = _clean(name)
     if text in _OFFSET:
         factor, offset, exponents = _OFFSET[text]
@@ -175,7 +179,7 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
         raise UnitError(f"unit '{name}': unknown symbol '{head}'{why}{hint}")
     if rest and re.fullmatch(r"-?\d+", rest[0]):
         if abs(n := int(rest[0][:4])) > LARGEST_POWER:
-            raise UnitError(f"unit '{name[:60]}': power {rest[0][:20]}; {LARGEST_POWER} is the largest")
+            raise UnitError(f"unit '{name}': power {shorten(rest[0], 20)}; {LARGEST_POWER} is the largest")
         f, p, rest = f**n, tuple(e * n for e in p), rest[1:]
     return f, p, rest
 
@@ -219,7 +223,7 @@ def factor(name: str) -> float:
     return u.factor
 
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.S)
+_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.S)
 
 
 def parse_quantity(text: str, to: str, per_g0: bool = False) -> float:
@@ -229,9 +233,11 @@ def parse_quantity(text: str, to: str, per_g0: bool = False) -> float:
     then ``0.9deg/h/g`` fits ``rad/s``.  Raises :class:`UnitError` for a non-number, an unknown unit, a wrong
     dimension.
     """
-    match = _NUMBER.match(text)
+    match = _NUMBER.fullmatch(text.strip())
     if not match or not math.isfinite(float(match[1])):
-        raise UnitError(f"'{text}': a finite number with an optional unit is expected, such as 45.75deg, 0.3deg/h, 2mA")
+        raise UnitError(
+            f"'{shorten(text)}': a finite number with an optional unit is expected, such as 45.75deg, 0.3deg/h, 2mA"
+        )
     value, name = float(match[1]), match[2]
     if not name:
         target = unit(to)
@@ -244,7 +250,7 @@ def parse_quantity(text: str, to: str, per_g0: bool = False) -> float:
                     return convert(value, shifted, to)
         return convert(value, name, to)
     except UnitError as error:
-        raise UnitError(f"'{text.strip()}': {error}") from None
+        raise UnitError(f"'{shorten(text.strip())}': {error}") from None
 
 
 def base_unit(name: str) -> tuple[dict[str, int], float] | None:

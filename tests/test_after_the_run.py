@@ -41,7 +41,7 @@ class Own(System):
     stop = 3.0
     step = 0.1
 
-    def reduce(self, record, specification=None):
+    def findings(self, record):
         raises = record.run.options["raises"]
         gravity = 9.8
         if raises == "key":
@@ -142,7 +142,7 @@ def test_the_user_stops_the_reduction(gyrobench: Call) -> None:
 def test_the_traceback_on_request(gyrobench: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GYROBENCH_TRACEBACK", "1")
     code, _, err = gyrobench("run", "own", "--set", "raises=zero", "--out", "r")
-    assert code == 3 and "Traceback" in err and "in reduce\n" in err and "the record is kept in r" in err
+    assert code == 3 and "Traceback" in err and "in findings\n" in err and "the record is kept in r" in err
 
 
 def test_an_exception_before_the_run_names_its_line_too(gyrobench: Call) -> None:

@@ -217,7 +217,7 @@ MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
     "parameter": (lambda r: gb.load(NAME, TINY).set("gyro.D_J", 1).run(), "D_J"),
     "part": (lambda r: gb.load(NAME, parts={"gyro": "no.fmu"}).run(), "slot gyro: no.fmu: .* no such file"),
     "map": (lambda r: gb.load(NAME, maps={"gyro": "no.toml"}), "slot gyro: no.toml: no such mapping file"),
-    "seed": (lambda r: gb.load(NAME).run(seed=1.5), "seed 1.5: a whole number"),  # type: ignore[arg-type]
+    "seed": (lambda r: gb.load(NAME).run(seed=1.5), "seed = 1.5: a whole number"),  # type: ignore[arg-type]
     "engine": (lambda r: gb.load(NAME).run(engine="fast"), "engine 'fast': one of native"),
     "specification": (lambda r: gb.load(NAME).run(spec="gyro"), "no such file or acceptance specification"),
     "resume": (lambda r: gb.load(NAME).run(resume=True), "name the folder of the run in out"),
@@ -253,14 +253,19 @@ class Own(System):
     stop = 3.0
     step = 0.1
 
-    def reduce(self, record, specification=None):
+    def findings(self, record):
         return {}["nothing"]
 '''
 
 
+def test_a_system_does_not_judge_itself() -> None:
+    with pytest.raises(TypeError, match=r"returned by findings\(record\)"):
+        type("Own", (gb.System,), {"reduce": lambda self, record: None})
+
+
 def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     init_bench(folder / "mine", [])
-    for name, text in (("own", SYSTEM), ("bare", SYSTEM.split("    def reduce")[0])):
+    for name, text in (("own", SYSTEM), ("bare", SYSTEM.split("    def findings")[0])):
         (folder / "mine" / "systems" / name).mkdir()
         (folder / "mine" / "systems" / name / "system.py").write_text(text, encoding="utf-8")
     monkeypatch.chdir(folder / "mine")

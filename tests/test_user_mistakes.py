@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from gyrobench.commands import cli
+from gyrobench.report.result_json import content_hash
 
 Call = Callable[..., tuple[int, str, str]]
 BENCH = ["run", "estimator_bench", "--set", "samples=13000"]
@@ -54,6 +55,11 @@ REFUSED = [
     ([*BENCH, "--part", "estimator=estimator_sage_husa", "--set", "estimator.b=1.5"], "parameter b = 1.5 "),
     (["run", "table_position_test", "--set", "mounts=0 inf"], "angles in deg with spaces between are expected"),
     (["run", "table_position_test", "--set", f"positions=[{10**400}]"], "a number is expected, or a text with number"),
+    (["run", "servo_polar", "--set", f"latitude=1{'(' * 120}"], "((((...': 120 letters; a unit has at most 100"),
+    (["run", "servo_polar", "--set", f"latitude={'[' * 250}{']' * 250}"], "JSON of more than 200 levels"),
+    (["run", "servo_polar", "--timeout", "[1, 2]"], "--timeout = [1, 2]: one number is expected, not a list"),
+    (["sweep", "servo_polar", "--over", "latitude=0..1:9999999999"], "a grid has 2 to 1000000 points"),
+    (["run", "servo_two_axis", "--set", f"mounts={'9' * 100}"], "mounts"),
     (["run", "nothing.ssp"], "nothing.ssp refuses to run:\n  - no such file"),
     (["run", "vertical_gyro", "--set", "phases=erection rst"], "'rst' is none of erection"),
     (["run", "stabilizer_sdf", "--set", "J0=0kg.m2"], "J0 = 0 kg.m2: must be > 0"),
@@ -93,7 +99,9 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     for folder, system, rename in (("b", "vertical_gyro", "of b: "), ("c", "other", "")):
         changed = [{**c, "name": rename + c["name"]} for c in document["coefficients"]]
         Path(folder).mkdir()
-        text = json.dumps({**document, "system": system, "coefficients": changed})
+        other = {**document, "system": system, "coefficients": changed}
+        digest = content_hash({k: v for k, v in other.items() if k not in ("schema", "report_id")})
+        text = json.dumps({**other, "report_id": digest})
         Path(folder, "result.json").write_text(text, encoding="utf-8")
     code, _, err = gyrobench("compare", "a", "b")
     assert code == 2

@@ -11,7 +11,7 @@ from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
-from gyrobench.system.values import InvalidValueError, parse
+from gyrobench.system.values import InvalidValueError, parse_number
 from gyrobench.workflow.inputs import load_test
 
 HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
@@ -82,19 +82,25 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
 
 def parse_time(option: str, text: str | None) -> float | None:
     """Return the time given by an option in s.  Raises InvalidValueError."""
-    return float(parse(option, text, "s")) if text else None
+    return parse_number(option, text, "s") if text else None
 
 
-def load_with_values(name: str, values: Mapping[str, str], step: float | None = None) -> System | Suite:
+def load_with_values(
+    name: str, values: Mapping[str, str], step: float | None = None, coupling: str = "sequential"
+) -> System | Suite:
     """Return a system or suite with the values of --set, see :func:`gyrobench.workflow.inputs.load_test`."""
     test = load_test(name, step)
+    if coupling == "parallel":
+        if isinstance(test, Suite):
+            raise UsageError(f"--coupling: {name} is a suite; run its tests one by one: {', '.join(test.tests())}")
+        test.coupling = coupling
     apply_values(test, values)
     return test
 
 
-def load_system(name: str, values: Mapping[str, str]) -> System:
+def load_system(name: str, values: Mapping[str, str], coupling: str = "sequential") -> System:
     """Return a system with the values of --set.  Raises UsageError for a suite too, naming its tests."""
-    test = load_with_values(name, values)
+    test = load_with_values(name, values, None, coupling)
     if isinstance(test, Suite):
         raise UsageError(f"{name} is a suite; name one of its tests: {', '.join(test.tests())}")
     return test

@@ -13,8 +13,10 @@ from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.app import app, echo
 from gyrobench.commands.completion import complete_part
 from gyrobench.commands.options import (
+    Coupling,
     Json,
     Map,
+    Order,
     Out,
     Part,
     Set,
@@ -52,6 +54,7 @@ def show(
     values: Set = None,
     part: Part = None,
     mapping: Map = None,
+    coupling: Coupling = Order.sequential,
     picture: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw the wiring.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -66,7 +69,7 @@ def show(
     from gyrobench.commands.show_system import show_suite, show_system
     from gyrobench.system.suite import Suite
 
-    test = load_with_values(system, parse_settings(values))
+    test = load_with_values(system, parse_settings(values), None, coupling.value)
     if isinstance(test, Suite):
         show_suite(test, picture, as_json)
     else:

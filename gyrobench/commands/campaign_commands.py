@@ -50,6 +50,13 @@ def sweep(
     part: Part = None,
     mapping: Map = None,
     spec: Spec = None,
+    fixed_design: Annotated[
+        bool,
+        typer.Option(
+            "--fixed-design",
+            help="Design once, at nominal values; else what follows from a part does so at each point.",
+        ),
+    ] = False,
     keep: Annotated[
         str | None,
         typer.Option(metavar="all|failures|extremes|none", help="Records and reports to keep; default failures."),
@@ -72,13 +79,14 @@ def sweep(
     Examples:
       gyrobench sweep tumble_single_axis --over "latitude=0deg..80deg:9" --over "gyro.D_I=0.1,0.3,1 deg/h/g" --seeds 100
       gyrobench sweep tumble_single_axis --over "gyro.D_I=normal(0, 0.5) deg/h/g" --runs 256 --design lhs
+      gyrobench sweep platform_single_axis --over "platform.J=1,2,4 kg.m2" --fixed-design
       gyrobench sweep tumble_single_axis --data "lot/*.csv" --spec floated_gyro --keep all --site
     """
     from gyrobench.commands import run_campaign
 
     more = {
         "runs": runs, "design": design, "table": table, "data": data, "spec": spec, "keep": keep,
-        "time_limit": time_limit, "memory_limit": memory_limit,
+        "fixed_design": fixed_design or None, "time_limit": time_limit, "memory_limit": memory_limit,
     }  # fmt: skip
     axes = run_campaign.require_over(over, seeds, data, table)
     definition = run_campaign.from_arguments(system, axes, seeds, values, part, mapping, more)

@@ -12,8 +12,11 @@ def write(url: str, out: Path | None, publish: Path | None) -> None:
     """Write the site, print what it answers and where it is."""
     from gyrobench.campaign.execution.store import Campaign
     from gyrobench.campaign.site.site_folder import write_site
+    from gyrobench.commands.console import print_notes
 
-    written = write_site(Campaign.open(url), out, publish)
+    campaign = Campaign.open(url)
+    print_notes(campaign.notes)
+    written = write_site(campaign, out, publish)
     for sentence in written.answer:
         print(sentence)
     print(display_path(written.index))
@@ -33,11 +36,13 @@ def compare(folders: Sequence[Path], out: Path | None, as_json: bool) -> None:
     from gyrobench.campaign.analysis.campaign_comparison import compare_campaigns
     from gyrobench.campaign.execution.store import Campaign
     from gyrobench.campaign.site.campaign_comparison_page import write_comparison
-    from gyrobench.commands.console import print_report_files
+    from gyrobench.commands.console import print_notes, print_report_files
     from gyrobench.workflow.run_comparison import comparison_folder
 
     if len(folders) != 2:
         raise UsageError(f"{len(folders)} campaigns; two are compared: gyrobench compare CAMPAIGN CAMPAIGN")
-    doc = compare_campaigns(*(Campaign.open(f) for f in folders))
+    campaigns = [Campaign.open(f) for f in folders]
+    print_notes(note for campaign in campaigns for note in campaign.notes)
+    doc = compare_campaigns(*campaigns)
     paths = write_comparison(doc, out or comparison_folder(folders), Bench.find().folder)
     print_report_files(paths, None if as_json else "\n".join(doc["answer"]))

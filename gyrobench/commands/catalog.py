@@ -6,10 +6,10 @@ import ast
 import contextlib
 import re
 import shutil
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from gyrobench import reading
 from gyrobench.bench import ROOMS, Bench, BenchError, suggest_names
 
 #: a class that derives from another: what its docstring is indented by, and the docstring
@@ -30,7 +30,7 @@ def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
         body = text[match.end() : end.start() if end else len(text)]
         attributes = {}
         for name, value in re.findall(rf"^{match[1]}(title|spec) = (\(.*?\)|[^\n]*)$", body, re.MULTILINE | re.DOTALL):
-            with contextlib.suppress(ValueError, SyntaxError):
+            with contextlib.suppress(ValueError, SyntaxError, RecursionError, MemoryError):
                 attributes[name] = ast.literal_eval(value)
         found = match[2], attributes
     return found
@@ -47,8 +47,8 @@ def _entry(name: str, file: Path) -> dict[str, Any]:
 
 def _title(file: Path) -> str:
     try:
-        return str(tomllib.loads(file.read_text(encoding="utf-8")).get("title", ""))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return str(reading.toml(reading.read_text(file, ValueError), file.name, ValueError).get("title", ""))
+    except ValueError as error:
         return f"cannot be read: {error}"
 
 

@@ -8,7 +8,9 @@ import signal
 import sys
 import traceback
 
+from gyrobench.commands import streams
 from gyrobench.commands.app import app
+from gyrobench.reading import visible
 from gyrobench.workflow.user_errors import exit_code, user_message
 
 for module in ("bench", "run", "campaign", "exchange"):  # each adds its own, in the order of the help
@@ -17,6 +19,7 @@ for module in ("bench", "run", "campaign", "exchange"):  # each adds its own, in
 
 def main() -> None:
     """Run a command; an error ends in one message and an exit code, with a traceback if GYROBENCH_TRACEBACK=1."""
+    streams.prepare()
     for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C: files that are being written are finished or removed
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
             signal.signal(getattr(signal, name), signal.default_int_handler)
@@ -31,7 +34,7 @@ def main() -> None:
             raise
         if os.environ.get("GYROBENCH_TRACEBACK"):
             traceback.print_exception(error)
-        print(f"gyrobench: {user_message(error)}", file=sys.stderr)
+        print(f"gyrobench: {visible(user_message(error))}", file=sys.stderr)
         sys.exit(code)
 
 

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import display_path
+from gyrobench.reading import visible
 from gyrobench.report.plain_text import align_columns
 from gyrobench.units import format_quantity
 
 
 def print_note(text: str) -> None:
     """Print a line on standard error."""
-    print(text, file=sys.stderr, flush=True)
+    print(visible(text), file=sys.stderr, flush=True)
 
 
 def print_notes(notes: Iterable[str]) -> None:
@@ -32,7 +33,7 @@ def print_report_files(paths: Mapping[str, Path], text: str | None) -> None:
     if text is None:
         print(paths["json"].read_text(encoding="utf-8").rstrip("\n"))
     elif text:
-        print(text)
+        print(visible(text))
     for path in paths.values():
         print(display_path(path), file=sys.stderr if text is None else sys.stdout)
 

@@ -25,18 +25,31 @@ def find_socket(slot: str) -> Socket:
     return socket(slots[name].socket).standing_for(slots[name].quantities)
 
 
+def _parameters(slot: str, description: Any) -> list[str]:
+    """Return the lines of the table [parameters] for "SYSTEM.slot"; none for a socket, of which no design is known."""
+    from gyrobench.packaging import load_part
+    from gyrobench.system.parameter_proposal import parameter_lines, wanted_parameters
+
+    name, dot, place = slot.partition(".")
+    if not dot:
+        return []
+    system = load_system(name, {})
+    system.request(place)
+    part = load_part(system.slots[place].part, Bench.find().folder)
+    return parameter_lines(description, wanted_parameters(system, place, part))
+
+
 def write_mapping(fmu: Path, slot: str, out: Path | None) -> tuple[str, list[str]]:
     """Return a first mapping file of the FMU, written to ``out`` where given, and what it still lacks."""
-    from fmpy import read_model_description
-
     from gyrobench.system.binding import SocketMismatchError, fit, parse_mapping
+    from gyrobench.system.fmu_variables import read_description
     from gyrobench.system.mapping_proposal import mapping_text
 
     check_fmu_files({slot: fmu})
     wanted = find_socket(slot)
-    description: Any = read_model_description(str(fmu), validate=False)
+    description: Any = read_description(fmu)
     head = f"# Mapping of {description.modelName} ({fmu.name}) into the socket {wanted.name}."
-    text = mapping_text(wanted, description, head)
+    text = mapping_text(wanted, description, head, parameters=_parameters(slot, description))
     if out is not None:
         if out.exists():
             raise UsageError(f"--out {out}: the file exists; choose another name")

@@ -84,6 +84,20 @@ Retry = Annotated[bool, typer.Option("--retry", help="Run again what crashed, hu
 WithSite = Annotated[bool, typer.Option("--site", help="Write the site of the campaign, too; see gyrobench site.")]
 
 
+class Order(StrEnum):
+    sequential = "sequential"
+    parallel = "parallel"
+
+
+Coupling = Annotated[
+    Order,
+    typer.Option(
+        help="sequential: part after part, each with the newest values; parallel: each wire carries the value of the "
+        "step before, so that loops of direct feedthrough run too.",
+    ),
+]
+
+
 class Engine(StrEnum):
     native = "native"
     linked = "linked"

@@ -117,8 +117,10 @@ def _print_outcome(outcome: RunOutcome | SuiteOutcome, as_json: bool) -> str:
             print(json.dumps(outcome.record.run.as_dict(), indent=1, ensure_ascii=False))
         else:
             print(f"no reduction; record: {display_path(outcome.folder)}")
-        return NO_VERDICT
-    console.print_report_files(outcome.paths, None if as_json else format_result(outcome.result))
+    else:
+        console.print_report_files(outcome.paths, None if as_json else format_result(outcome.result))
     if outcome.stopped:
         raise outcome.stopped
+    if outcome.result is None:
+        return NO_VERDICT
     return outcome.verdict if isinstance(outcome, SuiteOutcome) else outcome.result.verdict

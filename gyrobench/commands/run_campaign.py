@@ -40,8 +40,13 @@ def from_arguments(
 
 
 def default_out(definition: Definition, sweep: bool) -> str:
-    """Return where a campaign is stored unless a place is named: by its name, a sweep by its content."""
+    """Return where a campaign is stored unless a place is named: by its name, a sweep by its content.
+
+    Raises UsageError for a name that leads elsewhere.
+    """
     if not sweep:
+        if {"..", Path(definition.name).anchor} & {*Path(definition.name).parts}:
+            raise UsageError(f"name = {definition.name}: the folder of a campaign is named so: leave out '..' and '/'")
         return str(Bench.find().out / "campaigns" / definition.name)
     text = json.dumps(definition.as_given(), sort_keys=True)
     return str(Bench.find().out / "campaigns" / f"{definition.system}-{hashlib.sha256(text.encode()).hexdigest()[:8]}")

@@ -10,6 +10,7 @@ import typer
 from gyrobench.bench import UsageError, display_path
 from gyrobench.commands.app import app, echo, exit_on_fail
 from gyrobench.commands.options import (
+    Coupling,
     Data,
     Engine,
     Force,
@@ -17,6 +18,7 @@ from gyrobench.commands.options import (
     Json,
     Map,
     NoReport,
+    Order,
     Out,
     Part,
     Resume,
@@ -39,12 +41,13 @@ def run(
         Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
     ] = None,
     step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
+    coupling: Coupling = Order.sequential,
     check_step: Annotated[
         bool | None,
         typer.Option(
             "--check-step/--no-check-step",
             help="Repeat the run with its step and half of it, noise off, and take the effect of the step into u. "
-            "Default: two short runs for a system with loops, else none.",
+            "Default: two short runs for a system with loops or --coupling parallel, else none.",
         ),
     ] = None,
     timeout: Annotated[
@@ -77,7 +80,7 @@ def run(
 
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
-    test = load_with_values(system, parse_settings(values), time_step)
+    test = load_with_values(system, parse_settings(values), time_step, coupling.value)
     request = RunRequest(
         parts=parts,
         maps=maps,

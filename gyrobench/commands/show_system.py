@@ -18,6 +18,7 @@ def show_system(
     system: System, parts: Mapping[str, str], maps: Mapping[str, Path], picture: Path | None, as_json: bool
 ) -> None:
     """Print slots, wires, order, cuts, delays and plan of a system, or draw its wiring."""
+    from gyrobench.engine import preflight
     from gyrobench.system.parameters import defaults, resolve
     from gyrobench.system.part_files import resolve_parts
     from gyrobench.system.system_description import describe
@@ -27,11 +28,14 @@ def show_system(
         raise UsageError(f"--picture {picture}: the drawing is an SVG; write {picture.with_suffix('.svg')}")
     check_fmu_files(parts)
     notes: list[str] = []
-    paths, _ = resolve_parts(require_slots(system), parts, "native", Bench.find().folder, notes)
+    paths, built = resolve_parts(require_slots(system), parts, "native", Bench.find().folder, notes)
     assembly = assemble(system, paths, maps)
     parameters = resolve(assembly, system, 1, defaults(assembly))[1]  # refuses parameters that do not exist
     description = describe(assembly)
-    invalid = list(system.check()) or system.check_parameters(parameters)
+    foreign = [slot for slot in paths if slot not in built]
+    invalid = preflight.problems(assembly, foreign) + preflight.step_problems(assembly, system.step)
+    invalid += list(system.check()) or system.check_parameters(parameters)
+    description["notes"] += preflight.remarks(assembly, foreign, system.step)
     description["notes"] += [f"a run is refused: {p}" for p in invalid]
     if picture is not None:
         from gyrobench.report import wiring_figure

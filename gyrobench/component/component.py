@@ -57,6 +57,7 @@ from gyrobench.component.declarations import (
     shape_of,
 )
 from gyrobench.component.integration import advance
+from gyrobench.component.math import value
 from gyrobench.component.numerics import ROUNDING, normal
 from gyrobench.component.tangents import Tangent, dig, tangents
 from gyrobench.component.vectors import Vector, copied, is_finite
@@ -190,7 +191,7 @@ class Component:
         x: Any = self
         for key in s.path:
             x = getattr(x, key) if isinstance(key, str) else x[key]
-        return float(x)
+        return float(value(x))  # a dual number, in a refusal while derivatives are taken
 
     def _put(self, s: Scalar, x: float) -> None:
         box: Any = self

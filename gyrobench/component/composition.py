@@ -2,7 +2,7 @@
 
 Declarations and equations (``start``, ``flow``, ``outputs``, ``@sampled`` methods) are collected along the inheritance
 order, bases first; within a class those of its blocks come before its own.  All of them run: an equation of a subclass
-adds to those of its bases.  Procedures (all other methods) are overridden as in Python.
+adds to those of its bases.  Procedures (all other methods) are overridden as in Python, and called by ``super()``.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import attrgetter
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.component.declarations import Declaration, floats, shape_of
+from gyrobench.component.math import value
 from gyrobench.component.vectors import copied
 from gyrobench.errors import GyrobenchError
 
@@ -115,23 +117,22 @@ class View:
         if condition:
             placed = self._placed
             values = {n: getattr(self._part, flat) for n, flat in placed.names.items()}
-            shown = {n: f"{float(x):g}" for n, x in values.items() if not isinstance(x, list)}
+            shown = {n: f"{float(value(x)):g}" for n, x in values.items() if not isinstance(x, list)}
             self._part._refused(message.format(self=placed.name, **shown))
 
 
 def view_of(placed: Placed) -> type[View]:
     """Return the class of the views of a block: its names lead to those of the part."""
-    inside: dict[str, Any] = {}
-    for klass in lineage(type(placed.block), Block):
-        inside |= {n: a for n, a in vars(klass).items() if not n.startswith("__")}
-    inside |= {n: property(attrgetter(f"_part.{n}")) for n in TIMES}
+    kind = type(placed.block)
+    inside: dict[str, Any] = {n: property(attrgetter(f"_part.{n}")) for n in TIMES}
     inside["der"] = property(lambda view: _Names(view._part.der, placed.names))
     inside["noise"] = property(lambda view: _Names(view._part.noise, placed.names))
     for n, inner in placed.blocks.items():
         inside[n] = property(lambda view, inner=inner: view._part._view(inner))  # type: ignore[misc]
     for n, flat in placed.names.items():
         inside[n] = property(attrgetter(f"_part.{flat}"))
-    return type(type(placed.block).__name__, (View,), {**inside, "__slots__": (), "_placed": placed})
+    # a subclass of the block's class, so that super() finds its bases
+    return type(kind.__name__, (View, kind), {**inside, "__slots__": (), "_placed": placed})
 
 
 class _Names:
@@ -309,13 +310,9 @@ def pieces(cls: type, base: type, by_class: dict[type, list[Placed]]) -> dict[st
     by_kind: dict[str, list[Piece]] = {kind: [] for kind in (*EQUATIONS, "sampled")}
 
     def collect(klass: type, placed: Placed | None) -> None:
+        _refuse_super(klass, base if placed is None else Block)
         for name, f in own_equations(klass).items():
             every = getattr(f, "_every", 0)
-            if "super" in f.__code__.co_names:
-                raise ComponentError(
-                    f"{klass.__name__}.{name}: the equations of the bases run by themselves, before this: leave out "
-                    f"super().{name}()"
-                )
             by_kind["sampled" if every else name].append(Piece(f, klass, placed, every))
 
     def block(p: Placed) -> None:
@@ -329,3 +326,21 @@ def pieces(cls: type, base: type, by_class: dict[type, list[Placed]]) -> dict[st
             block(p)
         collect(klass, None)
     return by_kind
+
+
+def _refuse_super(klass: type, base: type) -> None:
+    """Raise ComponentError where a class calls an equation of its bases, which would run twice."""
+    equations = {*EQUATIONS, *(n for k in lineage(klass, base) for n in own_equations(k))}
+    for name, f in {**vars(klass), **own_equations(klass)}.items():
+        if not isinstance(f, FunctionType) or name.startswith("__") or "super" not in f.__code__.co_names:
+            continue
+        import dis  # costs a hundredth of a second, which few parts need
+
+        for call in dis.get_instructions(f):
+            attribute = call.opname in ("LOAD_METHOD", "LOAD_ATTR", "LOAD_SUPER_ATTR")
+            if attribute and call.argval in equations and call.positions is not None:
+                raise ComponentError(
+                    f"{f.__code__.co_filename}:{call.positions.lineno}: {klass.__name__}.{name}: the equations of the "
+                    f"bases run by themselves, before those of this class: leave out super().{call.argval}(); what a "
+                    "subclass is to change stands in a procedure, which super() may call"
+                )

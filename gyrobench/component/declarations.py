@@ -43,6 +43,8 @@ class Declaration:
         below: float | None = None,
         quantity: str = "",
     ) -> None:
+        if not isinstance(unit, str | type) or not isinstance(doc, str):
+            raise TypeError(f"unit {unit!r}, description {doc!r}: texts are expected: Parameter(0.2, 'N.m', 'torque')")
         self.start = floats(start)
         self.shape = shape_of(start)
         self.type: type = unit if isinstance(unit, type) else float

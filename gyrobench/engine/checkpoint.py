@@ -15,15 +15,16 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 import time
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gyrobench import reading
 from gyrobench.arrays import Array
 from gyrobench.bench import display_path
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
@@ -33,7 +34,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
 FILE = "checkpoint.npz"
-FORMAT = 1
+FORMAT = 2
 PERIOD = 60.0  # s of wall time between two checkpoints
 FIRST = 5.0  # s of wall time until the first one
 SHARE = 50.0  # and this many times what the last one took
@@ -83,12 +84,38 @@ def _read(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     try:
         with np.load(file, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
-        head = json.loads(arrays.pop("head").tobytes().decode("utf-8"))
-        if head["format"] != FORMAT:
-            raise ValueError(f"format {head['format']}, this version reads {FORMAT}")
+        stored = json.loads(arrays.pop("head").tobytes().decode("utf-8"))
+        if stored["format"] != FORMAT:
+            raise ValueError(f"format {stored['format']}, this version reads {FORMAT}")
+        head, verified = reading.opened(stored, FILE, ValueError)
+        if not verified or head["arrays"] != _digests(arrays):
+            raise ValueError("changed after it was saved")
         return head, arrays
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (
+        OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError,
+        RuntimeError,
+    ) as error:  # fmt: skip
         raise ResumeError(f"{file}: not a checkpoint that can be read: {error}") from None
+
+
+def _digests(arrays: Mapping[str, Array]) -> dict[str, str]:
+    """Return the SHA-256 of arrays with their types and shapes: numpy does not check the sums of the archive."""
+    return {
+        name: hashlib.sha256(f"{a.dtype.str} {a.shape} ".encode() + a.tobytes()).hexdigest()
+        for name, a in arrays.items()
+    }
+
+
+def store(file: Path, head: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
+    """Write a checkpoint: what is known of the run, and its arrays."""
+    stored = reading.sealed({"format": FORMAT, **head, "arrays": _digests(arrays)})
+
+    def save(path: Path) -> None:
+        with path.open("wb") as f:
+            everything: dict[str, Any] = {"head": np.frombuffer(json.dumps(stored).encode("utf-8"), np.uint8), **arrays}
+            np.savez(f, **everything)
+
+    write_whole(file, save)
 
 
 def _joined(rows: list[Array], width: int) -> Array:
@@ -250,7 +277,6 @@ class CheckpointManager:
         """Write the checkpoint; return what prevents it, "" where nothing: the run itself is sound."""
         program = self.program
         head = {
-            "format": FORMAT,
             "job": self.job,
             "k": state.k,
             "finished": state.finished,
@@ -259,25 +285,17 @@ class CheckpointManager:
             "resumed_at": self.resumed_at,
         }
         arrays: dict[str, Any] = {
-            "head": np.frombuffer(json.dumps(head).encode("utf-8"), np.uint8),
             "out": program.out,
             "last": np.array([state.last]),
             "channel": _joined(state.channel_rows, 1 + len(program.channel.names)),
             "window": _joined(state.window_rows, 1 + len(program.window.names)),
         }
-
-        def save(path: Path) -> None:
-            with path.open("wb") as f:
-                np.savez(f, **arrays)
-                f.flush()
-                os.fsync(f.fileno())
-
         try:
             for slot, instance in self.instances.items():
                 arrays[f"state.{slot}"] = np.frombuffer(instance.save_state(), np.uint8)
                 instance.status.call = 0
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(self.folder / FILE, save)
+            store(self.folder / FILE, head, arrays)
         except (FmuCallError, OSError) as error:
             return str(error)
         return ""

@@ -96,7 +96,7 @@ def run_job(job: Job, loads: Loads, files: RunFiles, board: RunBoard, parent: in
                 ending.remarks = (f"an FMU changed the working directory to {_here()}; the run was not affected",)
             _write(files, job, ending)
         except BaseException:  # a fault of gyrobench itself
-            write_whole(files.file("ending"), json.dumps({"fault": traceback.format_exc()}).encode())
+            write_whole(files.file("ending"), json.dumps({"fault": traceback.format_exc()}).encode(), durable=False)
         for instance in instances.values():
             instance.free()
         code = 0
@@ -193,7 +193,7 @@ def _write(files: RunFiles, job: Job, ending: Ending) -> None:
         found["resume"] = [str(error)]
     if job.checkpoints is not None:
         found["checkpoints"] = [job.checkpoints.resumed_at, job.checkpoints.resume_hint]
-    write_whole(files.file("ending"), json.dumps(found).encode())
+    write_whole(files.file("ending"), json.dumps(found).encode(), durable=False)
 
 
 ERRORS: dict[str, Any] = {"call": FmuCallError, "stopped": EngineStopped, "resume": ResumeError}

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from gyrobench.engine.engine_library import SOURCE, library_path, make_library
 from gyrobench.engine.program import PartProgram, Program, VariableGroup
+from gyrobench.files import is_intact
 from gyrobench.packaging import load_part
 from gyrobench.packaging.fmu import native_guid
 
@@ -117,7 +118,7 @@ def obstacle(program: Program, parts: Mapping[str, str], guids: Mapping[str, str
     if rounded := [p.slot for p in program.parts for g in p.sets if not (g.doubles or whole.issuperset(g.source))]:
         return f"{', '.join(rounded)}: a wire from a real to a whole number, whose range is checked in calls only"
     if program.delays or program.constants or any(g.shifted for p in program.parts for g in p.sets):
-        return "a mapping file states an offset, a constant or a delay"
+        return "a wire has an offset, a constant or a delay"
     changed = [s for s, name in parts.items() if guids[s] != native_guid(name, load_part(name, bench))]
     return f"{', '.join(changed)}: the files of the part have changed since its FMU was built" if changed else ""
 
@@ -130,6 +131,6 @@ def linked_library(program: Program, steps: float | None) -> Path | None:
     engine = SOURCE.read_text(encoding="utf-8")
     source = "#define LINKED\n" + engine.replace('#include "system.h"\n', system_text(program))
     path = library_path("linked", source)
-    if steps is not None and steps * len(program.parts) * SAVED < COMPILATION and not path.exists():
+    if steps is not None and steps * len(program.parts) * SAVED < COMPILATION and not is_intact(path):
         return None
     return make_library(path, source)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench.engine import preflight
 from gyrobench.engine.checkpoint import CheckpointManager, ResumeError
 from gyrobench.engine.execution import Ending, Job, execute
 from gyrobench.engine.fmi3_instance import new_instance
@@ -107,6 +108,9 @@ class Session:
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
         foreign = [slot for slot in paths if slot not in self.built]
         self.notes += [f"{s}: {paths[s].name} is not of this bench: SHA-256 {self.hashes[s]}" for s in foreign]
+        self.foreign = foreign
+        if found := preflight.problems(self.assembly, foreign):
+            raise InvalidConfigurationError(self.system.name, found)
         self.engine = self._choose(engine)
         self.linkable = self.engine != "reference" and engine != "native" and not self._obstacle()
         self.steps = 0  # of all runs
@@ -214,7 +218,10 @@ class Session:
         if not 0.0 < system.step < float("inf"):
             raise InvalidValueError(f"step = {system.step} s: must be > 0")
         system.refuse()
+        if found := preflight.step_problems(self.assembly, system.step):
+            raise InvalidConfigurationError(system.name, found)
         starts, parameters, notes = resolve(self.assembly, system, seed, self.base)
+        notes = [*preflight.remarks(self.assembly, self.foreign, system.step), *notes]
         if problems := system.check_parameters(parameters):
             raise InvalidConfigurationError(system.name, problems)
         errors = setup_errors(self.assembly, system, seed, self.base, parameters)
@@ -244,7 +251,7 @@ class Session:
         system, starts, document = self.prepare(values, seed, step)
         schedule = Schedule.of(system)
         if checkpoints is not None:
-            job = {k: getattr(document, k) for k in ("system", "seed", "step", "options", "parameters")}
+            job = {k: getattr(document, k) for k in ("system", "seed", "step", "coupling", "options", "parameters")}
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
             job |= {"parts": parts, "stop": system.stop, "every": schedule.every}
             checkpoints.check(job, self.program, self.assembly.descriptions)
@@ -358,6 +365,7 @@ class Session:
             date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             seed=seed,
             step=system.step,
+            coupling=system.coupling,
             engine=self.engine,
             **self.assembly.order.as_dict(system.step),
             parts=parts,

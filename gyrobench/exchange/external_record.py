@@ -35,6 +35,29 @@ LENGTH = 1e-2  # of a window, by which its length may differ from that of the pl
 TURN = 0.1  # of a window by angle: the angle is a reading
 
 
+def shortest_window(system: System) -> float:
+    """Return the length of the shortest window of the plan, s; the step where the plan has none."""
+    phases = [p for p in getattr(system.plan(), "phases", ()) if getattr(p, "window", 0.0) > 0.0]
+    lengths = [p.window / abs(p.target) if p.mode == "rate" and p.target else p.window for p in phases]
+    return min(lengths, default=system.step)
+
+
+def row_steps(system: System) -> int:
+    """Return how many steps two rows of a result may be apart: a whole part of the channels' period.
+
+    At most a quarter of the shortest window where samplers alone make the windows, for they hold what they say until
+    the next one ends; 1 where other parts say something of a window.
+    """
+    channels = max(1, round(system.channel_period / system.step))
+    if system.windows is None:
+        return channels
+    slots = {n.partition(".")[0] for n in (system.windows.watch, *system.windows.columns.values())}
+    if any(system.slots[s].socket != "Sampler" for s in slots):
+        return 1
+    most = max(1.0, 0.25 * shortest_window(system) / system.step)
+    return max(k for k in range(1, channels + 1) if channels % k == 0 and k <= most)
+
+
 @dataclass(frozen=True)
 class RecordedOutput:
     """Recorded output in a file: its name there, None for a constant; how it becomes SI; whether it is held."""
@@ -102,6 +125,7 @@ class ResultReader:
     windows: dict[str, list[AnyArray]] = field(default_factory=dict)
     channels: dict[str, list[AnyArray]] = field(default_factory=dict)
     last: tuple[float, float] | None = None  # time and count of the row before
+    until: float = 0.0  # s, the last row of the channels
     done: bool | None = None  # None: the file does not have the end of the plan
     single: bool = False  # numbers of single precision
 
@@ -115,18 +139,37 @@ class ResultReader:
             if not len(time):
                 continue
             self._check_time(time)
+            time = time[: self._until_done(block, time)]
+            if not len(time):  # after the end of the plan
+                continue
+            block = {n: c[: len(time)] for n, c in block.items()}
             if windows is not None:
                 self.single = self.single or any(c.dtype == np.float32 for c in block.values())
                 self._windows(block, time)
-            self._channels(block, time, shown)
-            if (end := self.series.get(self.system.done or "")) is not None:
-                self.done = bool(end.si(block, np.array([len(time) - 1]))[0] != 0.0)
-            count = self.last[1] if self.last else 0.0
-            if windows is not None:
-                count = float(self.series[windows.watch].si(block, np.array([len(time) - 1]))[0])
+            before = time[-2] if len(time) > 1 else self.until
+            late = self.done and time[-1] - before > 1.5 * self.step  # it goes on after the end of the plan
+            self._channels(block, time[:-1] if late else time, shown)
+            self.until = float(before if late else time[-1])
+            count = (
+                0.0 if windows is None else float(self.series[windows.watch].si(block, np.array([len(time) - 1]))[0])
+            )
             self.last = float(time[-1]), count
         if self.last is None:
             raise DataError(self.result.name, ["no rows"])
+
+    def _until_done(self, block: Block, time: AnyArray) -> int:
+        """Return the number of rows until the plan is over: a run of the bench ends there.  Raises DataError."""
+        end = self.series.get(self.system.done or "")
+        if end is None:
+            return len(time)
+        over = end.si(block, np.arange(len(time))) != 0.0
+        first = 0 if self.done else int(np.argmax(over)) if np.any(over) else len(time)
+        if not np.all(over[first:]):
+            again = time[first + int(np.argmin(over[first:]))]
+            raise self._fail(f"{self.system.done} goes back to 0 at t = {again:.9g} s: more than one run in the file")
+        rows = 0 if self.done else min(first + 1, len(time))
+        self.done = self.done or first < len(time)
+        return rows
 
     def _fail(self, problem: str) -> DataError:
         return DataError(self.result.name, [problem])
@@ -166,7 +209,7 @@ class ResultReader:
             k = int(np.argmax(steps))
             raise self._fail(
                 f"{steps[k]:g} windows end between the rows at t = {time[k] - gap[k]:.9g} s and {time[k]:.9g} s: the "
-                f"output is too coarse; write a row at least every {self._shortest():.4g} s"
+                f"output is too coarse; write a row at least every {shortest_window(self.system):.4g} s"
             )
         late = gap[at] > 1.5 * self.step if len(at) else np.zeros(0, dtype=bool)
         of_the_step = [n for n, o in windows.columns.items() if not self.series[o].held and self.series[o].name]
@@ -181,11 +224,6 @@ class ResultReader:
                 k = int(np.argmax(~np.isfinite(values)))
                 raise self._fail(f"{output} is {values[k]:g} at t = {time[at[k]]:.9g} s")
             self.windows.setdefault(name, []).append(values)
-
-    def _shortest(self) -> float:
-        plan = self.system.plan()
-        lengths = [p.window for p in getattr(plan, "phases", ()) if getattr(p, "mode", "") != "rate" and p.window > 0.0]
-        return min(lengths, default=self.step)
 
     def _channels(self, block: Block, time: AnyArray, names: list[str]) -> None:
         """Take the rows at whole multiples of the channels' period, the last of those of one time."""
@@ -214,7 +252,7 @@ class ResultReader:
             _, first = np.unique(channels["time"][::-1], return_index=True)
             channels = {n: c[::-1][first] for n, c in channels.items()}
             period = max(1, round(self.system.channel_period / self.step)) * self.step
-            wanted = int(self.last[0] / period + 1e-6) + 1
+            wanted = int(self.until / period + 1e-6) + 1
             if len(channels["time"]) != wanted:
                 problem = (
                     f"the file has {len(channels['time'])} of the {wanted} rows at multiples of {period:g} s that the "

@@ -17,7 +17,7 @@ import numpy as np
 
 from gyrobench.arrays import AnyArray
 from gyrobench.exchange.mat_files import SEVEN_THREE, is_mat, read_mat
-from gyrobench.record.csv_reader import CsvColumn, DataError, Head, read_head
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, for_arrow, read_head, regular
 
 Block = dict[str, AnyArray]
 ROWS = 1 << 16  # of a block
@@ -48,7 +48,7 @@ def open_result(source: Path | AnyArray) -> ResultFile:
     if source.is_dir():
         return _of_folder(source)
     try:
-        with source.open("rb") as file:
+        with regular(source).open("rb") as file:
             begin = file.read(128)
     except OSError as error:
         raise DataError(source, [f"cannot be read: {error.strerror}"]) from None
@@ -191,7 +191,7 @@ def _of_parquet(file: Path) -> ResultFile:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(file)
+        table = pq.ParquetFile(for_arrow(file))
         names = table.schema_arrow.names
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(file, [f"not a Parquet file that can be read: {str(error)[:200]}"]) from None

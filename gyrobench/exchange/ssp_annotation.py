@@ -32,7 +32,8 @@ def digest(root: ET.Element, files: Mapping[str, bytes]) -> str:
     bare = copy.deepcopy(root)
     for element in bare.findall("ssd:Annotations", NS):
         bare.remove(element)
-    text = ET.canonicalize(ET.tostring(bare, encoding="unicode"), strip_text=True)
+    # prefixes are rewritten: those of a text depend on what its process has registered
+    text = ET.canonicalize(ET.tostring(bare, encoding="unicode"), strip_text=True, rewrite_prefixes=True)
     h = hashlib.sha256(text.encode())
     for name in sorted(files):
         h.update(f"\0{name}\0".encode() + hashlib.sha256(files[name]).digest())
@@ -134,13 +135,12 @@ def repeated(content: Mapping[str, Any], root: ET.Element, folder: Path, path: P
 
 def _same(name: str, file: Path) -> bool:
     """Return whether an FMU is what the bench builds of a part now."""
-    from fmpy import read_model_description
-
     from gyrobench.packaging import load_part
     from gyrobench.packaging.fmu import native_guid
+    from gyrobench.system.fmu_variables import read_description
 
     try:
         part = load_part(name)
     except BenchError:
         return False
-    return bool(read_model_description(str(file), validate=False).guid == native_guid(name, part))
+    return bool(read_description(file).guid == native_guid(name, part))

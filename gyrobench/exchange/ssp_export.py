@@ -1,10 +1,12 @@
 """A system as SSP 1.0 archive: structure (SSD), parameter values (SSV) and the FMUs.
 
-``SystemStructure.ssd``       components in execution order, connectors with units, connections; the communication step
-                              as the annotation that OMSimulator reads (SSP has no other place for it)
+``SystemStructure.ssd``       components in execution order, connectors with units, connections; communication step and
+                              interval of the results as annotations of OMSimulator (SSP has no other place for them)
 ``resources/<slot>.ssv``      what the system and the user set, bound to the component, in the FMU's own units
 ``resources/parameters.ssv``  the same of all slots as "slot.variable", for tools that want it handed over
-``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...)
+``resources/<slot>.fmu``      one FMU for each slot, and one for each connection with a factor (``gain_01``, ...); those
+                              of the bench have the system's step and end, and no unit where the socket takes any:
+                              OMSimulator refuses a wire from "A" to "1", whatever the structure says
 
 What other tools do with it, measured (libcosimpy 0.0.6, FMPy 0.3.32):
 
@@ -22,15 +24,15 @@ from __future__ import annotations
 
 import io
 import math
-import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
+from gyrobench.exchange.external_record import row_steps
 from gyrobench.exchange.gains import INPUT, Gains, gain_fmu, gains_of, varying
 from gyrobench.exchange.ssp_annotation import annotate, annotate_gains
 from gyrobench.exchange.ssp_values import SSC, SSD, SSV
@@ -42,6 +44,7 @@ from gyrobench.system.wiring import Assembly, assemble
 
 PARAMETERS = "resources/parameters.ssv"
 STAMP = (1980, 1, 1, 0, 0, 0)
+SOLVER = "solver1"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
@@ -83,11 +86,25 @@ def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
 
 
 def stop_time(system: System) -> float:
-    """Return a time by which the plan has ended: its duration plus 5 % plus a minute for each phase, in whole steps."""
-    plan = system.plan()
+    """Return a time by which the plan has ended, in whole steps: that at which a run stops, else the duration of the
+    plan plus 5 % plus a minute for each phase.
+    """
     if system.stop is not None:
-        return system.stop
-    return math.ceil(math.ceil(1.05 * plan.duration() + 60.0 * len(plan.phases)) / system.step - 1e-6) * system.step
+        steps = round(system.stop / system.step)  # as many as a run of the bench
+    else:
+        plan = system.plan()
+        steps = math.ceil(math.ceil(1.05 * plan.duration() + 60.0 * len(plan.phases)) / system.step - 1e-6)
+    return float(f"{max(1, steps) * system.step:.15g}")
+
+
+def experiment(system: System, inputs: bool) -> dict[str, str]:
+    """Return the attributes of the DefaultExperiment of a system that is one FMU.
+
+    Its step is that between two rows of the result, which importers take for their output where they are not told
+    otherwise; with inputs that someone may feed it is the system's own.
+    """
+    step = system.step if inputs else float(f"{row_steps(system) * system.step:.15g}")
+    return {"startTime": "0.0", "stopTime": repr(stop_time(system)), "stepSize": repr(step)}
 
 
 def export_ssp(
@@ -119,7 +136,10 @@ def export_ssp(
     files = {
         PARAMETERS: _xml(_values(assembly.system.name, values_of, prefix=True)),
         **{f"resources/{s}.ssv": _xml(_values(assembly.system.name, {s: v})) for s, v in values_of.items() if v},
-        **{f"resources/{name}.fmu": with_experiment(data, assembly.system) for name, data in fmus.items()},
+        **{
+            f"resources/{name}.fmu": for_system(data, assembly.system, unitless(assembly, gains, name))
+            for name, data in fmus.items()
+        },
         **{f"resources/{slot}.toml": Path(file).read_bytes() for slot, file in (maps or {}).items()},
     }
     root = structure(assembly, gains, values_of)
@@ -182,15 +202,26 @@ def initial_inputs(
     return starts, []
 
 
-def with_experiment(fmu: bytes, system: System) -> bytes:
-    """Return an FMU; the DefaultExperiment of one of the bench's own has the step and the stop time of the system."""
+def for_system(fmu: bytes, system: System, unitless: Container[str] = ()) -> bytes:
+    """Return an FMU of the bench with the step and the stop time of a system in its description; another as it is.
+
+    unitless: variables that lose their unit.
+    """
     with zipfile.ZipFile(io.BytesIO(fmu)) as source:
         entries = {info: source.read(info) for info in source.infolist()}
     info, text = next((i, d) for i, d in entries.items() if i.filename == "modelDescription.xml")
-    if b'generationTool="gyrobench"' not in text:
+    root = ET.fromstring(text)
+    if root.get("generationTool") != "gyrobench":
         return fmu
-    experiment = f'<DefaultExperiment startTime="0.0" stopTime="{stop_time(system)!r}" stepSize="{system.step!r}" />'
-    entries[info] = re.sub(rb"<DefaultExperiment [^>]*>", experiment.encode(), text, count=1)
+    experiment = root.find("DefaultExperiment")
+    assert experiment is not None
+    experiment.attrib |= {"stopTime": repr(stop_time(system)), "stepSize": repr(system.step)}
+    for variable in root.iterfind("ModelVariables/*"):
+        if variable.get("name") in unitless:
+            for element in variable.iter():
+                element.attrib.pop("unit", None)
+                element.attrib.pop("displayUnit", None)
+    entries[info] = _xml(root)
     changed = io.BytesIO()
     with zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as target:
         for info, data in entries.items():
@@ -204,11 +235,18 @@ def _xml(root: ET.Element) -> bytes:
     return data
 
 
-def _unit(assembly: Assembly, slot: str, bound: Bound) -> str:
-    """Return the unit of a connector; none where the socket takes any: its FMU says "1", which others compare."""
-    connector = assembly.bindings[slot].socket.connector(bound.element.split("[")[0])
-    anything = connector is not None and not connector.unit
-    return "" if bound.kind != "Real" or anything else bound.unit
+def _unit(assembly: Assembly, gains: Gains, name: str, bound: Bound) -> str:
+    """Return the unit of a connector; none of a gain, and where the socket takes any."""
+    if name in gains.parts or bound.kind != "Real":
+        return ""
+    connector = assembly.bindings[name].socket.connector(bound.element.split("[")[0])
+    return bound.unit if connector is None or connector.unit else ""
+
+
+def unitless(assembly: Assembly, gains: Gains, name: str) -> set[str]:
+    """Return the variables of a component, arrays as such, that have no unit in an archive."""
+    ports = (b for _, b in _ports(assembly, gains, name) if not _unit(assembly, gains, name, b))
+    return {b.variable.partition("[")[0] if b.size else b.variable for b in ports}
 
 
 def structure(assembly: Assembly, gains: Gains, starts: Starts) -> ET.Element:
@@ -235,13 +273,14 @@ def structure(assembly: Assembly, gains: Gains, starts: Starts) -> ET.Element:
         ports = ET.SubElement(component, f"{{{SSD}}}Connectors")
         for kind, bound in _ports(assembly, gains, name):
             connector = ET.SubElement(ports, f"{{{SSD}}}Connector", name=bound.variable, kind=kind)
-            unit = "" if name in gains.parts else _unit(assembly, name, bound)
+            unit = _unit(assembly, gains, name, bound)
             ET.SubElement(connector, f"{{{SSC}}}{bound.kind}", {"unit": unit} if unit else {})
             used.add(unit)
         if starts[name]:
             bindings = ET.SubElement(component, f"{{{SSD}}}ParameterBindings")
             kind = "application/x-ssp-parameter-set"
             ET.SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=kind, source=f"resources/{name}.ssv")
+        _solver(component, name=SOLVER)
     connections = ET.SubElement(top, f"{{{SSD}}}Connections")
     for link in gains.links:
         element = ET.SubElement(
@@ -254,21 +293,24 @@ def structure(assembly: Assembly, gains: Gains, starts: Starts) -> ET.Element:
         )
         if link.gain:
             element.set("suppressUnitConversion", "true")
-    _fixed_step(top, system.step)
+    _solver(top, name=SOLVER, method="oms_ma", fixedStepSize=repr(system.step))
     _units(root, assembly, used)
-    ET.SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0", stopTime=repr(stop_time(system)))
+    experiment = ET.SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0", stopTime=repr(stop_time(system)))
+    every = row_steps(system)  # half a step less: a row at the multiples, whatever the rounding of the time
+    _solver(experiment, resultFile=f"{system.name}_res.mat", loggingInterval=repr((every - 0.5) * system.step))
     return root
 
 
-def _fixed_step(top: ET.Element, step: float) -> None:
-    """Annotate the step; OMSimulator does not simulate without it, others read past it."""
+def _solver(element: ET.Element, **settings: str) -> None:
+    """Annotate a system with the solver of OMSimulator 3, a component with its name, the experiment with the results.
+
+    Without the name at a component, OMSimulator runs it at steps of 1 ms without a word; others read past it.
+    """
     ET.register_namespace("oms", OMS)
-    annotations = ET.SubElement(top, f"{{{SSD}}}Annotations")
-    one = ET.SubElement(annotations, f"{{{SSC}}}Annotation", type="org.openmodelica")
-    information = ET.SubElement(ET.SubElement(one, f"{{{OMS}}}Annotations"), f"{{{OMS}}}SimulationInformation")
-    attributes = {"description": "oms-ma", "stepSize": repr(step)}
-    attributes |= {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
-    ET.SubElement(information, f"{{{OMS}}}FixedStepMaster", attributes)
+    one = ET.SubElement(
+        ET.SubElement(element, f"{{{SSD}}}Annotations"), f"{{{SSC}}}Annotation", type="org.openmodelica"
+    )
+    ET.SubElement(ET.SubElement(one, f"{{{OMS}}}Annotations"), f"{{{OMS}}}SimulationInformation", settings)
 
 
 def _ports(assembly: Assembly, gains: Gains, name: str) -> Iterable[tuple[str, Bound]]:

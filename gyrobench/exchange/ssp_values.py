@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
 from gyrobench import reading, units
@@ -16,6 +19,20 @@ SSD, SSC, SSV, SSM = (
     f"{SSP}SystemStructure{n}" for n in ("Description", "Common", "ParameterValues", "ParameterMapping")
 )
 NS = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "ssm": SSM}
+
+SCHEMAS = {
+    f"{{{SSD}}}SystemStructureDescription": "SystemStructureDescription.xsd",
+    f"{{{SSV}}}ParameterSet": "SystemStructureParameterValues.xsd",
+    f"{{{SSM}}}ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+TOLD = 5  # errors by the schema that are listed of a file
+
+#: types of values -> family; the sized ones are those of SSP 2.0
+KINDS = {
+    **dict.fromkeys(("Real", "Float64", "Float32"), "Real"),
+    **dict.fromkeys(("Integer", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))), "Integer"),
+    **{n: n for n in ("Boolean", "String", "Enumeration")},
+}
 
 Scale = tuple[tuple[Any, ...], float, float]  # exponents, factor, offset: SI = factor * value + offset
 
@@ -41,6 +58,8 @@ class Units:
         """Return exponents, factor and offset of a unit; None where it is not known."""
         if name in self.declared:
             return self.declared[name]
+        if name.startswith("[") and name.endswith("]"):  # as on a drawing
+            return self.scale(name[1:-1])
         try:
             u = units.unit(name)
         except units.UnitError:
@@ -90,7 +109,10 @@ def _values(element: ET.Element) -> dict[str, SspValue]:
         child, name = next(iter(p), None), p.get("name", "")
         if child is None:
             raise ArchiveError(f"parameter '{name}' has no value")
-        kind, text = child.tag.rpartition("}")[2], child.get("value", "")
+        stated, text = child.tag.rpartition("}")[2], child.get("value", "")
+        kind = KINDS.get(stated, "")
+        if not kind:
+            raise ArchiveError(f"parameter '{name}': type {stated} is not read")
         try:
             value: Any = text
             if kind == "Real":
@@ -99,17 +121,35 @@ def _values(element: ET.Element) -> dict[str, SspValue]:
                 value = int(text)
             elif kind == "Boolean":
                 value = text in ("true", "1")
-            elif kind != "String":
-                raise ArchiveError(f"parameter '{name}': type {kind} is not read")
-        except ValueError as error:
-            if isinstance(error, ArchiveError):
-                raise
+        except ValueError:
             raise ArchiveError(f"parameter '{name}' = '{text}': not a value of the type {kind}") from None
         found[name] = SspValue(kind, value, child.get("unit", ""))
     return found
 
 
-def _read(binding: ET.Element, folder: Path, inline: str, what: str) -> ET.Element | None:
+@functools.cache
+def _schema(name: str) -> Any:
+    import fmpy.ssp
+    from lxml import etree
+
+    return etree.XMLSchema(etree.parse(Path(fmpy.ssp.__file__).parent / "schema" / name))
+
+
+def schema_errors(file: Path, source: str) -> list[str]:
+    """Return what the schema of SSP 1.0 forbids in a file that is XML, the first places; nothing of a later version."""
+    from lxml import etree
+
+    root = etree.fromstring(file.read_bytes(), etree.XMLParser(resolve_entities=False, no_network=True))
+    if root.tag not in SCHEMAS or root.get("version") != "1.0":
+        return []
+    schema = _schema(SCHEMAS[root.tag])
+    schema.validate(root)
+    found = [f"{source}, line {e.line}: {re.sub('{[^}]*}', '', e.message)}" for e in schema.error_log]
+    more = [f"{source}: {len(found) - TOLD} more of the kind"] if len(found) > TOLD else []
+    return [f"against the schema of SSP 1.0: {x}" for x in (*found[:TOLD], *more)]
+
+
+def _read(binding: ET.Element, folder: Path, inline: str, what: str, schema: list[str]) -> ET.Element | None:
     """Return an element that stands in the binding or in the file that it names."""
     element = binding.find(inline, NS)
     source = binding.get("source")
@@ -117,25 +157,28 @@ def _read(binding: ET.Element, folder: Path, inline: str, what: str) -> ET.Eleme
         return element
     if binding.get("sourceBase", "SSD") != "SSD":
         raise ArchiveError(f"{what} {source}: a source inside a component is not read")
-    file = (folder / source).resolve()
+    file = (folder / unquote(source)).resolve()
     if not file.is_relative_to(folder.resolve()) or not file.is_file():
         raise ArchiveError(f"{what} {source}: no such file in the archive")
-    return reading.xml(file.read_bytes(), f"{what} {source}", ArchiveError)
+    found = reading.xml(file.read_bytes(), f"{what} {source}", ArchiveError)
+    schema += [e for e in schema_errors(file, source) if e not in schema]
+    return found
 
 
 def bound_values(
-    element: ET.Element, folder: Path, ssd_units: ET.Element | None
+    element: ET.Element, folder: Path, ssd_units: ET.Element | None, schema: list[str]
 ) -> Iterator[tuple[str, SspValue, Units]]:
     """Yield name, value and units of all that is bound to a system or a component, after mappings.
 
-    With a mapping only its entries are applied.  Raises ArchiveError.
+    With a mapping only its entries are applied, those without a source to nothing.  schema: gets what the schemas
+    forbid in the files.  Raises ArchiveError.
     """
     for binding in element.findall("ssd:ParameterBindings/ssd:ParameterBinding", NS):
         kind = binding.get("type", "application/x-ssp-parameter-set")
         if kind != "application/x-ssp-parameter-set":
             raise ArchiveError(f"parameters of the type {kind} are not read")
         holder = binding.find("ssd:ParameterValues", NS)
-        found = _read(binding, folder, "ssd:ParameterValues/ssv:ParameterSet", "parameter set")
+        found = _read(binding, folder, "ssd:ParameterValues/ssv:ParameterSet", "parameter set", schema)
         if found is None:
             raise ArchiveError("a parameter binding has neither source nor values" if holder is None else "no values")
         known = Units(ssd_units, found.find("ssv:Units", NS))
@@ -144,11 +187,15 @@ def bound_values(
         if mapping is None:
             yield from ((name, value, known) for name, value in values.items())
             continue
-        entries = _read(mapping, folder, "ssm:ParameterMapping", "parameter mapping")
+        entries = _read(mapping, folder, "ssm:ParameterMapping", "parameter mapping", schema)
         if entries is None:
             raise ArchiveError("a parameter mapping has neither source nor entries")
         for entry in entries.findall("ssm:MappingEntry", NS):
             source, target = entry.get("source", ""), entry.get("target", "")
+            if not source:
+                continue
+            if not target:
+                raise ArchiveError(f"parameter mapping: the entry of {source} has no target")
             if source not in values:
                 raise ArchiveError(f"parameter mapping: no parameter '{source}' in the set for {target}")
             yield target, _mapped(entry, values[source]), known

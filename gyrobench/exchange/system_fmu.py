@@ -22,7 +22,7 @@ from gyrobench.component.component import Component
 from gyrobench.engine.linked_system import obstacle
 from gyrobench.engine.program import build_program
 from gyrobench.exchange.exposure import SECTIONS, ExposedVariable, choose
-from gyrobench.exchange.ssp_export import ExportError, prepare, recorded, stop_time
+from gyrobench.exchange.ssp_export import ExportError, experiment, prepare, recorded
 from gyrobench.exchange.system_source import Exposed, SystemSource, source_files
 from gyrobench.packaging import load_part
 from gyrobench.packaging.compiler import this_platform
@@ -145,11 +145,11 @@ def _attributes(system: System, source: SystemSource, fmi: int) -> dict[str, str
 
 def _common(root: ET.Element, system: System, face: Any, extra: tuple[str, ...]) -> ET.Element:
     """Add units, log category and default experiment; return the element of the variables."""
-    units(root, face, extra)
+    root.append(units(face.layout, *extra))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
-    times = {"startTime": "0.0", "stopTime": repr(stop_time(system)), "stepSize": repr(system.step)}
-    ET.SubElement(root, "DefaultExperiment", times)
+    inputs = any(s.section == "input" for s in face.layout)
+    ET.SubElement(root, "DefaultExperiment", experiment(system, inputs))
     return ET.SubElement(root, "ModelVariables")
 
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.errors import GyrobenchError
 from gyrobench.library.experiment import Experiment, File, Run, open_run
 from gyrobench.library.many_runs import campaign, site, sweep
@@ -60,28 +61,35 @@ __all__ = [
 ]
 
 
+@checked
 def load(
     name: File,
     values: Mapping[str, Any] | None = None,
     *,
     parts: Mapping[str, File] | None = None,
     maps: Mapping[str, File] | None = None,
+    coupling: str = "sequential",
     **options: Any,
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
-    mapping file of a third-party FMU.  Raises errors of type GyrobenchError; UsageError for a suite.
+    mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
+    before.  Raises errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
         raise UsageError(f"{name} is a suite of tests: gyrobench.load_suite('{name}')")
+    if coupling not in ("sequential", "parallel"):
+        raise UsageError(f"coupling = '{coupling}': one of sequential, parallel")
+    test.coupling = "parallel" if coupling == "parallel" else ""
     experiment = Experiment(test, parts or {}, maps or {})
     for key, value in {**(values or {}), **options}.items():
         experiment.set(key, value)
     return experiment
 
 
+@checked
 def load_suite(
     name: str,
     values: Mapping[str, Any] | None = None,
@@ -100,6 +108,7 @@ def load_suite(
     return suite
 
 
+@checked
 def reduce(
     name: str, data: File, *, spec: File | None = None, out: File | None = None, force: bool = False, **values: str
 ) -> Run:
@@ -110,6 +119,7 @@ def reduce(
     return load(name).reduce(data, spec=spec, out=out, force=force, **values)
 
 
+@checked
 def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparison:
     """Return runs, or folders of runs, side by side; the first is the baseline.
 
@@ -128,6 +138,7 @@ def compare(*runs: Run | SuiteRun | File, names: Iterable[str] = ()) -> Comparis
     return compare_results(list(zip(named, results, strict=True)))
 
 
+@checked
 def design(
     name: str,
     wants: Mapping[str, str | float],

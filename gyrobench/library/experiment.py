@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.notebook import html
+from gyrobench.reading import shorten
 from gyrobench.record.record import Record
 from gyrobench.report.notebook_html import fragment, paragraph, table_html
-from gyrobench.report.page_model import Column, Row, Table, text_cell
+from gyrobench.report.page_model import Column, PageTable, Row, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
 from gyrobench.result import Result
 from gyrobench.system.system import System
-from gyrobench.system.values import parse
+from gyrobench.system.values import parse_number
 from gyrobench.units import format_quantity
 from gyrobench.workflow.external_run import reduce_result
 from gyrobench.workflow.feedback import Feedback
@@ -61,6 +63,7 @@ class Run:
         named = f"{run.system}, seed {run.seed}" if run.seed is not None else run.system
         return self.folder.name if self.folder is not None else named
 
+    @checked
     def report(self, folder: File | None = None, force: bool = False) -> dict[str, Path]:
         """Write result.json, report.html and report.pdf, into another folder with the record; return the files.
 
@@ -124,6 +127,7 @@ class Experiment:
         """Options and their values, SI."""
         return dict(self.system.values)
 
+    @checked
     def set(self, name: str, value: Any) -> Self:
         """Set an option or, as "slot.parameter", a parameter of a part; a number is SI, a text has its unit.
 
@@ -134,6 +138,7 @@ class Experiment:
         self._release()
         return self
 
+    @checked
     def run(
         self,
         seed: int = 1,
@@ -182,6 +187,7 @@ class Experiment:
             self._prepared.close()
             self._prepared = None
 
+    @checked
     def reduce(
         self,
         data: File,
@@ -205,6 +211,7 @@ class Experiment:
         )  # fmt: skip
         return finished(outcome)
 
+    @checked
     def reduce_result(
         self,
         result: File | np.ndarray[Any, Any],
@@ -244,10 +251,11 @@ class Experiment:
             for n, o in self.system.options.items()
         ]
         slots = ", ".join(f"{name}: {self.parts.get(name, s.part)}" for name, s in self.system.slots.items())
-        table = Table([Column("option"), Column("value"), Column("meaning")], rows, f"Parts: {slots}.")
+        table = PageTable([Column("option"), Column("value"), Column("meaning")], rows, f"Parts: {slots}.")
         return fragment(paragraph(self.system.title, strong=True), table_html(table))
 
 
+@checked
 def open_run(folder: File) -> Run:
     """Return a run from its folder, with the result that was saved.  Raises RecordError and UsageError."""
     folder = require_run(Path(folder))
@@ -275,8 +283,8 @@ def checked_seed(seed: Any) -> int:
         number = operator.index(seed)
     except TypeError:
         number = -1
-    if number < 0:
-        raise UsageError(f"seed {seed!r}: a whole number from 0 is expected")
+    if not 0 <= number < 1 << 63:
+        raise UsageError(f"seed {shorten(repr(seed))}: a whole number from 0 to 2^63 - 1 is expected")
     return number
 
 
@@ -285,7 +293,7 @@ def path_of(file: File | None) -> Path | None:
 
 
 def time_of(name: str, value: float | str | None) -> float | None:
-    return None if value is None else float(parse(name, value, "s"))
+    return None if value is None else parse_number(name, value, "s")
 
 
 def mapping_files(maps: Mapping[str, File]) -> dict[str, Path]:

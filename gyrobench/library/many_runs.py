@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench.boundary import checked
 from gyrobench.library.experiment import File
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from gyrobench.campaign.site.site_folder import CampaignSite
 
 
+@checked
 def campaign(
     definition: File | Mapping[str, Any],
     *,
@@ -43,6 +45,7 @@ def campaign(
     return _executed(asked, out or asked.out, client, scheduler, workers, retry, progress)
 
 
+@checked
 def sweep(
     system: str,
     over: Mapping[str, Any] | None = None,
@@ -68,6 +71,7 @@ def sweep(
     return _executed(asked, out, client, scheduler, workers, False, progress)
 
 
+@checked
 def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> CampaignSite:
     """Write the site of a stored campaign; ``.index`` is its page, ``.answer`` the sentences with which it opens.
 

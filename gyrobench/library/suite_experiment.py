@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.library.experiment import File, Run, checked_seed, feedback_of, mapping_files, open_run, time_of
 from gyrobench.notebook import html
 from gyrobench.report.plain_text import format_result
@@ -58,11 +59,13 @@ class SuiteExperiment:
         """Name of the suite."""
         return self.suite.name
 
+    @checked
     def set(self, name: str, value: Any) -> Self:
         """Set an option of the suite, of its tests, or a parameter of a part; returns the suite."""
         self.suite.set(name, value)
         return self
 
+    @checked
     def run(
         self,
         out: File,
@@ -84,12 +87,15 @@ class SuiteExperiment:
         )  # fmt: skip
         return _suite_run(execute_suite(request, self.suite, feedback_of(progress)))
 
+    @checked
     def reduce(
         self, runs: Iterable[Run | File], out: File, *, spec: File | None = None, force: bool = False
     ) -> SuiteRun:
         """Write the report of the suite from runs that exist, each in a folder.  Raises UsageError."""
         folders = []
         for number, run in enumerate(runs, 1):
+            if not isinstance(run, Run | str | Path):
+                raise UsageError(f"run {number} of the suite = {run!r}: a run or the folder of one is expected")
             folder = run.folder if isinstance(run, Run) else Path(run)
             if folder is None:
                 raise UsageError(

@@ -87,6 +87,8 @@ class Linear:
         self.step = step
         system = assembly.system
         if late := [c.wire for c in assembly.connections if c.delayed]:
+            if system.coupling:
+                raise LinearizationError("the parts are coupled in parallel")
             raise LinearizationError(f"a mapping file delays {', '.join(dict.fromkeys(late))}")
         sources = [s for s, d in system.slots.items() if socket(d.socket).name == "Excitation"]
         varying = [c for c in assembly.connections if c.output.constant is None]

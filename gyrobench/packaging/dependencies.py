@@ -9,12 +9,12 @@ from typing import TypeAlias
 from gyrobench.component import Discrete, Input, Output, Parameter, State
 from gyrobench.component.composition import TIMES
 from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
-from gyrobench.packaging.source import Code, Source, dotted
+from gyrobench.packaging.source import Code, PartCode, dotted
 
 Reach: TypeAlias = dict[str, set[str]]  # variable -> the known variables it follows
 
 
-def called(e: ast.AST, code: Code, source: Source) -> Code | None:
+def called(e: ast.AST, code: Code, source: PartCode) -> Code | None:
     """Return the procedure or function that an expression calls; None where it does not call one of the part's."""
     if not isinstance(e, ast.Call):
         return None
@@ -25,6 +25,8 @@ def called(e: ast.AST, code: Code, source: Source) -> Code | None:
         of = dotted(e.func.value)
         if of == "self":
             return source.method(e.func.attr, code)
+        if of == "super()":
+            return source.base_method(e.func.attr, code)
         if of.startswith("self."):
             return source.block_method(of.removeprefix("self."), e.func.attr, code)
     return None
@@ -36,7 +38,9 @@ class Dependencies:
     reach: what is known of them before.
     """
 
-    def __init__(self, source: Source, kinds: Iterable[str], known: Iterable[str], reach: Reach | None = None) -> None:
+    def __init__(
+        self, source: PartCode, kinds: Iterable[str], known: Iterable[str], reach: Reach | None = None
+    ) -> None:
         self.source = source
         self.known = set(known)
         self.reach: Reach = reach or {}
@@ -110,7 +114,7 @@ def flat_name(e: ast.AST, code: Code) -> str | None:
     return f"{code.flat(of.removeprefix('self.'))}_{e.attr}" if of.startswith("self.") else None
 
 
-def reached(code: Code, source: Source) -> Iterator[Code]:
+def reached(code: Code, source: PartCode) -> Iterator[Code]:
     """Yield a piece of code and all that it calls."""
     codes: list[Code] = [code]
     for c in codes:
@@ -123,12 +127,12 @@ def reached(code: Code, source: Source) -> Iterator[Code]:
                 codes.append(callee)
 
 
-def read_names(code: Code, source: Source) -> set[str]:
+def read_names(code: Code, source: PartCode) -> set[str]:
     """Return every variable that is named in a piece of code and in what it calls."""
     return {name for c in reached(code, source) for n in c.nodes() if (name := flat_name(n, c)) is not None}
 
 
-def written_names(code: Code, source: Source) -> set[str]:
+def written_names(code: Code, source: PartCode) -> set[str]:
     """Return every variable that a piece of code, or what it calls, writes."""
     names: set[str] = set()
     for c in reached(code, source):
@@ -143,17 +147,17 @@ def written_names(code: Code, source: Source) -> set[str]:
     return names
 
 
-def _declared(source: Source, *kinds: type) -> list[str]:
+def _declared(source: PartCode, *kinds: type) -> list[str]:
     return [n for n, d in source.cls.declarations.items() if isinstance(d, kinds)]
 
 
-def dependencies(source: Source) -> dict[str, set[str]]:
+def dependencies(source: PartCode) -> dict[str, set[str]]:
     """Return output (declared name) -> the inputs that it follows without delay."""
     reach = Dependencies(source, ["outputs"], _declared(source, Input)).reach
     return {n: reach.get(n, set()) for n in _declared(source, Output)}
 
 
-def initial_dependencies(source: Source) -> dict[str, set[str]]:
+def initial_dependencies(source: PartCode) -> dict[str, set[str]]:
     """Return what outputs ("y") and derivatives ("der.x") follow during initialization, declared names.
 
     Parameters, inputs and start values of states; there the equations of the start, of the outputs and of the
@@ -166,7 +170,7 @@ def initial_dependencies(source: Source) -> dict[str, set[str]]:
     return {n: reach.get(n, set()) for n in names}
 
 
-def written(source: Source) -> set[str]:
+def written(source: PartCode) -> set[str]:
     """Return the discretes that a sampled method writes; the others keep what ``start`` gave them."""
     names: set[str] = set()
     for _, code in source.equations["sampled"]:
@@ -174,7 +178,7 @@ def written(source: Source) -> set[str]:
     return {n for n in names if isinstance(source.cls.declarations.get(n), Discrete)}
 
 
-def followed(source: Source) -> list[str] | None:
+def followed(source: PartCode) -> list[str] | None:
     """Return the inputs and changing discretes that ``outputs`` reads, discretes first; none: the outputs stay.
 
     None where it reads states, noise or time, with which it changes at every step, and where it is too short (no loop,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 from gyrobench.units import base_unit
 
 #: section -> causality, variability, initial
@@ -78,11 +79,15 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     ET.SubElement(v, kind, of_type)
 
 
-def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -> None:
-    """Add the definitions of all units in use to the description, spelled out in base units."""
-    used = sorted({unit_name(s) for s in cls.layout if s.decl.type is float} | set(extra))
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for name in used:
+def units(layout: Iterable[Scalar], *more: str) -> ET.Element:
+    """Return the definitions of all units in use, see :func:`unit_definitions`."""
+    return unit_definitions({unit_name(s) for s in layout if s.decl.type is float}.union(more))
+
+
+def unit_definitions(names: Iterable[str]) -> ET.Element:
+    """Return the definitions of units, spelled out in base units."""
+    definitions = ET.Element("UnitDefinitions")
+    for name in sorted(names):
         u = ET.SubElement(definitions, "Unit", {"name": name})
         base = base_unit(name)
         if base is not None:  # FMI has whole exponents only: sqrt(Hz) is named but not spelled out
@@ -91,6 +96,7 @@ def units(root: ET.Element, cls: type[Component], extra: tuple[str, ...] = ()) -
             if factor != 1.0:
                 attributes["factor"] = repr(factor)
             ET.SubElement(u, "BaseUnit", attributes)
+    return definitions
 
 
 def default_experiment(cls: type[Component]) -> dict[str, str]:
@@ -111,7 +117,7 @@ def licence(cls: type[Component]) -> dict[str, str]:
 
 def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
     """Return the XML text.  ``target`` is "native" or "python": what each can do differs."""
-    source = Source(cls)
+    source = PartCode(cls)
     root = ET.Element(
         "fmiModelDescription",
         {
@@ -143,7 +149,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     if native:
         files = ET.SubElement(co, "SourceFiles")
         ET.SubElement(files, "File", {"name": "fmi2.c"})
-    units(root, cls)
+    root.append(units(cls.layout))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
@@ -155,7 +161,7 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None:
+def _structure(parent: ET.Element, cls: type[Component], source: PartCode) -> None:
     """Add the outputs with the inputs and states they follow without delay, derivatives and initial unknowns."""
     follows = dependencies(source)
     outputs = [s for s in cls.layout if s.section == "output"]
@@ -179,7 +185,7 @@ def _structure(parent: ET.Element, cls: type[Component], source: Source) -> None
             ET.SubElement(node, "Unknown", {"index": str(s.reference + 1), "dependencies": on_index})
 
 
-def initial_references(cls: type[Component], source: Source) -> dict[str, list[int]]:
+def initial_references(cls: type[Component], source: PartCode) -> dict[str, list[int]]:
     """Return the places of the variables that outputs and derivatives depend on during initialization, by name."""
     follows = initial_dependencies(source)
     known = [x for x in cls.layout if x.section in ("parameter", "input", "state")]

@@ -23,7 +23,7 @@ from gyrobench.packaging.description import (
     units,
 )
 from gyrobench.packaging.native_target import variables
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 
@@ -125,7 +125,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
             "canHandleVariableCommunicationStepSize": "true",
         },
     )
-    units(root, cls, extra=("s",))
+    root.append(units(cls.layout, "s"))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
@@ -136,7 +136,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
         add_variable(declared, cls, v[0], v if v[0].decl.shape else ())
 
     structure = ET.SubElement(root, "ModelStructure")
-    source = Source(cls)
+    source = PartCode(cls)
     follows, initial = dependencies(source), initial_references(cls, source)
     firsts = [v[0] for v in every]
     outputs = [s for s in firsts if s.section == "output"]

@@ -207,6 +207,13 @@ class Expressions(Places):
             if code is None:
                 raise self.refuse(e, f"self.{e.func.attr} is not a procedure of this part")
             return code
+        if of == "super()":
+            code = source.base_method(e.func.attr, self.code)
+            if code is None:
+                raise self.refuse(e, f"{of}.{e.func.attr} is not a procedure of the bases of this class")
+            return code
+        if of.startswith("super("):
+            raise self.refuse(e, f"write super().{e.func.attr}(...): the bases of this class, in their order")
         blocks = self.code.placed.blocks if self.code.placed else source.cls.placed
         if of.removeprefix("self.") in blocks:
             code = source.block_method(of.removeprefix("self."), e.func.attr, self.code)

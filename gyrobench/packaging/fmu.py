@@ -12,13 +12,14 @@ from pathlib import Path
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component
-from gyrobench.files import make_once, write_whole
+from gyrobench.files import make_once, sha256, write_whole
 from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
 from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
 from gyrobench.packaging.loading import BuildError, load_part, sources
 from gyrobench.packaging.native_library import make_library
+from gyrobench.user_code import blamed
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
 
@@ -57,7 +58,7 @@ def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
     return guid_of(_content(cls, name, "native", fmi))
 
 
-def write_archive(path: Path, entries: dict[str, bytes]) -> None:
+def write_archive(path: Path, entries: dict[str, bytes], durable: bool = True) -> None:
     """Write a zip archive; the same entries give the same file."""
 
     def write(temporary: Path) -> None:
@@ -69,7 +70,7 @@ def write_archive(path: Path, entries: dict[str, bytes]) -> None:
                 z.writestr(info, entries[name])
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, write)  # a build that is stopped leaves no half file
+    write_whole(path, write, durable)  # a build that is stopped leaves no half file
 
 
 def native_entries(files: dict[str, str], name: str, platforms: tuple[str, ...], fmi: int) -> dict[str, bytes]:
@@ -127,7 +128,8 @@ def build(
     cls = load_part(part, bench) if isinstance(part, str) else part
     name = part if isinstance(part, str) else sources(cls)["model"].parent.name
     identifier = name
-    what = _content(cls, name, target, fmi)
+    with blamed(sources(cls)["model"]):
+        what = _content(cls, name, target, fmi)
     readme = sources(cls)["model"].parent / "README.md"
     documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
     if target == "native":
@@ -154,19 +156,12 @@ def build(
         entries |= index_page(name, summary(cls), cls.__doc__ or "", cls.layout) | licences(target == "python")
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
-        write_archive(path, entries)
+        write_archive(path, entries, durable=False)
 
-    make_once(cached, write)
+    with blamed(sources(cls)["model"]):
+        make_once(cached, write)
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
-    if not _is_copy(path, cached):
+    if not path.exists() or sha256(path) != sha256(cached):
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda temporary: shutil.copy2(cached, temporary))
+        write_whole(path, lambda temporary: shutil.copyfile(cached, temporary))
     return path
-
-
-def _is_copy(path: Path, of: Path) -> bool:
-    """Return whether a file has the size and the time of another, as its copy has until something writes to it."""
-    if not path.exists():
-        return False
-    one, other = path.stat(), of.stat()
-    return (one.st_size, one.st_mtime_ns) == (other.st_size, other.st_mtime_ns)

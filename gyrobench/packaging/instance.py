@@ -19,7 +19,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from gyrobench.component import Component, ComponentError
 from gyrobench.component.declarations import element_names
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import temporary_folder, unzip_fmu
+from gyrobench.files import check_size, temporary_folder, unzip_fmu
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.loading import load_part
 
@@ -152,6 +152,7 @@ class Fmu:
 
         self._own = like is None
         if like is None:
+            check_size(path)
             self.description = fmpy.read_model_description(str(path), validate=False)
             self.folder = temporary_folder()
             unzip_fmu(path, self.folder)

@@ -19,6 +19,7 @@ from types import ModuleType
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
+from gyrobench.user_code import blamed, check_attributes
 
 ROOM = "components"
 _loaded: dict[str, tuple[type[Component], dict[Path, str]]] = {}  # by file: the class, and the hashes of its sources
@@ -37,7 +38,8 @@ def import_file(path: Path, name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        with blamed(path):
+            spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
@@ -96,6 +98,7 @@ def _load(name: str, bench: Path | None) -> type[Component]:
     if len(classes) != 1:
         raise BuildError(f"{path}: one Component class is expected, found {len(classes)}")
     cls: type[Component] = classes[0]
+    check_attributes(cls, Component, path)
     cls.sources = {"model": str(path), **{n: str(f) for n, f in files.items()}}
     _loaded[f"{home.folder}:{path.resolve()}"] = cls, {f: _digest(f) for f in (path, *files.values())}
     return cls

@@ -11,7 +11,7 @@ from pathlib import Path
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
-from gyrobench.packaging.source import Source, member
+from gyrobench.packaging.source import PartCode, member
 from gyrobench.packaging.translate import Translation
 
 HERE = Path(__file__).parent
@@ -74,7 +74,7 @@ def _runs(references: list[int]) -> list[tuple[int, int]]:
 
 def c_source(cls: type[Component], guid: str) -> str:
     """Return model.c of a part.  Raises SubsetError where an equation leaves the subset."""
-    source = Source(cls)
+    source = PartCode(cls)
     layout = cls.layout
     counts = {s: sum(1 for x in layout if x.section == s) for s in {x.section for x in layout}}
     checked = [s for s in layout if s.section in ("parameter", "input", "state")]

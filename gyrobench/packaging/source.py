@@ -124,7 +124,7 @@ def read_code(function: Any, owner: type | None, placed: Placed | None) -> Code:
     raise SubsetError(f"{path}:{at.co_firstlineno}: {function.__qualname__} is not found in its file: was it changed?")
 
 
-class Source:
+class PartCode:
     """The code of a part: its equations, and the procedures and functions that they call."""
 
     def __init__(self, cls: type[Component]) -> None:
@@ -166,7 +166,16 @@ class Source:
 
     def method(self, name: str, code: Code) -> Code | None:
         """Return the procedure that ``self.name(...)`` calls in ``code``; None where there is none of that name."""
-        f = getattr(code.owner, name, None)
+        return self._procedure(getattr(code.owner, name, None), name, code)
+
+    def base_method(self, name: str, code: Code) -> Code | None:
+        """Return the procedure that ``super().name(...)`` calls in ``code``; None where the bases have none."""
+        inside = dict(zip(code.function.__code__.co_freevars, code.function.__closure__ or (), strict=True))
+        if code.owner is None or "__class__" not in inside:
+            return None
+        return self._procedure(getattr(super(inside["__class__"].cell_contents, code.owner), name, None), name, code)
+
+    def _procedure(self, f: Any, name: str, code: Code) -> Code | None:
         if not isinstance(f, FunctionType) or f is vars(Component).get(name) or not procedure_name(name, f):
             return None
         return read_code(f, code.owner, code.placed)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from gyrobench.component import Discrete, Input, Output, Parameter, State
 from gyrobench.packaging.c_arrays import CExpression, CVariable, Shape, cells, dimensions, words
 from gyrobench.packaging.expressions import Expressions
-from gyrobench.packaging.source import Code, Source, SubsetError, gives_value, local, member, returns
+from gyrobench.packaging.source import Code, PartCode, SubsetError, gives_value, local, member, returns
 
 WRITABLE: dict[str, tuple[type, ...]] = {
     "start": (Discrete, State),
@@ -338,12 +338,13 @@ class Method(Expressions):
 class Translation:
     """The equations of a part as C: ``text`` holds the functions, ``heads`` those that are declared before."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: PartCode) -> None:
         self.source = source
         self.heads: list[str] = []
         self.functions: list[str] = []
         self.procedures: dict[tuple[object, ...], Procedure] = {}
         self.under_way: list[object] = []
+        self.names: list[str] = []  # of the procedures, before those of one name are numbered
         self.written: set[str] = set()  # by the sampled methods
         for kind in ("start", "flow", "outputs"):
             self.equation(kind, False)
@@ -402,9 +403,12 @@ class Translation:
             raise caller.refuse(node, f"{code.node.name} calls itself: equations have no recursion")
         self.under_way.append(key)
         name = f"{code.placed.name}_{code.node.name}" if code.placed else code.node.name
+        if code.owner is not None and getattr(code.owner, code.node.name, code.function) is not code.function:
+            name = f"{code.function.__qualname__.split('.')[-2:][0]}_{name}"  # one that super() calls
         name += "_d" if dual else "_"
-        same = sum(p.name.rstrip("0123456789") == name for p in self.procedures.values())
-        name += str(same + 1) if same else ""
+        self.names.append(name)
+        same = self.names.count(name)
+        name += str(same) if same > 1 else ""
         method = Method(self, code, dual, PROCEDURE, shapes)
         head, text = method.text(name)
         self.under_way.pop()

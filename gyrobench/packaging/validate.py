@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, BenchError
+from gyrobench.files import check_description
 from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
@@ -93,6 +94,7 @@ def _described(path: Path) -> tuple[Any, list[str]]:
     """Return the model description and its problems: FMPy's checks but for that of the names, which is made here."""
     from fmpy import read_model_description
 
+    check_description(path)
     with zipfile.ZipFile(path) as archive:
         names = [f.orig_filename for f in archive.filelist if "\\" in f.orig_filename]
     problems = [f'The file path "{n}" contains a backslash.' for n in names]
@@ -112,10 +114,12 @@ def _described(path: Path) -> tuple[Any, list[str]]:
 
 
 def _units(description: Any) -> list[str]:
+    """Return the units that are neither known nor defined by the FMU itself."""
     problems: dict[str, str] = {}
+    defined = {u.name for u in description.unitDefinitions if u.baseUnit is not None}
     for v in description.modelVariables:
         name = v.unit or (v.declaredType.unit if v.declaredType is not None else None)
-        if name and name not in problems:
+        if name and name not in problems and name not in defined:
             try:
                 unit(name)
             except UnitError as error:

@@ -26,6 +26,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
+from gyrobench.reading import require_regular
 
 MAX_LISTED = 8  # row numbers listed before "and n more"
 SCANNED = 50  # lines below the header that tell the decimal sign
@@ -68,9 +69,23 @@ WINDOW_COLUMNS = (
 )
 
 
+def regular(file: Path) -> Path:
+    """Return a file.  Raises DataError for a pipe or a device."""
+    return require_regular(Path(file), lambda text: DataError(file, [text]))
+
+
+def for_arrow(file: Path) -> Any:
+    """Return what pyarrow can open: the path, or the open file where the path is not UTF-8."""
+    try:
+        str(file).encode()
+    except UnicodeEncodeError:
+        return file.open("rb")
+    return file
+
+
 def read_lines(file: Path) -> list[str]:
     """Return the lines of a text file.  Raises DataError for one that is not UTF-8, as from spreadsheets on Windows."""
-    data = Path(file).read_bytes()
+    data = regular(file).read_bytes()
     try:
         return data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
@@ -81,7 +96,7 @@ def read_lines(file: Path) -> list[str]:
 def check_utf8(file: Path) -> None:
     """Raise DataError for a file of any length that is not UTF-8 text, with the row."""
     decoder, row = codecs.getincrementaldecoder("utf-8")(), 1
-    with Path(file).open("rb") as data:
+    with regular(file).open("rb") as data:
         block = b" "
         while block:
             block = data.read(1 << 20)
@@ -117,7 +132,7 @@ class Head:
 def read_head(file: Path) -> Head:
     """Return header and comments of a file of any length.  Raises DataError for none, and for text not in UTF-8."""
     comments: dict[str, str] = {}
-    with Path(file).open("rb") as lines:
+    with regular(file).open("rb") as lines:
         for number, data in enumerate(lines, 1):
             try:
                 line = data.decode("utf-8-sig" if number == 1 else "utf-8").rstrip("\r\n")

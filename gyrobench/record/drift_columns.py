@@ -19,7 +19,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import CsvColumn, DataError, Head, header_places, read_head
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, for_arrow, header_places, read_head, regular
 from gyrobench.record.record import Record
 from gyrobench.record.time_series import read_blocks
 
@@ -63,7 +63,7 @@ def open_table(source: Path, channel: str = "") -> DriftTable:
     """
     if source.is_dir():
         return _of_run(Record.load(source), source, channel)
-    if not source.is_file():
+    if not regular(source).is_file():
         raise DataError(source, ["no such file; name a CSV or Parquet file, or the folder of a run"])
     if source.stat().st_size == 0:
         raise DataError(source, ["the file is empty"])
@@ -92,7 +92,7 @@ def _of_parquet(source: Path) -> DriftTable:
 
     try:
         # neither mapped nor read ahead: both keep the whole of a long file in memory
-        file = pq.ParquetFile(source, buffer_size=BUFFER, pre_buffer=False)
+        file = pq.ParquetFile(for_arrow(source), buffer_size=BUFFER, pre_buffer=False)
     except (pa.ArrowInvalid, OSError) as error:
         raise DataError(source, [f"not a readable Parquet file: {error}"]) from None
     schema = file.schema_arrow

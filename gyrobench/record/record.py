@@ -3,10 +3,11 @@
 ``record.parquet``   one row for each completed window (columns in SI, see the Sampler socket)
 ``channels.parquet`` decimated signals: ``time`` and "slot.variable" columns
 ``run.json``         system, parts with SHA-256, parameters, seed, versions, order, step, complete, stopped_at,
-                     SHA-256 of the tables: :mod:`gyrobench.record.run_document`
+                     SHA-256 of the tables and of itself: :mod:`gyrobench.record.run_document`
 
 Without pyarrow the tables are CSV files of the same names; numbers are written so that they read back bit for bit.
-Every file is written under a temporary name and renamed, run.json last: a folder with run.json is complete.
+Every file is written under a temporary name and renamed once it is on the disk, run.json last: a folder with it is
+complete.  The digests are checked whenever a record is read.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 
 from gyrobench.arrays import AnyArray
 from gyrobench.bench import UsageError
+from gyrobench.boundary import checked
 from gyrobench.files import sha256, write_whole
 from gyrobench.notebook import Displayed, data_frame
 from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocument, read_run
@@ -48,7 +50,12 @@ def write_table(stem: Path, columns: dict[str, AnyArray]) -> Path:
         import pyarrow.parquet as pq
 
         table = pa.table([_arrow(c) for c in columns.values()], names=list(columns))
-        write_whole(parquet, lambda p: pq.write_table(table, p))
+
+        def save(path: Path) -> None:
+            with path.open("wb") as file:  # not by its name, which may not be UTF-8
+                pq.write_table(table, file)
+
+        write_whole(parquet, save)
         text.unlink(missing_ok=True)
         return parquet
 
@@ -95,7 +102,7 @@ def read_table(stem: Path) -> dict[str, AnyArray] | None:
     if parquet.exists():
         import pyarrow.parquet as pq
 
-        with pq.ParquetFile(parquet) as file:
+        with parquet.open("rb") as data, pq.ParquetFile(data) as file:
             table = file.read()
         return {name: _numpy(table.column(name)) for name in table.column_names}
     if text.exists():
@@ -122,6 +129,7 @@ class Record(Displayed):
     run: RunDocument = field(default_factory=lambda: RunDocument())
     folder: Path | None = None
 
+    @checked
     def save(self, folder: Path) -> Path:
         """Write the folder (see the module) and return it."""
         folder = Path(folder)
@@ -137,6 +145,7 @@ class Record(Displayed):
         return folder
 
     @classmethod
+    @checked
     def load(cls, folder: Path) -> Record:
         """Read a folder.  Raises RecordError when it is not a record, or when a table is not the one that was saved."""
         folder = Path(folder)
@@ -161,6 +170,7 @@ class Record(Displayed):
         state = "" if self.complete else ", incomplete"
         return f"<Record of {self.run.system}: {windows} windows, {signals} channels of {samples} samples{state}>"
 
+    @checked
     def table(self, name: str) -> tuple[dict[str, AnyArray], dict[str, str]]:
         """Return the columns of "windows" or "channels" and their SI units, "" where not known.  Raises UsageError."""
         tables = {"windows": (self.windows, self.run.window_units), "channels": (self.channels, self.run.units)}
@@ -169,6 +179,7 @@ class Record(Displayed):
         columns, units = tables[name]
         return columns, {c: "s" if c == "time" else units.get(c, "") for c in columns}
 
+    @checked
     def frame(self, table: str = "windows") -> pandas.DataFrame:
         """Return "windows" or "channels" as a data frame, SI; its ``attrs["units"]`` says the units.
 
@@ -176,6 +187,7 @@ class Record(Displayed):
         """
         return data_frame(*self.table(table))
 
+    @checked
     def to_csv(self, folder: Path) -> list[Path]:
         """Write windows.csv and channels.csv into a folder, those that have rows; return the files.
 

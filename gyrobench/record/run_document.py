@@ -196,11 +196,12 @@ class Document(Entry):
     customer: str = ""
     conditions: str = ""
     equipment: str = ""
+    notes: list[str] = Field(default_factory=list, description="notes and warnings given before the run")
 
     def write(self, folder: Path) -> None:
         """Write run.json into a folder."""
-        text = json.dumps(self.as_dict(), indent=1, ensure_ascii=False, allow_nan=False)
-        write_whole(Path(folder) / FILE, (text + "\n").encode())
+        text = json.dumps(reading.sealed(self.as_dict()), indent=1, ensure_ascii=False, allow_nan=False)
+        write_whole(Path(folder) / FILE, (text + "\n").encode("utf-8", "backslashreplace"))
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with changed entries."""
@@ -219,6 +220,7 @@ class RunDocument(Document):
     order: list[str] = Field(default_factory=list, description="slots in the order of execution")
     cuts: list[str] = Field(default_factory=list, description="connections that carry the value of the step before")
     delays: dict[str, float] = Field(default_factory=dict, description="connection -> delay, s")
+    coupling: str = Field(default="", description="parallel: every connection carries the value of the step before")
     parts: dict[str, PartInfo] = Field(default_factory=dict, description="slot -> FMU")
     parameters: dict[str, Value] = Field(default_factory=dict, description="slot.parameter -> value, SI")
     changed: list[str] = Field(default_factory=list, description="options, parameters and slots that were set")
@@ -226,7 +228,6 @@ class RunDocument(Document):
     units: dict[str, str] = Field(default_factory=dict, description="recorded channel -> unit")
     window_units: dict[str, str] = Field(default_factory=dict, description="column of the windows -> unit, SI")
     plan: list[PlanRow] = Field(default_factory=list)
-    notes: list[str] = Field(default_factory=list, description="notes and warnings given before the run")
     linear: LinearModels | None = Field(default=None, description="of a system with loops")
     timing: dict[str, float] = Field(default_factory=dict, description="slot -> s of wall time")
     steps: int = Field(default=0, description="communication steps done")
@@ -290,12 +291,26 @@ class SuiteDocument(Document):
 SUITE_KEYS = {"identity", "runs", "tests"}
 
 
+#: of the run.json of 0.1.0, and of one that was written by hand
+NO_DIGEST = "run.json has no SHA-256 of its own: whether it was changed after the run is not known."
+
+
+def _changed(problem: str) -> RecordError:
+    return RecordError(f"{problem}; restore it from a copy, or repeat the run")
+
+
 def read_run(folder: Path) -> RunDocument | SuiteDocument:
     """Return the run.json of a folder.  Raises RecordError where there is none that can be read."""
     file = Path(folder) / FILE
-    data = reading.json_object(reading.read_text(file, RecordError), file, RecordError)
+    data, verified = reading.opened(
+        reading.json_object(reading.read_text(file, RecordError), file, RecordError), file, _changed
+    )
     try:
-        return (SuiteDocument if SUITE_KEYS & data.keys() else RunDocument).model_validate(data)
+        kind: type[RunDocument | SuiteDocument] = SuiteDocument if SUITE_KEYS & data.keys() else RunDocument
+        run = kind.model_validate(data)
+        if not verified and NO_DIGEST not in run.notes:
+            run.notes.append(NO_DIGEST)
+        return run
     except ValidationError as error:
         problems = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
         shown = "; ".join([*problems[:3], *([f"and {len(problems) - 3} more"] if len(problems) > 3 else [])])
@@ -308,7 +323,9 @@ def schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "https://gyrobench.example/schema/run-1.json",
         "title": "gyrobench run",
-        "description": "What a record says of its run, or of the tests of a suite. SI units; further keys are allowed.",
+        "description": "What a record says of its run, or of the tests of a suite. SI units; further keys are "
+        "allowed. sha256, the last key of a file, is the SHA-256 of all others as JSON text in UTF-8 with sorted keys, "
+        "', ' and ': ' between them.",
     }
     return {**head, **TypeAdapter(RunDocument | SuiteDocument).json_schema()}
 

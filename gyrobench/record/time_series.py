@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, header_places
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, for_arrow, header_places
 from gyrobench.record.sampling import Successive
 
 Block = Mapping[str, Array]
@@ -85,7 +85,7 @@ def _open(file: Path, head: Head, wanted: list[str], kind: Any, invalid: Callabl
         decimal_point="," if head.decimal_comma else ".", strings_can_be_null=True,
     )  # fmt: skip
     return arrow.open_csv(
-        file,
+        for_arrow(file),
         arrow.ReadOptions(skip_rows=head.line, column_names=names, block_size=BLOCK),
         arrow.ParseOptions(  # an empty line is a row of one empty cell, or none
             delimiter=head.delimiter, invalid_row_handler=invalid, ignore_empty_lines=len(head.names) > 1

@@ -15,11 +15,11 @@ from gyrobench.report.page_model import (
     CollapsedBlocks,
     Column,
     Page,
+    PageTable,
     Picture,
     Pictures,
     Row,
     Section,
-    Table,
     Text,
     number_cell,
     text_cell,
@@ -170,11 +170,11 @@ def page(doc: Json) -> Page:
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
 
 
-def side_tables(doc: Json) -> list[Table]:
+def side_tables(doc: Json) -> list[PageTable]:
     """Return the tables that stand side by side: runs, ranking, estimates and differences."""
     ranked = ranking_section.section(doc, letters(len(doc["runs"]))).blocks
     blocks = [_runs(doc), *ranked, *_estimates(doc), *_differences(doc)]
-    return [b for b in blocks if isinstance(b, Table)]
+    return [b for b in blocks if isinstance(b, PageTable)]
 
 
 def side_figure(doc: Json, key: str) -> str:
@@ -207,7 +207,7 @@ def letters(count: int) -> list[str]:
     return [_letter(k) for k in range(count)]
 
 
-def _runs(doc: Json) -> Table:
+def _runs(doc: Json) -> PageTable:
     pooled = any(run["seeds"] for run in doc["runs"])
     rows = [
         Row(
@@ -223,7 +223,7 @@ def _runs(doc: Json) -> Table:
     columns = [Column(""), Column("run", wide=True), Column("system"), Column("report")]
     columns += [*([Column("seeds")] if pooled else []), Column("verdict")]
     means = " Runs that differ in the seed alone are one: estimates are means over the seeds, u their standard errors."
-    return Table(columns, rows, f"Runs.{means if pooled else ''}")
+    return PageTable(columns, rows, f"Runs.{means if pooled else ''}")
 
 
 def _differing(doc: Json) -> list[Any]:
@@ -239,7 +239,9 @@ def _differing(doc: Json) -> list[Any]:
         ]
         columns = [Column("setting"), *(Column(_letter(k), wide=True) for k in part)]
         blocks.append(
-            Table(columns, rows, "Components, parameters and settings that differ; parameters in SI units.", small=True)
+            PageTable(
+                columns, rows, "Components, parameters and settings that differ; parameters in SI units.", small=True
+            )
         )
     return blocks
 
@@ -276,7 +278,7 @@ def _estimates(doc: Json) -> list[Any]:
         columns = [Column("name"), Column("unit")]
         for k in part:
             columns += [Column(_letter(k)), Column(f"u({_letter(k)})")]
-        blocks.append(Table(columns, rows, "Estimates and their standard uncertainties."))
+        blocks.append(PageTable(columns, rows, "Estimates and their standard uncertainties."))
     return blocks
 
 
@@ -307,7 +309,7 @@ def _differences(doc: Json) -> list[Any]:
             if doc["runs"][base]["seeds"]
             else "the runs are treated as independent."
         )
-        blocks.append(Table(columns, rows, caption))
+        blocks.append(PageTable(columns, rows, caption))
     blocks.append(
         Text(
             f"{marked} of {len(all_of_them)} differences exceed their expanded uncertainty; about "
@@ -344,7 +346,7 @@ def _equal(doc: Json) -> list[Any]:
     if not doc["equal"]:
         return []
     rows = [Row([text_cell(row["what"]), _value(doc, ("equal", i, "value"))]) for i, row in enumerate(doc["equal"])]
-    table = Table(
+    table = PageTable(
         [Column("setting"), Column("value", wide=True)], rows, "Equal in all runs; parameters in SI units.", small=True
     )
     return [CollapsedBlocks(f"{len(rows)} entries", [table])]

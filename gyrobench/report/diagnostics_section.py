@@ -11,10 +11,10 @@ from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     Cell,
     CollapsedBlocks,
+    PageTable,
     Picture,
     Row,
     Section,
-    Table,
     Text,
     columns,
     number_cell,
@@ -57,12 +57,12 @@ def _residuals(report: Report[RunResult], result: DriftTestResult) -> list[Any]:
     )  # fmt: skip
     acf = _acf(
         result.acf, "windows",
-        "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
+        "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
         "Autocorrelation of the residuals against lag, with bounds",
     )  # fmt: skip
     quantiles = Picture(
         "quantiles", plots.quantiles(values, "quantiles"),
-        "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
+        "Residuals against normal quantiles. Points on the line and inside the 95 % band are compatible with a normal "
         "distribution; points off it at the ends are outliers.",
         "Q-Q plot of the residuals against a normal distribution", half=True,
     )  # fmt: skip
@@ -101,7 +101,7 @@ def _tests(report: Report[RunResult], caption: str) -> list[Any]:
         p = number_cell(report.document, ("tests", k, "p"), write=write_p, mark=mark)
         rows.append(Row([text_cell(test.name, "strong"), text_cell(test.what), statistic, p, text_cell(test.finding)]))
     heads = columns("test", "sensitive to", "statistic", "p", "finding", wide=("sensitive to", "finding"))
-    return [Table(heads, rows, caption)] if rows else []
+    return [PageTable(heads, rows, caption)] if rows else []
 
 
 def _stability(report: Report[RunResult]) -> list[Any]:
@@ -109,7 +109,7 @@ def _stability(report: Report[RunResult]) -> list[Any]:
     psd = result.psd if isinstance(result, DriftTestResult) else None
     allan = Picture(
         "allan", plots.allan(result.allan, "allan") if result.allan else "",
-        "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
+        "Allan deviation with 95 % confidence intervals. Slope −½: white noise (of a rate: angle random walk); 0: "
         "bias instability; +½: random walk (of a rate: rate random walk). In the residuals of a fit the slow drift "
         "that its terms take up is missing: a fall at long averaging times is then the fit's.",
         "Allan deviation against averaging time, logarithmic axes", half=True,
@@ -134,7 +134,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
             f"{condition}. Above 100, errors of the model are amplified in the least-determined combination."
         )
         blocks.append(Text(text))
-    heads = ["name", "u, Type A", "dof", "k", "U (95 %)", "t", "p (t)", "closed form", "difference"]
+    heads = ["name", "u, Type A", "dof", "k", "U (95 %)", "t", "p (t)", "closed form", "difference"]
     groups = unit_groups(result.coefficients)
     if not groups:
         heads.insert(1, "unit")
@@ -145,7 +145,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
     caption = (
         "Uncertainty of each estimate. Closed form: the formula of the source; difference: closed form − estimate."
     )
-    blocks.append(Table(columns(*heads), rows, caption, small=True))
+    blocks.append(PageTable(columns(*heads), rows, caption, small=True))
     matrix = result.correlation if isinstance(result, DriftTestResult) else []
     correlation = Picture(
         "correlation", plots.correlation(matrix, names, "correlation"),
@@ -154,7 +154,7 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
     )  # fmt: skip
     scores = Picture(
         "scores", plots.scores(result.coefficients, "scores"),
-        "Deviation of the estimates from the truth in units of u. Band: ±k, coverage probability 95 %.",
+        "Deviation of the estimates from the truth in units of u. Band: ±k, coverage probability 95 %.",
         "Estimate minus truth over standard uncertainty, one point per coefficient", half=True,
     )  # fmt: skip
     tables = [block for k, t in enumerate(result.tables) for block in method_table(doc, ("tables", k), t)]
@@ -219,7 +219,7 @@ def budget(report: Report[RunResult]) -> list[Any]:
     alt = "Uncertainty budget as bars: contribution of each source to the uncertainty of the coefficients"
     caption = "Uncertainty budget: contribution of each source, and their root sum of squares against the stated u."
     heads = ("source", "u(x)", "unit", "sensitivity coefficient c", "unit", "|c|·u(x)", "note")
-    table = Table(
+    table = PageTable(
         columns(*heads, wide=("source", "note")), rows,
         "Uncertainty budget: standard uncertainty u(x) of each source, sensitivity coefficient and contribution to u.",
         small=True,

@@ -10,10 +10,10 @@ from gyrobench.report.page_model import (
     BulletList,
     CollapsedBlocks,
     Page,
+    PageTable,
     Picture,
     Row,
     Section,
-    Table,
     Text,
     columns,
     number_cell,
@@ -124,4 +124,4 @@ def _values(report: Report[DriftRecordResult], k: int) -> Any:
     heads = columns(("averaging time", "s"), (first.kind, c.unit), "95 % from", "to", "edf")
     heads += columns(*((d.kind, c.unit) for d in others))
     caption = "Deviations. edf: equivalent degrees of freedom of the Allan deviation."
-    return CollapsedBlocks("Values of the deviations", [Table(heads, rows, caption, small=True)])
+    return CollapsedBlocks("Values of the deviations", [PageTable(heads, rows, caption, small=True)])

@@ -11,9 +11,9 @@ from gyrobench.report.page_model import (
     Cell,
     CollapsedBlocks,
     Equation,
+    PageTable,
     Picture,
     Row,
-    Table,
     columns,
     number_cell,
     pictures,
@@ -72,7 +72,7 @@ def system(report: Report[Result]) -> list[Any]:
         Row([number_cell(report.document, ("derived", "plan", k, name), significant=7) for name in shown])
         for k in range(len(plan))
     ]
-    return blocks + ([Table(columns(*(PLAN[n] for n in shown)), rows, "Test plan.", small=True)] if rows else [])
+    return blocks + ([PageTable(columns(*(PLAN[n] for n in shown)), rows, "Test plan.", small=True)] if rows else [])
 
 
 def _cuts(run: Provenance) -> list[str]:
@@ -100,4 +100,4 @@ def full_values(report: Report[Result]) -> list[Any]:
         )
     heads = columns("name", "estimate", "u", "95\N{NO-BREAK SPACE}% from", "to")
     caption = "Estimates at full precision, units as in the table of coefficients."
-    return [CollapsedBlocks("Full precision, as in result.json", [Table(heads, rows, caption, small=True)])]
+    return [CollapsedBlocks("Full precision, as in result.json", [PageTable(heads, rows, caption, small=True)])]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from gyrobench import notebook
 from gyrobench.record.record import Record
 from gyrobench.report.numbers import write_number
-from gyrobench.report.page_model import BulletList, Cell, Column, Row, Table, text_cell
+from gyrobench.report.page_model import BulletList, Cell, Column, PageTable, Row, text_cell
 from gyrobench.result import NO_VERDICT, DriftRecordResult, DriftTestResult, LoopResult, Result, SuiteResult
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def warning_list(warnings: Sequence[str]) -> str:
     return f'<ul style="list-style:none;padding-left:0;margin:.4em 0">{items}</ul>' if items else ""
 
 
-def table_html(table: Table) -> str:
+def table_html(table: PageTable) -> str:
     """Return a table of a report; numbers stand under each other at their decimal sign."""
     border = "border-bottom:1px solid var(--grid);"
     head = "".join(
@@ -108,7 +108,7 @@ def result_html(result: Result) -> str:
     head = [paragraph(result.title, strong=True), paragraph(verdict), *map(paragraph, result.summary)]
     methods = [paragraph(f"Methods: {result.suite.consistency}.")] if isinstance(result, SuiteResult) else []
     blocks = coefficients(report)
-    tables = [table_html(b) for b in blocks if isinstance(b, Table)]
+    tables = [table_html(b) for b in blocks if isinstance(b, PageTable)]
     tables += [warning_list(b.items) for b in blocks if isinstance(b, BulletList)]
     return fragment(*head, *methods, warning_list(result.warnings), *tables, figure_html(_main_figure(report)))
 
@@ -149,15 +149,15 @@ def record_html(record: Record) -> str:
     return fragment(*blocks)
 
 
-def _first_windows(record: Record) -> Table:
+def _first_windows(record: Record) -> PageTable:
     columns, units = record.table("windows")
     count = len(next(iter(columns.values()), ()))
     rows = [Row([_number(v[k].item()) for v in columns.values()]) for k in range(min(count, MAX_ROWS))]
     caption = f"Windows 1 to {len(rows)} of {count}, SI."
-    return Table([Column(n, "" if units[n] == "1" else units[n]) for n in columns], rows, caption)
+    return PageTable([Column(n, "" if units[n] == "1" else units[n]) for n in columns], rows, caption)
 
 
-def _channel_ranges(record: Record) -> Table:
+def _channel_ranges(record: Record) -> PageTable:
     columns, units = record.table("channels")
     rows = [
         Row([text_cell(name), text_cell(units[name]), *(_number(float(f())) for f in (v.min, v.mean, v.max))])
@@ -167,7 +167,7 @@ def _channel_ranges(record: Record) -> Table:
     time: Any = columns.get("time", ())
     span = f", t = {time[0]:.6g} to {time[-1]:.6g} s" if len(time) else ""
     heads = ("channel", "unit", "smallest", "mean", "largest")
-    return Table([Column(h) for h in heads], rows, f"Channels, {len(time)} samples each{span}; SI.")
+    return PageTable([Column(h) for h in heads], rows, f"Channels, {len(time)} samples each{span}; SI.")
 
 
 def _number(value: float | int) -> Cell:

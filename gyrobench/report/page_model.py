@@ -37,7 +37,7 @@ class Column:
     unit: str = ""
     number: bool = False
     wide: bool = False  # may take the room that is left
-    width: int = 0  # characters after the decimal sign, set by Table
+    width: int = 0  # characters after the decimal sign, set by PageTable
 
 
 def columns(*heads: str | tuple[str, str], wide: Collection[str] = ()) -> list[Column]:
@@ -54,7 +54,7 @@ class Row:
 
 
 @dataclass
-class Table:
+class PageTable:
     columns: list[Column]
     rows: list[Row]
     caption: str
@@ -126,7 +126,7 @@ class ResultSummary:
     rule: str
     summary: list[str]
     warnings: list[str]
-    requirements: Table | None
+    requirements: PageTable | None
     kind: str = "answer"
 
 
@@ -180,7 +180,7 @@ class Page:
             major, minor = (major, minor + 1) if section.sub else (major + 1, 0)
             section.number = f"{major}.{minor}" if section.sub else str(major)
             for block in walk(section.blocks):
-                if isinstance(block, Table):
+                if isinstance(block, PageTable):
                     tables += 1
                     block.number = tables
                 elif isinstance(block, Pictures):

@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.suite.ranking import RankedValue, rank
-from gyrobench.report.page_model import BulletList, Column, Row, Section, Table, Text, number_cell, text_cell
+from gyrobench.report.page_model import BulletList, Column, PageTable, Row, Section, Text, number_cell, text_cell
 from gyrobench.report.replicates import ComparedRun, Draws
 from gyrobench.result import Coefficient
 
@@ -106,7 +106,7 @@ def section(doc: Json, letters: Sequence[str]) -> Section:
     return Section("Ranking", "ranking", blocks)
 
 
-def _places(doc: Json, letters: Sequence[str]) -> Table:
+def _places(doc: Json, letters: Sequence[str]) -> PageTable:
     """Return the rank of each run by each measure."""
     rows = []
     for ranked in (doc["ranking"], *doc["purposes"]):
@@ -115,10 +115,10 @@ def _places(doc: Json, letters: Sequence[str]) -> Table:
         cells = [text_cell(x, "strong" if x in ("1", "1 =") else "") for x in shown]
         rows.append(Row([text_cell(ranked.get("purpose", "First measure")), text_cell(ranked["name"]), *cells]))
     columns = [Column("purpose", wide=True), Column("measure"), *(Column(x) for x in letters)]
-    return Table(columns, rows, "Ranks of all runs by all measures, 1: the smallest value; =: shared.")
+    return PageTable(columns, rows, "Ranks of all runs by all measures, 1: the smallest value; =: shared.")
 
 
-def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequence[str]) -> Table:
+def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequence[str]) -> PageTable:
     ranked = doc
     for key in path:
         ranked = ranked[key]  # type: ignore[index]
@@ -154,4 +154,4 @@ def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequen
         Column(ranked["name"], unit),
     ]
     columns += [Column("u"), Column("ratio to the smallest"), Column("probability")]
-    return Table(columns, rows, caption)
+    return PageTable(columns, rows, caption)

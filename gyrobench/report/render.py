@@ -9,9 +9,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from gyrobench.reading import visible
 from gyrobench.report.assets import content_dir, read_content
 from gyrobench.report.page_model import Equation, Page, walk
 from gyrobench.report.style import clean_svg, themed
+
+SCHEME = re.compile(r"[\s\x00-\x20]*([A-Za-z][\w+.\-\s]*):")
 
 
 def equations(page: Page) -> None:
@@ -52,7 +55,7 @@ def html(page: Page, bench: Path | None = None) -> str:
 
     name = "templates/report.html.j2"
     template = _environment(content_dir(bench, name)).get_template(name)
-    data = asdict(page)
+    data = _plain(asdict(page))
     for section in data["sections"]:
         for block in section["blocks"]:
             _theme(block)
@@ -66,7 +69,7 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
     """Return the page as a PDF (A4, searchable text, vector figures)."""
     import matplotlib
 
-    data = asdict(page)
+    data = _plain(asdict(page))
     files: dict[str, bytes] = {"main.typ": read_content("templates/report.typ", bench).encode()}
     for picture in page.pictures:
         files[f"figures/{picture.key}.svg"] = picture.svg.encode()
@@ -78,6 +81,21 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     made: bytes = _typst(files, font_paths=[str(fonts)])
     return made
+
+
+def _plain(value: Any, key: str = "") -> Any:
+    """Return a page whose texts, which may be those of others, are shown and not obeyed, and whose links lead to files.
+
+    A link with a scheme (``javascript:``) is left out, unless it is one of the web.
+    """
+    if isinstance(value, dict):
+        return {name: _plain(inner, name) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if not isinstance(value, str):
+        return value
+    scheme = SCHEME.match(value) if key == "link" else None
+    return "" if scheme and scheme[1].lower() not in ("http", "https") else visible(value)
 
 
 def _theme(block: dict[str, Any]) -> None:

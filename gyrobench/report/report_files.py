@@ -108,7 +108,9 @@ def write_files(
 
     def make(kind: str) -> bytes:
         if kind == "json":
-            return (json.dumps(doc, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+            return (json.dumps(doc, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode(
+                "utf-8", "backslashreplace"
+            )
         from gyrobench.report import render
 
         return render.html(page(), bench).encode() if kind == "html" else render.pdf(page(), bench)

@@ -7,7 +7,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.report.numbers import write_number
-from gyrobench.report.page_model import CollapsedBlocks, Picture, Row, Table, columns, number_cell, pictures, text_cell
+from gyrobench.report.page_model import (
+    CollapsedBlocks,
+    PageTable,
+    Picture,
+    Row,
+    columns,
+    number_cell,
+    pictures,
+    text_cell,
+)
 from gyrobench.report.plots import finite, short
 from gyrobench.report.result_json import Report
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
@@ -33,7 +42,7 @@ def blocks(report: Report[Result]) -> list[Any]:
     return figures
 
 
-def _points(report: Report[Result], k: int, r: Response) -> Table:
+def _points(report: Report[Result], k: int, r: Response) -> PageTable:
     """Return frequency, gain, phase, uncertainty and coherence of every measured point."""
     heads = {"x": (r.x_name, r.x_unit), "y": (r.y_name, r.y_unit), "phase": ("phase", "°")}
     heads |= {"u": ("u, relative", ""), "coherence": ("coherence", "")}
@@ -44,7 +53,7 @@ def _points(report: Report[Result], k: int, r: Response) -> Table:
         cells = [number_cell(report.document, ("responses", k, n, i), significant=digits.get(n, 6)) for n in shown]
         rows.append(Row([*cells, *([text_cell("yes" if r.counts[i] else "no")] if r.counts else [])]))
     caption = f"Points of the {r.name}. u: standard uncertainty of the gain, relative, and of the phase in radians."
-    return Table(columns(*shown.values(), *(["counts"] if r.counts else [])), rows, caption, small=True)
+    return PageTable(columns(*shown.values(), *(["counts"] if r.counts else [])), rows, caption, small=True)
 
 
 def of_all_runs(key: str, named: Named) -> list[Any]:

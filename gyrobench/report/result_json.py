@@ -7,8 +7,6 @@ found in ``Report.document``, the JSON content (NaN and infinities are null), by
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -183,17 +181,25 @@ def report_id(result: Result) -> str:
     return Report.of(result).report_id
 
 
-def load(text: str) -> Result:
-    """Return the Result in the text of a ``result.json``; raises ResultError for any other text."""
-    data = reading.json_object(text, "result.json", ResultError)
+def read_document(text: str, name: object, error: reading.Raise) -> dict[str, Any]:
+    """Return the content of a ``result.json``, whose report_id is the digest of all the rest; else raise the error."""
+    data = reading.json_object(text, name, error)
     if data.get("schema") != SCHEMA:
-        raise ResultError(f"not a result of gyrobench: 'schema' must be {SCHEMA!r}")
+        raise error(f"{name}: not a result of gyrobench: 'schema' must be {SCHEMA!r}")
+    rest = {key: value for key, value in data.items() if key not in ("schema", "report_id")}
+    reading.check_digest(rest, data.get("report_id"), name, lambda text: error(f"{text}; gyrobench report writes it"))
+    return data
+
+
+def load(text: str, name: object = "result.json") -> Result:
+    """Return the Result in the text of a ``result.json``; raises ResultError, with the name, for any other text."""
+    data = read_document(text, name, ResultError)
     for key in ("schema", "report_id", "derived"):
         data.pop(key, None)
     try:
         return Result.from_dict(data)
     except (KeyError, TypeError) as error:
-        raise ResultError(f"a result with missing or unknown fields: {error}") from None
+        raise ResultError(f"{name}: a result with missing or unknown fields: {error}") from None
 
 
 def pointer(*path: str | int) -> str:
@@ -213,5 +219,4 @@ def value_at(doc: Any, *path: str | int) -> Any:
 
 def content_hash(content: Mapping[str, Any]) -> str:
     """Return ten hexadecimal digits of the SHA-256 of JSON content."""
-    text = json.dumps(content, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()[:10]
+    return reading.digest(content)[: reading.SHORTEST]

@@ -14,11 +14,11 @@ from gyrobench.report.page_model import (
     BulletList,
     Cell,
     Page,
+    PageTable,
     Picture,
     ResultSummary,
     Row,
     Section,
-    Table,
     Text,
     columns,
     number_cell,
@@ -125,8 +125,8 @@ def answer(report: Report[Result]) -> ResultSummary:
                 text_cell(c.verdict, c.verdict),
             ]
             rows.append(Row(cells))
-    heads = columns("requirement", "meaning", "estimate", "U (95 %)", "unit", "limit", "verdict", wide=("meaning",))
-    table = Table(heads, rows, "Conformity with each requirement.") if rows else None
+    heads = columns("requirement", "meaning", "estimate", "U (95 %)", "unit", "limit", "verdict", wide=("meaning",))
+    table = PageTable(heads, rows, "Conformity with each requirement.") if rows else None
     rule = result.decision_rule if rows or result.verdict != NO_VERDICT else ""
     return ResultSummary(result.verdict, rule, result.summary, result.warnings, table)
 
@@ -146,7 +146,7 @@ def coefficients(report: Report[Result]) -> list[Any]:
     result = report.result
     limits = any(c.limit is not None for c in result.coefficients)
     truth = any(c.truth is not None for c in result.coefficients)
-    heads = ["name", "meaning", "estimate", "u", "95 % from", "to"]
+    heads = ["name", "meaning", "estimate", "u", "95 % from", "to"]
     heads += [*(["truth", "z"] if truth else []), *(["limit", "verdict"] if limits else [])]
     groups = unit_groups(result.coefficients)
     if not groups:
@@ -164,7 +164,7 @@ def coefficients(report: Report[Result]) -> list[Any]:
     if not limits:
         note += " No specification was applied; conformity is not stated."
     missing = no_values((c.name, c.no_value) for c in result.coefficients)
-    table = [Table(columns(*heads, wide=("meaning",)), rows, f"Coefficients. {note}")] if rows else []
+    table = [PageTable(columns(*heads, wide=("meaning",)), rows, f"Coefficients. {note}")] if rows else []
     return [*table, BulletList(missing, warn=True)] if missing else table
 
 
@@ -237,7 +237,7 @@ def _measured(report: Report[RunResult], record: Mapping[str, Any]) -> list[Any]
     if rows:
         caption = "Measured series: mean of the windows and rms residual, in the unit of the quantity."
         heads = columns("series", "windows", "quantity", "mean", "residual rms", wide=("series",))
-        blocks.append(Table(heads, rows, caption))
+        blocks.append(PageTable(heads, rows, caption))
     return blocks
 
 

@@ -14,12 +14,12 @@ from gyrobench.report.page_model import (
     CollapsedBlocks,
     Column,
     Page,
+    PageTable,
     Picture,
     Pictures,
     ResultSummary,
     Row,
     Section,
-    Table,
     Text,
     number_cell,
     text_cell,
@@ -122,7 +122,7 @@ def _consistency(report: Report[SuiteResult]) -> list[Any]:
         "Welch's test; p, adjusted: for the number of measurands (Holm). Letters: the member tests, as in the head."
     )
     failed = [f"{f.label} gave no result: {f.reason}" for f in suite.failed]
-    return [Table(columns, rows, caption), *([BulletList(failed, warn=True)] if failed else [])]
+    return [PageTable(columns, rows, caption), *([BulletList(failed, warn=True)] if failed else [])]
 
 
 def _cross(report: Report[SuiteResult]) -> list[Any]:
@@ -168,7 +168,7 @@ def _cross(report: Report[SuiteResult]) -> list[Any]:
     )
     if split:
         caption += " Type A, Type B, shared: components of u; shared: in several tests, see Method and provenance."
-    return [Pictures(pictures), Table(columns, rows, caption, small=True)] if rows else []
+    return [Pictures(pictures), PageTable(columns, rows, caption, small=True)] if rows else []
 
 
 def _forest(q: SuiteQuantity, key: str) -> Picture:
@@ -219,7 +219,7 @@ def _pairs(report: Report[SuiteResult]) -> list[Any]:
                 else text_cell("–" if a == b else "")
             )
         rows.append(Row(cells))
-    matrix = Table(
+    matrix = PageTable(
         [Column("largest E_n", wide=True), *(Column(letters[b]) for b in compared)], rows,
         "Largest normalized error E_n between two methods over all measurands that both determine; above 1 the values "
         "are inconsistent with their expanded uncertainties.",
@@ -243,7 +243,7 @@ def _pairs(report: Report[SuiteResult]) -> list[Any]:
                 )
             )
     columns = [Column("pair", wide=True), Column("difference"), Column("U of the difference (95 %)"), Column("E_n")]
-    table = Table(columns, pair_rows, "Normalized errors of all pairs.", small=True)
+    table = PageTable(columns, pair_rows, "Normalized errors of all pairs.", small=True)
     return [matrix, CollapsedBlocks(f"All {len(pairs)} pairs", [table])]
 
 
@@ -261,7 +261,7 @@ def _tests(report: Report[SuiteResult]) -> list[Any]:
     columns = [Column(""), Column("test", wide=True), Column("report"), Column("date"), Column("duration", "s")]
     columns += [Column("phases"), Column("windows"), Column("residual"), Column("unit")]
     caption = "Member tests, each with a report of its own; residual: residual standard deviation of the windows."
-    blocks: list[Any] = [Table(columns, rows, caption, small=True)]
+    blocks: list[Any] = [PageTable(columns, rows, caption, small=True)]
     for k, m in enumerate(members):
         test = _test(m)
         where = f" Run and report in {test.folder}." if test.folder else ""
@@ -302,7 +302,7 @@ def _how(result: SuiteResult) -> list[Any]:
             rows.append(Row([text_cell(q.name, "strong"), text_cell(terms.removeprefix("+ "))]))
     if rows:
         caption = "Measurands that are combinations of coefficients (factors in powers of g)."
-        blocks.append(Table([Column("measurand"), Column("combination", wide=True)], rows, caption))
+        blocks.append(PageTable([Column("measurand"), Column("combination", wide=True)], rows, caption))
     return [*blocks, *source_blocks(result.sources)]
 
 
@@ -335,16 +335,16 @@ def _provenance(report: Report[SuiteResult]) -> list[Any]:
             parts.setdefault((slot, p.name, p.version, p.sha256), []).append(LETTERS[k % 26])
     columns = [Column("test"), Column("seed"), Column("step", "s"), Column("engine"), Column("versions")]
     columns.append(Column("changed", wide=True))
-    blocks: list[Any] = [Table(columns, rows, "Run settings of each test, with changed defaults.", small=True)]
+    blocks: list[Any] = [PageTable(columns, rows, "Run settings of each test, with changed defaults.", small=True)]
     columns = [Column("test"), Column("file"), Column("SHA-256", wide=True)]
-    blocks.append(Table(columns, hashes, "Records and results of the tests, with their hash.", small=True))
+    blocks.append(PageTable(columns, hashes, "Records and results of the tests, with their hash.", small=True))
     if parts:
         rows = [
             Row([text_cell(slot, "strong"), *map(text_cell, (*about, "".join(who))), Cell(sha, mark="hash")])
             for (slot, *about, sha), who in sorted(parts.items())
         ]
         columns = [*map(Column, ("slot", "component", "version", "tests")), Column("SHA-256", wide=True)]
-        blocks.append(Table(columns, rows, "Components of the simulated tests.", small=True))
+        blocks.append(PageTable(columns, rows, "Components of the simulated tests.", small=True))
     given = ", ".join(f"{n} = {v}" for n, v in run.changed.items())
     facts = [("set", given), ("seed of the suite", run.seed), ("versions", _versions(run.versions))]
     settings = [f"{name[0].upper()}{name[1:]}: {value}" for name, value in facts if value not in (None, "")]

@@ -11,16 +11,15 @@ from gyrobench.report.page_model import (
     BulletList,
     Cell,
     CollapsedBlocks,
+    PageTable,
     Row,
-    Table,
     Text,
     columns,
     number_cell,
     text_cell,
 )
 from gyrobench.report.result_json import Report, value_at
-from gyrobench.result import Coefficient
-from gyrobench.result import Table as MethodTable
+from gyrobench.result import Coefficient, Table
 
 # endings of names that tell the unit, longest first
 _UNITS = {
@@ -70,7 +69,7 @@ def unit_groups(coefficients: Sequence[Coefficient]) -> list[tuple[str, list[int
     return [] if 2 * alone > len(by_unit) > 1 else list(by_unit.items())
 
 
-def method_table(doc: Any, path: tuple[str | int, ...], table: MethodTable, wide: Collection[str] = ()) -> list[Any]:
+def method_table(doc: Any, path: tuple[str | int, ...], table: Table, wide: Collection[str] = ()) -> list[Any]:
     """Return a table of a method as a block, none where it has no rows.  wide: heads that take the room that is left.
 
     Numbers are rounded to the column "u(symbol)" of their own or "u" where there is one; a column "p" is written as
@@ -89,7 +88,7 @@ def method_table(doc: Any, path: tuple[str | int, ...], table: MethodTable, wide
             cells.append(number_cell(doc, (*path, "rows", i, j), **shown))
         rows.append(Row(cells))
     caption = ". ".join(t.rstrip(".") for t in (table.title, table.caption) if t)
-    return [Table(columns(*map(words, heads), wide=wide), rows, f"{caption}.")] if rows else []
+    return [PageTable(columns(*map(words, heads), wide=wide), rows, f"{caption}.")] if rows else []
 
 
 def limit_text(limit: Sequence[float | None] | None) -> str:
@@ -126,7 +125,7 @@ def render_value(
             for k in flat:
                 name, unit = words(k)
                 rows.append(Row([text_cell(name), _cell(doc, (*path, k), None, significant), text_cell(unit)]))
-            blocks.append(Table(columns("quantity", "value", "unit"), rows, caption))
+            blocks.append(PageTable(columns("quantity", "value", "unit"), rows, caption))
         for k in nested:
             text = f"{caption.rstrip('.')}: {words(k)[0]}." if len(nested) > 1 else caption
             blocks += render_value(doc, (*path, k), text, by_u, significant)
@@ -137,7 +136,7 @@ def render_value(
             next((v for k, v in row.items() if k == "u" or k.startswith("u_")), None) if by_u else None for row in value
         ]
         rows = [Row([_cell(doc, (*path, i, k), us[i], significant) for k in keys]) for i in range(len(value))]
-        return [Table(columns(*map(words, keys)), rows, caption)]
+        return [PageTable(columns(*map(words, keys)), rows, caption)]
     return [Text(f"{caption.rstrip('.')}: {compact(value)}.")]
 
 
@@ -182,7 +181,7 @@ def how_tables(report: Report[Any]) -> list[Any]:
             time = number_cell(doc, ("provenance", "timing", slot), significant=3)
             rows.append(Row([text_cell(slot, "strong"), *names, time, Cell(part.sha256 or "–", mark="hash")]))
         heads = columns("slot", "component", "version", "target", "FMI", ("time", "s"), "SHA-256", wide=("SHA-256",))
-        blocks.append(Table(heads, rows, "Components in their slots, with the computing time of each.", small=True))
+        blocks.append(PageTable(heads, rows, "Components in their slots, with the computing time of each.", small=True))
     blocks += _changed(report) + _defaults(report)
     facts = {"seed": "", "step": "s", "engine": "", "complete": "", "stopped_at": "s"}
     rows = [
@@ -192,13 +191,13 @@ def how_tables(report: Report[Any]) -> list[Any]:
         if value_at(doc, "provenance", k) is not None
     ]  # fmt: skip
     if rows:
-        blocks.append(Table(columns("setting", "value", "unit"), rows, "Settings of the run."))
+        blocks.append(PageTable(columns("setting", "value", "unit"), rows, "Settings of the run."))
     blocks += render_value(doc, ("provenance", "data"), "Data reduced.")
     if run.notes:
         blocks.append(BulletList(run.notes))
     if run.versions:
         rows = [Row([text_cell(k), text_cell(v)]) for k, v in run.versions.items()]
-        table = Table(columns("package", "version"), rows, "Package versions.", small=True)
+        table = PageTable(columns("package", "version"), rows, "Package versions.", small=True)
         blocks.append(CollapsedBlocks("Package versions", [table]))
     return blocks
 
@@ -215,7 +214,7 @@ def _changed(report: Report[Any]) -> list[Any]:
         value = _plain(report.document, ("provenance", where, name)) if where else text_cell("changed")
         rows.append(Row([text_cell(name, "strong"), value]))
     caption = "Options, parameters and components that differ from their defaults, in SI units."
-    return [Table(columns("changed", "value (SI)"), rows, caption, small=True)]
+    return [PageTable(columns("changed", "value (SI)"), rows, caption, small=True)]
 
 
 def _defaults(report: Report[Any]) -> list[Any]:
@@ -230,6 +229,6 @@ def _defaults(report: Report[Any]) -> list[Any]:
         if names:
             rows = [Row([text_cell(n), _plain(report.document, ("provenance", key, n))]) for n in names]
             caption = f"{what.capitalize()} at their default values, in SI units."
-            table = Table(columns("name", "value (SI)"), rows, caption, small=True)
+            table = PageTable(columns("name", "value (SI)"), rows, caption, small=True)
             blocks.append(CollapsedBlocks(f"Defaults: {len(names)} {what}", [table]))
     return blocks

@@ -42,7 +42,7 @@ from gyrobench.system.connectors import QUANTITIES
 from gyrobench.system.fmu_variables import Variable, variables
 from gyrobench.system.mapping_proposal import propose
 from gyrobench.system.sockets import Connector, Socket, element_names
-from gyrobench.system.values import InvalidValueError, flatten, parse
+from gyrobench.system.values import InvalidValueError, flatten, parse_number
 
 NUMBERS = ("Real", "Integer", "Boolean")
 KEYS_SHOWN = ("name or names", "unit", "factor", "offset", "constant", "feedthrough", "delay")
@@ -196,7 +196,7 @@ class _Fitter:
     def number(self, element: str, key: str, entry: Mapping[str, Any], unit: str, default: float) -> float | None:
         """Return a number of a mapping entry in SI, or None after noting a problem."""
         try:
-            return float(parse(f"{key}", entry.get(key, default), unit or "1"))
+            return parse_number(f"{key}", entry.get(key, default), unit or "1")
         except (InvalidValueError, TypeError) as error:
             self.problems.append(f"{element}: in the mapping: {error}")
             return None

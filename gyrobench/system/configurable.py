@@ -18,6 +18,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.reading import shorten
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.values import InvalidValueError, flatten, parse
+from gyrobench.user_code import blamed, check_attributes
 
 
 class InvalidConfigurationError(GyrobenchError):
@@ -130,7 +131,8 @@ def load_configurable(name: str, bench: Path | None = None) -> Configurable:
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
-    spec.loader.exec_module(module)
+    with blamed(file):
+        spec.loader.exec_module(module)
     classes = [
         v
         for v in vars(module).values()
@@ -138,8 +140,12 @@ def load_configurable(name: str, bench: Path | None = None) -> Configurable:
     ]
     if len(classes) != 1:
         raise InvalidConfigurationError(name, [f"{file}: defines {len(classes)} systems or suites, must define one"])
-    loaded = classes[0]()
+    base = next(c for c in classes[0].__mro__ if c.__module__ != module_name)
+    check_attributes(classes[0], base, file, {"options": Option})
+    with blamed(file):
+        loaded = classes[0]()
+        lacks = loaded.unfinished()
     loaded.name, loaded.folder = name, folder
-    if lacks := loaded.unfinished():
+    if lacks:
         raise InvalidConfigurationError(name, [f"{file}: {lack}" for lack in lacks])
     return loaded

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.component.declarations import element_names
-from gyrobench.files import sha256
+from gyrobench.files import check_description, sha256
 
 #: type of an FMU variable -> family: what can be connected with what, and how values are given as text
 FAMILIES = {
@@ -48,7 +48,8 @@ class Variable:
 def read_description(path: Path) -> Any:
     """Return the model description of an FMU as FMPy reads it, without validation.
 
-    A process reads a file of the same content once: what is returned is not to be changed.
+    A process reads a file of the same content once: what is returned is not to be changed.  Raises
+    OversizedArchiveError, and what the zip archive, the XML and FMPy raise.
     """
     return _read_description(path, sha256(path))
 
@@ -57,6 +58,7 @@ def read_description(path: Path) -> Any:
 def _read_description(path: Path, _digest: str) -> Any:
     from fmpy import read_model_description
 
+    check_description(path)
     return read_model_description(str(path), validate=False)
 
 

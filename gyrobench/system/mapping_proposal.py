@@ -20,7 +20,7 @@ from gyrobench.system.fmu_variables import Variable, variables
 
 SAME_DIMENSION, SAME_NAME, LIKE, WORDS = 3.0, 4.0, 2.0, 1.5
 ENOUGH = 1.5  # score below which nothing is proposed
-#: letters and words that engineers use for the quantities of connectors, by the start of the connector's name
+#: letters and words that engineers use for the quantities of connectors and parameters, by the start of the name
 USUAL = {
     "omega": ("w", "rate", "gyr", "omega", "ang_vel"),
     "alpha": ("alpha", "ang_acc"),
@@ -28,6 +28,10 @@ USUAL = {
     "i": ("i", "cur", "current", "torque"),
     "u": ("u", "v", "pickoff", "signal", "sg"),
     "angle": ("angle", "phi", "theta", "pos"),
+    "k": ("k", "scale", "torquer", "sf"),
+    "K_sg": ("pickoff", "sens", "sg"),
+    "D_F": ("bias", "fixed"),
+    "H": ("momentum",),
 }
 
 
@@ -40,7 +44,8 @@ class Proposal:
     found: bool
 
 
-def _dimension(unit: str, declared: Mapping[str, Any]) -> tuple[Any, ...] | None:
+def dimension(unit: str, declared: Mapping[str, Any]) -> tuple[Any, ...] | None:
+    """Return the exponents of a unit, by the FMU or by its name; None where it is not understood."""
     definition = declared.get(unit)
     if definition is not None and definition.baseUnit is not None:
         return tuple(int(getattr(definition.baseUnit, s) or 0) for s in units.BASE)
@@ -72,7 +77,8 @@ def _groups(free: Sequence[Variable], n: int) -> list[list[Variable]]:
     return [run for run in runs if len({(v.unit, v.kind) for v in run}) == 1 and _stem([v.name for v in run])]
 
 
-def _score(c: Connector, group: Sequence[Variable], declared: Mapping[str, Any]) -> float:
+def likeness(c: Connector, group: Sequence[Variable], declared: Mapping[str, Any]) -> float:
+    """Return how much names, units and descriptions speak for variables of an FMU to be a connector."""
     first = group[0]
     own = re.sub(r"[#\[\]_]", "", _stem([v.name for v in group]) if len(group) > 1 else first.name).lower()
     name = c.name.lower().replace("_", "")
@@ -82,7 +88,7 @@ def _score(c: Connector, group: Sequence[Variable], declared: Mapping[str, Any])
     words = set(re.findall(r"[a-z]{4,}", f"{own} {first.description}".lower()))
     score += WORDS * min(1, len(words & set(re.findall(r"[a-z]{4,}", c.meaning.lower()))))
     if first.unit and c.unit:
-        exponents = _dimension(first.unit, declared)
+        exponents = dimension(first.unit, declared)
         if exponents is not None:
             wanted = tuple(units.unit(c.unit).exponents)
             same = exponents[:-1] == wanted[:-1]  # rad may be left out
@@ -111,7 +117,7 @@ def propose(socket: Socket, description: Any, mapping: Mapping[str, Any] | None 
         for causality in ("input", "output")
     }
     offers = [
-        (_score(c, group, declared) - (0.5 if c.optional else 0.0), -order, c, group)
+        (likeness(c, group, declared) - (0.5 if c.optional else 0.0), -order, c, group)
         for order, c in enumerate(wanted)
         for group in _groups(free[c.causality], len(c.elements))
         if all(v.kind == "Real" or c.whole for v in group) and not (c.unit == "1" and group[0].unit not in ("", "1"))
@@ -121,8 +127,37 @@ def propose(socket: Socket, description: Any, mapping: Mapping[str, Any] | None 
         enough = ENOUGH + SAME_DIMENSION if c.optional else ENOUGH
         if score >= enough and c.name not in taken and not any(v in g for g in taken.values() for v in group):
             taken[c.name] = group
+    taken |= _only_ones_left([c for c in wanted if not c.optional and c.name not in taken], free, taken, declared)
     found = [_lines(c, taken[c.name]) for c in wanted if c.name in taken]
     return found + [_missing(c) for c in wanted if c.name not in taken and not c.optional]
+
+
+def _only_ones_left(
+    wanted: Sequence[Connector],
+    free: Mapping[str, Sequence[Variable]],
+    taken: Mapping[str, Sequence[Variable]],
+    declared: Mapping[str, Any],
+) -> dict[str, list[Variable]]:
+    """Return the connector that alone is left of its causality, with the variables that alone are left for it.
+
+    Whatever their names, unless a unit speaks against them.
+    """
+    found = {}
+    for causality, variables_of_it in free.items():
+        lacking = [c for c in wanted if c.causality == causality]
+        left = [v for v in variables_of_it if not any(v in g for g in taken.values())]
+        if len(lacking) != 1 or len(left) != len(lacking[0].elements):
+            continue
+        (c,) = lacking
+        of_kind = all(v.kind == "Real" or c.whole for v in left)
+        if of_kind and all(_dimension_fits(v.unit, c.unit, declared) for v in left):
+            found[c.name] = left
+    return found
+
+
+def _dimension_fits(unit: str, wanted: str, declared: Mapping[str, Any]) -> bool:
+    own = dimension(unit, declared) if unit else None
+    return own is None or not wanted or own[:-1] == tuple(units.unit(wanted).exponents)[:-1]
 
 
 def _named_variables(mapping: Mapping[str, Any], own: Mapping[str, Variable]) -> set[str]:
@@ -181,8 +216,14 @@ def undeclared(socket: Socket, description: Any, proposals: Sequence[Proposal]) 
     ]
 
 
-def mapping_text(socket: Socket, description: Any, head: str, mapping: Mapping[str, Any] | None = None) -> str:
-    """Return a first mapping file (TOML)."""
+def mapping_text(
+    socket: Socket,
+    description: Any,
+    head: str,
+    mapping: Mapping[str, Any] | None = None,
+    parameters: Sequence[str] = (),
+) -> str:
+    """Return a first mapping file (TOML).  parameters: the lines of its table [parameters]."""
     proposals = propose(socket, description, mapping)
     blocks = ["\n".join(p.lines) for p in proposals]
     notes = undeclared(socket, description, proposals)
@@ -190,4 +231,5 @@ def mapping_text(socket: Socket, description: Any, head: str, mapping: Mapping[s
     signs = (
         ["# Check units, signs and axes: names do not tell them.  A factor of -1 reverses a sign."] if blocks else []
     )
-    return "\n\n".join(["\n".join([head, *fits, *signs]), *blocks, *(["\n".join(notes)] if notes else [])]) + "\n"
+    ends = ["\n".join(lines) for lines in (notes, parameters) if lines]
+    return "\n\n".join(["\n".join([head, *fits, *signs]), *blocks, *ends]) + "\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import functools
 import hashlib
@@ -10,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import units
+from gyrobench.errors import GyrobenchError
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.part_values import PartValues
@@ -78,6 +80,27 @@ def _usual(slot: str, name: str, bound: Bound, binding: Binding, base: Mapping[s
     return usual_size(own, like)
 
 
+def _overrides(given: Mapping[str, Any], assembly: Assembly, base: Mapping[str, Any]) -> dict[str, Any]:
+    """Elements and SI values of all "slot.parameter" that were given.  Raises InvalidValueError."""
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        found |= _override(name, value, assembly.bindings[name.partition(".")[0]], base)
+    return found
+
+
+def followed(assembly: Assembly, system: System) -> set[str]:
+    """Return the "slot.parameter" that the design of a system, or the factor of a wire, takes from the parts.
+
+    As far as it comes: a design that refuses its values has not asked for all of them.
+    """
+    base = defaults(assembly)
+    parts = PartValues(system, base)
+    with contextlib.suppress(GyrobenchError, ArithmeticError):
+        follow_factors(assembly, system, parts)
+        system.flat_parameters(parts)
+    return parts.read
+
+
 def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) -> dict[str, Any]:
     """Elements and SI values of one "slot.parameter" as given by the user.  Raises InvalidValueError."""
     slot, _, parameter = name.partition(".")
@@ -129,10 +152,11 @@ def resolve(
         else:
             notes.append(f"{name}: no parameter or input of that name; not set")
     chosen.update(raw)
-    overrides: dict[str, Any] = {}
-    for name, value in system.overrides.items():
-        overrides.update(_override(name, value, assembly.bindings[name.partition(".")[0]], base))
-    parts = PartValues(system, base, {**raw, **overrides})
+    overrides = _overrides(system.overrides, assembly, base)
+    nominal = overrides if system.nominal is None else _overrides(system.nominal, assembly, base)
+    if unseen := [n for n, v in overrides.items() if system.nominal is not None and nominal.get(n, base.get(n)) != v]:
+        notes.append(f"the design is held at nominal values: it does not follow {', '.join(unseen)}")
+    parts = PartValues(system, base, {**raw, **nominal})
     follow_factors(assembly, system, parts)
     for name, value in system.flat_parameters(parts).items():
         where_known = name.endswith("?")

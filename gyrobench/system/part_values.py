@@ -23,6 +23,7 @@ class PartValues:
         self, system: System, base: Mapping[str, Any] | None = None, chosen: Mapping[str, Any] | None = None
     ) -> None:
         self.notes: list[str] = []
+        self.read: set[str] = set()  # "slot.parameter" that a design has asked for
         self._system = system
         self._chosen = dict(chosen or {})
         self._values = nest({**(base or {}), **self._chosen})
@@ -59,6 +60,7 @@ class PartValues:
 
     # ------------------------------------------------------------ what no FMU has
     def _value(self, name: str, missing: Callable[[str, str], Any]) -> Any:
+        self.read.add(name)
         if name in self._values:
             return self._values[name]
         slot, _, parameter = name.partition(".")

@@ -147,11 +147,22 @@ class System(Configurable):
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
     step: float = 1e-3  # s, communication step
+    coupling: str = ""  # "parallel": every wire carries the value of the communication step before (Jacobi)
     stop: float | None = None  # s, or a property; None: only `done` ends the run
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "reduce" in vars(cls):
+            raise TypeError(
+                f"{cls.__name__}.reduce: what a record says, without limits and verdict, is returned by "
+                "findings(record); reduce judges it, for every system alike"
+            )
 
     def __init__(self) -> None:
         super().__init__()
         self.overrides: dict[str, Any] = {}  # "slot.parameter" -> value as given
+        #: the same as designs see it, of a design that is held at nominal values; None: it follows the parts
+        self.nominal: dict[str, Any] | None = None
 
     def set(self, name: str, value: Any) -> None:
         """Set an option or, as "slot.parameter", a parameter of a part.  Raises InvalidValueError."""

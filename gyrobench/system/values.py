@@ -61,6 +61,14 @@ def nest(values: Mapping[str, Any]) -> dict[str, Any]:
     return nested | {name: build(cells) for name, cells in arrays.items()}
 
 
+def parse_number(name: str, value: Any, unit: str = "1") -> float:
+    """Return one number in SI, see :func:`parse`.  Raises InvalidValueError for a list too."""
+    number = parse(name, value, unit)
+    if isinstance(number, list):
+        raise InvalidValueError(f"{name} = {reading.shorten(str(value))}: one number is expected, not a list")
+    return float(number)
+
+
 def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
     """A value as SI number(s): a number, a text with an optional unit, a list (or its JSON text) of these.
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gyrobench.system.values import InvalidValueError, parse
+from gyrobench.system.values import InvalidValueError, parse_number
 
 SEPARATOR = ";"
 
@@ -32,10 +32,10 @@ def parse_visits(option: str, text: str, units: Sequence[str], dwell: float) -> 
             shape = " ".join("NAME" if not u else f"ANGLE{'deg' if u == 'rad' else u}" for u in units)
             raise InvalidValueError(f"{where}: write '{shape}' or '{shape} TIME', visits apart by '{SEPARATOR}'")
         place = tuple(
-            w if not u else float(parse(where, w if w.strip("-+.0123456789e") else f"{w}deg", u))
+            w if not u else parse_number(where, w if w.strip("-+.0123456789e") else f"{w}deg", u)
             for w, u in zip(words, units, strict=False)
         )
-        time = float(parse(where, words[-1], "s")) if len(words) > len(units) else dwell
+        time = parse_number(where, words[-1], "s") if len(words) > len(units) else dwell
         if not time > 0.0:
             raise InvalidValueError(f"{where}: the time must be above 0")
         found.append(Visit(place, time))

@@ -168,6 +168,7 @@ class _Layer:
 def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path] | None = None) -> Assembly:
     """Reads the model descriptions, fits each FMU into its slot, lays the wires and finds the order.
 
+    Coupled in parallel, a system has no algebraic loops, and its parts may stand in any order.
     Raises SocketMismatchError, WiringError, AlgebraicLoopError; nothing is loaded or run.
     """
     unchanged = {slot: s.part in (str(paths[slot]), paths[slot].stem) for slot, s in system.slots.items()}
@@ -193,6 +194,9 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
     if layer.problems:
         raise WiringError(system.name, layer.problems)
     layer.unfed()
+    parallel = system.coupling == "parallel"
+    if parallel:
+        layer.connections = [replace(c, delayed=c.output.constant is None) for c in layer.connections]
     for slot, binding in bindings.items():
         layer.notes += [f"{slot}: {w}" for w in binding.warnings]
     links = [
@@ -206,7 +210,8 @@ def assemble(system: System, paths: Mapping[str, Path], maps: Mapping[str, Path]
     except AlgebraicLoopError as error:
         raise AlgebraicLoopError(error.loop, _remedy(error.loop, descriptions, bindings)) from None
     delays = dict.fromkeys(c.wire for c in layer.connections if c.delayed)
-    order = replace(order, cuts=(*order.cuts, *(Cut(wire, "stated in the mapping file") for wire in delays)))
+    why = "parallel coupling" if parallel else "stated in the mapping file"
+    order = replace(order, cuts=(*order.cuts, *(Cut(wire, why) for wire in delays)))
     return Assembly(system, dict(paths), descriptions, bindings, layer.connections, order, layer.notes)
 
 
@@ -236,4 +241,5 @@ def _remedy(loop: list[tuple[str, str]], descriptions: Mapping[str, Any], bindin
             f"or delay one of its wires by a communication step, in the mapping file of {slot}:\n"
             f"    [{name}]\n    delay = 1"
         )
+    lines.append("or couple all parts in parallel, each wire a communication step late: --coupling parallel")
     return "\n".join(lines)

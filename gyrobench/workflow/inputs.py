@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError, suggest_names
+from gyrobench.files import OversizedArchiveError
 from gyrobench.result import Specification
 from gyrobench.system import suite as suites
 from gyrobench.system.suite import Suite
@@ -63,21 +64,26 @@ def check_fmu_files(parts: Mapping[str, str | Path]) -> None:
     for slot, part in parts.items():
         if not str(part).endswith(".fmu"):
             continue
-        from fmpy import read_model_description
+        from gyrobench.system.fmu_variables import read_description
 
         try:
             if not Path(part).is_file():
                 raise ValueError("no such file")
-            read_model_description(part, validate=False)
+            read_description(Path(part))
+        except OversizedArchiveError as error:
+            raise UsageError(f"slot {slot}: {error}") from None
         except Exception as error:  # of the zip archive, of the XML, or FMPy's own
             raise UsageError(f"slot {slot}: {part}: not a readable FMU: {error}") from None
 
 
 def find_specification(spec: str | Path | None) -> Path | None:
     """Return the file of an acceptance specification, given by name or path.  Raises UsageError."""
-    if spec is None or Path(spec).is_file():
-        return Path(spec) if spec else None
-    known = Bench.find().specifications()
+    if spec is None:
+        return None
+    bench = Bench.find()
+    if (file := bench.existing(Path(spec))).is_file():
+        return file
+    known = bench.specifications()
     spec = str(spec)
     if spec not in known:
         raise UsageError(f"{spec}: no such file or acceptance specification; {suggest_names(spec, known)}")

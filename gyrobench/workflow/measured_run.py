@@ -53,6 +53,7 @@ def reduce_measured(
     values: as given to --set, for the reader.  Raises UsageError, DataError, ReductionError and PostRunError.
     """
     measured = _measured_data(system)
+    data = Bench.find().existing(data)
     file = find_specification(spec)
     limits = load_limits(file)
     if measured.progress:

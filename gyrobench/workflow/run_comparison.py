@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
+from gyrobench.boundary import checked
 from gyrobench.notebook import data_frame
 from gyrobench.report import FORMATS, ResultError
 from gyrobench.result import Result
@@ -53,6 +55,7 @@ class Comparison:
                 rows.append(row | {"U": d.get("U"), "significant": d.get("significant")})
         return data_frame({key: [row[key] for row in rows] for key in rows[0]}, {})
 
+    @checked
     def write(self, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
         """Write comparison.json, .html and .pdf into a folder; return their paths."""
         from gyrobench.report import compare
@@ -96,9 +99,9 @@ def read_result(folder: Path) -> Result:
     if not file.is_file():
         raise UsageError(f"{folder}: no result.json; write it by gyrobench report {folder}")
     try:
-        return load(file.read_text(encoding="utf-8"))
+        return load(reading.read_text(file, ResultError), file)
     except ResultError as error:
-        raise UsageError(f"{file}: {error}") from None
+        raise UsageError(str(error)) from None
 
 
 def _require_two(runs: int) -> None:

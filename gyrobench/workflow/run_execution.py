@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.errors import GyrobenchError
@@ -31,7 +33,8 @@ class RunRequest:
 
     step: s, None for the system's own.  timeout: s, for one call of an FMU, None for the usual.  in_memory: nothing is
     written, ``out``, ``force`` and ``resume`` have no meaning.  formats: of the report.  check_step: whether what the
-    step does is found by two further runs; None: by two short ones for a system with loops, else not.
+    step does is found by further runs; None: by short ones for a system with loops or one that is coupled in parallel,
+    else not.
     """
 
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -138,26 +141,54 @@ def _report(
     stopped: PostRunError | None = None
     step = request.step or system.step
     with record_kept(folder, record):
-        if not system.has_reduction:
-            return RunOutcome(record, folder=folder)
         check: StepCheck | None = None
-        by_default = bool(system.loops) or system.closed_loop
+        by_default = bool(system.loops) or system.closed_loop or system.coupling == "parallel"
         wanted = by_default if request.check_step is None else request.check_step
+        kept = "report" if system.has_reduction else "record"
         if wanted and record.complete:
             try:
-                check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
+                if system.has_reduction:
+                    check = check_step(session, system, request.seed, step, feedback, short=request.check_step is None)
+                else:
+                    record.run.notes += channel_step_effect(session, record, request.seed, step, feedback)
             except RunInterrupted as error:
-                stopped = CommandInterrupted(f"step check {error}; the report is without it")
+                stopped = CommandInterrupted(f"step check {error}; the {kept} is without it")
             except Exception as error:
-                stopped = PostRunError(f"step check: {user_message(error)}\nthe report is without it")
+                stopped = PostRunError(f"step check: {user_message(error)}\nthe {kept} is without it")
                 stopped.__cause__ = error
-        reasons = []
+        unknown = ""
         if stopped is not None and request.check_step is None and not isinstance(stopped, CommandInterrupted):
-            text = f"The communication step is not in u: {stopped}.".replace("\n", "; ")
-            reasons, stopped = [Reason("step.missing", text)], None
+            unknown, stopped = f"{stopped}.".replace(":\n  - ", ": ").replace("\n", "; "), None
+        if not system.has_reduction:
+            if unknown:
+                record.run.notes.append(f"The effect of the communication step is not known: {unknown}")
+                feedback.notes(record.run.notes[-1:])
+            if folder is not None and wanted:
+                record.save(folder)
+            return RunOutcome(record, folder=folder, stopped=stopped)
+        reasons = [Reason("step.missing", f"The communication step is not in u: {unknown}")] if unknown else []
         result = system.reduce(record, limits, check, reasons)
         paths = write_report(result, folder, record, spec, request.formats)
         return RunOutcome(record, result, folder, paths, stopped)
+
+
+def channel_step_effect(
+    session: Session, record: Record, seed: int, step: float, feedback: Feedback = SILENT
+) -> list[str]:
+    """Return what half the step changes in the channels of a run without a reduction, as a sentence for each."""
+    with feedback.progress(f"step check, {0.5 * step:g} s") as progress:
+        other = session.run({}, seed, 0.5 * step, None, progress).channels
+    sentences = []
+    for name, values in record.channels.items():
+        if name == "time":
+            continue
+        rows = min(len(values), len(other[name]))
+        change = float(np.max(np.abs(other[name][:rows] - values[:rows]), initial=0.0))
+        span = float(np.ptp(values)) if len(values) else 0.0
+        share = f" ({change / span:.2g} of its range)" if span > 0.0 else ""
+        sentences.append(f"Half the step changes {name} by up to {change:.3g}{share}.")
+    feedback.notes(sentences)
+    return sentences
 
 
 def check_step(

@@ -55,8 +55,10 @@ def prepare_run_folder(
         "step": step,
     }
     identity = json.loads(json.dumps(identity))
+    coupling = [system.coupling] if system.coupling else []
     texts = {slot: file.read_text(encoding="utf-8") for slot, file in maps.items()}
-    text = json.dumps([identity, texts, session.engine], sort_keys=True)
+    text = json.dumps([identity, texts, session.engine, *coupling], sort_keys=True)
+    identity["coupling"] = system.coupling
     folder = out or Bench.find().out / system.name / hashlib.sha256(text.encode()).hexdigest()[:8]
     folder = Path(os.path.abspath(folder))  # wherever a part may go
     if folder.exists() and not folder.is_dir():
@@ -164,7 +166,7 @@ def _covers(old: Any, new: Any) -> bool:
     """Return whether ``old`` has all entries of ``new``, with the same values."""
     if isinstance(old, dict) and isinstance(new, dict):
         return all(_covers(old.get(k), v) for k, v in new.items())
-    return bool(old == new)
+    return bool(old == new) or (old is None and new == "")
 
 
 def save_partial_record(record: Record, folder: Path) -> Path:

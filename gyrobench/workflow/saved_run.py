@@ -12,6 +12,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import FORMATS, NAMES
+from gyrobench.report.result_json import read_document
 from gyrobench.result import Result, StepCheck
 from gyrobench.result_content import typed
 from gyrobench.system.system import System
@@ -72,8 +73,8 @@ def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: S
 
 
 def _step_check(file: Path) -> StepCheck | None:
-    """Return the step check of a result.json.  Raises RecordError for one that cannot be read."""
-    held = reading.json_object(reading.read_text(file, RecordError), file, RecordError).get("step_check") or {}
+    """Return the step check of a result.json.  Raises RecordError for one that cannot be read or was changed."""
+    held = read_document(reading.read_text(file, RecordError), file, RecordError).get("step_check") or {}
     try:
         check: StepCheck = typed(StepCheck, held)
     except TypeError:  # none, or of before the step was in u

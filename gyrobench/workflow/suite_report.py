@@ -25,6 +25,7 @@ from gyrobench.record.run_document import (
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.report import FORMATS
+from gyrobench.report.result_json import read_document
 from gyrobench.result import DriftTestResult, SuiteResult
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import find_specification, load_limits
@@ -138,7 +139,7 @@ def write_suite_report(
 
 
 def _result(file: Path) -> dict[str, Any]:
-    return reading.json_object(reading.read_text(file, RecordError), file, RecordError)
+    return read_document(reading.read_text(file, RecordError), file, RecordError)
 
 
 def _load_member(folder: Path, label: str) -> Member:

@@ -76,7 +76,7 @@ def user_message(error: BaseException) -> str:
         return str(error)
     place = content_location(error)
     if isinstance(error, OSError) and place is None:
-        return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror or str(error)
     if place is None:
         inside = [f"{file}:{line}" for file, line in _frames(error) if file.startswith(str(TOOL) + os.sep)]
         place = inside[-1] if inside else "unknown place"

@@ -13,28 +13,21 @@ from gyrobench import units
 from gyrobench.record import sampling
 from gyrobench.record.drift_columns import ANGLE, harmonic_names
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.series.checks import block_means
+from gyrobench.reduction.noise_model.model import NoiseModel
 from gyrobench.reduction.series.deviations import Deviation
-from gyrobench.reduction.series.noise_coefficients import JUST, NoiseCoefficients, slopes
+from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
-from gyrobench.report.numbers import write_number, write_p
 from gyrobench.result import Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
+from . import noise_tables
+from .noise_tables import number
 from .preparation import Prepared
 
-STEP_BLOCKS, STEP = 64, 8.0  # means whose changes are compared; robust standard deviations
-WILD = 20.0  # standard deviations
-COUNTS = 3.0  # steps of the values' resolution within which a sample is not called wild
 NOTHING = 1e-9  # of the standard deviation of a rate: rounding
 MORE_DIGITS = "Record more digits."
 FINER_ANGLE = "Read a finer angle, or reduce one row in several: the change within a sample must be larger."
-MISFIT = 1e-3  # p of the spectrum under the model below which it does not fit
-
-
-def number(x: float, u: float | None = None) -> str:
-    return write_number(x, u, 3).text
 
 
 def acquisition(p: Prepared, run: RunDocument) -> Table:
@@ -50,9 +43,9 @@ def acquisition(p: Prepared, run: RunDocument) -> Table:
     if run.series:
         rows[:0], more = _column_rows(p.name, run.series)
         rows += more
-    if p.averaged > 1:
-        rows.append(["samples in a mean of spectrum and models, because of gaps", p.averaged, "1"])
-    rows.append(["longest stretch without a gap", p.stretch.size * p.stretch_step / 3600.0, "h"])
+    if filled := p.noise.treatment.filled:
+        rows.append(["missing samples completed by what the noise around says of them", filled, "1"])
+    rows.append(["longest stretch without a gap of a thousand samples", p.stretch.size * p.step / 3600.0, "h"])
     return Table(
         "acquisition", "Acquisition", "What was recorded, and what is missing", ["quantity", "value", "unit"], rows
     )
@@ -128,56 +121,40 @@ def regression(p: Prepared) -> list[Table]:
     return out + ([Table("harmonics", "Harmonics over the angle", caption, head, turns)] if turns else [])
 
 
-def slope_readings(noise: NoiseCoefficients, allan: Deviation) -> Table:
+def slope_readings(noise: NoiseModel, allan: Deviation) -> Table:
     """Return the coefficients beside those read from the slopes of the Allan deviation."""
     read = slopes(allan)
     rows = []
     for term, (unit, si, _) in TERMS.items():
         row: list[Any] = [term, unit]
-        for e in (getattr(noise, term), getattr(read, term)):
+        for e in (noise[term], getattr(read, term)):
             row += [e.value / si if e.determined else None, e.low / si if e.determined else None, abs(e.high) / si]
         rows.append(row)
-    head = ["coefficient", "unit", "likelihood", "95 % from", "95 % to", "slopes", "from (slopes)", "to (slopes)"]
+    head = ["coefficient", "unit", "model", "95 % from", "95 % to", "slopes", "from (slopes)", "to (slopes)"]
     caption = (
-        "Restricted maximum likelihood, which is reported, beside the reading of the Allan deviation where its "
+        "The noise model, which is reported, beside the reading of the Allan deviation where its "
         "slope is that of the term; 95 % intervals; without an estimate: below the upper end. The slopes take each "
         "term as if alone: their intervals need not cover"
     )
     return Table("two_ways", "Two ways to the coefficients", caption, head, rows)
 
 
-def lines(p: Prepared, removed: bool) -> list[Table]:
+def lines(p: Prepared) -> list[Table]:
     rows = [
         [k, x.frequency, x.u_frequency, x.amplitude / DPH, x.u_amplitude / DPH, x.false_alarm]
-        for k, x in enumerate(p.model.lines.lines, 1)
+        for k, x in enumerate(p.lines.lines, 1)
     ]
     head = ["line", "frequency / Hz", "u(f) / Hz", "amplitude / (°/h)", "u(A) / (°/h)", "p"]
-    use = "taken out before the noise model" if removed else "left in (remove_lines = false)"
+    use = "taken out before the noise model" if p.noise.treatment.lines else "left in (remove_lines = false)"
     caption = f"Sines, {use}; p: probability of a line as clear in a record without any"
     return [Table("lines", "Lines", caption, head, rows)] if rows else []
 
 
 def line_texts(p: Prepared) -> list[str]:
-    found = p.model.lines
+    found = p.lines
     if not found.lines:
         return [f"No line stands out of the spectrum at a false-alarm probability of {found.level:g} for the record."]
     return [] if found.complete else ["The search for lines ended at its limit: there may be more."]
-
-
-def misfit_text(noise: NoiseCoefficients) -> str:
-    """Return whether the spectrum is that of the five terms."""
-    check = noise.check
-    if check is None:
-        return ""
-    if check.p > MISFIT and check.line_p > MISFIT:
-        return f"The spectrum is compatible with the noise coefficients (p {_p(check.p)})."
-    if check.p <= MISFIT:
-        low, high = check.band
-        return (
-            f"The spectrum is not that of the five terms (p {_p(check.p)}): between {low:.2g} and {high:.2g} Hz the "
-            f"power is {check.ratio:.2g} times that of the noise coefficients."
-        )
-    return f"An ordinate of the spectrum stands out at {check.line:.4g} Hz (p {_p(check.line_p)}): a line is left."
 
 
 def coarse_text(name: str, run: RunDocument) -> str:
@@ -208,19 +185,29 @@ def explained_text(p: Prepared) -> str:
     )
 
 
-def doubts(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> dict[str, str]:
+def saturated_text(p: Prepared, run: RunDocument) -> str:
+    """Return that values stay at an end of the range; "" where they do not."""
+    about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
+    ends = about["stuck"].get(p.name, 0) if about and column["kind"] != ANGLE and column["white"] else 0
+    if ends <= max(10, 1e-4 * about.get("samples", 0)):
+        return ""
+    return (
+        f"{ends} samples stay at the largest or smallest value of the file: the converter may have been at its limit. "
+        "The coefficients are too small then. Use a larger range."
+    )
+
+
+def doubts(p: Prepared, run: RunDocument) -> dict[str, str]:
     """Return why no limit can be judged by the coefficients: the model or the readings are not as assumed."""
-    misfit = misfit_text(noise) if noise.check is not None and noise.check.p <= MISFIT else ""
-    found = {"misfit": misfit, "coarse": coarse_text(p.name, run), "explained": explained_text(p)}
+    noise = p.noise
+    found = {"misfit": "" if noise.agrees else noise_tables.agreement_text(noise), "coarse": coarse_text(p.name, run),
+             "explained": explained_text(p), "saturated": saturated_text(p, run),
+             "level": noise_tables.levels_text(noise)}  # fmt: skip
     return {f"drift_record.{id}": text for id, text in found.items() if text}
 
 
-def _p(p: float) -> str:
-    text = write_p(p).text
-    return text if text.startswith("<") else f"= {text}"
-
-
-def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[Reason]:
+def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
     column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
     out = list[Reason]()
@@ -228,40 +215,25 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[Re
     def say(id: str, text: str) -> None:
         out.append(Reason(f"drift_record.{id}", text))
 
-    if (check := noise.check) is not None and check.p <= MISFIT:
+    noise = p.noise
+    if not noise.agrees:
         say(
             "misfit",
-            f"{misfit_text(noise)} The coefficients and their intervals describe the rest of the spectrum at best. See "
-            "the figures; look for Gauss-Markov drift, a resonance, steps, or noise that changes with time.",
+            f"{noise_tables.agreement_text(noise)} No coefficient is stated. See the figures; look for lines that "
+            "wander, steps, or noise that changes with time.",
         )
-    if just := [term for term in TERMS if getattr(noise, term).just_determined]:
-        say("just_determined", f"{', '.join(just)}: {JUST}.")
-    coarse = 0.0  # rad/s: where most samples are the same number of counts, one more is neither wild nor a step
-    if column and (q := column["resolution"]):
-        coarse = COUNTS * (q if column["kind"] == "rate" else q / p.step)
-    out += [Reason("drift_record.step", text) for text in step_warnings(p, coarse)]
-    off = np.abs(p.clean - np.nanmedian(p.clean))
-    spread = 1.4826 * float(np.nanmedian(off))
-    if spread and (wild := np.flatnonzero(off > max(WILD * spread, coarse))).size:
-        many = f"{wild.size} samples lie" if wild.size > 1 else "A sample lies"
-        say(
-            "wild",
-            f"{many} more than {WILD:g} standard deviations from the median, the first at {number(p.time[wild[0]])} s. "
-            "They raise N and hide the rest. Where they are no drift, mark them in a column flag.",
-        )
+    for id, text in (("wild", noise_tables.wild_text(noise, p.time)), ("step", noise_tables.steps_text(noise, p.time)),
+                     ("level", noise_tables.levels_text(noise))):  # fmt: skip
+        if text:
+            say(id, text)
     if about and about["jitter"] > 0.01 and not about["rounded"]:
         say(
             "jitter",
             f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
             "models take the samples as even. Sample by a clock, or resample.",
         )
-    ends = about["stuck"].get(p.name, 0) if about and column["kind"] != ANGLE and column["white"] else 0
-    if ends > max(10, 1e-4 * about.get("samples", 0)):
-        say(
-            "saturated",
-            f"{ends} samples stay at the largest or smallest value of the file: the converter may "
-            "have been at its limit. The coefficients are too small then. Use a larger range.",
-        )
+    if saturated := saturated_text(p, run):
+        say("saturated", saturated)
     if rounding := coarse_text(p.name, run):
         say("coarse", f"{rounding} {MORE_DIGITS if column['kind'] == 'rate' else FINER_ANGLE}")
     if explained := explained_text(p):
@@ -278,26 +250,6 @@ def warnings(p: Prepared, noise: NoiseCoefficients, run: RunDocument) -> list[Re
     return out
 
 
-def step_warnings(p: Prepared, coarse: float = 0.0) -> list[str]:
-    """Return a warning where one change from block to block stands out of all: a step, which no noise makes.
-
-    coarse: change of a single sample that says nothing, rad/s.
-    """
-    m = max(1, p.stretch.size // STEP_BLOCKS)
-    change = np.diff(block_means(p.stretch, m))
-    off = change - np.median(change)
-    k = int(np.argmax(np.abs(off)))
-    spread = 1.4826 * float(np.median(np.abs(off)))
-    if not spread or abs(off[k]) < max(STEP * spread, coarse / m):
-        return []
-    hours = (k + 1) * m * p.stretch_step / 3600.0
-    return [
-        f"The level changes by {number(off[k] / DPH)} °/h within {number(2.0 * m * p.stretch_step)} s, about "
-        f"{number(hours)} h after the beginning of the longest stretch: a step, which is not in the model; K and B take"
-        " it for theirs. Reduce the parts before and after it, or find its cause."
-    ]
-
-
 def _flat(p: Prepared, run: RunDocument) -> bool:
     if not run.series or run.series["factor"] > 1 or run.series["columns"][p.name]["kind"] != "rate":
         return False
@@ -308,24 +260,33 @@ def _flat(p: Prepared, run: RunDocument) -> bool:
 
 def conventions(run: RunDocument) -> list[str]:
     return [
-        "N, B, K, R, Q as in IEEE 952 with S two-sided; N in °/√h is the density in °/h/√Hz over 60. B is flicker "
-        "without cutoff, its floor in the Allan deviation 0.664 B.",
+        "N, B, K, R, Q as in IEEE 952 with S two-sided; N in °/√h is the density in °/h/√Hz over 60, towards frequency "
+        "0. B is flicker without cutoff, its floor in the Allan deviation 0.664 B; B_min is the least Allan deviation "
+        "of the whole model, whatever makes it.",
+        "Gauss-Markov process: dx/dt = −x/τ + w, variance σ², density of w two-sided, q = 2 σ²/τ.",
         "Spectrum figures are one-sided: 2 S.",
         "Not determined: the 95 % interval of the coefficient holds zero; its upper end is stated.",
-        "Lines and columns that the rate follows significantly are taken out of it before coefficients and deviations.",
+        "Lines, columns that the rate follows significantly, wild samples and steps of the level are taken out of it "
+        "before coefficients and deviations; the deviation of the record as it was judges the model.",
     ]
 
 
-def summary(name: str, noise: NoiseCoefficients, several: bool) -> list[str]:
+def summary(name: str, noise: NoiseModel, several: bool) -> list[str]:
+    of = f"{name}: " if several else ""
+    if not noise.agrees:
+        return [f"{of}{noise_tables.agreement_text(noise)} No coefficient is stated."]
     known, lacking = [], []
     for term, (unit, si, _) in TERMS.items():
-        e = getattr(noise, term)
-        u = (e.high - e.low) / (2.0 * 1.96 * si)
+        e = noise[term]
         if e.determined:
-            low, high = number(e.low / si, u), number(e.high / si, u)
-            known.append(f"{term} = {number(e.value / si, u)} {unit} ({low} to {high})")
+            known.append(f"{term} = {noise_tables.range_text(e, si)} {unit}")
         else:
             lacking.append(f"{term} (below {number(max(abs(e.low), abs(e.high)) / si)} {unit})")
-    of = f"{name}: " if several else ""
+    least = noise.minimum
+    if least.reached:
+        known.append(f"least Allan deviation {noise_tables.range_text(least.deviation, DPH)} °/h at "
+                     f"{noise_tables.range_text(least.tau)} s")  # fmt: skip
+    known += [f"Gauss-Markov drift of {noise_tables.range_text(g.sigma, DPH)} °/h rms, correlation time "
+              f"{noise_tables.range_text(g.tau)} s" for g in noise.processes if g.tau.determined]  # fmt: skip
     out = [f"{of}{'; '.join(known)}; 95 % intervals."] if known else []
     return out + ([f"{of}The record does not determine {', '.join(lacking)}."] if lacking else [])

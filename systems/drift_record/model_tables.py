@@ -13,7 +13,7 @@ from gyrobench.reduction.series.stationarity import RunsTest
 from gyrobench.result import Table
 from gyrobench.units import DPH
 
-from .description import number
+from .noise_tables import number
 
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 RAN = {"runs": "runs of block statistics", "up_down": "runs up and down", "trend": "trend", "unit_root": "unit root",

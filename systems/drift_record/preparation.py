@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,27 +12,29 @@ from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.noise_model.fit import fit_noise
+from gyrobench.reduction.noise_model.model import NoiseModel
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
-from gyrobench.reduction.series.lines import SpectralLine
+from gyrobench.reduction.series.lines import Lines
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 
-from .regressors import RegressionSlope, block_means_of, regress
+from .regressors import RegressionSlope, regress
 
-WHOLE = 0.5  # part of the samples that a stretch without a gap must hold
-LEAST = 512  # samples of it
+LEAST = 512  # samples of a record
 OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged"}
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A rate on the grid, rad/s, NaN in gaps; clean: without what regression and lines take out.
+    """A rate on the grid, rad/s, NaN in gaps, and its noise model; clean: without what columns, lines, steps explain,
+    and without its wild samples.
 
-    stretch: the longest one of ``clean`` without a gap, for spectra and models; of means over ``averaged`` samples
-    where gaps are many.  step, stretch_step: s.
+    stretch: the longest part of ``clean`` without a long gap, for spectra and time-series models; what was missing or
+    wild in it is drawn from the noise around.  step: s.
     """
 
     name: str
@@ -42,16 +43,22 @@ class Prepared:
     rate: Array
     clean: Array
     regressions: tuple[RegressionSlope, ...]
+    noise: NoiseModel
     model: DriftModel  # of the stretch
     stretch: Array
-    stretch_step: float
-    averaged: int
     first: int  # place of the stretch on the grid
 
     @property
     def cleaned(self) -> bool:
         """Whether anything was taken out."""
-        return self.clean is not self.rate
+        t = self.noise.treatment
+        return bool(any(r.kept for r in self.regressions) or t.lines or t.steps or t.wild.size)
+
+    @property
+    def lines(self) -> Lines:
+        """The lines, taken out before the noise model or left in."""
+        m, t = self.model.lines, self.noise.treatment
+        return replace(m, lines=tuple(self.noise.lines), complete=t.complete_lines) if t.lines else m
 
 
 @dataclass(frozen=True)
@@ -90,9 +97,10 @@ def columns_of(record: Record) -> Columns:
     return Columns(step * np.arange(float(rate.size)), {"drift": rate}, others, run.window_units, step, said)
 
 
-def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
-    """Return a rate with what other columns and lines explain taken out.
+def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True, wild: bool = True) -> Prepared:
+    """Return a rate with its noise model and what other columns, lines and steps explain taken out.
 
+    means: a sample is the mean over the step.  wild: samples are looked for that are none of the noise.
     Raises ReductionError for a record too short or without a stretch long enough.
     """
     rate = columns.rates[name]
@@ -100,62 +108,21 @@ def prepare(name: str, columns: Columns, remove_lines: bool) -> Prepared:
         raise ReductionError(
             [f"column '{name}': {np.count_nonzero(np.isfinite(rate))} samples; at least {LEAST} needed"]
         )
-    time = columns.time
     regressions = regress(rate, columns.others, columns.others_unit)
-    clean = rate
+    left = rate
     for r in regressions:
         if r.kept:
             x = columns.others[r.name]
-            clean = clean - r.slope * np.nan_to_num(x - np.nanmean(x))
-    stretch, first, averaged = longest_stretch(clean)
-    step = columns.step * averaged
+            left = left - r.slope * np.nan_to_num(x - np.nanmean(x))
     try:
-        model = describe(stretch, step)
+        noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
+        first, stretch = noise.longest
+        model = describe(stretch, columns.step)
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None
-    if remove_lines and model.lines.lines:
-        begin = time[first] + 0.5 * columns.step * (averaged - 1)
-        clean = clean - sum_of(model.lines.lines, time - begin, columns.step, averaged)
-        stretch = model.lines.residual
-    return Prepared(name, time, columns.step, rate, clean, regressions, model, stretch, step, averaged, first)
-
-
-def sum_of(lines: Sequence[SpectralLine], t: Array, step: float, averaged: int) -> Array:
-    """Return the lines at times t, s; what the mean over ``averaged`` samples had weakened is restored."""
-    out = np.zeros_like(t)
-    for line in lines:
-        x = math.pi * line.frequency * step
-        weaker = math.sin(averaged * x) / (averaged * math.sin(x)) if averaged > 1 else 1.0
-        out += line.amplitude / weaker * np.sin(2.0 * math.pi * line.frequency * t + line.phase)
-    return out
-
-
-def longest_stretch(x: Array) -> tuple[Array, int, int]:
-    """Return the longest stretch without a gap, its first index on the grid, and of how many samples it has the means.
-
-    Means, over those samples of each that are there (half of them or more), where single gaps cut the record short.
-    Raises ReductionError where there is none of LEAST values.
-    """
-    best: tuple[Array, int, int] | None = None
-    averaged, y = 1, x
-    total = np.count_nonzero(np.isfinite(x))
-    while y.size >= LEAST:
-        a, b = _longest(y)
-        if best is None or (b - a) * averaged > 1.5 * best[0].size * best[2]:
-            best = y[a:b], a * averaged, averaged
-        if (b - a) * averaged >= WHOLE * total:
-            break
-        averaged *= 2
-        y = block_means_of(x, averaged)
-    if best is None or best[0].size < LEAST:
-        raise ReductionError([f"no stretch of {LEAST} samples without a gap: the gaps leave no spectrum"])
-    return best
-
-
-def _longest(x: Array) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(np.isfinite(x).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    a, b = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))].tolist() if edges.size else (0, 0)
-    return int(a), int(b)
+    return Prepared(
+        name, columns.time, columns.step, rate, noise.cleaned, regressions, noise, model, stretch, first
+    )  # fmt: skip
 
 
 #: noise coefficient -> parameter of the gyro that gives it

@@ -1,34 +1,32 @@
-"""Reduction of a drift record: noise coefficients N, B, K, R, Q of each column, and the evidence for them.
+"""Reduction of a drift record: noise model of each column, its coefficients N, B, K, R, Q, and the evidence for it.
 
-    S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2 sin^2(pi f tau)/tau,   two-sided;   rate = ... + R t
+The rate without what other columns explain goes to gyrobench.reduction.noise_model: white noise through the filter of
+the sensor, angle noise, Gauss-Markov processes, flicker, random walk, ramp; lines, wild samples and steps taken out and
+told.  A coefficient is printed where the deviation implied by the whole model is the record's own.  Beside it the
+slopes of the Allan deviation, deviations, spectrum, stationarity, distribution and an autoregressive model.
+[DRIFT-NOISE-MODEL, DRIFT-ALLAN, DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; IEEE 952, annex C; Xia 2008, ch. 3]
 
-estimated by restricted maximum likelihood from the rate without what lines and other columns explain
-(gyrobench.reduction.series.noise_coefficients), beside them the slopes of the Allan deviation, deviations, spectrum,
-stationarity, distribution and an autoregressive model.
-[DRIFT-ALLAN, DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; IEEE 952, annex C; Xia 2008, ch. 3]
-
-Not modelled: noise that none of the five terms describes (Gauss-Markov drift of a correlation time within the record):
-the test of the model says so; steps of the bias; drift of the scale factor.
+Not modelled: drift of the scale factor; temperature that acts with a lag; noise whose level changes (said, not
+modelled).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.noise_model.model import NoiseModel
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
-from gyrobench.reduction.series.long_record import SHORTEST
-from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
+from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
@@ -44,15 +42,16 @@ from gyrobench.result_entries import (
 )
 from gyrobench.units import DPH
 
-from . import description, model_tables
-from .preparation import LEAST, WHOLE, Prepared, columns_of, prepare, truth_of
+from . import description, model_tables, noise_tables
+from .preparation import Columns, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
 
 SHOWN, SHOWN_LAGS = 1500, 40  # intervals of the record, lags that are drawn
+LEAST_DEVIATION = "B_min"
 RESIDUAL = (
-    "The deviations are those of the rate without what lines and other columns explain: where these fits have taken "
-    "slow drift along, the deviations are too small at long averaging times."
+    "The deviations are those of the rate without what lines, steps and other columns explain and without its wild "
+    "samples: where these fits have taken slow drift along, they are too small at long averaging times."
 )
 FIELDS = ("tau", "deviation", "low", "high", "edf", "count", "exponent")
 KINDS = {"allan": "Allan", "modified": "modified Allan", "hadamard": "Hadamard"}
@@ -60,25 +59,28 @@ KINDS = {"allan": "Allan", "modified": "modified Allan", "hadamard": "Hadamard"}
 
 @dataclass(frozen=True)
 class Analysed:
-    """A column with its noise coefficients and deviations, SI."""
+    """A column with its noise model and deviations, SI."""
 
     of: Prepared
-    noise: NoiseCoefficients
     deviations: Mapping[str, Deviation]
+
+    @property
+    def noise(self) -> NoiseModel:
+        return self.of.noise
 
 
 def from_record(record: Record) -> DriftRecordResult:
     """Return what a record says.  Raises ReductionError where it is too short or cannot be analysed."""
     run = record.run
     columns = columns_of(record)
-    remove = bool(run.options.get("remove_lines", True))
-    analysed = [analyse(prepare(name, columns, remove), run.series) for name in columns.rates]
+    analysed = [analyse(name, columns, run) for name in columns.rates]
     several = len(analysed) > 1
     return DriftRecordResult(
-        method="Noise coefficients by restricted maximum likelihood, deviations, spectrum, model of the random drift",
-        sources=["DRIFT-ALLAN; IEEE 952, annex C", "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
-        equation='S(f) = N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0), quad '
-        'sigma_"A"^2 = N^2/tau + (2 ln 2)/pi B^2 + K^2 tau/3 + R^2 tau^2/2 + 3 Q^2/tau^2',
+        method="Noise model of greatest evidence whose deviation is the record's own, deviations, spectrum, models",
+        sources=["DRIFT-NOISE-MODEL, DRIFT-ALLAN; IEEE 952, annex C",
+                 "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
+        equation='S(f) = N^2 abs(H)^2 + sum_i (2 sigma_i^2 tau_i)/(1 + (2 pi f tau_i)^2) + B^2/(2 pi f) + '
+        'K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0)',
         conventions=[*columns.conventions, *description.conventions(run)],
         coefficients=[c for a in analysed for c in _coefficients(a, run, several)],
         reasons=[r for a in analysed for r in _reasons(a, run, several)],
@@ -86,7 +88,7 @@ def from_record(record: Record) -> DriftRecordResult:
         instrument=run.instrument,
         site={} if run.measured else run_metadata.Site.of(run).shown(),
         simulated=not run.measured,
-        columns=[_column(a, run, remove) for a in analysed],
+        columns=[_column(a, run) for a in analysed],
     )  # fmt: skip
 
 
@@ -97,49 +99,23 @@ def _named(term: str, a: Analysed, several: bool) -> str:
 def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
     of = f"Column {a.of.name}: " if several else ""
-    said = [replace(r, text=of + r.text) for r in description.warnings(a.of, a.noise, run)]
-    names = tuple(_named(term, a, several) for term in TERMS)
-    against = description.doubts(a.of, a.noise, run).items()
+    said = [replace(r, text=of + r.text) for r in description.warnings(a.of, run)]
+    names = tuple(_named(term, a, several) for term in (*TERMS, LEAST_DEVIATION))
+    against = description.doubts(a.of, run).items()
     return said + [Reason(id, of + text, ("pass", "fail"), names, severity="doubt") for id, text in against]
 
 
-def stretches(x: Array, least: int = 2) -> list[Array]:
-    """Return the runs of a series without a gap, ``least`` values or more."""
-    edges = np.flatnonzero(np.diff(np.isfinite(x).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    return [x[a:b] for a, b in edges.tolist() if b - a >= least]
-
-
-def analyse(p: Prepared, series: Mapping[str, Any] | None = None) -> Analysed:
-    """Return the noise coefficients and deviations of a column."""
-    whole = stretches(p.clean, SHORTEST)
-    held_whole = sum(x.size for x in whole) >= WHOLE * np.count_nonzero(np.isfinite(p.clean))
-    singles = p.averaged > 1 and (len(whole) > MANY or not held_whole)  # are missing all over
-    noise = missing_all_over(p, whole) if singles else fit(whole, p.step)
+def analyse(name: str, columns: Columns, run: RunDocument) -> Analysed:
+    """Return a column with its noise model and deviations."""
+    series = run.series or {}
+    about: Mapping[str, Any] = series["columns"][name] if series else {"kind": "", "white": True}
+    points = about["kind"] == "rate" and series.get("samples") == "points" and series["factor"] == 1
+    p = prepare(name, columns, bool(run.options.get("remove_lines", True)), not points, about["white"])
     held = deviations(p.clean, p.step, tuple(KINDS))
-    every = {kind: _read(d) for kind, d in (series or {}).get("deviations", {}).get(p.name, {}).items()}
+    every = {kind: _read(d) for kind, d in series.get("deviations", {}).get(name, {}).items()}
     if every and p.cleaned:  # of the averaging times that the means do not reach, as recorded
         held = {kind: _joined(every[kind], d) for kind, d in held.items()}
-    return Analysed(p, noise, held if p.cleaned or not every else every)
-
-
-def missing_all_over(p: Prepared, whole: Sequence[Array]) -> NoiseCoefficients:
-    """Return the coefficients of a record from which single samples are missing: B, K and R of means over those that
-    are there, N and Q of the longest stretches ``whole`` without a gap.
-
-    Means of k samples in place of m hold s2 (1/k - 1/m) of white noise more, s2 the variance of a sample: so much is
-    taken off N2 and the lower end of its interval, not off the upper, as little of it is there where samples are not
-    independent.  That N is taken where it is the better one.  Errors of angles do not cancel in such means.
-    """
-    slow = fit([p.stretch], p.stretch_step)
-    k = np.isfinite(p.clean[p.first : p.first + p.stretch.size * p.averaged]).reshape(-1, p.averaged).sum(axis=1)
-    steps = np.diff(p.clean)
-    more = 0.5 * float(np.nanmean(steps**2)) * p.step * (p.averaged * float(np.mean(1.0 / k)) - 1.0)
-    value, low = (math.sqrt(max(x * x - more, 0.0)) for x in (slow.N.value, max(slow.N.low, 0.0)))
-    N, Q = Estimate(value, low, slow.N.high, low > 0.0), Estimate(0.0, 0.0, slow.Q.high, False)
-    if sum(x.size for x in whole) >= LEAST:
-        fast = fit(whole, p.step)
-        N, Q = min((N, fast.N), key=lambda e: e.high - e.low), fast.Q
-    return replace(slow, N=N, Q=Q)
+    return Analysed(p, held if p.cleaned or not every else every)
 
 
 def _read(d: Mapping[str, Any]) -> Deviation:
@@ -151,26 +127,36 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
     return Deviation(long.kind, **{n: np.append(getattr(short, n)[below], getattr(long, n)) for n in FIELDS})
 
 
-MANY = 200  # stretches of a record that are fitted one by one
-
-
 def _coefficients(a: Analysed, run: RunDocument, several: bool) -> list[Coefficient]:
     truth, relative = truth_of(run), float(run.options.get("u_scale_factor", 0.0))
-    return [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+    out = [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+    least, when = a.noise.minimum.deviation, a.noise.minimum.tau
+    meaning = f"bias instability as the least Allan deviation, at {noise_tables.range_text(when)} s"
+    why = "" if least.determined else "not determined: the deviation still falls at the longest averaging time"
+    return [*out, _stated(a, _named(LEAST_DEVIATION, a, several), meaning, "°/h", least, DPH, why, None, relative)]
 
 
 def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
     unit, si, meaning = TERMS[term]
-    e: Estimate = getattr(a.noise, term)
+    e: Estimate = a.noise[term]
+    why = "" if e.determined else noise_tables.absent(term, a.noise)
+    return _stated(a, name, meaning, unit, e, si, why, truth, relative)
+
+
+def _stated(
+    a: Analysed, name: str, meaning: str, unit: str, e: Estimate, si: float, why: str, truth: float | None,
+    relative: float,
+) -> Coefficient:  # fmt: skip
+    """Return a coefficient with its interval; without a value where there is none or the model is not right."""
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
-    if not e.determined:
-        below = max(abs(low), abs(high))
-        why = f"not determined, below {below:.2g} {unit} (95 %): the record is too short or other noise covers it"
+    if not a.noise.agrees:
+        why, low, high = noise_tables.contradicted(a.noise), math.nan, math.nan
+    elif why:
+        why = f"{why}; below {max(abs(low), abs(high)):.2g} {unit} (95 %)"
+    if why:
         return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
                            no_value=why)  # fmt: skip
-    if e.just_determined:
-        meaning = f"{meaning}; just determined"
     u_a = (high - low) / (2.0 * NORMAL)
     u = math.hypot(u_a, relative * value)
     more = NORMAL * (u - u_a)
@@ -180,12 +166,12 @@ def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relativ
     )  # fmt: skip
 
 
-def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
+def _column(a: Analysed, run: RunDocument) -> DriftColumn:
     p, m = a.of, a.of.model
     tau = np.geomspace(p.step, max(d.tau[-1] for d in a.deviations.values()), 120)
     s, c = m.spectrum, m.correlation
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
-    dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f, m.dt) / DPH**2
+    dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f) / DPH**2
     lags = slice(0, SHOWN_LAGS + 1)
     return DriftColumn(
         name=p.name,
@@ -198,15 +184,16 @@ def _column(a: Analysed, run: RunDocument, removed: bool) -> DriftColumn:
         tables={
             "acquisition": [description.acquisition(p, run)],
             "regression": description.regression(p),
-            "deviations": [description.slope_readings(a.noise, a.deviations["allan"])],
-            "spectrum": description.lines(p, removed),
+            "deviations": [noise_tables.bias_instability(a.noise), noise_tables.agreement(a.noise),
+                           description.slope_readings(a.noise, a.deviations["allan"])],
+            "spectrum": [*description.lines(p), *noise_tables.resonances(a.noise)],
             "stationarity": [model_tables.stationarity(m)],
-            "model": model_tables.models(m),
+            "model": [*noise_tables.gauss_markov(a.noise), *model_tables.models(m)],
         },
         texts={
             "acquisition": description.acquisition_texts(p, run),
-            "deviations": [RESIDUAL] if p.cleaned else [],
-            "spectrum": [*description.line_texts(p), description.misfit_text(a.noise)],
+            "deviations": [noise_tables.agreement_text(a.noise), *([RESIDUAL] if p.cleaned else [])],
+            "spectrum": [*description.line_texts(p), noise_tables.terms_text(a.noise)],
             "model": model_tables.model_texts(m),
         },
     )  # fmt: skip

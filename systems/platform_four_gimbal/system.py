@@ -15,7 +15,7 @@ from .flights import FLIGHTS
 LAWS = ("secant", "sign", "constant")  # the part's gain 0, 1, 2
 
 
-class PlatformFourGimbal(TwoGyroTest):
+class PlatformFourGimbalSystem(TwoGyroTest):
     """Gimbals from outside: 4 roll, 3 pitch, 2 inner roll, 1 azimuth.  The inner three are held by two gyros, resolver
     and three channels; the servo of the fourth nulls the inner roll, g4' = k G(g3) g2.
 

@@ -21,7 +21,7 @@ COMMAND = 1e-3  # rad/s, of the command step
 COMMANDS = commands("exciter.command")
 
 
-class PlatformThreeAxis(ThreeAxisTest):
+class PlatformThreeAxisSystem(ThreeAxisTest):
     """Three floated gyros on the inner element of three gimbals; their signals are distributed to the motors of the
     gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
 

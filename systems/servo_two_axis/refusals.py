@@ -87,7 +87,7 @@ def _advice(latitude: float, time: float, terms: int, earth_rate: float) -> str:
 def numbers(text: str) -> list[int] | None:
     """Return mounts from "2 4" or "2, 4"; None if one is none of the twelve."""
     words = text.replace(",", " ").split()
-    if not words or not all(w.isdigit() and int(w) in geometry.MOUNTS for w in words):
+    if not words or not all(w in map(str, geometry.MOUNTS) for w in words):
         return None
     return [int(w) for w in words]
 

@@ -14,7 +14,7 @@ from gyrobench.system.families.table_test import TableTest, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
-from gyrobench.system.values import parse
+from gyrobench.system.values import parse_number
 
 from . import setup
 from .measured import MEASURED
@@ -81,7 +81,7 @@ class ServoTwoAxis(TableTest):
 
     def earth_rate(self) -> float:
         """Return the Earth rate as the site will have it, rad/s."""
-        return float(parse("site.earth_rate", self.overrides.get("site.earth_rate", frames.EARTH_RATE), "rad/s"))
+        return parse_number("site.earth_rate", self.overrides.get("site.earth_rate", frames.EARTH_RATE), "rad/s")
 
     def plan(self) -> Plan:
         return setup.plan(self.mounts(), self["time"], self["window"], self["settle"])

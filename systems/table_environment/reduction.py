@@ -143,21 +143,36 @@ class Reduction(DriftReduction[EnvironmentSetup]):
         note = "level of the later tests times the sensitivity found"
         for cause in CAUSES:
             c, level = result[cause.name], float(self.setup.options.get(cause.option, 0.0))
-            per, size = abs(c.estimate) * units.factor(cause.unit), units.factor(cause.level_unit)
-            effect, at = per * level, (level / size, units.display(cause.level_unit), c.estimate, c.unit)
-            effects.append(ErrorLine(cause.meaning, effect))
-            needed = NEEDED / per / size if c.estimate else None
-            rows.append([cause.meaning, *at, effect / DPH, effect / ERU, needed])
-            named = (f"surroundings.{cause.column}", cause.meaning)
+            found, meaning = c.estimate * units.factor(cause.unit), cause.meaning
+            if cause.column == "tilt_north":
+                found += self._turned_rate(result["s_rate"].estimate)
+                meaning += ", gravity and Earth rate"
+            per, size = abs(found), units.factor(cause.level_unit)
+            effect = per * level
+            at = (level / size, units.display(cause.level_unit), found / units.factor(cause.unit), c.unit)
+            effects.append(ErrorLine(meaning, effect))
+            needed = NEEDED / per / size if per else None
+            rows.append([meaning, *at, effect / DPH, effect / ERU, needed])
+            named = (f"surroundings.{cause.column}", meaning)
             lines.append(BudgetLine(*named, *at, effect / DPH, "°/h", "surroundings", note))
         self.level = total = budgets.combine(effects, self.setup.seed)
         rows += [[name, None, None, None, None, x / DPH, x / ERU, None] for name, x in total.named()]
         caption = (
-            "Levels: those of the later tests (options u_...), not of this run. Last column: the level at which the "
-            "effect is 1e-9 ERU, a tenth of 1e-8 ERU."
+            "Levels: those of the later tests (options u_...), not of this run. A static tilt about north acts by "
+            "gravity (s_N) and turns the input axis against the Earth's rate (W sin φ). Last column: level at which "
+            "the effect is 1e-9 ERU, a tenth of 1e-8 ERU."
         )
         head = ["cause", "level", "unit", "sensitivity", "unit", "drift / (°/h)", "drift / ERU", "level needed"]
         return lines, Table("budget.surroundings", "Budget of the surroundings", caption, head, rows)
+
+    def _turned_rate(self, s_rate: float) -> float:
+        """Return the drift rate per static tilt about north by the Earth's rate, rad/s per rad.
+
+        Such a tilt q leans the input axis from east downwards: w_E = -q W sin phi is then on it, which the test has
+        in the column of the rate and not in that of the tilt.  A tilt about east turns no rate onto the input axis.
+        [ENV-DISTURBANCE; Hu 1981, Table 5-4]
+        """
+        return -s_rate * self.setup.earth_rate * math.sin(self.setup.latitude)
 
     def _alignment(self) -> Table:
         """Return the budget of the rate on the input axis of a table that turns."""

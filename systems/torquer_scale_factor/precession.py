@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.effects import with_set_up
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.mixture import equivalent_dof
-from gyrobench.reduction.estimation.noise_estimate import Estimate
+from gyrobench.reduction.estimation.noise_estimate import NoiseEstimate
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.sources import Effect
 
@@ -40,7 +40,7 @@ class Precession:
 
     K: Array
     drift: Array
-    est: Estimate
+    est: NoiseEstimate
     fit: Findings | None = None
     effects: Sequence[Effect] = ()
 

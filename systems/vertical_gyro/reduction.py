@@ -132,12 +132,23 @@ class Reduction(LoopReduction):
             found.warn("erection.not_erected", text)
 
     def _rest(self, gate: Gate) -> None:
-        tilt, o = np.hypot(*_of(gate).T), self.run.options
-        half = tilt[tilt.size // 2 :]
-        closed = float(o["earth_rate"]) * math.cos(float(o["latitude"])) / self.gain if self.linear else None
-        u = float(np.std(half)) / math.sqrt(8.0)
-        meaning = "mean tilt at rest, second half"
-        self.found.measure("hang-off", meaning, "arcmin", float(half.mean()), u, scale=ARCMIN, closed=closed)
+        """Measure the tilt at rest: of switches the mean of the second half, chattering in the dead zone; of the linear
+        law what it settles to, A + B exp(-gain t) of either lean: the rest of the erection decays by the gain.
+        """
+        leans, o = _of(gate), self.run.options
+        if not self.linear:
+            half = np.hypot(*leans.T)[len(leans) // 2 :]
+            u, meaning = float(np.std(half)) / math.sqrt(8.0), "mean tilt at rest, second half"
+            self.found.measure("hang-off", meaning, "arcmin", float(half.mean()), u, scale=ARCMIN)
+            return
+        t = gate.t - gate.t[0]
+        X = np.column_stack([np.ones_like(t), np.exp(-self.gain * t)])
+        settled, *_ = np.linalg.lstsq(X, leans, rcond=None)
+        size, left = float(np.hypot(*settled[0])), float(np.std(leans - X @ settled))
+        u = math.hypot(self.gain * size * self.run.step / math.sqrt(3.0), left)  # what it moves in a step, as self.u
+        closed = float(o["earth_rate"]) * math.cos(float(o["latitude"])) / self.gain
+        meaning = "tilt at rest that the erection settles to"
+        self.found.measure("hang-off", meaning, "arcmin", size, u, scale=ARCMIN, closed=closed)
 
     def _acceleration(self, gate: Gate) -> None:
         rows, o, c = _through(gate), self.run.options, gate.channels

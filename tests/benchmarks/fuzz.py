@@ -2,8 +2,8 @@
 
     python tests/benchmarks/fuzz.py [KIND ...] [--inputs 200000]
 
-Kinds and changes: tests/fuzzing.py.  Every process works in a folder of its own; the tree of the bench and the home
-folder are looked at before and after.
+Kinds and changes: tests/support/fuzzing.py; "stored" turns one bit of a stored file.  Every process works in a folder
+of its own; the tree of the bench and the home folder are looked at before and after.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS / "support")]
 BUILT = TESTS.parent / "fmus"  # where the FMUs belong that the attacks are made from
 #: share of the inputs; the others read in some ms, these in some tenths of a second
-RARE = {"numbers": 0.01, "ssp": 0.05}
+RARE = {"numbers": 0.01, "ssp": 0.05, "environment": 0.0005}
 
 
 def attacked(job: tuple[str, int, int]) -> tuple[str, int, float, float, list[str]]:

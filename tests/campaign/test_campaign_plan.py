@@ -1,4 +1,4 @@
-"""Axes, points and the identity of runs: nothing is executed here."""
+"""Axes, points and the identity of runs: nothing is executed here, apart from a sweep with its design held."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.bench import UsageError
+import gyrobench as gb
+from gyrobench.bench import UsageError, standard_folder
 from gyrobench.campaign.execution.axes import Axis, Distribution, draw, parse_axis
 from gyrobench.campaign.execution.campaign_plan import CampaignPlan, make_plan
 from gyrobench.campaign.execution.definition import from_mapping, read_definition
@@ -53,7 +54,7 @@ def test_values_as_a_person_writes_them(text: str, unit: str, shown: list[Any]) 
     [
         ("0..1deg, 2", "some values have a unit and some have none"),
         ("1deg,2s", "does not convert"),
-        ("1..2:1", "two points or more"),
+        ("1..2:1", "a grid has 2 to 1000000 points"),
         ("-1..2:5log", "must be > 0"),
         ("gauss(0, 1)", "no such distribution; there are: uniform, normal"),
         ("uniform(1)", "takes 2 numbers"),
@@ -158,13 +159,48 @@ def test_files(tmp_path: Path) -> None:
         ({"system": "weighing", "over": {"sauce.offset": "1,2"}}, "no slot 'sauce'"),
         ({"system": "weighing", "over": {"temperature": "uniform(1, 2) K"}}, "how many points are drawn"),
         ({"system": "weighing", "runs": 5}, "nothing is drawn"),
-        ({"system": "weighing", "seeds": 0}, "a number of seeds from 1 on"),
+        ({"system": "weighing", "seeds": 0}, "a number of seeds from 1 to"),
         ({"system": "weighing", "data": "none/*.csv"}, "no such file"),
         ({"system": "weighing", "memory_limit": "lots"}, "500MB or 1.5GB"),
         ({"system": "weighing", "set": {"temperature": "3K"}, "over": {"temperature": "1,2 K"}}, "leave out one"),
-        ({"system": "weighing", "table": "none.csv"}, "none.csv: not a readable table: No such file"),
+        ({"system": "weighing", "table": "none.csv"}, "none.csv: No such file"),
     ],
 )
 def test_what_is_refused_before_anything_runs(asked: dict[str, Any], problem: str) -> None:
     with pytest.raises(UsageError, match=problem):
         make_plan(from_mapping(asked))
+
+
+LOOP = {"system": "platform_single_axis", "over": {"platform.J": "2,4 kg.m2"}, "set": {"hold": "10s"}}
+
+
+def test_a_design_that_follows_a_varied_part_is_told_and_can_be_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gain of the loop is in proportion to the inertia it is designed for: of a sweep of the inertia each point is
+    the same loop, unless the design is held; then twice the inertia halves the gain and costs phase margin.
+    """
+    pytest.importorskip("distributed")
+    monkeypatch.chdir(standard_folder())
+    (note,) = [n for n in make_plan(from_mapping(LOOP)).notes if "--fixed-design" in n]
+    assert note.startswith("platform.J: the design of platform_single_axis follows it")
+    held = make_plan(from_mapping({**LOOP, "fixed_design": True}))
+    assert not [n for n in held.notes if "--fixed-design" in n] and held.nominal == {}
+    assert not {r.run for r in held.runs} & {r.run for r in make_plan(from_mapping(LOOP)).runs}
+    kept, following = (
+        gb.sweep(**LOOP, fixed_design=f, workers=1, check_step=False)["PM.estimate"].tolist() for f in (True, False)
+    )
+    assert kept[0] == following[0]  # 2 kg m2 is nominal
+    assert abs(following[1] - following[0]) < 1.0
+    assert kept[0] - kept[1] > 5.0
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"over": {"crossover": "5,10 Hz"}}, "no parameter of a part is varied"),
+        ({"parts": {"estimator": "estimator_none, estimator_kalman_rate"}}, "estimator is an axis of parts"),
+        ({"fixed_design": "yes"}, "true or false is expected"),
+    ],
+)
+def test_a_design_that_cannot_be_held_is_refused(more: dict[str, Any], words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        make_plan(from_mapping({**LOOP, "fixed_design": True, **more}))

@@ -17,7 +17,7 @@ import gyrobench as gb
 from gyrobench.bench import UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
 from gyrobench.campaign.analysis.measures import numbers
-from gyrobench.campaign.execution.store import Campaign
+from gyrobench.campaign.execution.store import Campaign, CampaignError, CampaignStore
 from gyrobench.campaign.site.site_folder import write_site
 
 RUNS = 300
@@ -256,3 +256,41 @@ def test_lot_of_measured_files(tmp_path: Path) -> None:
     assert tolerance["high"] < 3.0 * np.sqrt(1.0 + 0.02**2) + 1.0  # of a unit normal, not of the outlier at 9
     html = (lot / "site" / "index.html").read_text(encoding="utf-8")
     assert 'href="../kept/0000000000000014/report.html"' in html  # gyro 20, one click away
+
+
+def foreign(tmp_path: Path, report: str, text: str = "lot") -> Campaign:
+    """A campaign of others with one run, whose digests fit: who writes it can compute them."""
+    rows = [
+        {"run": "0", "index": 0, "system": "toy", "seed": 1, "state": "done", "reason": text, "a.estimate": 1.0,
+         "report": report, "instrument": "one", "date": "2026-01-01", "verdict": "pass"}
+    ]  # fmt: skip
+    (tmp_path / "secret").mkdir()
+    (tmp_path / "secret" / "report.html").write_text("mine")
+    axes = [{"name": "data", "kind": "data", "unit": ""}]
+    document = {"name": text, "question": "", "system": "toy", "axes": axes, "definition": {}, "options": {}}
+    with CampaignStore(tmp_path / "c") as store:
+        store.begin(document | {"parts": {}, "versions": {}}, {"0": {"index": 0}})
+        store.append(rows, {"a.estimate": "°/h"})
+    return Campaign.open(tmp_path / "c")
+
+
+@pytest.mark.parametrize(
+    "report",
+    ["../secret/report.html", "kept/../../secret/report.html", "javascript:alert(1)//report.html", "kept/0/x.js"],
+)
+def test_a_foreign_campaign_neither_writes_outside_nor_brings_scripts(tmp_path: Path, report: str) -> None:
+    campaign = foreign(tmp_path, report)
+    for places in ((None, tmp_path / "out"), (tmp_path / "site", None)):
+        with pytest.raises(CampaignError, match="not the place of a report of this campaign"):
+            write_site(campaign, *places)
+    assert {f.name for f in tmp_path.iterdir()} <= {"c", "secret", "site", "out"}
+    assert not list((tmp_path / "out").rglob("*.html"))
+
+
+def test_characters_that_turn_the_direction_of_a_text_are_shown(tmp_path: Path) -> None:
+    """A name with which the page would show "fail" the other way round, and which clears a terminal."""
+    campaign = foreign(tmp_path, "kept/0/report.html", "a\u202eliaf\x1b[2J")
+    write_site(campaign, tmp_path / "site")
+    for name in ("index.html", "runs.js"):
+        page = (tmp_path / "site" / name).read_text(encoding="utf-8")
+        assert "a⟨U+202E⟩liaf" in page and "\u202e" not in page and "\x1b" not in page, name

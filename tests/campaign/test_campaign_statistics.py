@@ -96,6 +96,24 @@ def test_small_lots_and_coefficients_that_say_nothing_new() -> None:
     assert robust_outliers(x[:8]) is None
 
 
+def test_one_coefficient_far_off_is_not_diluted_by_the_others() -> None:
+    """Off by 7 deviations in one of four: the distance in all four, 7.2 for one in 20, alone would let it pass."""
+    named = []
+    for seed in range(6):
+        x = np.random.default_rng(seed).normal(size=(20, 4))
+        x[3, 2] = -7.0
+        named.append(bool(robust_outliers(x).outlier[3]))  # type: ignore[union-attr]
+    assert sum(named) >= 5
+
+
+@pytest.mark.parametrize("n", [5, 6, 10, 20, 25, 40])
+def test_of_normal_lots_as_many_values_lie_outside_the_limits_as_of_three_sigma(n: int) -> None:
+    """0.27 % of the values, whatever their number; ± 3 sigma of few values had 1.0 to 2.5 % outside."""
+    x = np.random.default_rng(n).normal(size=(60_000 // n, n))
+    outside = [np.sum((v < low) | (v > high)) for v in x for _, low, high in [control_limits(v)]]  # type: ignore[misc]
+    assert sum(outside) / x.size == pytest.approx(0.0027, abs=0.0009)
+
+
 def test_control_limits_are_not_widened_by_what_they_are_to_show() -> None:
     x = np.random.default_rng(3).normal(5.0, 2.0, 400)
     x[::40] += 100.0

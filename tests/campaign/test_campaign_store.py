@@ -165,7 +165,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
             store.append(ROWS, {"a.u": "°/s"})
     (tmp_path / "c" / "runs" / "torn.parquet").write_bytes(b"PAR1")
     with pytest.raises(
-        CampaignError, match=r"torn.parquet: not readable.*remove the file: the runs in it are run again"
+        CampaignError, match=r"torn.parquet: changed after it was saved.*remove the file: the runs in it are run again"
     ):
         Campaign.open(tmp_path / "c")
     assert json.loads((tmp_path / "c" / "campaign.json").read_text())["schema"] == "gyrobench-campaign-1"

@@ -140,7 +140,7 @@ def test_nothing_or_a_damaged_file_is_refused(small: System, tmp_path: Path) -> 
     stop(small, tmp_path / "r", 0.1)
     file = tmp_path / "r" / FILE
     data = file.read_bytes()
-    for bad in (b"", data[: len(data) // 2], b"PK" + bytes(100), data.replace(b'"format": 1', b'"format": 9')):
+    for bad in (b"", data[: len(data) // 2], b"PK" + bytes(100), data.replace(b'"format": 2', b'"format": 9')):
         file.write_bytes(bad)
         with pytest.raises(ResumeError, match=r"checkpoint.npz: not a checkpoint that can be read"):
             run(small, **again)

@@ -243,11 +243,21 @@ def test_python_and_native_parts_give_the_same_record(small: System) -> None:
     assert python.run.parts["gyro"].target == "python"
 
 
-def test_nan_of_a_foreign_part_is_stopped_by_the_next_one(small: System, foreign: Foreign) -> None:
-    with pytest.raises(RunError, match=r"rebalance: doStep failed at t = 0.15\d* s.*\n.*FMU log: .*u") as caught:
-        run(small, parts={"gyro": foreign("faulty")}, values={"gyro.fault": 4, "gyro.at": 150, "rebalance.K_p": 0.0})
+@pytest.mark.parametrize("engine", ["native", "reference"])
+def test_nan_is_the_fault_of_the_part_that_gives_it(
+    small: System, foreign: Foreign, tmp_path: Path, engine: str
+) -> None:
+    """The next part of the bench cannot take it; another foreign one in between passes it on."""
+    wrong, values = {"gyro": foreign("faulty")}, {"gyro.fault": 4, "gyro.at": 150}
+    with pytest.raises(RunError) as caught:
+        run(small, wrong, values={**values, "rebalance.K_p": 0.0}, engine=engine)
+    assert str(caught.value).startswith("gyro: doStep failed at t = 0.15 s: its output u is nan\n")
+    assert "FMU log: rebalance does not take it: input u is nan at t = 0.15 s" in str(caught.value)
     assert caught.value.record is not None
     assert not caught.value.record.complete
+    (tmp_path / "lag.toml").write_text('[i]\nname = "y"\n[i_read]\nname = "y"\n')
+    with pytest.raises(RunError, match=r"gyro: doStep failed at t = 0\.15 s: its output u is nan\n.*sampler does not"):
+        run(small, {**wrong, "rebalance": foreign("lag")}, {"rebalance": tmp_path / "lag.toml"}, values, engine=engine)
 
 
 def test_infinite_parameter_does_not_cost_the_record(tmp_path: Path) -> None:

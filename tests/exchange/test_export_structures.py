@@ -14,13 +14,17 @@ from fmpy import read_model_description
 from lxml import etree
 
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.exchange.gains import gains_of
+from gyrobench.exchange.external_record import row_steps
+from gyrobench.exchange.gains import Gains, gains_of
 from gyrobench.exchange.ssp_annotation import read_gains
-from gyrobench.exchange.ssp_export import export_ssp, prepare, stop_time, structure
+from gyrobench.exchange.ssp_export import OMS, export_ssp, prepare, stop_time, structure, unitless
 from gyrobench.exchange.ssp_values import NS
 from gyrobench.packaging import build
+from gyrobench.system.fmu_variables import variables
 from gyrobench.system.suite import Suite, load_test
-from gyrobench.system.system import load_system
+from gyrobench.system.system import System, load_system
+from gyrobench.system.wiring import Assembly
+from gyrobench.units import same_dimension
 
 SYSTEMS = [n for n in sorted(Bench(standard_folder()).systems()) if n != "drift_test_suite"]
 
@@ -56,7 +60,49 @@ def test_structure(name: str) -> None:
     assert {c.wire for c in gains.parts.values()} == factors | set(system.factors)
     experiment = root.find("ssd:DefaultExperiment", NS)
     assert experiment is not None and float(experiment.get("stopTime", "0")) == stop_time(system) > 0.0
-    assert f'stepSize="{system.step!r}"' in ET.tostring(root, encoding="unicode")
+    steps = stop_time(system) / system.step
+    assert abs(steps - round(steps)) < 1e-6  # the last step of an importer is as long as the others
+    if system.stop is not None:
+        assert round(steps) == round(system.stop / system.step)  # as many as in a run of the bench
+    solver(root, system)
+    same_units(assembly, gains)
+
+
+def information(element: ET.Element) -> dict[str, str]:
+    """Return what OMSimulator 3 reads of an element."""
+    where = "ssd:Annotations/ssc:Annotation[@type='org.openmodelica']/oms:Annotations/oms:SimulationInformation"
+    (found,) = element.iterfind(where, {**NS, "oms": OMS})
+    return found.attrib
+
+
+def solver(root: ET.Element, system: System) -> None:
+    """Step and method at the system, the solver's name at each component, rows that a reduction takes."""
+    top, experiment = root.find("ssd:System", NS), root.find("ssd:DefaultExperiment", NS)
+    assert top is not None and experiment is not None
+    assert information(top) == {"name": "solver1", "method": "oms_ma", "fixedStepSize": repr(system.step)}
+    components = root.findall(".//ssd:Component", NS)
+    assert components and all(information(c) == {"name": "solver1"} for c in components)
+    results = information(experiment)
+    rows = float(results["loggingInterval"]) / system.step + 0.5  # half a step less: rounding of the time loses no row
+    assert rows == pytest.approx(row_steps(system), abs=1e-6)
+    assert system.channel_period / system.step / row_steps(system) == pytest.approx(
+        round(system.channel_period / system.step / row_steps(system))
+    )
+
+
+def same_units(assembly: Assembly, gains: Gains) -> None:
+    """OMSimulator compares the dimensions that the FMUs of the archive declare themselves."""
+    known = {}
+    for name in gains.order:
+        description = assembly.descriptions.get(name)
+        lost = unitless(assembly, gains, name)
+        for v in variables(description).values() if description is not None else ():
+            known[name, v.name] = "" if v.array in lost else v.unit
+        if description is None:
+            assert lost == {"u", "y"}
+    for c in gains.links:
+        a, b = known.get((c.source, c.output.variable), ""), known.get((c.target, c.input.variable), "")
+        assert not (a and b) or same_dimension(a, b), f"{c.source}.{c.output.variable} [{a}] -> {c.target} [{b}]"
 
 
 def test_every_file_of_an_archive(tmp_path: Path) -> None:
@@ -72,6 +118,8 @@ def test_every_file_of_an_archive(tmp_path: Path) -> None:
         assert (float(experiment.stepSize), float(experiment.stopTime)) == (1e-4, stop_time(system)), n
         names.add(Path(n).stem)
     assert names == {*system.slots, "gain_01", "gain_02"}
+    gain = read_model_description(io.BytesIO(files["resources/gain_01.fmu"]))
+    assert {v.name: v.unit for v in gain.modelVariables} == {"factor": "1", "offset": "1", "u": None, "y": None}
     sets = {n: ET.fromstring(d) for n, d in files.items() if n.endswith(".ssv")}
     assert {s.get("name") for s in sets.values()} == {system.name}
     given = {p.get("name") for p in sets["resources/parameters.ssv"].iterfind(".//ssv:Parameter", NS)}

@@ -146,6 +146,18 @@ def test_channels_of_the_array(own: gb.Run, elsewhere: Array) -> None:
             np.testing.assert_array_equal(column[: len(rows)], elsewhere[name][rows[: len(column)]], err_msg=name)
 
 
+def test_what_comes_after_the_end_of_the_plan_is_left_out(own: gb.Run, elsewhere: Array) -> None:
+    """An importer goes on to its stop time; a run of the bench, and its channels, end with the plan."""
+    longer = np.concatenate([elsewhere, np.repeat(elsewhere[-1:], 300)])
+    longer["time"][len(elsewhere) :] += COARSE * np.arange(1, 301)  # 30 s: three rows of the channels
+    longer["table.angle"][len(elsewhere) :] = 7.0
+    run = gb.load(NAME, VALUES).reduce_result(longer)
+    assert estimates(run.result) == estimates(own.result)
+    assert run.record.run.stopped_at == pytest.approx(own.record.run.stopped_at, abs=COARSE)
+    assert 0 <= len(own.record.channels["time"]) - len(run.record.channels["time"]) <= 1
+    assert 7.0 not in run.record.channels["table.angle"]
+
+
 def file_observer(folder: Path, **slots: str) -> Any:
     """libcosim's observer that writes a CSV file a slot, of these variables, every 50 steps."""
     from ctypes import POINTER, c_char_p
@@ -231,7 +243,7 @@ def refusals(series: Array) -> dict[str, tuple[Array, str]]:
         "interpolation": (changed(series, sampler__count=half), "the tool has interpolated between"),
         "two runs": (
             np.concatenate([series, changed(series, time=series["time"] + series["time"][-1])]),
-            "goes back at t = ",
+            "goes back to 0 at t = ",
         ),
         "order": (series[::-1], "comes after"),
         "not a number": (changed(series, sampler__mean=np.full(len(series), np.nan)), "sampler.mean is nan at t = "),

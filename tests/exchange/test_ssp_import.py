@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from archives import LAG, bound, real, write_archive
 
 from gyrobench.engine.session import run
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.system.system import InvalidConfigurationError
 
 Foreign = Callable[[str], Path]
-NAMES = " ".join(
-    f'xmlns:{n}="http://ssp-standard.org/SSP1/SystemStructure{what}"'
-    for n, what in {
-        "ssd": "Description",
-        "ssc": "Common",
-        "ssv": "ParameterValues",
-        "ssm": "ParameterMapping",
-    }.items()
-)
-LAG = '<ssd:Component name="{}" type="application/x-fmu-sharedlibrary" source="resources/lag.fmu">{}</ssd:Component>'
 INNER = """<ssd:System name="inner">
   <ssd:Connectors>
     <ssd:Connector name="in" kind="input"><ssc:Real/></ssd:Connector>
@@ -47,39 +37,11 @@ FIXED = """<ssd:Annotations><ssc:Annotation type="org.openmodelica"><oms:Annotat
 </ssc:Annotation></ssd:Annotations>"""
 
 
-def bound(values: str, mapping: str = "", attributes: str = "") -> str:
-    inside = f'<ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>{values}</ssv:Parameters></ssv:ParameterSet>'
-    entries = f'<ssd:ParameterMapping><ssm:ParameterMapping version="1.0">{mapping}</ssm:ParameterMapping>'
-    return (
-        f"<ssd:ParameterBindings><ssd:ParameterBinding {attributes}><ssd:ParameterValues>{inside}"
-        f"</ssd:ParameterValues>{entries + '</ssd:ParameterMapping>' if mapping else ''}</ssd:ParameterBinding>"
-        "</ssd:ParameterBindings>"
-    )
-
-
-def real(name: str, value: float, unit: str = "") -> str:
-    of_unit = f' unit="{unit}"' if unit else ""
-    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}"{of_unit}/></ssv:Parameter>'
-
-
 @pytest.fixture
 def archive(foreign: Foreign, tmp_path: Path) -> Callable[..., Path]:
-    """Write an archive: elements, connections, what is bound to the system, units, end of the system."""
-
-    def write(elements: str, connections: str = "", values: str = "", units: str = "", end: str = "") -> Path:
-        links = f"<ssd:Connections>{connections}</ssd:Connections>" if connections else ""
-        text = (
-            f'<ssd:SystemStructureDescription {NAMES} version="1.0" name="x"><ssd:System name="x">{values}'
-            f"<ssd:Elements>{elements}</ssd:Elements>{links}{end}</ssd:System>{units}"
-            '<ssd:DefaultExperiment startTime="0" stopTime="0.5"/></ssd:SystemStructureDescription>'
-        )
-        path = tmp_path / "x.ssp"
-        with zipfile.ZipFile(path, "w") as z:
-            z.writestr("SystemStructure.ssd", text)
-            z.write(foreign("lag"), "resources/lag.fmu")
-        return path
-
-    return write
+    return lambda *content, **more: write_archive(
+        tmp_path / "x.ssp", {"resources/lag.fmu": foreign("lag")}, *content, **more
+    )
 
 
 def test_nested_systems_transformations_and_their_parameters(archive: Callable[..., Path]) -> None:

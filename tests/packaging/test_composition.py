@@ -14,7 +14,7 @@ from gyrobench.component import Block, Component, ComponentError, Input, Noise, 
 from gyrobench.packaging import SubsetError, load_part
 from gyrobench.packaging.dependencies import reached
 from gyrobench.packaging.instance import TARGETS, make
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 
 PIECES = '''\
 """Pieces of a bench of its own: two mixins, a block, a function."""
@@ -220,7 +220,7 @@ def test_equations_stand_in_two_files_at_most(part: str) -> None:
     """The part's own and one of the blocks (the check of a rotation matrix apart); a part that is put together of more
     names each block in its README, where the reader finds what it does.
     """
-    source = Source(load_part(part, standard_folder()))
+    source = PartCode(load_part(part, standard_folder()))
     files = {
         Path(c.path).name for pieces in source.equations.values() for _, code in pieces for c in reached(code, source)
     }
@@ -278,7 +278,9 @@ def test_an_equation_that_calls_that_of_its_base() -> None:
     def flow(self: One) -> None:
         super(One, self).flow()
 
-    with pytest.raises(ComponentError, match=r"run by themselves, before this: leave out super\(\)\.flow\(\)"):
+    with pytest.raises(
+        ComponentError, match=r"test_composition.py:279: .* by themselves.*leave out super\(\)\.flow\(\)"
+    ):
         type("Sub", (One,), {"flow": flow})
 
 
@@ -305,7 +307,7 @@ def test_equations_without_a_file_are_refused_where_they_are_built() -> None:
     exec("def outputs(self):\n    self.y = 1.0\n", names)
     cls = type("Sub", (Component,), {"y": Output("V"), "outputs": names["outputs"]})
     with pytest.raises(SubsetError, match="equations must stand in a file"):
-        Source(cls)
+        PartCode(cls)
 
 
 def test_a_recursion_is_refused(bench: Path) -> None:

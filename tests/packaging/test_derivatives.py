@@ -19,7 +19,7 @@ from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
 from gyrobench.packaging.dependencies import reached
 from gyrobench.packaging.reference import read_reference
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 
 SIZES = {"rad/s": 1e-3, "rad": 1e-3, "A": 1e-3, "V": 1e-3}
 
@@ -84,7 +84,7 @@ def traced(name: str) -> Callable[..., Traced]:
 
 def trace(part: Component, monkeypatch: pytest.MonkeyPatch) -> tuple[np.ndarray, list[str]]:
     """d(state derivatives, outputs) / d(parameters, inputs, states), by CasADi at the part's present point."""
-    source = Source(type(part))
+    source = PartCode(type(part))
     codes = [c for k in ("flow", "outputs") for _, code in source.equations[k] for c in reached(code, source)]
     for names in {id(c.function.__globals__): c.function.__globals__ for c in codes}.values():
         for name in gyrobench.component.math.FUNCTIONS:

@@ -16,7 +16,7 @@ from gyrobench.component import Component, ComponentError
 from gyrobench.packaging import SubsetError, compiler, load_part, native_target
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.instance import elements, make
-from gyrobench.packaging.source import Source
+from gyrobench.packaging.source import PartCode
 
 Written = Callable[[str, str], type[Component]]
 
@@ -312,7 +312,7 @@ def test_dependencies(written: Written) -> None:
             return
         self.after_return = 1.0
 """
-    assert dependencies(Source(written("toy", body))) == {
+    assert dependencies(PartCode(written("toy", body))) == {
         "direct": {"a"},
         "through_local": {"b"},
         "through_helper": {"c"},
@@ -350,7 +350,7 @@ def test_initial_dependencies(written: Written) -> None:
         self.y = self.q
         self.z = self.v + self.der.x
 """
-    source = Source(written("toy", body))
+    source = PartCode(written("toy", body))
     found = initial_dependencies(source)
     assert found["y"] == {"p", "b", "white", "seed"}
     assert found["z"] == {"r", "v", "a", "x"}

@@ -37,16 +37,20 @@ def changed(path: Path, to: Path, edit: Callable[[str], str], drop: str = "nothi
 
 
 def test_an_unknown_unit(fmu: Callable, tmp_path: Path) -> None:
-    """Foreign units are told once each, with the variable and what would do."""
+    """Foreign units are told once each, with the variable and what would do; not those that the FMU itself defines."""
 
     def edit(text: str) -> str:
-        text = text.replace('Unit name="rad/s2"', 'Unit name="furlong/s2"').replace(
-            'unit="rad/s2"', 'unit="furlong/s2"'
-        )
+        text = re.sub(r'<Unit name="rad/s2">.*?</Unit>', '<Unit name="furlong/s2" />', text, flags=re.S)
+        text = text.replace('unit="rad/s2"', 'unit="furlong/s2"')
         return text.replace('generationTool="gyrobench"', 'generationTool="other"')
 
     (problem,) = validate(changed(fmu("floated_gyro", "native"), tmp_path / "a.fmu", edit))
     assert problem.startswith("ramp: unit 'furlong/s2': unknown symbol 'furlong'")
+
+    def defined(text: str) -> str:
+        return edit(text).replace('"furlong/s2" />', '"furlong/s2"><BaseUnit rad="1" s="-2" factor="2.5" /></Unit>')
+
+    assert validate(changed(fmu("floated_gyro", "native"), tmp_path / "b.fmu", defined)) == []
 
 
 def test_a_wrong_structure(fmu: Callable, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from gyrobench import reading
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine.session import RunInterrupted, run
 from gyrobench.record.record import Record
@@ -59,10 +60,10 @@ def test_a_run_of_every_system_follows_the_schema(name: str, tmp_path: Path) -> 
     document = saved(tmp_path)
     published().validate(document)
     assert {"parts", "plan", "order", "parameters", "tables", "problem", "steps"} <= set(document)
-    assert set(document) <= set(RunDocument.model_fields), "every key has a field"
+    assert set(document) <= {*RunDocument.model_fields, "sha256"}, "every key has a field"
     assert ("linear" in document) is (name in WITH_LOOPS)
     read = read_run(tmp_path)
-    assert isinstance(read, RunDocument) and read.as_dict() == document
+    assert isinstance(read, RunDocument) and reading.sealed(read.as_dict()) == document
     assert [row.phase for row in read.plan] == list(range(1, len(document["plan"]) + 1))
     assert read.parts.keys() == system.slots.keys() and all(len(p.sha256) == 64 for p in read.parts.values())
 
@@ -95,7 +96,7 @@ def test_a_measured_record_of_every_test_follows_the_schema(name: str, tmp_path:
     folder = record.save(tmp_path / "record")
     document = saved(folder)
     published().validate(document)
-    assert set(document) <= set(RunDocument.model_fields), "every key has a field"
+    assert set(document) <= {*RunDocument.model_fields, "sha256"}, "every key has a field"
     assert document["measured"] and document["laboratory"] == "L" and document["operator"] == "A. Tester"
     assert Record.load(folder).run == record.run
 
@@ -124,10 +125,11 @@ def test_a_key_of_python_is_a_name_in_json() -> None:
 
 def test_keys_of_a_newer_version_are_kept(tmp_path: Path) -> None:
     document = {"system": "s", "complete": True, "plan": [{"phase": 1, "colour": "red"}], "mood": {"a": [1]}}
-    (tmp_path / "run.json").write_text(json.dumps(document), encoding="utf-8")
+    (tmp_path / "run.json").write_text(json.dumps(reading.sealed(document)), encoding="utf-8")
     read = read_run(tmp_path)
     assert read.as_dict() == document
     published().validate(document)
+    published().validate(reading.sealed(document))
 
 
 @pytest.mark.parametrize(
@@ -202,7 +204,7 @@ def test_a_record_without_channels_leaves_none_of_an_earlier_one(folder: Path) -
 
 def test_an_old_run_json_names_no_tables_and_loads(folder: Path) -> None:
     document = saved(folder)
-    del document["tables"]
+    del document["tables"], document["sha256"]
     (folder / "run.json").write_text(json.dumps(document), encoding="utf-8")
     (folder / "channels.parquet").unlink()
     record = Record.load(folder)

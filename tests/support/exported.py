@@ -153,7 +153,7 @@ def left_over(
 def effects(at_h: Result, at_half: Result) -> dict[str, float]:
     """Return what the step does to each measure, from runs at the step and at half of it."""
     rows = step_effects(at_h.coefficients, at_half.coefficients, 0.5)
-    return {r["name"]: float(r["change"]) for r in rows}
+    return {r.name: r.change for r in rows}
 
 
 #: systems that FMPy's simulate_ssp cannot run, by the word of docs/guides/run_elsewhere.md for the reason

@@ -20,6 +20,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
+from gyrobench import reading
 from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 
@@ -34,6 +37,7 @@ NASTY = [
     b"[" * 3000, b'{"a":' * 2000, b'"', b"'", b"#", b"=", b",", b";", b"|", b"/", b"..", b"../../etc/passwd", b"%s%n",
     b"deg", b"deg/h", b"K^99", b"m2" * 200, b"1deg/0s", b"<", b">", b"&", b"<![CDATA[",
     b"<!DOCTYPE a [<!ENTITY b 'c'>]>", b"a" * 20000, b"\xed\xa0\x80",
+    b"(" * 3000, b"sqrt(" * 3000, b"9" * 5000, b" " * 20000, b"..", b":", b"uniform(",
 ]  # fmt: skip
 Attack = Callable[[int], str | None]
 
@@ -85,9 +89,26 @@ def held(what: Callable[[random.Random], object], seed: int) -> str | None:
     return None
 
 
+def sealed_again(content: bytes) -> bytes:
+    """Return a stored document with the digests of what it holds now, so that a reader takes it; else the bytes."""
+    try:
+        document = json.loads(content)
+        if "report_id" in document:
+            rest = {k: v for k, v in document.items() if k not in ("schema", "report_id")}
+            return json.dumps({**document, "report_id": reading.digest(rest)[: reading.SHORTEST]}).encode()
+        return json.dumps(reading.sealed({k: v for k, v in document.items() if k != reading.SEAL})).encode()
+    except (ValueError, AttributeError, TypeError, RecursionError):
+        return content
+
+
 def attacks(folder: Path, *kinds: str) -> dict[str, Attack]:
     """Return the attacks by kind (default: all); files are written into the folder."""
-    every = (_csv, _numbers, _series, _set, _settings, _units, _mapping, _spec, _record, _result, _fmu, _ssp, _other)
+    from fuzzing_of_uses import OF_USES
+
+    every = (
+        _csv, _numbers, _series, _set, _settings, _units, _axes, _mapping, _spec, _record, _result, _fmu, _ssp, _other,
+        *OF_USES,
+    )  # fmt: skip
     wanted = {f.__name__[1:]: f for f in every if not kinds or f.__name__[1:] in kinds}
     return {name: partial(held, prepare(folder)) for name, prepare in wanted.items()}
 
@@ -218,6 +239,27 @@ def _units(folder: Path) -> Callable[[random.Random], object]:
     return one
 
 
+def _axes(folder: Path) -> Callable[[random.Random], object]:
+    """Values of --over."""
+    from gyrobench.campaign.execution.axes import Distribution, draw, parse_axis
+
+    texts = [
+        b"0deg..80deg:9",
+        b"1e-3..1:7log deg/h",
+        b"0.1,0.3,1 deg/h/g",
+        b"uniform(-1, 1) deg/h",
+        b"a,b",
+        b"normal(0, 2)",
+    ]
+
+    def one(rng: random.Random) -> None:
+        axis = parse_axis("latitude", changed(rng.choice(texts), rng).decode("utf-8", "replace"))
+        if isinstance(axis, Distribution):
+            draw([axis], 4)
+
+    return one
+
+
 def _mapping(folder: Path) -> Callable[[random.Random], object]:
     from fmpy import read_model_description
 
@@ -275,7 +317,8 @@ def _record(folder: Path) -> Callable[[random.Random], object]:
         columns.unlink(missing_ok=True)
         what = rng.choice(["run.json", table, "honest", "csv"])
         if what in files:
-            (home / what).write_bytes(changed(files[what], rng))
+            content = changed(files[what], rng)
+            (home / what).write_bytes(sealed_again(content) if what == "run.json" and rng.random() < 0.7 else content)
         else:
             document = json.loads(files["run.json"])
             if what == "csv":
@@ -286,7 +329,8 @@ def _record(folder: Path) -> Callable[[random.Random], object]:
             else:
                 (home / table).write_bytes(changed(files[table], rng))
                 document["tables"] = {table: sha256(home / table)}
-            (home / "run.json").write_text(json.dumps(document), encoding="utf-8")
+            del document[reading.SEAL]
+            (home / "run.json").write_text(json.dumps(reading.sealed(document)), encoding="utf-8")
         record = Record.load(home)
         if rng.random() < REDUCED:
             system.reduce(record, None)
@@ -304,14 +348,16 @@ def _result(folder: Path) -> Callable[[random.Random], object]:
     text = json.dumps(result_json.document(system.reduce(system.read_measured(file, {}), None))).encode()
 
     def one(rng: random.Random) -> None:
-        result_json.load(changed(text, rng).decode("utf-8", "replace"))
+        content = changed(text, rng)
+        if rng.random() < 0.7:
+            content = sealed_again(content)
+        result_json.load(content.decode("utf-8", "replace"))
 
     return one
 
 
 def _other(folder: Path) -> Callable[[random.Random], object]:
     """Result files of other tools, of each format."""
-    import numpy as np
     import pyarrow as pa
     import pyarrow.parquet as pq
     from scipy.io import savemat

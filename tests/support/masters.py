@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -93,14 +93,35 @@ def ecospy(file: Path, names: Names, step: float, steps: int, every: int) -> Ser
     return dict(zip(names, np.array(rows).T, strict=True)), 0, seconds
 
 
+#: what the library of fmu-manipulation-toolbox logs as an error of every container
+NO_ERROR = "Solver configure...."
+
+
+def logged(run: Callable[..., Any], *args: Any, **options: Any) -> tuple[Any, list[str]]:
+    """Return what a function of FMPy gives, and the errors that the FMU logs."""
+    errors: list[str] = []
+
+    def logger(_environment: Any, _name: Any, status: int, _category: Any, message: bytes) -> None:
+        text = (message or b"").decode(errors="replace")
+        if status > 1 and text != NO_ERROR:
+            errors.append(text)
+
+    return run(*args, **options, logger=logger), errors
+
+
 def one_fmu(file: Path, names: Names, step: float, steps: int, every: int) -> Series:
-    """One FMU in FMPy, a container or the linked one; ``every`` steps of the system in a communication step."""
+    """One FMU in FMPy, a container or the linked one, with the outputs that it gives by itself.
+
+    ``every`` steps of the system are one communication step.
+    """
     from fmpy import simulate_fmu
 
-    wanted, interval = list(names), every * step
+    interval = every * step
     began = time.perf_counter()
-    found = simulate_fmu(str(file), stop_time=steps * step, output_interval=interval, step_size=interval, output=wanted)
-    return {n: found[n] for n in wanted}, 0, time.perf_counter() - began
+    found, errors = logged(simulate_fmu, str(file), stop_time=steps * step, output_interval=interval)
+    if errors or (missing := [n for n in names if n not in found.dtype.names]):
+        raise PeerError(f"logged as errors: {errors}" if errors else f"no outputs: {missing}")
+    return {n: found[n] for n in names}, 0, time.perf_counter() - began
 
 
 TOOLS = {"FMPy simulate_ssp": fmpy_ssp, "libcosimpy": libcosimpy, "ecospy": ecospy, "FMU in FMPy": one_fmu}

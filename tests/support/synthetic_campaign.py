@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -45,7 +47,9 @@ def write(folder: Path, columns: dict[str, Any], units: dict[str, str], **defini
         fields.append(pa.field(name, kind, metadata=None if unit is None else {"unit": unit}))
         arrays.append(pa.array(list(values), kind))
     (folder / "runs").mkdir(parents=True)
-    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), folder / "runs" / "a.parquet")
+    content = io.BytesIO()
+    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), content)
+    (folder / "runs" / f"{hashlib.sha256(content.getvalue()).hexdigest()[:16]}.parquet").write_bytes(content.getvalue())
     document = {"schema": "gyrobench-campaign-1", "name": folder.name, "question": "", "system": "synthetic",
                 "definition": {}, "axes": [], "options": {}, "parts": {}, "versions": {}, **definition}  # fmt: skip
     (folder / "campaign.json").write_text(json.dumps(document))

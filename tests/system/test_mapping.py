@@ -203,8 +203,10 @@ def test_fit_command(foreign: Foreign, tmp_path: Path, command: Callable[..., tu
     written = file.read_text()
     vendor = tomllib.loads((FOREIGN / "python_gyro.toml").read_text())
     proposed = tomllib.loads(written)
+    parameters = proposed.pop("parameters")
+    assert parameters["k"]["name"] == "k_torquer" == vendor.pop("parameters")["k"]["name"]
     assert {k: (v.get("name"), v.get("names")) for k, v in proposed.items()} == {
-        k: (v.get("name"), v.get("names")) for k, v in vendor.items() if k != "parameters"
+        k: (v.get("name"), v.get("names")) for k, v in vendor.items()
     }
     assert "# pickoff: no dependencies are declared" in written
     assert command(*arguments, "--out", file)[0] == 2  # not over what is there

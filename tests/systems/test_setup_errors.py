@@ -158,6 +158,16 @@ def test_an_estimate_far_from_its_truth_is_said_first(z: tuple[float | None, ...
     assert result.warnings == [missed.text, "another"]
 
 
+def test_what_must_not_be_used_does_not_pass() -> None:
+    """The latitude of the site is off by 4.25 deg: D_I is missed by some 2,000 u, inside of limits that are wide."""
+    system = load()
+    system.set("site.latitude", "50deg")
+    with Session(system) as session:
+        result = system.reduce(session.run(SHORT, 3), {"D_I": (-5.0, 5.0), "D_O": (-5.0, 5.0)})
+    assert abs(result["D_I"].z or 0.0) > 500.0 and any("do not use" in w for w in result.warnings)
+    assert (result["D_I"].verdict, result["D_O"].verdict, result.verdict) == ("inconclusive",) * 3
+
+
 def test_an_estimate_near_its_truth_is_not() -> None:
     assert missed_truth(result_of(4.99, -5.0, None), ["gyro.k = 1"]) == []
 

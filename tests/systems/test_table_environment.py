@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.result import DriftTestResult
 from gyrobench.system.configurable import InvalidConfigurationError
@@ -119,6 +120,34 @@ def test_budgets_of_a_report(found: DriftTestResult) -> None:
     assert [r[5] for r in causes] == pytest.approx([abs(r[3]) * r[1] * _per(r) for r in causes], rel=1e-9)
     assert totals["root of squares"] == pytest.approx(math.sqrt(sum(r[5] ** 2 for r in causes)))
     assert totals["Monte Carlo, standard deviation"] == pytest.approx(totals["root of squares"], rel=0.03)
+
+
+def test_static_tilt_about_north_turns_the_gyro_against_the_earth(session: Session) -> None:
+    """Turned as a rotation, the input axis east leans by q about north to -q up: -q W sin phi of the Earth's rate is on
+    it and -q g along it.  Hu 1981, Table 5-4, 3.3e-6 ERU and 4.8e-6 g per arcsec at 42.36 deg; with D_I = 0.1 ERU/g the
+    tilt allowed for 1e-9 ERU at 45.75 deg is 1e-9/((sin phi + 0.1) 4.848e-6) = 2.526e-4 arcsec.
+    """
+    quiet = {**dict.fromkeys(session.system.noises, 0.0), "dwell": 1200.0, "readings": 60}
+
+    def budget(values: dict[str, Any]) -> list[Any]:
+        """Sensitivity (deg/h/arcsec) and needed level (arcsec) of the tilt about north, of a run without noise."""
+        result = session.system.reduce(session.run({**quiet, **values}, seed=1, step=5e-3))
+        row = next(t for t in result.tables if t.id == "budget.surroundings").rows[2]
+        return [row[3], row[7]]
+
+    sensitivity, needed = budget({"gyro.D_IO": 0.0})
+    assert needed == pytest.approx(1e-9 / ((math.sin(math.radians(45.75)) + 0.1) * ARCSEC), rel=2e-3)
+    assert needed == pytest.approx(2.53e-4, rel=5e-3)
+    true = drawn(np.random.default_rng(7))
+    phi, q = true["latitude"], 1e-6
+    earth, up = ERU * np.array([0.0, math.cos(phi), math.sin(phi)]), np.array([0.0, 0.0, 1.0])
+    g = frames.normal_gravity(phi) / frames.G0
+    along = g * true["gyro.D_I"] - g * g * true["gyro.D_IO"]  # of X = -up . I, with the output axis up
+    drift = lambda axis: -float(earth @ axis) - along * float(up @ axis)  # noqa: E731
+    per = (drift(np.array([math.cos(q), 0.0, -math.sin(q)])) - drift(np.array([1.0, 0.0, 0.0]))) / q * ARCSEC / DPH
+    sensitivity, needed = budget(true)
+    assert sensitivity == pytest.approx(per, rel=5e-3)
+    assert needed == pytest.approx(1e-9 * ERU / DPH / abs(per), rel=5e-3)
 
 
 def _per(row: list[Any]) -> float:

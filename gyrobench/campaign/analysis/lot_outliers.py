@@ -5,7 +5,8 @@ from the half of the lot with the smallest covariance determinant (P. Rousseeuw 
 (1999) 212) and lets every instrument back in that the accepted ones do not reject (as A. Hadi, J. R. Stat. Soc. B 54
 (1992) 761).  The last judgement is that of each instrument against all accepted others: with m accepted ones in p
 coefficients, d² of one more follows p (m + 1)(m - 1) / (m (m - p)) F(p, m - p) in normal lots, so the chance that a lot
-without outliers names any is about ``level``, whatever its size.
+without outliers names any is about ``level``, whatever its size.  Beside the distance in all coefficients each is
+judged by itself, half the chance for either: one coefficient that is far off is diluted among many.
 
 Not modelled: lots of mixed populations (two batches), and heavy-tailed ones, whose tails are named as outliers.
 """
@@ -37,10 +38,11 @@ class LotOutliers:
     """Robust distances of n instruments in q coefficients.
 
     joint: one distance in all used coefficients; else the largest of the coefficients one by one, for a small lot.
-    distance: (n,), NaN where a coefficient is missing.  p: (n,), of the distance, times the number of judgements.
+    distance: (n,), NaN where a coefficient is missing.  p: (n,), the smallest of the distance and of the coefficients,
+    times the number of judgements.
     outlier: (n,).  score: (n, q), deviation from the mean of the accepted over their standard deviation, NaN for
     coefficients that are not used.  used: (q,), coefficients that most rows have, that vary and are not combinations of
-    others.  limit: distance above which an instrument is named.
+    others.  limit: distance above which an instrument is named; one that is named below it is so by one coefficient.
     """
 
     joint: bool
@@ -70,23 +72,28 @@ def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> LotOu
         return None
     p = int(used.sum())
     joint = n >= MIN_PER_COEFFICIENT * p
-    groups = [np.flatnonzero(used)] if joint else [np.array([k]) for k in np.flatnonzero(used)]
-    count = n * len(groups)
+    alone = [np.array([k]) for k in np.flatnonzero(used)]
+    together = [np.flatnonzero(used)] if joint and p > 1 else []
     distance, chance, limit = np.zeros(n), np.ones(n), 0.0
     score = np.full(inside.shape, np.nan)
-    for group in groups:
+    for group in [*alone, *together]:
+        many = group.size > 1
+        count = n * (1 if many else p) * (2 if together else 1)
         scaled = _scaled(inside[:, group])
         accepted = _accepted(scaled, level / count, np.random.default_rng(seed))
         d2, tail, limit2 = _judged(scaled, accepted, level / count)
-        distance, chance = np.fmax(distance, np.sqrt(d2)), np.fmin(chance, tail)
-        limit = max(limit, float(np.sqrt(limit2)))
+        chance = np.fmin(chance, count * tail)
+        if many:
+            distance, limit = np.sqrt(d2), float(np.sqrt(limit2))
+        elif not together:
+            distance, limit = np.fmax(distance, np.sqrt(d2)), max(limit, float(np.sqrt(limit2)))
         kept = scaled[accepted]
         score[:, group] = (scaled - kept.mean(axis=0)) / kept.std(axis=0, ddof=1)
     return LotOutliers(
         joint,
         _spread(distance, complete),
-        _spread(np.minimum(1.0, count * chance), complete),
-        np.where(complete, _spread(count * chance, complete) < level, False),
+        _spread(np.minimum(1.0, chance), complete),
+        np.where(complete, _spread(chance, complete) < level, False),
         _spread(score, complete),
         used,
         limit,

@@ -16,23 +16,37 @@ from gyrobench.reduction.suite.ranking import LEVEL as CHANGE_LEVEL
 from gyrobench.reduction.suite.ranking import adjusted
 
 MEDIAN_RANGE = 0.9538725524  # median of |x1 - x2| of two normal values over their sigma
-SIGMAS = 3.0
+#: number of values -> half width of the limits over sigma from the median moving range, so that 0.27 % of all values of
+#: normal lots lie outside as they do of 3 sigma where sigma is known: counted over 12e6 values each, to 0.3 %; an even
+#: and an odd number of differences have medians of their own
+ODD = {5: 6.01, 7: 5.30, 9: 4.79, 11: 4.45, 13: 4.22, 15: 4.05, 21: 3.74}
+EVEN = {6: 6.91, 8: 5.65, 10: 4.96, 12: 4.52, 16: 4.09, 20: 3.84}
+MANY = {30: 3.534, 50: 3.310, 100: 3.156, 200: 3.071}
 NORMAL = 1.959963984540054
 DAY = 86400.0
 
 
 def control_limits(values: Array) -> tuple[float, float, float] | None:
-    """Return centre and limits of a chart of single values: median ± 3 sigma, sigma from the median moving range.
+    """Return centre and limits of a chart of single values: median ± c sigma, sigma from the median moving range.
 
-    Medians, since the few bad values that a chart is to show would widen limits of means.  None where fewer than five
-    values, or no dispersion, is there.  Of normal values 0.3 % lie outside by chance.
+    Medians, since the few bad values that a chart is to show would widen limits of means.  c is 3 for long charts and
+    more for short ones, whose sigma is not well known (:func:`half_width`): of normal values 0.27 % lie outside by
+    chance, however many they are.  None where fewer than five values, or no dispersion, is there.
     """
     x = values[np.isfinite(values)]
     if len(x) < 5:
         return None
     sigma = float(np.median(np.abs(np.diff(x)))) / MEDIAN_RANGE
     centre = float(np.median(x))
-    return None if sigma == 0.0 else (centre, centre - SIGMAS * sigma, centre + SIGMAS * sigma)
+    half = half_width(len(x)) * sigma
+    return None if sigma == 0.0 else (centre, centre - half, centre + half)
+
+
+def half_width(n: int) -> float:
+    """Return the half width of the limits for n values, 5 or more, over sigma: from the tables, linear in 1/n."""
+    table = {**(EVEN if n % 2 == 0 else ODD), **MANY}
+    inverse = [0.0, *(1.0 / k for k in sorted(table, reverse=True))]
+    return float(np.interp(1.0 / n, inverse, [3.0, *(table[k] for k in sorted(table, reverse=True))]))
 
 
 def seconds(rows: Any) -> Array:

@@ -18,11 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 
+MOST = 1_000_000  # points of an axis, seeds, runs of a campaign
 DESIGNS = ("random", "lhs", "sobol")
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+LONGEST = 200  # letters of a grid or a distribution: what is longer is a list, and takes the patterns below too long
+NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 QUANTITY = re.compile(rf"({NUMBER})\s*(.*)", re.S)
 _GRID = re.compile(rf"({NUMBER})\s*(\S*?)\s*\.\.\s*({NUMBER})\s*(\S*?)\s*:\s*(\d+)\s*(log)?\b\s*(.*)", re.S)
 _CALL = re.compile(r"([a-z]+)\s*\((.*)\)\s*(.*)", re.S)
@@ -81,10 +83,27 @@ def point(value: float, unit: str) -> AxisValue:
     return AxisValue(value, f"{value!r} {unit}" if unit else repr(value))
 
 
-def parse_axis(name: str, given: Any) -> Axis | Distribution:
-    """Return what a text, a number or a list of both means.  Raises UsageError."""
+def check_value(given: Any) -> Any:
+    """Return a value of a campaign: number, text, list of them or table; raise ValueError for anything else."""
     if hasattr(given, "tolist"):
         given = given.tolist()
+    if isinstance(given, dict):
+        return {k: check_value(v) for k, v in given.items()}
+    if isinstance(given, list | tuple):
+        return [check_value(v) for v in given]
+    if isinstance(given, str) and "\0" not in given:
+        return given
+    if isinstance(given, bool) or (isinstance(given, int | float) and -1e300 < given < 1e300):
+        return given
+    raise ValueError("a number, a text with its unit, or a list of them is expected")
+
+
+def parse_axis(name: str, given: Any) -> Axis | Distribution:
+    """Return what a text, a number or a list of both means.  Raises UsageError."""
+    try:
+        given = check_value(given)
+    except ValueError as error:
+        raise UsageError(f"{name} = {reading.shorten(repr(given))}: {error}") from None
     try:
         if isinstance(given, str):
             return _grid(name, given) or _distribution(name, given) or _list(name, _split(given))
@@ -101,19 +120,22 @@ def _one_unit(name: str, found: Sequence[tuple[float, str]], tail: str) -> tuple
         raise UsageError(f"{name}: some values have a unit and some have none; write it at the last or at each")
     if unit:
         units.unit(unit)
-    return [x if u == unit else units.convert(x, u, unit) for x, u in named], unit
+    values = [x if u == unit else units.convert(x, u, unit) for x, u in named]
+    if not all(map(math.isfinite, values)):
+        raise UsageError(f"{name}: a number beyond what a computer holds")
+    return values, unit
 
 
 def _grid(name: str, text: str) -> Axis | None:
-    match = _GRID.fullmatch(text.strip())
+    match = _GRID.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if match is None:
         return None
     low_text, low_unit, high_text, high_unit, count, log, tail = match.groups()
     ends = [(float(low_text), low_unit or (high_unit if not tail else "")), (float(high_text), high_unit)]
     (low, high), unit = _one_unit(name, ends, tail.strip())
-    n = int(count)
-    if n < 2:
-        raise UsageError(f"{name}: {text}: a grid has two points or more")
+    n = int(count) if len(count) < 9 else MOST + 1
+    if not 2 <= n <= MOST:
+        raise UsageError(f"{name}: {reading.shorten(text)}: a grid has 2 to {MOST} points")
     if log and not (low > 0.0 and high > 0.0):
         raise UsageError(f"{name}: {text}: values in equal ratios must be > 0")
     steps = [k / (n - 1) for k in range(n)]
@@ -123,7 +145,7 @@ def _grid(name: str, text: str) -> Axis | None:
 
 
 def _distribution(name: str, text: str) -> Distribution | None:
-    match = _CALL.fullmatch(text.strip())
+    match = _CALL.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if match is None:
         return None
     family, inside, tail = match.groups()
@@ -215,8 +237,11 @@ def draw(
             raise UsageError(f"sobol: {runs} points are not balanced; take a power of two, {lower} or {2 * lower}")
         p = qmc.Sobol(d, seed=rng).random(runs)
     p = np.clip(p, 2.0**-53, 1.0 - 2.0**-53)
-    columns = [axis.quantile(p[:, k]).tolist() for k, axis in enumerate(axes)]
-    assert all(math.isfinite(x) for column in columns for x in column)
+    with np.errstate(all="ignore"):
+        columns = [axis.quantile(p[:, k]).tolist() for k, axis in enumerate(axes)]
+    for axis, column in zip(axes, columns, strict=True):
+        if not all(map(math.isfinite, column)):
+            raise UsageError(f"{axis.name}: the distribution reaches beyond what a computer holds")
     return [
         {axis.name: point(column[k], axis.unit) for axis, column in zip(axes, columns, strict=True)}
         for k in range(runs)

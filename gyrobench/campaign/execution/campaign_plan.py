@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,10 +18,11 @@ from typing import Any
 
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.campaign.execution.axes import QUANTITY, Axis, AxisValue, Distribution
+from gyrobench.campaign.execution.axes import MOST, QUANTITY, Axis, AxisValue, Distribution
 from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, tool_digest
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
+from gyrobench.system.parameters import followed
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import InvalidConfigurationError, System
@@ -91,6 +93,12 @@ class CampaignPlan:
         }
 
     @property
+    def nominal(self) -> dict[str, Any] | None:
+        """Return the values of parts that the design is held at; None where it follows the parts."""
+        d = self.definition
+        return {n: v for n, v in d.set.items() if "." in n} if d.fixed_design else None
+
+    @property
     def is_suite(self) -> bool:
         return any(name for setup in self.setups for name in setup)
 
@@ -119,8 +127,10 @@ class _Planner:
         axes, distributions = d.axes(list(slots))
         columns, rows = d.rows()
         varied = [*(a.name for a in (*axes, *columns) if a.kind != "part"), *(x.name for x in distributions)]
-        self.names = [*d.set, *varied]
+        self.names, self.varied = [*d.set, *varied], varied
         self._require_names()
+        if d.fixed_design:
+            self._require_fixed_design([a.name for a in (*axes, *columns) if a.kind == "part"])
         spec = find_specification(d.path(d.spec) if d.spec and d.path(d.spec).is_file() else d.spec)
         in_bundle = self.bundle.add(spec) if spec else None
         files = d.files()
@@ -168,6 +178,9 @@ class _Planner:
         drawn = d.drawn(distributions)
         if any(seed is not None for _, seed in rows) and (d.seeds != 1 or distributions):
             raise UsageError("the table has seeds of its own: leave out seeds, and distributions")
+        count = math.prod(len(a.points) for a in axes) * len(drawn) * len(rows) * max(len(files), 1) * len(seeds)
+        if count > MOST:
+            raise UsageError(f"{count} runs; a campaign has up to {MOST}: fewer points or seeds, or draw them (runs)")
         grid = list(itertools.product(*(a.points for a in axes)))
         settings = dict(d.set)
         own = bool(distributions or d.table is not None)  # each point has noise of its own
@@ -231,7 +244,17 @@ class _Planner:
         number, what = (MEASURED, self._files_of(self.test.name)) if file is not None else self._setup(given, parts)
         d, data = self.definition, str(file) if file is not None else None
         values = {name: _canonical(value) for name, value in given.items()}
-        identity = [self.digests, what, values, seed, d.step, d.check_step, self.data[data] if data else None]
+        identity: list[Any] = [
+            self.digests,
+            what,
+            values,
+            seed,
+            d.step,
+            d.check_step,
+            self.data[data] if data else None,
+        ]
+        if d.fixed_design:
+            identity.append({n: _canonical(v) for n, v in d.set.items()})
         key = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
         return PlannedRun(key, index, number, given, seed, data, shown)
 
@@ -279,11 +302,31 @@ class _Planner:
         assembly = assemble(system, paths, maps)
         if isinstance(self.test, System):
             self._require_parameters(assembly)
+            self._note_design(assembly, system)
         inside = {slot: self.bundle.add(path) for slot, path in paths.items()}
         names = {s: str(files.get(s, slot.part)) for s, slot in system.slots.items()}
         built = {names[s]: inside[s] for s in paths if not names[s].endswith(".fmu")}
         given = {s: inside[s] if names[s].endswith(".fmu") else names[s] for s in files}
         return Assigned(given, built, {s: self.bundle.add(f) for s, f in maps.items()})
+
+    def _require_fixed_design(self, swapped: list[str]) -> None:
+        """Raise UsageError where there is no design to hold."""
+        if isinstance(self.test, Suite) or self.definition.data is not None:
+            raise UsageError("fixed design: of one system that is simulated, not of a suite or of measured files")
+        if swapped:
+            raise UsageError(f"fixed design: {swapped[0]} is an axis of parts; a design is held at values of one part")
+        if all(name in self.test.options for name in self.varied):
+            raise UsageError("fixed design: no parameter of a part is varied (slot.parameter); options are the design")
+
+    def _note_design(self, assembly: Assembly, system: System) -> None:
+        """Note the axes that the design of the system follows."""
+        moved = sorted(followed(assembly, system) & {n.partition("[")[0] for n in self.varied})
+        if moved and not self.definition.fixed_design:
+            self.notes += [
+                f"{name}: the design of {system.name} follows it, so that each point has parameters of its own (the "
+                "gain of a loop, say); --fixed-design (fixed_design = true) asks what one design does at all of them"
+                for name in moved
+            ]
 
     def _require_parameters(self, assembly: Assembly) -> None:
         """Raise UsageError for a varied or fixed parameter that the part in its slot does not have."""

@@ -21,6 +21,9 @@ Every point of an axis is combined with every point of the others.  Distribution
 "name [unit]", and "seed" if it is given; or "FILE.py:function", which returns such rows as dictionaries (values in SI
 or texts), called with the ``arguments``.  ``data``: pattern of measured files, one run a file.
 
+fixed_design: what a system derives from its parts (the gain of a loop from an inertia) is derived once, at the values
+of ``set`` and of the parts; else it follows the parts to every point, which is then a design of its own.
+
 Noise: at the points of grids and lists each seed is used once a point, so that points are compared under equal noise;
 points that are drawn, and rows of a table, have seeds of their own.
 """
@@ -30,19 +33,74 @@ from __future__ import annotations
 import csv
 import glob
 import importlib.util
-import tomllib
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from gyrobench import units
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.campaign.execution.axes import DESIGNS, Axis, AxisValue, Distribution, draw, parse_axis
-from gyrobench.system.values import parse
+from gyrobench.campaign.execution.axes import (
+    DESIGNS,
+    MOST,
+    Axis,
+    AxisValue,
+    Distribution,
+    check_value,
+    draw,
+    parse_axis,
+)
+from gyrobench.errors import GyrobenchError
+from gyrobench.reading import shorten
+from gyrobench.system.values import parse_number
 
 KEEP = ("all", "failures", "extremes", "none")
 HOUR = 3600.0
+
+
+def _plain_text(value: str | Path) -> str | Path:
+    if "\0" in str(value):
+        raise ValueError("a null character, which no name has")
+    return value
+
+
+Text = Annotated[str, AfterValidator(_plain_text)]
+File = Annotated[str | Path, AfterValidator(_plain_text)]
+#: a value, or a table of them: what it means is found when the test is known
+Values = dict[str, Annotated[Any, AfterValidator(check_value)]]
+Count = Annotated[int, Field(ge=0, le=MOST)]
+
+
+class CampaignFile(BaseModel):
+    """The keys of a definition and the types of their values."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    system: Text
+    name: Text = ""
+    question: str = ""
+    set: Values = {}
+    over: Values = {}
+    parts: dict[str, Text | list[Text]] = {}
+    maps: dict[str, File] = {}
+    seeds: Any = 1  # a number of seeds, or a list: see Definition.seed_list
+    runs: Count = 0
+    design: Text = "random"
+    design_seed: Annotated[int, Field(ge=0, lt=1 << 32)] = 1
+    table: File | list[dict[str, Any]] | tuple[dict[str, Any], ...] | None = None
+    arguments: dict[str, Any] = {}
+    data: File | list[File] | None = None
+    step: float | str | None = None
+    check_step: bool | None = None
+    spec: File | None = None
+    keep: Text = "failures"
+    time_limit: float | str = "1h"
+    memory_limit: float | str | None = None
+    retries: Count = 2
+    out: File | None = None
 
 
 @dataclass
@@ -69,6 +127,7 @@ class Definition:
     data: Any = None
     step: Any = None
     check_step: bool | None = None
+    fixed_design: bool = False
     spec: str | None = None
     keep: str = "failures"
     time_limit: Any = "1h"
@@ -82,11 +141,13 @@ class Definition:
             raise UsageError(f"keep = {self.keep}: {suggest_names(str(self.keep), KEEP)}")
         if self.design not in DESIGNS:
             raise UsageError(f"design = {self.design}: {suggest_names(str(self.design), DESIGNS)}")
+        if not isinstance(self.fixed_design, bool):
+            raise UsageError(f"fixed_design = {self.fixed_design}: true or false is expected")
         if not isinstance(self.retries, int) or self.retries < 0:
             raise UsageError(f"retries = {self.retries}: a whole number from 0 on is expected")
-        self.time_limit = float(parse("time_limit", self.time_limit, "s"))
+        self.time_limit = parse_number("time_limit", self.time_limit, "s")
         self.memory_limit = None if self.memory_limit is None else memory(self.memory_limit)
-        self.step = None if self.step is None else float(parse("step", self.step, "s"))
+        self.step = None if self.step is None else parse_number("step", self.step, "s")
         self.set, self.over = flat(self.set), flat(self.over)
         self.name = self.name or self.system
 
@@ -96,18 +157,18 @@ class Definition:
 
     def as_given(self) -> dict[str, Any]:
         """Return what was given, as plain JSON."""
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("folder", "out")}
+        own = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.name not in ("folder", "out")}
         if isinstance(self.table, list | tuple):
             own["table"] = f"{len(self.table)} rows"
         standard = {f.name: f.default for f in fields(self)}
-        return {k: plain(v) for k, v in own.items() if v != standard[k] and v not in ({}, None)}
+        return {k: v for k, v in own.items() if v != standard[k] and v not in ({}, None)}
 
     # ------------------------------------------------------------------------------------------ points
     def axes(self, slots: Sequence[str]) -> tuple[list[Axis], list[Distribution]]:
         """Return the axes and the distributions; a name of ``over`` that is a slot is an axis of parts."""
         found = [parse_axis(name, given) for name, given in self.over.items() if name not in slots]
         swapped = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
-        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in swapped.items()}
+        lists = {s: _names(s, v) for s, v in swapped.items()}
         parts = [
             Axis(slot, "part", "", tuple(AxisValue(p.strip(), p.strip()) for p in names))
             for slot, names in lists.items()
@@ -121,7 +182,7 @@ class Definition:
     def fixed_parts(self, slots: Sequence[str]) -> dict[str, str]:
         """Return the part of each slot that has one for all runs."""
         given = {**{n: v for n, v in self.over.items() if n in slots}, **self.parts}
-        lists = {s: v.split(",") if isinstance(v, str) else list(v) for s, v in given.items()}
+        lists = {s: _names(s, v) for s, v in given.items()}
         return {slot: names[0].strip() for slot, names in lists.items() if len(names) == 1}
 
     def drawn(self, axes: Sequence[Distribution]) -> list[Mapping[str, AxisValue]]:
@@ -136,13 +197,16 @@ class Definition:
 
     def seed_list(self) -> list[int]:
         """Return the seeds of a point."""
-        if isinstance(self.seeds, int) and not isinstance(self.seeds, bool) and self.seeds > 0:
+        if isinstance(self.seeds, int) and not isinstance(self.seeds, bool) and 0 < self.seeds <= MOST:
             return list(range(1, self.seeds + 1))
         if isinstance(self.seeds, list | tuple | range) and self.seeds:
             seeds = list(self.seeds)
-            if all(type(s) is int and s >= 0 for s in seeds) and len(set(seeds)) == len(seeds):
+            if all(type(s) is int and 0 <= s < 1 << 63 for s in seeds) and len(set(seeds)) == len(seeds):
                 return seeds
-        raise UsageError(f"seeds = {self.seeds}: a number of seeds from 1 on, or a list of different ones, is expected")
+        given = shorten(str(self.seeds))
+        raise UsageError(
+            f"seeds = {given}: a number of seeds from 1 to {MOST}, or a list of different ones, is expected"
+        )
 
     def files(self) -> list[Path]:
         """Return the measured files, in the order of their names.  Raises UsageError where there are none."""
@@ -166,10 +230,13 @@ class Definition:
         elif isinstance(self.table, str | Path):
             content = read_table(self.path(self.table))
         else:
-            content = [dict(row) for row in self.table]
+            try:
+                content = [dict(row) for row in self.table]
+            except (TypeError, ValueError):
+                raise UsageError(f"table = {shorten(str(self.table))}: rows of names and values are expected") from None
         if not content:
             raise UsageError(f"table = {self.table}: has no rows")
-        seeds = [row.pop("seed", None) for row in content]
+        seeds = [_row_seed(k, row.pop("seed", None)) for k, row in enumerate(content, 1)]
         names = list(dict.fromkeys(name for row in content for name in row))
         axes = {}
         for name in names:
@@ -177,7 +244,7 @@ class Definition:
             assert isinstance(axis, Axis)
             axes[name] = iter(axis.points), Axis(name, "table", axis.unit, ())
         rows: list[tuple[Mapping[str, AxisValue], int | None]] = [
-            ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, None if s is None else int(s))
+            ({n: next(axes[n][0]) for n in names if row.get(n) is not None}, s)
             for row, s in zip(content, seeds, strict=True)
         ]
         return [axis for _, axis in axes.values()], rows
@@ -194,20 +261,40 @@ class Definition:
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[spec.name] = module  # its dataclasses look for it
-        spec.loader.exec_module(module)
-        if not hasattr(module, function):
-            raise UsageError(f"table = {where}: no function {function} in {file}")
-        return [dict(row) for row in getattr(module, function)(**self.arguments)]
+        try:
+            spec.loader.exec_module(module)
+            if not hasattr(module, function):
+                raise UsageError(f"table = {where}: no function {function} in {file}")
+            return [dict(row) for row in getattr(module, function)(**self.arguments)]
+        except GyrobenchError:
+            raise
+        except (Exception, SystemExit) as error:  # of the user's code
+            raise UsageError(f"table = {where}: {type(error).__name__}: {error}") from error
+
+
+def _names(slot: str, given: Any) -> list[str]:
+    """Return the parts of a slot.  Raises UsageError for anything but names."""
+    names = given.split(",") if isinstance(given, str) else given
+    if not isinstance(names, list | tuple) or not names or not all(isinstance(n, str) for n in names):
+        raise UsageError(f"{slot} = {shorten(repr(given))}: the name of a part or the file of an FMU is expected")
+    return list(names)
+
+
+def _row_seed(row: int, given: Any) -> int | None:
+    if given is None:
+        return None
+    try:
+        seed = int(given)
+    except (TypeError, ValueError):
+        seed = -1
+    if not 0 <= seed < 1 << 63:
+        raise UsageError(f"row {row} of the table: seed = {shorten(str(given))}: a whole number from 0 is expected")
+    return seed
 
 
 def read_definition(file: Path) -> Definition:
     """Return the definition in a TOML file.  Raises UsageError."""
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: not a TOML file: {error}") from None
+    content = reading.toml(reading.read_text(file, UsageError), file, UsageError)
     content.setdefault("name", file.stem)
     for table in {"set", "over"} & content.keys():
         content[table] = _texts(content[table])
@@ -222,22 +309,34 @@ def from_mapping(content: Mapping[str, Any], folder: Path | None = None, where: 
         content["system"] = content.pop("suite")
     for key in content:
         if key not in known:
-            raise UsageError(f"{where}: unknown key '{key}'; {suggest_names(key, known)}")
+            raise UsageError(f"{where}: unknown key '{key}'; {suggest_names(str(key), known)}")
     if not isinstance(content.get("system"), str):
         raise UsageError(f'{where}: what is run?  system = "NAME", see gyrobench list')
     try:
-        return Definition(**content, folder=folder or Path.cwd())
+        typed = CampaignFile.model_validate(content).model_dump(exclude_unset=True)
+        return Definition(**typed, folder=folder or Path.cwd())
+    except ValidationError as error:
+        raise UsageError(f"{where}: {problem_of(error)}") from None
     except UsageError as error:
         raise UsageError(f"{where}: {error}") from None
 
 
+def problem_of(error: ValidationError) -> str:
+    """Return the first problem of a definition: key, what is wrong with its value, and the value."""
+    first = error.errors()[0]
+    own = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
+    given = shorten(repr(first["input"]))
+    return f"{'.'.join(map(str, first['loc'][:2]))} = {given}: {own[:1].lower()}{own[1:]}"
+
+
 def read_table(file: Path) -> list[dict[str, Any]]:
     """Return the rows of a CSV file, each value with the unit of its column "name [unit]".  Raises UsageError."""
+    text = reading.read_text(file, UsageError)
     try:
-        with file.open(newline="", encoding="utf-8-sig") as text:
-            lines = [r for r in csv.reader(text) if any(x.strip() for x in r) and not r[0].startswith("#")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UsageError(f"{file}: not a readable table: {getattr(error, 'strerror', None) or error}") from None
+        cells_of = csv.reader(io.StringIO(text, newline=""))
+        lines = [r for r in cells_of if any(x.strip() for x in r) and not r[0].startswith("#")]
+    except csv.Error as error:
+        raise UsageError(f"{file}: not a readable table: {error}") from None
     if len(lines) < 2:
         raise UsageError(f"{file}: a header and at least one row are expected")
     head = [h.strip() for h in lines[0]]
@@ -278,8 +377,8 @@ def memory(given: Any) -> int:
         size = float(number) * sizes[text[len(number) :]]
     except (KeyError, ValueError):
         raise UsageError(f"memory_limit = {given}: write for example 500MB or 1.5GB") from None
-    if not size >= 1e6:
-        raise UsageError(f"memory_limit = {given}: no worker fits into that")
+    if not 1e6 <= size < 1e18:
+        raise UsageError(f"memory_limit = {shorten(text)}: no worker fits into that")
     return int(size)
 
 

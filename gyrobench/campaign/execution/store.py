@@ -12,7 +12,8 @@ warnings, warning_ids, for each coefficient ``<name>.estimate``, ``.u``, ``.lo``
 and report (path in this folder), for measured data also instrument and date.  A number has its unit in the metadata of
 its field.
 
-Every file is written whole and renamed, so a folder is readable at any moment.  One process writes at a time; between
+Every file is on the disk before its name is, and is checked when it is read: the name of a table is the SHA-256 of its
+content, campaign.json holds its own.  So a folder is readable at any moment.  One process writes at a time; between
 the two steps of a merge a run may stand in two files, with equal rows, and readers take one of them.
 """
 
@@ -21,7 +22,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -30,6 +30,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderLock, write_whole
 from gyrobench.notebook import MissingPackageError
@@ -68,6 +69,7 @@ LOG = pa.schema(
         "tries": pa.string(),
     }
 )
+OWN = ("runs", "log", "kept", "earlier", "site")  # folders
 FILES_BEFORE_MERGE = 50
 
 Row = Mapping[str, Any]
@@ -94,6 +96,7 @@ class Campaign:
         self.fs, self.root = fsspec.core.url_to_fs(self.url)
         self.local = Path(self.root) if "file" in _protocols(self.fs) else None
         self.definition: dict[str, Any] = {}
+        self.notes: list[str] = []  # on what is stored, for the user
         self.units: dict[str, str] = {}
 
     @classmethod
@@ -144,12 +147,17 @@ class Campaign:
 
     def _read_definition(self) -> None:
         try:
-            document = json.loads(self.read(FILE))
-            if document.get("schema") != SCHEMA:
-                raise ValueError(f"schema {document.get('schema')!r}, expected {SCHEMA!r}")
-        except (OSError, ValueError, AttributeError) as error:
+            text = self.read(FILE).decode()
+        except (OSError, ValueError) as error:
             raise CampaignError(f"{self.url}/{FILE}: not the description of a campaign: {error}") from None
-        self.definition = document
+        document = reading.json_object(text, f"{self.url}/{FILE}", CampaignError)
+        remedy = "restore it from a copy, or remove it: the command that made the campaign writes it again"
+        self.definition, verified = reading.opened(
+            document, f"{self.url}/{FILE}", lambda text: CampaignError(f"{text}; {remedy}")
+        )
+        self.notes = [] if verified else [f"{self.url}/{FILE} has no SHA-256 of its own, so changes to it do not show"]
+        if self.definition.get("schema") != SCHEMA:
+            raise CampaignError(f"{self.url}/{FILE}: schema {document.get('schema')!r}, expected {SCHEMA!r}")
 
     def _files(self, folder: str) -> list[str]:
         """Return the Parquet files of a folder; half ones, which a kill leaves, have another suffix."""
@@ -162,12 +170,14 @@ class Campaign:
     def _tables(self, folder: str) -> list[pa.Table]:
         tables = []
         for file in self._files(folder):
+            remedy = "remove the file: the runs in it are run again"
             try:
-                tables.append(pq.read_table(io.BytesIO(self.fs.cat_file(file))))
+                content = self.fs.cat_file(file)
+                if _name_of(content) != file.rpartition("/")[2]:
+                    raise CampaignError(f"{file}: changed after it was saved (its SHA-256 is not its name); {remedy}")
+                tables.append(pq.read_table(io.BytesIO(content)))
             except (OSError, pa.ArrowException) as error:
-                raise CampaignError(
-                    f"{file}: not readable: {error}; remove the file: the runs in it are run again"
-                ) from None
+                raise CampaignError(f"{file}: not readable: {error}; {remedy}") from None
         return tables
 
 
@@ -205,11 +215,11 @@ class CampaignStore(Campaign):
         """
         if self._exists(FILE):
             self._read_definition()
-        elif self.local is not None and any(p.name[:1] != "." for p in self.local.iterdir()):
+        elif self.local is not None and any(p.name not in OWN and p.name[:1] != "." for p in self.local.iterdir()):
             raise CampaignError(f"{self.url}: holds other files; name a new folder")
         self.definition = json.loads(json.dumps({"schema": SCHEMA, **document}, allow_nan=False))
-        text = json.dumps(self.definition, indent=1, ensure_ascii=False) + "\n"
-        self._write(FILE, text.encode())
+        text = json.dumps(reading.sealed(self.definition), indent=1, ensure_ascii=False) + "\n"
+        self._write(FILE, text.encode("utf-8", "backslashreplace"))
         table = self._arrange(plan, units or {})
         self.units = {**_units(table), **(units or {})}
         return dict(zip(table.column("run").to_pylist(), table.column("state").to_pylist(), strict=True))
@@ -285,7 +295,7 @@ class CampaignStore(Campaign):
         buffer = io.BytesIO()
         pq.write_table(table, buffer, compression="zstd")
         content = buffer.getvalue()
-        name = f"{folder}/{hashlib.sha256(content).hexdigest()[:16]}.parquet"
+        name = f"{folder}/{_name_of(content)}"
         self._write(name, content)
         return self._path(name)
 
@@ -295,26 +305,12 @@ class CampaignStore(Campaign):
             return
         path = self.local / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda temporary: _write_durably(temporary, content))
-        _sync_folder(path.parent)
+        write_whole(path, content)
 
 
-def _write_durably(path: Path, content: bytes) -> None:
-    """Write a file and wait until it is on the disk, so that its name never comes before its content."""
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name == "nt":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def _name_of(content: bytes) -> str:
+    """Return the name of a table, which is its digest."""
+    return f"{hashlib.sha256(content).hexdigest()[:16]}.parquet"
 
 
 def _protocols(fs: Any) -> tuple[str, ...]:
@@ -342,7 +338,7 @@ def _plain(value: Any, kind: pa.DataType) -> Any:
     if value is None or (isinstance(value, float) and value != value):
         return None
     if kind == pa.string():
-        return str(value)
+        return str(value).encode("utf-8", "backslashreplace").decode()  # bytes of a path
     return float(value) if kind == pa.float64() else value
 
 

@@ -70,6 +70,7 @@ class ExecutionSettings:
     spec: str | None
     step: float | None
     check_step: bool | None
+    nominal: Mapping[str, Any] | None  # values of parts that the design is held at
     keep: str
     time_limit: float
     memory_limit: int | None
@@ -244,6 +245,7 @@ class _WorkerState:
         if isinstance(self.test, Suite):
             return None, *self._suite(run, request)
         system = self.test.with_values(run.values)
+        system.nominal = None if self.settings.nominal is None else dict(self.settings.nominal)
         session = self._session(run.setup, "", system)
         outcome = execute_run(request, system, prepared=session)
         if outcome.stopped is not None:

@@ -8,7 +8,7 @@ from typing import Any
 from gyrobench.campaign.analysis.campaign_comparison import QUANTITIES
 from gyrobench.campaign.analysis.measures import Json
 from gyrobench.report.numbers import write_p
-from gyrobench.report.page_model import BulletList, Column, Page, Row, Section, Table, Text, number_cell, text_cell
+from gyrobench.report.page_model import BulletList, Column, Page, PageTable, Row, Section, Text, number_cell, text_cell
 from gyrobench.report.report_files import COMPARISON_NAMES, write_files
 from gyrobench.report.tables import compact
 
@@ -42,10 +42,10 @@ def _settings(doc: Json) -> list[Any]:
         for d in doc["differing"]
     ]
     columns = [Column("setting"), Column("A", wide=True), Column("B", wide=True)]
-    return [Table(columns, rows, "Options, components and versions that differ.", small=True)]
+    return [PageTable(columns, rows, "Options, components and versions that differ.", small=True)]
 
 
-def _tests(doc: Json) -> Table:
+def _tests(doc: Json) -> PageTable:
     rows = []
     for i, t in enumerate(doc["tests"]):
         at = ("tests", i)
@@ -68,7 +68,7 @@ def _tests(doc: Json) -> Table:
     how = (
         f"{doc['pairs']} runs of equal settings and seeds in pairs" if doc["pairs"] else "the campaigns are independent"
     )
-    return Table(
+    return PageTable(
         [Column(h) for h in heads],
         rows,
         f"What chance does not explain: {how}; runs that share a seed count as one; p adjusted for all rows (Holm).",

@@ -268,5 +268,8 @@ def distances(lot: Json) -> list[Picture]:
     ax.set_xlabel("measurement")
     ax.set_ylabel("robust distance / 1")
     number = write_number(limit, significant=3).text
-    caption = f"Robust distance of each measurement; dashed: {number}, above which one is named as an outlier."
+    caption = (
+        f"Robust distance of each measurement; dashed: {number}, above which one is named as an outlier, as is one by "
+        "a coefficient alone."
+    )
     return [Picture("distances", svg(fig, "distances"), caption, "Robust Mahalanobis distances", half=True)]

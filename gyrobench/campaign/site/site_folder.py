@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,10 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, numbers
-from gyrobench.campaign.execution.store import Campaign
+from gyrobench.campaign.execution.store import Campaign, CampaignError
 from gyrobench.campaign.site.site_page import page
 from gyrobench.files import write_whole
 from gyrobench.report.assets import read_content
@@ -31,6 +33,7 @@ from gyrobench.report.render import html
 from gyrobench.report.result_json import plain
 
 PUBLISHED = ("report.html", "report.pdf", "result.json")
+KEPT = re.compile(r"kept/[\w-]+/report\.html")  # where a campaign keeps the report of a run
 DIGITS = 7  # significant digits of the numbers in the table of the page
 
 
@@ -43,10 +46,11 @@ class CampaignSite:
 
 
 def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None = None) -> CampaignSite:
-    """Write the site of a campaign.
+    """Write the site of a campaign, which may be that of others.
 
     out: folder of the site, default ``site`` in the campaign; reports are linked where they are.  publish: a folder
-    that shall hold everything, reports included.  Raises UsageError.
+    that shall hold everything, reports included.  Raises UsageError, and
+    CampaignError for a row whose report is not one of the campaign's.
     """
     if out and publish:
         raise UsageError("out and publish: name one; a published site holds the reports, one of out links them")
@@ -57,6 +61,10 @@ def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None
     folder.mkdir(parents=True, exist_ok=True)
     rows = campaign.table()
     kept = sorted({r for r in rows["report"].dropna()}) if "report" in rows else []
+    if outside := [r for r in kept if not KEPT.fullmatch(r)]:
+        raise CampaignError(
+            f"{campaign.url}: {reading.visible(outside[0])}: not the place of a report of this campaign"
+        )
     if publish:
         _publish_reports(campaign, folder, kept)
     link = _links(campaign, folder, published=publish is not None)
@@ -121,7 +129,8 @@ def _csv(rows: Any, units: Mapping[str, str]) -> str:
 
 def _script(value: Json) -> str:
     """Return JSON that may stand in a script of a page."""
-    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
+    return reading.visible(text)
 
 
 # -------------------------------------------------------------------------------------------------- table of runs

@@ -17,11 +17,11 @@ from gyrobench.report.page_model import (
     Column,
     Markup,
     Page,
+    PageTable,
     Picture,
     Pictures,
     Row,
     Section,
-    Table,
     Text,
     number_cell,
     text_cell,
@@ -112,7 +112,7 @@ def _instruments(doc: Json, reports: Callable[[str], str]) -> list[Any]:
             _instrument(listed[i], reports, dated, [text_cell(" ".join(f"{w.rstrip('.')}." for w in listed[i]["why"]))])
             for i in bad
         ]
-        blocks.append(Table([*heads, Column("reason", wide=True)], rows, caption))
+        blocks.append(PageTable([*heads, Column("reason", wide=True)], rows, caption))
     if lot["common"]:
         blocks.append(Text("What most of the results warn of, in the words of the first:"))
         blocks.append(BulletList([f"{c['warning']} ({c['runs']} results)" for c in lot["common"]], warn=True))
@@ -134,7 +134,7 @@ def _instruments(doc: Json, reports: Callable[[str], str]) -> list[Any]:
         for i, entry in enumerate(listed[:MAX_LISTED])
     ]
     more = f" The first {MAX_LISTED}; all are in the table of runs." if len(listed) > MAX_LISTED else ""
-    table = Table([*heads, Column("robust distance")], rows, f"Verdict of every measurement.{more}")
+    table = PageTable([*heads, Column("robust distance")], rows, f"Verdict of every measurement.{more}")
     blocks.append(CollapsedBlocks(f"All {len(listed)} measurements", [table]) if bad else table)
     return blocks
 
@@ -181,7 +181,7 @@ def _control(doc: Json, measures: CampaignMeasures) -> list[Any]:
         )
     heads = ("name", "unit", "n", "mean", "standard deviation", "95 % / 95 % from", "to", "median u", "interval",
              "p (normal)", "beyond control limits")  # fmt: skip
-    table = Table(
+    table = PageTable(
         [Column(h) for h in heads],
         rows,
         f"Tolerance intervals: they hold 95 % of the population of instruments with 95 % confidence, uncertainty of "
@@ -206,7 +206,7 @@ def _changes(doc: Json) -> list[Any]:
              number_cell(doc, (*at, i, "ratio"), significant=3), number_cell(doc, (*at, i, "p"), write=write_p)])
         for i, p in enumerate(changes["pooled"])
     ]  # fmt: skip
-    pooled = Table(
+    pooled = PageTable(
         [Column("name"), Column("instruments"), Column("observed / expected"), Column("p")],
         rows,
         "Standard deviation between dates of one instrument over what u explains, pooled over instruments; a small p "
@@ -233,7 +233,7 @@ def _changes(doc: Json) -> list[Any]:
             )
         )
     heads = ("instrument", "name", "dates", "drift", "u", "unit", "p, adjusted", "")
-    drifts = Table(
+    drifts = PageTable(
         [Column(h) for h in heads],
         rows,
         f"Drift of instruments between dates, smallest p first ({len(order)} of {len(changes['drifts'])}); p adjusted "
@@ -265,7 +265,7 @@ def _coverage(doc: Json, measures: CampaignMeasures) -> list[Any]:
         rows.append(Row(cells))
     heads = ["name", "runs", "coverage", "95 % from", "to", "mean of z", "rms of z"]
     heads += ["runs, neither void nor inconclusive", "coverage", "from", "to"] if extra else []
-    table = Table(
+    table = PageTable(
         [Column(h) for h in heads],
         rows,
         "Share of the 95 % coverage intervals that contain the true value, with Clopper-Pearson bounds; marked where "
@@ -307,7 +307,7 @@ def _responses(doc: Json) -> list[Any]:
             )
         )
     heads = ("axis", "name", "quantity", "span of means", "unit", "share of variance", "p, adjusted", "")
-    table = Table(
+    table = PageTable(
         [Column(h) for h in heads],
         rows,
         "Main effects: span of the adjusted means over the levels of an axis, the share of the variance that it "
@@ -343,9 +343,9 @@ def _sobol(doc: Json) -> list[Any]:
     ]
     heads = ["axis", "name", "quantity", "first order", "95 % from", "to"]
     heads += ["total", "95 % from", "to"] if totals else []
-    table = Table([Column(h) for h in heads], rows, "Sobol' indices: shares of the variance.", small=True)
+    table = PageTable([Column(h) for h in heads], rows, "Sobol' indices: shares of the variance.", small=True)
     figures = _pictures(site_figures.indices(sobol["rows"]), "indices")
-    return [*blocks, *figures, CollapsedBlocks(f"Table of {len(rows)} indices", [table])]
+    return [*blocks, *figures, CollapsedBlocks(f"PageTable of {len(rows)} indices", [table])]
 
 
 def _distributions(doc: Json, measures: CampaignMeasures) -> list[Any]:
@@ -362,7 +362,7 @@ def _distributions(doc: Json, measures: CampaignMeasures) -> list[Any]:
     ]
     heads = ("name", "unit", "runs", "mean", "standard deviation", "smallest", "2.5 %", "median", "97.5 %", "largest",
              "median u")  # fmt: skip
-    table = Table([Column(h) for h in heads], rows, "Estimates of all runs with a result.")
+    table = PageTable([Column(h) for h in heads], rows, "Estimates of all runs with a result.")
     return [table, *_pictures(site_figures.distributions(measures), "distributions")]
 
 
@@ -384,7 +384,7 @@ def _failures(doc: Json) -> list[Any]:
             )
         )
     columns = [Column("state"), Column("runs"), Column("reason (of the first)", wide=True), Column("")]
-    return [Table(columns, rows, "Runs without result by reason; reasons that differ in numbers alone are one.")]
+    return [PageTable(columns, rows, "Runs without result by reason; reasons that differ in numbers alone are one.")]
 
 
 def _method(doc: Json) -> list[Any]:
@@ -396,12 +396,12 @@ def _method(doc: Json) -> list[Any]:
     blocks: list[Any] = []
     if rows:
         columns = [Column("axis"), Column("kind"), Column("unit"), Column("different values")]
-        blocks.append(Table(columns, rows, "Axes of the campaign."))
+        blocks.append(PageTable(columns, rows, "Axes of the campaign."))
     for key, what in (("options", "Fixed options, in SI units"), ("parts", "Components"), ("versions", "Versions")):
         if doc[key]:
             rows = [
                 Row([text_cell(k), text_cell(v if isinstance(v, str) else compact(v))]) for k, v in doc[key].items()
             ]
-            blocks.append(Table([Column("name"), Column("value", wide=True)], rows, f"{what}.", small=True))
+            blocks.append(PageTable([Column("name"), Column("value", wide=True)], rows, f"{what}.", small=True))
     files = "All rows: runs.csv; the numbers of this page: analysis.json."
     return [*blocks, Text(files, quiet=True)]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.diagnosis.handling_errors import Candidate, with_options
+from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate, with_options
 
 ANGLES = ("angle_start", "angle_end")
 TIMES = ("t_start", "t_end")
@@ -71,7 +71,7 @@ def _renamed(row: PlanRow, name: str) -> PlanRow:
     return row.model_copy(update={n: getattr(row, n).replace(old, name) for n in ("label", "face")})
 
 
-def exchanged_labels(record: Record) -> Iterator[Candidate]:
+def exchanged_labels(record: Record) -> Iterator[HandlingCandidate]:
     """Two attitudes of the plan exchanged, each pair of those with the same mode; where attitudes come back, two
     phases, too.
     """
@@ -79,7 +79,7 @@ def exchanged_labels(record: Record) -> Iterator[Candidate]:
     for a, b in combinations(sorted(modes), 2):
         if modes[a] == modes[b]:
             names = {row.phase: {a: b, b: a}.get(attitude_name(row), "") for row in record.run.plan}
-            yield Candidate(f"{a} and {b} exchanged", relabelled(record, names))
+            yield HandlingCandidate(f"{a} and {b} exchanged", relabelled(record, names))
     rows = [row for row in record.run.plan if attitude_name(row)]
     if not len(modes) < len(rows) <= MOST_PHASES:
         return
@@ -87,7 +87,7 @@ def exchanged_labels(record: Record) -> Iterator[Candidate]:
         a, b = attitude_name(x), attitude_name(y)
         if a != b and x.mode == y.mode:
             words = f"phases {x.phase} and {y.phase} ({a}, {b}) exchanged"
-            yield Candidate(words, relabelled(record, {x.phase: b, y.phase: a}))
+            yield HandlingCandidate(words, relabelled(record, {x.phase: b, y.phase: a}))
 
 
 def relabelled(record: Record, names: Mapping[int, str]) -> Record:
@@ -96,15 +96,17 @@ def relabelled(record: Record, names: Mapping[int, str]) -> Record:
     return Record(record.windows, {}, record.run.model_copy(update={"plan": plan}))
 
 
-def exchanged_columns(record: Record, pairs: Sequence[tuple[str, str]], words: str) -> Iterator[Candidate]:
+def exchanged_columns(record: Record, pairs: Sequence[tuple[str, str]], words: str) -> Iterator[HandlingCandidate]:
     """Columns exchanged, all pairs at once."""
     w = record.windows
     if all(n in w for pair in pairs for n in pair):
         columns = {**{a: w[b] for a, b in pairs}, **{b: w[a] for a, b in pairs}}
-        yield Candidate(words, changed(record, **columns))
+        yield HandlingCandidate(words, changed(record, **columns))
 
 
-def reversed_columns(record: Record, columns: Sequence[str], words: str, phases: bool = True) -> Iterator[Candidate]:
+def reversed_columns(
+    record: Record, columns: Sequence[str], words: str, phases: bool = True
+) -> Iterator[HandlingCandidate]:
     """Columns of the opposite sign, throughout and (phases) in each attitude alone; where attitudes come back, in each
     phase, too.
     """
@@ -113,7 +115,7 @@ def reversed_columns(record: Record, columns: Sequence[str], words: str, phases:
     def reversed_in(rows: NDArray[np.bool_]) -> Record:
         return changed(record, **{n: np.where(rows, -w[n], w[n]) for n in columns})
 
-    yield Candidate(f"{words} reversed", changed(record, **{n: -w[n] for n in columns}))
+    yield HandlingCandidate(f"{words} reversed", changed(record, **{n: -w[n] for n in columns}))
     if not phases:
         return
     phase = np.asarray(w["phase"]).astype(int)
@@ -122,21 +124,23 @@ def reversed_columns(record: Record, columns: Sequence[str], words: str, phases:
         if attitude_name(row) and row.phase in phase:
             places.setdefault(attitude_name(row), []).append(row.phase)
     for name, numbers in places.items() if len(places) > 1 else ():
-        yield Candidate(f"{words} reversed in {name}", reversed_in(np.isin(phase, numbers)))
+        yield HandlingCandidate(f"{words} reversed in {name}", reversed_in(np.isin(phase, numbers)))
     single = [(p, name) for name, numbers in places.items() for p in numbers if len(numbers) > 1]
     for p, name in single if len(single) <= MOST_PHASES else ():
-        yield Candidate(f"{words} reversed in phase {p} ({name})", reversed_in(phase == p))
+        yield HandlingCandidate(f"{words} reversed in phase {p} ({name})", reversed_in(phase == p))
 
 
 def scaled(
     record: Record, columns: Sequence[str], factors: Mapping[str, float], power: float = 1.0
-) -> Iterator[Candidate]:
+) -> Iterator[HandlingCandidate]:
     """Columns in another unit.  power: of the factor in the data."""
     for words, f in factors.items():
-        yield Candidate(words, changed(record, **{n: record.windows[n] * f for n in columns}), f**power)
+        yield HandlingCandidate(words, changed(record, **{n: record.windows[n] * f for n in columns}), f**power)
 
 
-def scaled_in_attitudes(record: Record, columns: Sequence[str], factors: Mapping[str, float]) -> Iterator[Candidate]:
+def scaled_in_attitudes(
+    record: Record, columns: Sequence[str], factors: Mapping[str, float]
+) -> Iterator[HandlingCandidate]:
     """Columns in another unit, or in another range of the meter, in one of a few attitudes."""
     names = list(dict.fromkeys(attitude_name(row) for row in record.run.plan if attitude_name(row)))
     phase = np.asarray(record.windows["phase"]).astype(int)
@@ -144,16 +148,16 @@ def scaled_in_attitudes(record: Record, columns: Sequence[str], factors: Mapping
         here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         for words, f in factors.items():
             columns_there = {n: np.where(here, record.windows[n] * f, record.windows[n]) for n in columns}
-            yield Candidate(f"{words}, in {name}", changed(record, **columns_there))
+            yield HandlingCandidate(f"{words}, in {name}", changed(record, **columns_there))
 
 
-def wrong_hemisphere(record: Record) -> Iterator[Candidate]:
+def wrong_hemisphere(record: Record) -> Iterator[HandlingCandidate]:
     """The latitude with the wrong sign."""
     latitude = float(record.run.options["latitude"])
-    yield Candidate("the latitude of the other sign", with_options(record, {"latitude": -latitude}))
+    yield HandlingCandidate("the latitude of the other sign", with_options(record, {"latitude": -latitude}))
 
 
-def shifted(record: Record, columns: Sequence[str], words: str) -> Iterator[Candidate]:
+def shifted(record: Record, columns: Sequence[str], words: str) -> Iterator[HandlingCandidate]:
     """Columns that belong to the row before or after; the row without one is left out."""
     w = record.windows
     n = len(w[columns[0]])
@@ -163,12 +167,12 @@ def shifted(record: Record, columns: Sequence[str], words: str) -> Iterator[Cand
         taken = slice(1, n) if step > 0 else slice(0, n - 1)
         rows = {c: np.asarray(v)[keep] for c, v in w.items()}
         rows |= {c: np.asarray(w[c])[taken] for c in columns}
-        yield Candidate(f"{words} belonging to {where}", Record(rows, {}, record.run))
+        yield HandlingCandidate(f"{words} belonging to {where}", Record(rows, {}, record.run))
 
 
 def exchanged_rows(
     record: Record, columns: Sequence[str], words: str, most: int = 80, far: int = 0
-) -> Iterator[Candidate]:
+) -> Iterator[HandlingCandidate]:
     """Two groups of rows exchanged in ``columns``, whose equal values make a group: those that follow one another, of
     up to ``most`` groups; any two, of up to ``far``.
     """
@@ -184,10 +188,10 @@ def exchanged_rows(
             continue
         order = np.where(group == a, first[b], np.where(group == b, first[a], np.arange(group.size)))
         swapped = {c: np.asarray(w[c])[order] for c in columns}
-        yield Candidate(f"{words} {a + 1} and {b + 1} exchanged", changed(record, **swapped))
+        yield HandlingCandidate(f"{words} {a + 1} and {b + 1} exchanged", changed(record, **swapped))
 
 
-def odd_rows(record: Record, column: str, words: str) -> Iterator[Candidate]:
+def odd_rows(record: Record, column: str, words: str) -> Iterator[HandlingCandidate]:
     """Rows whose value is that of the others times -1 or a known factor: those that differ from the median."""
     v = np.asarray(record.windows[column], dtype=float)
     middle = float(np.median(v))
@@ -201,10 +205,10 @@ def odd_rows(record: Record, column: str, words: str) -> Iterator[Candidate]:
         if 0 < np.count_nonzero(rows) < v.size / 2:
             first, last = np.flatnonzero(rows)[[0, -1]] + 1
             where = f"row {first}" if first == last else f"rows {first} to {last}"
-            yield Candidate(f"{words} {what} in {where}", changed(record, **{column: np.where(rows, v / f, v)}))
+            yield HandlingCandidate(f"{words} {what} in {where}", changed(record, **{column: np.where(rows, v / f, v)}))
 
 
-def _late(record: Record, means: Sequence[str]) -> Iterator[Candidate]:
+def _late(record: Record, means: Sequence[str]) -> Iterator[HandlingCandidate]:
     """Currents that belong to the row before or after, all of them or one."""
     yield from shifted(record, means, "the current")
     for n in means if len(means) > 1 else ():
@@ -212,7 +216,7 @@ def _late(record: Record, means: Sequence[str]) -> Iterator[Candidate]:
 
 
 # --------------------------------------------------------------------------------------------- families of tests
-def tumble(record: Record) -> Iterator[Candidate]:
+def tumble(record: Record) -> Iterator[HandlingCandidate]:
     """Rebalance currents (mean or mean_x, mean_y) over the angle of a turning table, and in dwells."""
     means = [n for n in ("mean", "mean_x", "mean_y") if n in record.windows]
     yield from exchanged_labels(record)
@@ -226,7 +230,7 @@ def tumble(record: Record) -> Iterator[Candidate]:
     yield from _late(record, means)
 
 
-def positions(record: Record) -> Iterator[Candidate]:
+def positions(record: Record) -> Iterator[HandlingCandidate]:
     """Rebalance currents in positions that a plan names."""
     means = [n for n in ("mean", "mean_x", "mean_y") if n in record.windows]
     yield from exchanged_labels(record)
@@ -237,7 +241,7 @@ def positions(record: Record) -> Iterator[Candidate]:
     yield from _late(record, means)
 
 
-def readings(record: Record) -> Iterator[Candidate]:
+def readings(record: Record) -> Iterator[HandlingCandidate]:
     """Readings (mean) at angles that are set one after the other."""
     yield from reversed_columns(record, ANGLES, "the rotation")
     yield from reversed_columns(record, ["mean"], "the reading")
@@ -246,13 +250,13 @@ def readings(record: Record) -> Iterator[Candidate]:
     yield from shifted(record, ["mean"], "the reading")
 
 
-def head(record: Record) -> Iterator[Candidate]:
+def head(record: Record) -> Iterator[HandlingCandidate]:
     """Readings in the positions of a head, in mounts that a plan names."""
     yield from exchanged_labels(record)
     yield from readings(record)
 
 
-def followed(record: Record) -> Iterator[Candidate]:
+def followed(record: Record) -> Iterator[HandlingCandidate]:
     """Case angles that follow the float, with pickoff voltages."""
     yield from reversed_columns(record, ANGLES, "the rotation")
     yield from reversed_columns(record, ["mean"], "the pickoff voltage")
@@ -263,7 +267,7 @@ def followed(record: Record) -> Iterator[Candidate]:
     yield from exchanged_rows(record, [*ANGLES, "mean"], "readings")
 
 
-def servo(record: Record) -> Iterator[Candidate]:
+def servo(record: Record) -> Iterator[HandlingCandidate]:
     """Angles of a table that its gyro holds."""
     yield from exchanged_labels(record)
     yield from reversed_columns(record, ANGLES, "the rotation")
@@ -276,7 +280,7 @@ OUTER, INNER = ("outer_start", "outer_end"), ("inner_start", "inner_end")
 BOTH = (*OUTER, *INNER)
 
 
-def two_axes(record: Record) -> Iterator[Candidate]:
+def two_axes(record: Record) -> Iterator[HandlingCandidate]:
     """Angles of a table with two axes, and with them rebalance currents (mean) or nothing."""
     yield from exchanged_labels(record)
     yield from exchanged_columns(record, list(zip(OUTER, INNER, strict=True)), "outer and inner angle exchanged")
@@ -294,12 +298,12 @@ def two_axes(record: Record) -> Iterator[Candidate]:
     yield from exchanged_rows(record, BOTH, "positions")
 
 
-def at_rest(record: Record) -> Iterator[Candidate]:
+def at_rest(record: Record) -> Iterator[HandlingCandidate]:
     """Currents in one attitude: only rows that are unlike the others can be seen."""
     yield from odd_rows(record, "mean", "the current")
 
 
-def table_of_rates(record: Record) -> Iterator[Candidate]:
+def table_of_rates(record: Record) -> Iterator[HandlingCandidate]:
     """A row for each current: rates of both senses."""
     yield from exchanged_rows(record, ["current"], "the currents of rows", far=12)
     yield from exchanged_rows(record, ["rate_plus", "rate_minus"], "the rates of rows", far=12)
@@ -309,4 +313,6 @@ def table_of_rates(record: Record) -> Iterator[Candidate]:
     for k in range(len(w["current"])):
         for f, words in ((1e3, "mA given as A"), (1e-3, "A given as mA"), (2.0, "half of it"), (0.5, "twice of it")):
             current = np.where(np.arange(len(w["current"])) == k, w["current"] * f, w["current"])
-            yield Candidate(f"the current of row {k + 1} in another unit ({words})", changed(record, current=current))
+            yield HandlingCandidate(
+                f"the current of row {k + 1} in another unit ({words})", changed(record, current=current)
+            )

@@ -64,7 +64,7 @@ IMPOSSIBLE = (GyrobenchError, ValueError, ArithmeticError)  # of a record that a
 
 
 @dataclass(frozen=True)
-class Candidate:
+class HandlingCandidate:
     """A mistake that may have been made.  record: with the mistake undone.  scale: by what undoing it multiplies the
     data and their noise: scatters are compared in the scale of the record as labelled.
     """
@@ -89,7 +89,7 @@ class _Tried:
 
 
 def examined(
-    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]] | None,
+    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]] | None,
     regression_of: Callable[[Record], Any] | None = None,
 ) -> DriftTestResult:  # fmt: skip
     """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what
@@ -119,7 +119,7 @@ def examined(
 
 
 def _with_diagnosis(
-    record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[Candidate]]
+    record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]]
 ) -> DriftTestResult:
     """Return the result with the mistake that explains its residuals named, where they are not ordinary."""
     reference, plain = result, record
@@ -180,7 +180,7 @@ def _freedom(result: DriftTestResult, windows: int) -> float:
     return max(windows - result.rank, 1.0) / (1.0 + 2.0 * total)
 
 
-def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
+def _cures(reduce: Reduce, candidates: Iterable[HandlingCandidate]) -> str:
     """Return the mistakes without which a record that is refused is an ordinary one; "" where there are several ways
     or none.
     """
@@ -193,7 +193,7 @@ def _cures(reduce: Reduce, candidates: Iterable[Candidate]) -> str:
 
 
 def _diagnosed(
-    result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[Candidate]
+    result: DriftTestResult, reference: DriftTestResult, reduce: Reduce, candidates: list[HandlingCandidate]
 ) -> DriftTestResult:
     """Return the result with what undoing each mistake does to the residuals, and those that explain them named.
 

@@ -35,7 +35,14 @@ from gyrobench.reduction.diagnosis.handling_candidates import (
     reversed_columns,
     wrong_hemisphere,
 )
-from gyrobench.reduction.diagnosis.handling_errors import IMPOSSIBLE, LEVEL, Candidate, Reduce, undone, with_options
+from gyrobench.reduction.diagnosis.handling_errors import (
+    IMPOSSIBLE,
+    LEVEL,
+    HandlingCandidate,
+    Reduce,
+    undone,
+    with_options,
+)
 from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
@@ -53,7 +60,7 @@ NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
 UNITY = 1.0  # u, least change of an estimate that counts
 
 
-def mistakes(record: Record) -> Iterator[Candidate]:
+def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
     readings reversed, latitude, scale factors and the zero of the angles in an attitude off - but for what a standard
     uncertainty is stated of.
@@ -66,12 +73,12 @@ def mistakes(record: Record) -> Iterator[Candidate]:
     latitude = float(options.get("latitude", 0.0))
     if "latitude" in options and not options.get("u_latitude"):
         moved = latitude + math.copysign(OFF, -latitude)
-        yield Candidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
+        yield HandlingCandidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
         yield from wrong_hemisphere(record)
     for name, stated in SCALES.items():
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
-            yield Candidate(f"the scale factor {name} wrong by 2 %", other)
+            yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     if options.get("u_mount") or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)
@@ -79,10 +86,10 @@ def mistakes(record: Record) -> Iterator[Candidate]:
     for name in places:
         here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         columns = {n: np.where(here, record.windows[n] + OFF, record.windows[n]) for n in ANGLES}
-        yield Candidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
+        yield HandlingCandidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
 
 
-def _two_pairs(record: Record) -> Iterator[Candidate]:
+def _two_pairs(record: Record) -> Iterator[HandlingCandidate]:
     """Two pairs of attitudes exchanged at once, where a mode has two alone: mounts and dwells of a tumble."""
     modes: dict[str, list[str]] = {}
     for row in record.run.plan:
@@ -92,7 +99,7 @@ def _two_pairs(record: Record) -> Iterator[Candidate]:
     for (a, b), (c, d) in combinations(pairs, 2):
         other = {a: b, b: a, c: d, d: c}
         names = {row.phase: other.get(attitude_name(row), "") for row in record.run.plan}
-        yield Candidate(f"{a} and {b}, {c} and {d} exchanged", relabelled(record, names))
+        yield HandlingCandidate(f"{a} and {b}, {c} and {d} exchanged", relabelled(record, names))
 
 
 def unshown(

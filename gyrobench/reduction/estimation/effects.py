@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.component.set_up import Errors
+from gyrobench.reading import shorten
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.setup.run_metadata import Remount
@@ -89,9 +90,10 @@ def _corrections(effects: Sequence[Effect], text: str, elsewhere: Sequence[str])
 
 
 def _read(text: str, unit: Mapping[str, str], by_id: Mapping[str, str]) -> Correction:
+    text = " ".join(text.split())  # the pattern would go through long runs of spaces again and again
     match = _ONE.fullmatch(text)
     if match is None:
-        raise ReductionError(f"corrections: '{text.strip()}' is not of the form {FORM}")
+        raise ReductionError(f"corrections: '{shorten(text)}' is not of the form {FORM}")
     source = by_id.get(match["source"], match["source"])
     if source not in unit:
         near = difflib.get_close_matches(source, unit, 1, 0.4)

@@ -21,7 +21,7 @@ from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuis
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.mixture import equivalent_dof
-from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
+from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import p_text
@@ -50,7 +50,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What is reported, in SI, in the order of the quantities; see Estimate."""
+    """What is reported, in SI, in the order of the quantities; see NoiseEstimate."""
 
     value: Array
     covariance: Array
@@ -70,7 +70,7 @@ class Findings:
 
     data: Regression
     quantities: tuple[Quantity, ...]
-    est: Estimate  # of the linear unknowns
+    est: NoiseEstimate  # of the linear unknowns
     reported: Estimates
     candidates: Sequence[Candidate] = ()  # of the nuisance model, in the order of est.evidence
     hidden: Sequence[Hidden] = ()

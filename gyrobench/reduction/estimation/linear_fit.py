@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
 from gyrobench.reduction.estimation.findings import Estimates, Findings, Group
-from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
+from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import RegressionError
@@ -119,7 +119,7 @@ def _noise_free(X: Array, y: Array, ideal: float) -> bool:
     return bool(np.linalg.norm(left) <= ideal * np.linalg.norm(y))
 
 
-def _reported(est: Estimate, joined: Sequence[tuple[Candidate, Evidence]], p: int) -> Estimates:
+def _reported(est: NoiseEstimate, joined: Sequence[tuple[Candidate, Evidence]], p: int) -> Estimates:
     """The p coefficients, then each effect that joined: its constant, or the standard deviation of its constants."""
     rows, spread, at = list(range(p)), {}, p
     for c, e in joined:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.mixture import Mixture
-from gyrobench.reduction.estimation.nuisance_states import Block
+from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
 from gyrobench.reduction.estimation.regression import Design
 
 JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
@@ -21,7 +21,7 @@ class Evidence:
     the coefficients (p,) then differ from those without it.
     """
 
-    block: Block
+    block: NuisanceBlock
     probability: float
     value: Array  # (k,)
     u: Array
@@ -75,7 +75,7 @@ class Likeliest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class NoiseEstimate:
     """A fit under an estimated noise model; arrays follow ``names``."""
 
     names: tuple[str, ...]

@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
-from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence, Likeliest, NoiseSummary
+from gyrobench.reduction.estimation.noise_estimate import Evidence, Likeliest, NoiseEstimate, NoiseSummary
 from gyrobench.reduction.estimation.normal_equations import NormalEquations
 from gyrobench.reduction.estimation.nuisance_evidence import evidence_of, repeated
-from gyrobench.reduction.estimation.nuisance_states import Block, State
+from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock, NuisanceState
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
@@ -52,7 +52,7 @@ class Problem:
     y: Array
     t0: Array
     t1: Array
-    blocks: Sequence[Block]
+    blocks: Sequence[NuisanceBlock]
     grid: noise.NoiseGrid
     columns: Array
     stated: Array
@@ -63,7 +63,14 @@ class Problem:
 
     @classmethod
     def of(
-        cls, X: Array, y: Array, t0: Array, t1: Array, readings: bool, blocks: Sequence[Block], known: Array | None
+        cls,
+        X: Array,
+        y: Array,
+        t0: Array,
+        t1: Array,
+        readings: bool,
+        blocks: Sequence[NuisanceBlock],
+        known: Array | None,
     ) -> Problem:
         n, p = X.shape
         grid = noise.noise_grid(t0, t1, readings)
@@ -92,7 +99,7 @@ class Problem:
 class Weighed:
     """States (combinations of effects) by noise models: likelihood and weight (s, G), unknowns (s G, c), s2 (s, G)."""
 
-    states: list[State]
+    states: list[NuisanceState]
     equations: NormalEquations
     likelihood: Array
     weight: Array
@@ -103,8 +110,8 @@ class Weighed:
 
 def fit(
     X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, limit: float = 1e3, readings: bool = False,
-    blocks: Sequence[Block] = (), known: Array | None = None,
-) -> Estimate:  # fmt: skip
+    blocks: Sequence[NuisanceBlock] = (), known: Array | None = None,
+) -> NoiseEstimate:  # fmt: skip
     """Return the coefficients of ``y = X a + noise`` for means ``y`` (n,) over windows [t0, t1] (s).
 
     readings: the data are differences of readings at t0 and t1, neighbours share one.  blocks: effects that may be in
@@ -195,7 +202,7 @@ def _kept(mixture: Mixture, keep: NDArray[np.bool_]) -> Mixture:
 def _summarized(
     problem: Problem, weighed: Weighed, beta: Array, mixture: Mixture, keep: NDArray[np.bool_],
     names: Sequence[str], design: Design, evidence: Sequence[Evidence],
-) -> Estimate:  # fmt: skip
+) -> NoiseEstimate:  # fmt: skip
     """Return what is reported: moments and intervals of the mixture, and what the most likely model says."""
     eye = np.eye(int(keep.sum()))
     covariance = np.einsum("g,gpq->pq", mixture.weight, mixture.covariance)
@@ -211,7 +218,7 @@ def _summarized(
     counted = _counted(models, weighed.best[1])
     columns = np.column_stack([problem.X, *(b.columns for b in problem.blocks)])[:, keep]
     joined = tuple(c for e in evidence if e.joined for c in e.names)
-    return Estimate(
+    return NoiseEstimate(
         names=(*names, *joined),
         beta=beta[keep],
         covariance=covariance * np.outer(u / sd, u / sd),
@@ -338,7 +345,9 @@ def _all_in(problem: Problem) -> tuple[NormalEquations, Array, float]:
     return equations, likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
 
 
-def _posterior(s: State, equations: NormalEquations, logdet: Array, n: int, p: int) -> tuple[Array, Array, Array]:
+def _posterior(
+    s: NuisanceState, equations: NormalEquations, logdet: Array, n: int, p: int
+) -> tuple[Array, Array, Array]:
     """Log likelihood (G,), coefficients (G, all) and variance of unit weight (G,) of a combination."""
     b, rss, determinant = equations.solve(s.extra, s.precision)
     rss = np.maximum(rss, 0.0)
@@ -351,7 +360,7 @@ def _posterior(s: State, equations: NormalEquations, logdet: Array, n: int, p: i
 
 def ordinary(
     X: Array, y: Array, names: Sequence[str], t0: Array, t1: Array, weights: Array | None = None, limit: float = 1e3
-) -> Estimate:
+) -> NoiseEstimate:
     """As :func:`fit` for noise that is taken as white: (weighted) least squares with t intervals of n - p degrees.
 
     weights (n,): proportional to 1/variance.  For a few readings, from which no noise model can be estimated; slow
@@ -364,7 +373,7 @@ def ordinary(
     spread = ols.s / float(np.median(root))
     density = spread * math.sqrt(float(np.median(t1 - t0)))
     whitened = ols.residual * root / ols.s if ols.s > 0.0 else np.zeros_like(y)
-    return Estimate(
+    return NoiseEstimate(
         names=ols.names,
         beta=ols.beta,
         covariance=ols.covariance,

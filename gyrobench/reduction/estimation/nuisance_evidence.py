@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.mixture import Mixture
 from gyrobench.reduction.estimation.noise_estimate import Evidence
-from gyrobench.reduction.estimation.nuisance_states import Block
+from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
 
 if TYPE_CHECKING:
     from gyrobench.reduction.estimation.noise_mixture_fit import Problem, Weighed
@@ -66,6 +66,6 @@ def _moments_of(values: Array, weight: Array) -> tuple[float, float, float, floa
     return centre, math.sqrt(float(weight @ (values - centre) ** 2)), low, high
 
 
-def repeated(block: Block, value: bool) -> NDArray[np.bool_]:
+def repeated(block: NuisanceBlock, value: bool) -> NDArray[np.bool_]:
     """Return a value for each column of a block."""
     return np.full(block.columns.shape[1], value)

@@ -46,7 +46,7 @@ MOST = 64  # combinations; beyond, effects are weighed one at a time and in pair
 
 
 @dataclass(frozen=True)
-class Block:
+class NuisanceBlock:
     """Columns (n, k) of one possible effect; scatter: its constants share one variance."""
 
     name: str
@@ -55,7 +55,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class State:
+class NuisanceState:
     """One combination: numbers of its columns among those of all effects, and for each noise model (G) the precision
     of the prior of each of them (0: flat), in units of the noise, and the log weight; scatter: standard deviation (G,)
     of each block.  favour: by which its log weight is larger in estimates and intervals.
@@ -75,8 +75,8 @@ class State:
 
 
 def states(
-    blocks: Sequence[Block], scale: Array, S: Array, square: Array, likely: Array, sigma: float
-) -> Iterator[State]:
+    blocks: Sequence[NuisanceBlock], scale: Array, S: Array, square: Array, likely: Array, sigma: float
+) -> Iterator[NuisanceState]:
     """The combinations of ``blocks``, whose columns are divided by scale (k,).
 
     S (G, k, k): of the docstring above, of all columns; square (G, k): sums of squares of the whitened columns.
@@ -120,4 +120,4 @@ def states(
                 flat += len(own)
                 favour += math.log(FAVOUR)
         there = tuple(c > 0.0 for c in chosen)
-        yield State(there, extra, np.concatenate(precision, axis=1), weight, flat, scatter, favour)
+        yield NuisanceState(there, extra, np.concatenate(precision, axis=1), weight, flat, scatter, favour)

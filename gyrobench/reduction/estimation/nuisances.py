@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import nuisance_states
-from gyrobench.reduction.estimation.noise_estimate import Estimate, Evidence
-from gyrobench.reduction.estimation.nuisance_states import Block
+from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
+from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
 from gyrobench.result import Reason, Table
 from gyrobench.units import DPH
 
@@ -69,8 +69,8 @@ class Candidate:
         )  # fmt: skip
 
     @property
-    def block(self) -> Block:
-        return Block(self.name, np.reshape(self.columns, (len(self.columns), -1)), self.scatter)
+    def block(self) -> NuisanceBlock:
+        return NuisanceBlock(self.name, np.reshape(self.columns, (len(self.columns), -1)), self.scatter)
 
 
 def trend(t_start: Array, t_end: Array) -> Candidate:
@@ -236,7 +236,7 @@ def _partners(columns: Array, model: Array, names: Sequence[str]) -> list[str]:
 
 
 def table(
-    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: Estimate, names: Sequence[str]
+    candidates: Sequence[Candidate], hidden: Sequence[Hidden], est: NoiseEstimate, names: Sequence[str]
 ) -> list[Table]:
     """Return the candidates with their estimates (if present), probabilities and what they change most."""
     rows: list[list[object]] = []
@@ -261,7 +261,7 @@ def table(
     return [Table(NUISANCES, "Nuisance model", caption, COLUMNS, rows)]
 
 
-def sentences(candidates: Sequence[Candidate], est: Estimate) -> list[str]:
+def sentences(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[str]:
     """Return what joined the model, as sentences."""
     out: list[str] = []
     for c, e in zip(candidates, est.evidence, strict=True):
@@ -276,7 +276,7 @@ def sentences(candidates: Sequence[Candidate], est: Estimate) -> list[str]:
     return out
 
 
-def implausible(candidates: Sequence[Candidate], est: Estimate) -> list[Reason]:
+def implausible(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[Reason]:
     """Return which effects that joined are larger than an error of the set-up can be."""
     out = []
     for c, e in reported(candidates, est):
@@ -294,6 +294,6 @@ def _percent(p: float) -> str:
     return "above 99.9 %" if p > 0.999 else f"{100.0 * p:.3g} %"
 
 
-def reported(candidates: Sequence[Candidate], est: Estimate) -> list[tuple[Candidate, Evidence]]:
+def reported(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[tuple[Candidate, Evidence]]:
     """Return those that joined."""
     return [(c, e) for c, e in zip(candidates, est.evidence, strict=True) if e.joined]

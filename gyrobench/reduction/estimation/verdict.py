@@ -82,7 +82,7 @@ def conclude(
         found = with_step(found, step_check)
     if record is not None:
         missed = missed_truth(found, set_values(record.run))
-        found = replace(found, reasons=[*missed, *found.reasons, *conditions.reasons(record)])
+        found = replace(found, reasons=[*missed, *conditions.reasons(record), *found.reasons])
     judged, reasons = _judged(found.coefficients, found.reasons, limits or {})
     verdict = worst_verdict(c.verdict for c in judged)
     rule = found.decision_rule or DECISION_RULE

@@ -175,8 +175,9 @@ class DeviationAccumulator:
     The memory does not depend on the record.
     """
 
-    def __init__(self, tau0: float, kinds: Iterable[str] = ("allan",)) -> None:
-        self.tau0, self.kinds = tau0, tuple(kinds)
+    def __init__(self, tau0: float, kinds: Iterable[str] = ("allan",), fine: bool = False) -> None:
+        """fine: four averaging times to an octave, whole numbers of samples, in place of one."""
+        self.tau0, self.kinds, self.fine = tau0, tuple(kinds), fine
         unknown = [k for k in self.kinds if k not in KINDS]
         if unknown or not tau0 > 0.0:
             raise ValueError(f"kinds are of {KINDS}, tau0 is positive: {unknown}, {tau0}")
@@ -185,6 +186,9 @@ class DeviationAccumulator:
     def _stage(self, k: int) -> _Stage:
         if k == len(self._stages):  # octaves: up to STARTS cells of one sample, then one more for each pairing of cells
             steps = [STARTS] if k else [1 << j for j in range(STARTS.bit_length())]
+            if self.fine:  # from 3/4 of an octave below STARTS on, or from one sample
+                least = STARTS.bit_length() * 4 - 7 if k else 0
+                steps = sorted({round(2.0 ** (j / 4.0)) for j in range(least, STARTS.bit_length() * 4 - 3)})
             self._stages.append(_Stage(1 << k, steps, self.kinds))
         return self._stages[k]
 
@@ -227,10 +231,10 @@ class DeviationAccumulator:
 
 
 def deviations(
-    rate: Array | Iterable[Array], tau0: float, kinds: Iterable[str] = ("allan",)
+    rate: Array | Iterable[Array], tau0: float, kinds: Iterable[str] = ("allan",), fine: bool = False
 ) -> dict[str, Deviation]:  # fmt: skip
     """Return the deviations of a rate (n,), or of stretches of it that have no known relation in time."""
-    total = DeviationAccumulator(tau0, kinds)
+    total = DeviationAccumulator(tau0, kinds, fine)
     for stretch in [rate] if isinstance(rate, np.ndarray) else rate:
         total.add(stretch)
         total.gap()

@@ -1,0 +1,100 @@
+"""Agreement of a noise model with the record: the deviation that it implies beside the record's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.ordinates import Model, spectrum
+from gyrobench.reduction.noise_model.terms import Grid
+from gyrobench.reduction.series.deviations import Deviation
+
+ENOUGH = 0.95  # of the averaging times
+PART = 0.1  # of the record: longest averaging time
+SHORTEST = 2  # samples: least averaging time
+NARROW, POINTS = 512, 1 << 15  # averaging time up to which the spectrum decides the degrees of freedom; frequencies
+
+
+@dataclass(frozen=True)
+class DeviationAgreement:
+    """Averaging times of m (k,) samples, from SHORTEST to PART of the record; tau0: of a sample, s.
+
+    deviation, low, high (k,): of the record with its interval of 95 %; implied (k,): of the model.
+    """
+
+    m: Array
+    deviation: Array
+    low: Array
+    high: Array
+    implied: Array
+    tau0: float = 1.0
+
+    @property
+    def tau(self) -> Array:
+        return self.m * self.tau0
+
+    def scaled(self, size: float, tau0: float) -> DeviationAgreement:
+        """Return the agreement in another unit of the rate, for samples of tau0 s."""
+        return DeviationAgreement(
+            self.m, self.deviation * size, self.low * size, self.high * size, self.implied * size, tau0
+        )  # fmt: skip
+
+    @property
+    def octave(self) -> NDArray[np.bool_]:
+        """Return which averaging times are 2, 4, 8 ... samples."""
+        out: NDArray[np.bool_] = np.log2(self.m) % 1.0 == 0.0
+        return out
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        inside: NDArray[np.bool_] = (self.low <= self.implied) & (self.implied <= self.high)
+        return inside
+
+    @property
+    def share(self) -> float:
+        """Return the part of the averaging times at which the implied deviation lies in the interval."""
+        return float(np.mean(self.inside)) if self.m.size else 1.0
+
+    @property
+    def octaves(self) -> float:
+        """Return that part of the averaging times 2, 4, 8 ... samples alone."""
+        return float(np.mean(self.inside[self.octave])) if self.octave.any() else 1.0
+
+    @property
+    def holds(self) -> bool:
+        return min(self.share, self.octaves) >= ENOUGH
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """Return the averaging time where the deviations differ most for their interval, and implied over own there."""
+        up, down = self.implied / self.high, self.low / np.maximum(self.implied, 1e-300)
+        k = int(np.argmax(np.maximum(up, down)))
+        return float(self.tau[k]), float(self.implied[k] / self.deviation[k])
+
+
+def compare(own: Deviation, implied: Array, samples: int) -> DeviationAgreement:
+    """Return the agreement of a deviation with the implied one (k,) at its tau, in samples."""
+    k = (own.tau >= SHORTEST - 1e-9) & (own.tau <= PART * samples * (1.0 + 1e-9))
+    return DeviationAgreement(own.tau[k], own.deviation[k], own.low[k], own.high[k], implied[k])
+
+
+def with_spectrum(own: Deviation, model: Model, p: Array) -> Deviation:
+    """Return a deviation with the intervals that a spectrum S allows, where it is narrower than a power law.
+
+    Of n differences with the transfer function H, degrees of freedom n <S H>^2/<(S H)^2>, sigma^2 = <S H>: a resonance
+    makes fewer of them than a power law has.
+    """
+    omega = np.pi * (np.arange(POINTS) + 0.5) / POINTS
+    S = spectrum(model, p, Grid(omega))
+    edf = own.edf.copy()
+    for i, m in enumerate(own.tau.tolist()):
+        if m <= NARROW:
+            y = S * 2.0 * np.sin(0.5 * m * omega) ** 4 / (m * np.sin(0.5 * omega)) ** 2
+            edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / float(np.mean(y * y)))
+    edf = np.maximum(edf, 1.0)
+    low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
+    return replace(own, low=low, high=high, edf=edf)

@@ -1,0 +1,261 @@
+"""Samples of a stretch that are missing or wild, completed by what its own noise says of them.
+
+The precision of the noise is diagonal in the cosine transform, P = C' diag(1/S) C.  A sample x_t differs from what all
+others say of it by (P x)_t/P_tt, of standard deviation P_tt^(-1/2): wild is what exceeds a limit, the largest of
+its neighbourhood first; where many are, the limit falls as long as few of what exceeds it are the noise's own.  Missing
+and wild samples x_m get their conditional mean -P_mm^-1 P_mo x_o (conjugate gradients), and the powers of the ordinates
+the expectation of what is left, by a draw P_mm^-1 (P u)_m of u from the same noise.  S is a smoothed spectrum of the
+completed stretch, so both are repeated.  [DRIFT-NOISE-MODEL; own derivation]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage, special
+
+from gyrobench.arrays import Array
+
+FALSE = 0.02  # samples of a record that are called wild by chance
+LOWEST, CHANCE = 3.7, 0.03  # limit in a record of many wild samples: part of them that may be the noise's own
+BULK = 0.97  # of the samples, by which the scatter is measured
+CORE = 3.0  # standard deviations of samples that no wild one is among
+LOCAL, PARTS = 512, 64  # samples, at least, and parts of a stretch, at most, of which the scatter is taken
+SWEEPS = 8  # of wild samples
+ROUNDS = 4  # of spectrum and completion
+ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
+BLOCK = 256  # samples of a median, of the level that wild samples do not move
+SMOOTH = 0.03  # of the frequency
+NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
+SEED = 90125
+
+
+@dataclass(frozen=True)
+class Completed:
+    """A stretch x (n,) without missing values, and extra (n,): powers of the ordinates that the completion lacks.
+
+    wild: indices.  missing: samples that were not there.  white (n,): the stretch with an even spectrum, of unit
+    variance, NaN where a sample is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
+    """
+
+    x: Array
+    extra: Array | None
+    wild: NDArray[np.int64]
+    missing: int
+    white: Array
+    noise: Array | None
+
+    @property
+    def drawn(self) -> Array:
+        """Return the stretch (n,) with what was missing or wild drawn from the noise around."""
+        return self.x if self.noise is None else self.x + self.noise
+
+
+def smooth_spectrum(power: Array) -> Array:
+    """Return a smoothed spectrum (n,) of powers (n,) of ordinates; that of the mean, k = 0, is very large."""
+    n = power.size
+    total = np.concatenate([[0.0], np.cumsum(power[1:])])
+    k = np.arange(1, n)
+    half = np.maximum(6, (SMOOTH * k).astype(int))
+    a, b = np.maximum(k - half, 1), np.minimum(k + half, n - 1)
+    # one-sided at the ends would be biased by the slope: as far on the one side as on the other
+    near = np.minimum(k - a, b - k)
+    near = np.maximum(near, np.minimum(2, np.minimum(k - 1, n - 1 - k)))
+    a, b = k - near, k + near
+    broad = (total[b] - total[a - 1]) / (b - a + 1.0)
+    fine = ndimage.uniform_filter1d(power[1:], NARROW, mode="reflect")
+    out = np.empty(n)
+    out[1:] = np.where((fine > ABOVE * broad) & (k > 30), fine, broad)
+    out[1:] = np.maximum(out[1:], 1e-12 * float(np.mean(power[1:])))
+    out[0] = 100.0 * n * float(np.max(out[1:]))
+    return out
+
+
+class _Precision:
+    """Products with the precision P of a spectrum S (n,)."""
+
+    def __init__(self, S: Array) -> None:
+        self.S = S
+
+    def __call__(self, x: Array) -> Array:
+        out: Array = fft.idct(fft.dct(x, norm="ortho") / self.S, norm="ortho")
+        return out
+
+    @property
+    def diagonal(self) -> float:
+        return float(np.mean(1.0 / self.S))
+
+    def solve(self, at: NDArray[np.int64], right: Array) -> Array:
+        """Return P_mm^-1 right (m,) by conjugate gradients."""
+        full = np.zeros(self.S.size)
+
+        def product(v: Array) -> Array:
+            full[at] = v
+            out: Array = self(full)[at]
+            return out
+
+        return _conjugate_gradients(product, right)
+
+
+def _conjugate_gradients(product: Callable[[Array], Array], right: Array) -> Array:
+    x, r = np.zeros_like(right), right.copy()
+    d, rr = r.copy(), float(r @ r)
+    stop = EXACT**2 * rr
+    for _ in range(ITERATIONS):
+        if rr <= stop:
+            break
+        q = product(d)
+        step = rr / float(d @ q)
+        x += step * d
+        r -= step * q
+        rr, old = float(r @ r), rr
+        d = r + rr / old * d
+    return x
+
+
+def level(x: Array) -> Array:
+    """Return the medians of blocks of a series (n,), NaN where nothing is there, interpolated to every sample."""
+    n = x.size
+    size = min(BLOCK, max(n // 4, 1))
+    parts = x[: n // size * size].reshape(-1, size)
+    there = np.isfinite(parts).sum(axis=1) > size // 4
+    if not there.any():
+        return np.full(n, float(np.nanmedian(x)))
+    middle = (np.arange(parts.shape[0]) + 0.5) * size
+    out: Array = np.interp(np.arange(n), middle[there], np.nanmedian(parts[there], axis=1))
+    return out
+
+
+def local_scale(z: Array, gone: NDArray[np.bool_]) -> Array:
+    """Return the scatter of a series (n,), by the size that BULK of all samples do not exceed, wild ones among the
+    others.
+
+    By parts of the series: where its noise changes slowly, no sample is wild for it.  1 for a normal series of unit
+    variance.  Heavy tails that more than 1 - BULK of the samples are in are the noise's own.
+    """
+    n = z.size
+    size = max(LOCAL, n // PARTS)
+    if n < 2 * size:
+        return np.full(n, _bulk(z[~gone], n))
+    edges = np.linspace(0, n, n // size + 1).astype(int)
+    found = np.array([_bulk(z[a:b][~gone[a:b]], b - a) for a, b in pairwise(edges.tolist())])
+    out: Array = np.interp(np.arange(n), 0.5 * (edges[1:] + edges[:-1]), found)
+    return out
+
+
+def _bulk(z: Array, n: int) -> float:
+    """Return the size that BULK of n samples do not exceed, over that of unit normal ones; z: those that are left."""
+    k = min(int(BULK * n), z.size - 1)
+    return float(np.partition(np.abs(z), k)[k]) / float(-special.ndtri(0.5 * (1.0 - BULK))) if z.size else 1.0
+
+
+def _scatter(z: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(z))) if z.size else 1.0
+
+
+def limit_of(size: Array) -> float:
+    """Return the standard deviations from which on a sample is wild, of their absolute values (m,)."""
+    m = size.size
+    highest = float(-special.ndtri(0.5 * FALSE / m))
+    tail = np.sort(size[size > LOWEST])
+    own = 2.0 * m * special.ndtr(-tail)
+    exceed = tail.size - np.arange(tail.size)
+    good = np.flatnonzero(own <= CHANCE * exceed)
+    return min(highest, float(tail[good[0]]) - 1e-9) if good.size else highest
+
+
+def core_excess(z: Array) -> float:
+    """Return by how much the mean square of z (m,) exceeds that of its normal core, over the latter.
+
+    Negative where the limit has cut the tails of the core; 0 where the core is not normal: its tails are its own.
+    """
+    if abs(_scatter(z) / _bulk(z, z.size) - 1.0) > 0.1:
+        return 0.0
+    inside = np.abs(z) < CORE
+    m2 = float(np.mean(z[inside] ** 2))
+
+    def squares(s: float) -> float:
+        c = CORE / s
+        return (
+            s
+            * s
+            * (
+                1.0
+                - 2.0 * c * math.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi) / float(special.erf(c / math.sqrt(2.0)))
+            )
+        )
+
+    s = math.sqrt(m2)
+    for _ in range(30):
+        s *= math.sqrt(m2 / squares(s))
+    return float(np.mean(z * z)) / (s * s) - 1.0
+
+
+def complete(x: Array, find_wild: bool = True) -> Completed:
+    """Return a stretch (n,), NaN where a sample is missing, completed; wild samples are found and count as missing."""
+    rng = np.random.default_rng(SEED)
+    missing = ~np.isfinite(x)
+    wild = np.zeros(x.size, dtype=bool)
+    base = level(x)
+    off = np.where(missing, 0.0, x - base)
+    scale = _scatter(off[~missing])
+    y = base + (np.clip(off, -4.0 * scale, 4.0 * scale) if scale else off)
+    lost = np.zeros(x.size)
+    noise: Array | None = None
+    z = np.zeros(x.size)
+    for k in range(ROUNDS):
+        if k == 1:  # what was wild beside a wilder one may be none under its own spectrum
+            wild[:] = False
+        P = _Precision(smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost))
+        y = _filled(x, missing | wild, P)
+        for _ in range(SWEEPS if find_wild else 1):
+            z = P(y) / math.sqrt(P.diagonal)
+            fresh = _wildest(z, missing | wild) if find_wild else np.zeros(1, dtype=bool)
+            if not fresh.any():
+                break
+            wild |= fresh
+            y = _filled(x, missing | wild, P)
+        at = np.flatnonzero(missing | wild)
+        if not at.size:
+            if k:
+                break
+            continue
+        noise = np.zeros(x.size)
+        noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
+        lost = fft.dct(noise, norm="ortho") ** 2
+    excess = 0.0
+    if wild.any():  # what is wild but below the limit is white noise of the samples as they are
+        excess = core_excess((z / local_scale(z, missing | wild))[~(missing | wild)]) / P.diagonal
+    white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
+    white[missing | wild] = np.nan
+    return Completed(
+        y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise
+    )
+
+
+def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:
+    """Return x with the conditional mean of what is gone."""
+    at = np.flatnonzero(gone)
+    if not at.size:
+        return x.copy()
+    base = level(np.where(gone, np.nan, x))  # the gradients start from it
+    y = np.where(gone, 0.0, x - base)
+    y[at] = P.solve(at, -P(y)[at] - (P(base))[at])
+    y += base
+    return y
+
+
+def _wildest(z: Array, gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which samples exceed the limit and all within three of them."""
+    size = np.abs(np.where(gone, 0.0, z))
+    scale = local_scale(z, gone)
+    if not np.all(scale > 0.0):  # most samples are the same
+        return np.zeros(z.size, dtype=bool)
+    size /= scale
+    out: NDArray[np.bool_] = (size > limit_of(size[~gone])) & (size >= ndimage.maximum_filter1d(size, 7))
+    return out

@@ -1,0 +1,346 @@
+"""Noise model of a rate record: terms, coefficients N, B, K, R, Q, Gauss-Markov processes, minimum of the deviation.
+
+    model = fit_noise(rate, tau0)            rate (n,) in any unit, NaN where a sample is missing; tau0 in s
+    model.N, .B, .K, .R, .Q                  coefficients with intervals of 95 % and whether the record determines them
+    model.processes                          Gauss-Markov processes as a Kalman filter takes them
+    model.minimum                            least Allan deviation and where
+    model.allan(tau), model.spectrum(f)      what the whole model implies
+    model.agreement                          that beside the record's own deviation
+    model.treatment                          wild and missing samples, steps, lines, change of the noise level
+
+The model is the one of greatest evidence whose deviation agrees with the record's own; intervals are of draws from the
+posterior of all models worth their weight.  [DRIFT-NOISE-MODEL]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model import posterior
+from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
+from gyrobench.reduction.noise_model.model import Minimum, NoiseModel, Process, Scale
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
+from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
+from gyrobench.reduction.noise_model.prior import PEAKS
+from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
+from gyrobench.reduction.noise_model.steps import largest_step
+from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.treatment import Treated, treat
+from gyrobench.reduction.series.deviations import Deviation, deviations
+from gyrobench.reduction.series.noise_coefficients import Estimate
+
+CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
+ABSENT = 0.025  # probability of its absence below which a term is determined
+BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
+SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
+STEPS = 5
+TRIED_MODELS, TRIED = 12, 60  # maxima and draws of each model that are held against the deviation
+RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
+DENSE = 4000  # frequencies of a spectrum that is interpolated
+AVERAGES = 40  # averaging times between which the minimum is sought
+SAMPLE = 250  # draws of the ramp and the minimum
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """Deviations of the record as it was and as it was cleaned, tau in samples, in units of ``size``."""
+
+    own: Deviation
+    clean: Deviation
+    removed: Array
+
+
+def fit_noise(
+    rate: Array,
+    tau0: float,
+    means: bool = True,
+    remove_lines: bool = True,
+    find_wild: bool = True,
+    raw: Array | None = None,
+) -> NoiseModel:
+    """Return the noise model of a rate (n,), NaN where a sample is missing.
+
+    means: a sample is the mean over tau0 (a difference of angles), not the rate at an instant.  raw: the record before
+    anything was taken out of it, whose deviation the model is held against; the rate itself unless given.
+    Raises SeriesError for a record that is too short or constant, ValueError for tau0 that is not positive.
+    """
+    if not tau0 > 0.0:
+        raise ValueError(f"tau0 = {tau0} s; it must be positive")
+    rate = np.asarray(rate, dtype=float)
+    scale = scale_of(rate, tau0, means)
+    raw = rate if raw is None else np.asarray(raw, dtype=float)
+    treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
+    treated, found = _without_steps(treated, means)
+    clouds = posterior.draw(found)
+    judge = _Judge(found, _deviations(raw / scale.size, treated), treated.samples)
+    at = judge.choose(clouds)
+    ramp = _ramp(found, clouds)
+    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
+    whole, clean = judge.both(allan(at.model, at.p, judge.own.tau, means) + slow)
+    of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
+    return NoiseModel(
+        scale=scale,
+        shape=joined([*split(at.model, at.p), *found.resonances]),
+        coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
+        processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
+        minimum=_minimum(at, clouds, ramp, treated.samples, scale),
+        treatment=treated,
+        agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
+        with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
+        models=len(found.seen),
+    )
+
+
+def scale_of(rate: Array, tau0: float, means: bool) -> Scale:
+    """Return the units in which a rate (n,) is fitted: its level, and the rms of its differences over sqrt 2."""
+    level = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
+    difference = np.diff(rate)
+    size = math.sqrt(0.5 * float(np.nanmean(difference**2))) if np.isfinite(difference).any() else 1.0
+    return Scale(tau0, size or 1.0, level, means)
+
+
+def times(e: Estimate, unit: float) -> Estimate:
+    """Return an estimate in another unit."""
+    return Estimate(e.value * unit, e.low * unit, e.high * unit, e.determined)
+
+
+# ------------------------------------------------------------------ steps
+def _without_steps(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
+    """Return the record without the steps of its level that the likelihood asks for, and the models of what is left."""
+    found = search(treated.ordinates(means))
+    for _ in range(STEPS):
+        better = _one_step(treated, found, means)
+        if better is None:
+            break
+        treated, found = better
+    return treated, found
+
+
+def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treated, ModelSearch] | None:
+    """Return the record without one step more, and its models, or None where the likelihood does not ask for it.
+
+    Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift;
+    the model is fitted again without each of them.
+    """
+    at = found.best
+    bound = 2.0 * math.log(treated.samples) + RATIO
+    fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
+    tried: list[tuple[float, Treated, Fitted]] = []
+    for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
+        parts = [*split(model, p), *found.resonances]
+        places = []
+        for i, s in enumerate(treated.stretches):
+            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means))
+            places.append((ratio, i, step))
+        ratio, i, step = max(places, key=lambda c: c[0])
+        if ratio < bound:
+            continue
+        s = treated.stretches[i]
+        new = replace(treated, stretches=(*treated.stretches[:i], replace(s, steps=(*s.steps, step)),
+                                          *treated.stretches[i + 1 :]))  # fmt: skip
+        data = new.ordinates(means)
+        data.fixed = found.data.fixed
+        fits = [maximize(data, found.prior, f.model, f.p) for f in found.ranked[:3]]
+        tried.append((min(f.value for f in fits), new, min(fits, key=lambda f: f.value)))
+    if not tried:
+        return None
+    value, new, _ = min(tried, key=lambda t: t[0])
+    least = min(f.value for f in found.ranked[:3])
+    if least - value < bound:
+        return None
+    return new, search_again(new.ordinates(means), found)
+
+
+def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> Array:
+    """Return the spectrum (n,) of terms at the ordinates of a stretch, interpolated; 1 for that of the mean."""
+    k = np.arange(1.0, n)
+    few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
+    S = spectrum(*joined(parts), Grid(math.pi * few / n, means))
+    return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])
+
+
+# ------------------------------------------------------------------ the model that is reported
+def _deviations(raw: Array, treated: Treated) -> _Scaled:
+    clean = treated.cleaned()
+    removed = raw - np.where(np.isfinite(clean), clean, 0.0)
+    for s in treated.stretches:  # of a wild sample what it exceeds its neighbours' word by
+        at = s.start + s.done.wild
+        removed[at] = raw[at] - s.clean[s.done.wild]
+    off = removed - np.nanmean(removed)
+    own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
+    quiet = float(np.nanmax(np.abs(off))) < 1e-9
+    out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), fine=True)["allan"].deviation ** 2
+    return _Scaled(own, deviations(clean, 1.0, ("allan",), fine=True)["allan"], np.resize(out, own.tau.size))
+
+
+class _Judge:
+    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
+
+    def __init__(self, found: ModelSearch, scaled: _Scaled, samples: int) -> None:
+        self.found, self.samples, self.means = found, samples, found.data.grid.means
+        terms, p = found.whole
+        self.own, self.clean = (with_spectrum(d, terms, p) for d in (scaled.own, scaled.clean))
+        self.removed = scaled.removed
+        peaks = found.resonances
+        self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
+
+    def both(self, variance: Array) -> tuple[DeviationAgreement, DeviationAgreement]:
+        """Return the agreements of an Allan variance (k,) of the broadband terms, with a ramp if there is one."""
+        whole = variance + self.peaks
+        return (compare(self.own, np.sqrt(whole + self.removed), self.samples),
+                compare(self.clean, np.sqrt(whole[: self.clean.tau.size]), self.samples))  # fmt: skip
+
+    def share(self, variance: Array) -> float:
+        """Return the least share of averaging times that agree; 1 where enough do."""
+        both = self.both(variance)
+        return 1.0 if all(a.holds for a in both) else min(min(a.share, a.octaves) for a in both)
+
+    def choose(self, clouds: Sequence[Cloud]) -> Fitted:
+        """Return the model to be reported: of greatest evidence, terms paid for, among those that agree with the
+        record.
+
+        Where no maximum agrees the draws are tried, the most probable ones first; where none does, the closest one.
+        """
+        tau = self.own.tau
+
+        def worth(f: Fitted) -> float:
+            return f.evidence - SIMPLER * len(f.model)
+
+        ranked = sorted(self.found.seen.values(), key=worth, reverse=True)
+        near = [f for f in ranked if worth(f) > worth(ranked[0]) - posterior.WINDOW][:TRIED_MODELS]
+        tried = list[tuple[float, Fitted]]()
+        for f in near:
+            tried.append((self.share(allan(f.model, f.p, tau, self.means)), f))
+            if tried[-1][0] == 1.0:
+                return f
+        for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
+            order = np.argsort(-cloud.log)[:TRIED]
+            for p, variance in zip(cloud.p[order], allan(cloud.model, cloud.p[order], tau, self.means), strict=True):
+                share = self.share(variance)
+                if share > max(t[0] for t in tried):
+                    tried.append((share, replace(self.found.seen[cloud.model], p=p)))
+                    if share == 1.0:
+                        return tried[-1][1]
+        best = max(tried, key=lambda t: t[0])
+        return best[1] if best[0] > tried[0][0] + 0.05 else tried[0][1]
+
+
+# ------------------------------------------------------------------ figures of the draws
+def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
+    """Return a coefficient in units of the record: value of the model reported, interval of all draws."""
+    figure = size_of(CALLED[name])
+    values, weights = weighted(clouds, figure)
+    if not values.size:
+        v0 = found.prior.others[CALLED[name]][0]
+        return Estimate(0.0, 0.0, math.exp(0.5 * (v0 + 2.0)), False)
+    low, high = (math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975))
+    least = found.prior.others[CALLED[name]][0] + BARELY
+    absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
+    own = figure(at.model, at.p[None])
+    if own is None or absent > ABSENT:
+        return Estimate(0.0, 0.0, high, False)
+    value = math.exp(0.5 * float(own[0]))
+    return Estimate(value, min(low, value), max(high, value), True)
+
+
+def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:
+    """Return the i-th Gauss-Markov process of a model; intervals are of those in the draws that are nearest to it."""
+    own = np.array([q for t, q in split(at.model, at.p) if t.name == "gauss_markov"])
+    sigma, tau, weight = [np.empty(0)], [np.empty(0)], [np.empty(0)]
+    for c in clouds:
+        each = [q for t, q in split(c.model, c.p) if t.name == "gauss_markov"]
+        if not each:
+            continue
+        q = np.stack(each, axis=1)  # (M, g, 2)
+        off = np.abs(q[:, :, 1:] - own[None, None, :, 1])  # (M, g, processes)
+        mine = np.argmin(off, axis=2) == i
+        distance = np.where(mine, off[:, :, i], np.inf)
+        k = np.argmin(distance, axis=1)
+        rows = np.flatnonzero(np.isfinite(distance[np.arange(k.size), k]))
+        sigma.append(q[rows, k[rows], 0])
+        tau.append(q[rows, k[rows], 1])
+        weight.append(c.weight[rows])
+    v, t, w = (np.concatenate(x) for x in (sigma, tau, weight))
+    present = float(w.sum())
+    ends = [[math.exp(f * quantile(x, w, q)) for q in (0.025, 0.975)] if w.size else [0.0, math.inf]
+            for x, f in ((v, 0.5), (t, 1.0))]  # fmt: skip
+    value = math.exp(0.5 * own[i, 0]), math.exp(own[i, 1])
+    estimates = [
+        Estimate(x, min(e[0], x), max(e[1], x), present > 1.0 - ABSENT) for x, e in zip(value, ends, strict=True)
+    ]
+    return Process(times(estimates[0], scale.size), times(estimates[1], scale.tau0), present)
+
+
+def _resampled(clouds: Sequence[Cloud], count: int) -> list[tuple[Model, Array]]:
+    """Return some draws (M, q) of each model, as many as its weight, by systematic resampling."""
+    out, passed = [], 0.0
+    for c in clouds:
+        edges = passed + np.cumsum(c.weight)
+        wanted = (np.arange(count) + 0.5) / count
+        inside = wanted[(wanted > passed) & (wanted <= edges[-1])]
+        passed = float(edges[-1])
+        if inside.size:
+            out.append((c.model, c.p[np.minimum(np.searchsorted(edges, inside), c.p.shape[0] - 1)]))
+    return out
+
+
+def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
+    """Return the ramp per sample: its normal distribution for given parameters, over the draws.
+
+    The interval holds that of the models with a random walk too: beside a free ramp, slow drift looks more like one
+    that comes back than it is.
+    """
+    z = np.sqrt(2.0) * np.array([-2.35, -1.33, -0.436, 0.436, 1.33, 2.35])  # nodes and weights of Gauss-Hermite
+    share = np.array([0.00453, 0.157067, 0.724629, 0.724629, 0.157067, 0.00453]) / math.sqrt(math.pi)
+    walks = [c for c in clouds if any(t.name == "walk" for t in c.model)]
+    total = sum(float(c.weight.sum()) for c in walks)
+    walks = [replace(c, weight=c.weight / total) for c in walks] if total > 0.0 else []
+    ends, value = [], 0.0
+    for some in (walks, clouds):
+        rows = [(model, *found.data.ramp_of(model, p)) for model, p in _resampled(some, SAMPLE)]
+        if rows:
+            mean, sd = (np.concatenate([row[i] for row in rows]) for i in (1, 2))
+            v, w = (mean[:, None] + sd[:, None] * z).ravel(), np.tile(share, mean.size)
+            ends += [quantile(v, w, 0.025), quantile(v, w, 0.975)]
+            value = float(np.median(mean))
+    return Estimate(value, min(ends), max(ends), min(ends) * max(ends) > 0.0)
+
+
+def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, scale: Scale) -> Minimum:
+    """Return the least deviation of the model without resonances, up to a quarter of the record."""
+    m = np.unique(np.rint(np.geomspace(1.0, max(samples / 4.0, 2.0), AVERAGES)))
+    slow = 0.5 * (ramp.value * m) ** 2 if ramp.determined else 0.0
+    rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in _resampled(clouds, SAMPLE)]
+    curves = np.concatenate(rows)
+    place = np.argmin(curves, axis=1)
+    own = np.sqrt(allan(at.model, at.p[None], m, scale.means)[0] + slow)
+    k = int(np.argmin(own))
+    low, high = np.quantile(np.min(curves, axis=1), [0.025, 0.975])
+    early, late = np.quantile(m[place], [0.025, 0.975])
+    reached = k < m.size - 1 and bool(np.mean(place == m.size - 1) < 0.025)
+    least = Estimate(float(own[k]), min(float(low), float(own[k])), max(float(high), float(own[k])), reached)
+    when = Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached)
+    return Minimum(times(least, scale.size), times(when, scale.tau0), reached)
+
+
+def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) -> dict[str, float]:
+    """Return the coefficients of the same model with the wild samples left in; {} without any."""
+    if not treated.wild.size:
+        return {}
+    data: Ordinates = treated.ordinates(means, keep_wild=True)
+    data.fixed = found.data.fixed
+    again = maximize(data, found.prior, at.model, at.p)
+    out = {}
+    for name, term in CALLED.items():
+        v = size_of(term)(again.model, again.p[None])
+        if v is not None:
+            out[name] = math.exp(0.5 * float(v[0]))
+    return out
+
+
+__all__ = ["PEAKS", "fit_noise"]

@@ -1,0 +1,168 @@
+"""What a noise model says: coefficients, Gauss-Markov processes, minimum of the deviation, deviation and spectrum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.agreement import DeviationAgreement
+from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
+from gyrobench.reduction.noise_model.prior import PEAKS
+from gyrobench.reduction.noise_model.steps import LevelStep
+from gyrobench.reduction.noise_model.terms import Grid
+from gyrobench.reduction.noise_model.treatment import Treated
+from gyrobench.reduction.series.lines import SpectralLine
+from gyrobench.reduction.series.noise_coefficients import Estimate
+
+
+@dataclass(frozen=True)
+class Process:
+    """Gauss-Markov process x' = -x/tau + w as a Kalman filter takes it: rms sigma in the unit of the rate, tau in s.
+
+    present: probability that the record has such a process, by the evidence of the models with one near this tau.
+    """
+
+    sigma: Estimate
+    tau: Estimate
+    present: float
+
+    @property
+    def density(self) -> float:
+        """Return the density of w, two-sided: sigma sqrt(2/tau), unit/sqrt(s)."""
+        return self.sigma.value * math.sqrt(2.0 / self.tau.value)
+
+    def discrete(self, step: float) -> tuple[float, float]:
+        """Return phi and the standard deviation of w_k in x_k+1 = phi x_k + w_k every ``step`` s."""
+        phi = math.exp(-step / self.tau.value)
+        return phi, self.sigma.value * math.sqrt(-math.expm1(-2.0 * step / self.tau.value))
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end."""
+
+    deviation: Estimate
+    tau: Estimate
+    reached: bool
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Units of a fit: tau0 of a sample, s, size and level of the rate; means: a sample is one over tau0."""
+
+    tau0: float
+    size: float
+    level: float
+    means: bool
+
+    @property
+    def units(self) -> dict[str, float]:
+        """Return the units of N, B, K, R, Q."""
+        root = math.sqrt(self.tau0)
+        return {"N": self.size * root, "B": self.size, "K": self.size / root, "R": self.size / self.tau0,
+                "Q": self.size * self.tau0}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseModel:
+    """Noise model of a rate record; see :func:`gyrobench.reduction.noise_model.fit.fit_noise`.
+
+    coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
+    parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
+    taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
+    """
+
+    scale: Scale
+    shape: tuple[Model, Array]
+    coefficients: dict[str, Estimate]
+    processes: tuple[Process, ...]
+    minimum: Minimum
+    treatment: Treated
+    agreements: tuple[DeviationAgreement, DeviationAgreement]
+    with_wild: dict[str, float]
+    models: int
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return a coefficient."""
+        return self.coefficients[name]
+
+    @property
+    def agreement(self) -> DeviationAgreement:
+        return self.agreements[0]
+
+    @property
+    def agrees(self) -> bool:
+        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned."""
+        return all(a.holds for a in self.agreements)
+
+    @property
+    def cleaned(self) -> Array:
+        """Return the record (n,) without lines, steps and wild samples, NaN where nothing is or was taken out."""
+        return self.scale.size * self.treatment.cleaned() + self.scale.level
+
+    @property
+    def longest(self) -> tuple[int, Array]:
+        """Return the first index and the samples of the longest stretch, cleaned and without a gap: what was missing or
+        wild is drawn from the noise around.
+        """
+        s = max(self.treatment.stretches, key=lambda s: s.own.size)
+        return s.start, self.scale.size * (s.clean + s.done.drawn - s.done.x) + self.scale.level
+
+    @property
+    def lines(self) -> list[SpectralLine]:
+        """Return the lines that were taken out, frequencies in Hz, amplitudes in the unit of the rate."""
+        return [
+            replace(x, frequency=x.frequency / self.scale.tau0, u_frequency=x.u_frequency / self.scale.tau0,
+                    amplitude=x.amplitude * self.scale.size, u_amplitude=x.u_amplitude * self.scale.size)
+            for x in self.treatment.lines
+        ]  # fmt: skip
+
+    @property
+    def steps(self) -> list[LevelStep]:
+        """Return the steps of the level that were taken out, in the unit of the rate."""
+        return [replace(s, size=s.size * self.scale.size, u=s.u * self.scale.size) for s in self.treatment.steps]
+
+    def allan(self, tau: Array) -> Array:
+        """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""
+        m = np.maximum(np.rint(tau / self.scale.tau0), 1.0)
+        ramp = self["R"].value * tau if self["R"].determined else np.zeros_like(tau)
+        out: Array = np.sqrt(self.scale.size**2 * allan(*self.shape, m, self.scale.means) + 0.5 * ramp**2)
+        return out
+
+    def spectrum(self, f: Array) -> Array:
+        """Return the two-sided spectrum (k,) of the samples, 0 < f <= 1/(2 tau0) in Hz, aliasing included."""
+        omega = 2.0 * math.pi * f * self.scale.tau0
+        out: Array = self.scale.size**2 * self.scale.tau0 * spectrum(*self.shape, Grid(omega, self.scale.means))
+        return out
+
+    def filter_words(self) -> str:
+        """Return what the sensor's filter is, in words; "" where the record shows none."""
+        found = next(((t, q) for t, q in split(*self.shape) if t.name == "white" and t.filter != "none"), None)
+        if found is None:
+            return ""
+        t, q = found
+        if t.filter == "first":
+            return f"low-pass of first order, time constant {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
+        if t.filter == "second":
+            f = math.exp(q[1]) / (2.0 * math.pi * self.scale.tau0)
+            return f"low-pass of second order, {f:.3g} Hz, damping {math.exp(q[2]):.2g}"
+        if t.filter == "average":
+            return f"mean over {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
+        if t.filter.startswith("mean"):
+            return f"mean over {t.filter[4:]} samples"
+        level = float(np.exp(-2.0 * np.sum(q[1::2])))
+        return f"smooth shape of {t.filter[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+
+    def peaks(self) -> list[tuple[float, float, float]]:
+        """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
+        out = []
+        for t, q in split(*self.shape):
+            if t.name in PEAKS:
+                width = 1.0 / math.pi if t.name == "resonance" else math.sqrt(2.0 * math.log(2.0)) / math.pi
+                frequency = math.exp(q[2]) / (2.0 * math.pi * self.scale.tau0)
+                wide = width / (math.exp(q[1]) * self.scale.tau0)
+                out.append((frequency, wide, self.scale.size * math.exp(0.5 * q[0])))
+        return out

@@ -1,0 +1,123 @@
+"""Draws from the posterior of the noise models of a record: what intervals and derived figures are taken from.
+
+Of every model worth its weight a t distribution about its maximum, weighted by the posterior over it (importance
+sampling); models are weighted by their evidence.  A figure that depends on several parameters or on the choice of the
+model - the minimum of the deviation, a coefficient beside other terms - is computed from the same draws.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
+from gyrobench.reduction.noise_model.prior import Prior
+from gyrobench.reduction.noise_model.search import B, Fitted, K, ModelSearch, Q, volume
+
+WINDOW = 6.0  # of the logarithm of the evidence: models below the best by more are left out
+MOST = 10  # models
+DRAWS = 1200  # in all
+FREEDOM = 6.0  # degrees of freedom of the t distribution
+SEED = 7041
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Draws p (M, q) of one model with their weights (M,), which add up to that of the model, and log posterior."""
+
+    model: Model
+    p: Array
+    weight: Array
+    log: Array
+
+
+def sample(found: Fitted, data: Ordinates, prior: Prior, count: int, rng: np.random.Generator) -> tuple[Cloud, float]:
+    """Return draws of a model, with weights that add up to 1, and what the evidence is above Laplace's, logarithm."""
+    q = found.p.size
+    values, vectors = np.linalg.eigh(found.information)
+    spread = np.minimum(1.0 / np.sqrt(np.maximum(values, 1e-9)), 3.0)
+    z = rng.standard_normal((count, q))
+    scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, count))
+    p = found.p + (z * scale[:, None] * spread) @ vectors.T
+    log_q = -0.5 * (FREEDOM + q) * np.log1p(np.sum((z * scale[:, None]) ** 2, axis=1) / FREEDOM)
+    log_q += math.lgamma(0.5 * (FREEDOM + q)) - math.lgamma(0.5 * FREEDOM) - 0.5 * q * math.log(FREEDOM * math.pi)
+    log_q -= float(np.sum(np.log(spread)))
+    part = max(1, 400_000 // data.grid.omega.size)
+    value = np.concatenate([data.value(found.model, p[i : i + part]) for i in range(0, count, part)])
+    log_p = -0.5 * value + prior.log(found.model, p)
+    log_w = np.where(np.isfinite(log_p), log_p - log_q, -np.inf)
+    top = float(np.max(log_w))
+    w = np.exp(log_w - top)
+    # a single draw far out must not carry the rest
+    w = np.minimum(w, np.sqrt(count) * w.mean())
+    evidence = top + math.log(float(w.mean()))
+    full = -0.5 * found.value + float(prior.log(found.model, found.p[None])[0])
+    laplace = (
+        full
+        + 0.5 * q * math.log(2.0 * math.pi)
+        - 0.5 * float(np.linalg.slogdet(found.information + 1e-3 * np.eye(q))[1])
+    )
+    return Cloud(found.model, p, w / w.sum(), log_p), evidence - laplace
+
+
+def candidates(search: ModelSearch) -> list[Fitted]:
+    """Return the models worth drawing from, the best first, and the best ones that have each of Q, B and K."""
+    ranked = sorted(search.seen.values(), key=lambda f: -f.evidence)
+    out = [f for f in ranked if f.evidence > ranked[0].evidence - WINDOW][:MOST]
+    for term in (Q, B, K):
+        having = [f for f in ranked if term in f.model]
+        if having and having[0] not in out:
+            out.append(having[0])
+    return out
+
+
+def draw(search: ModelSearch) -> list[Cloud]:
+    """Return the draws of the models of a search; the weights add up to 1."""
+    rng = np.random.default_rng(SEED)
+    models = candidates(search)
+    best = models[0].evidence
+    rows = []
+    for found in models:
+        share = math.exp(max(found.evidence - best, -4.0))
+        count = max(150, round(DRAWS * share / 2.0))
+        cloud, more = sample(found, search.data, search.prior, count, rng)
+        rows.append((cloud, found.evidence + min(max(more, -2.0), 2.0)))
+    top = max(e for _, e in rows)
+    total = sum(math.exp(e - top) for _, e in rows)
+    return [replace(cloud, weight=cloud.weight * math.exp(e - top) / total) for cloud, e in rows]
+
+
+def weighted(clouds: Sequence[Cloud], figure: Callable[[Model, Array], Array | None]) -> tuple[Array, Array]:
+    """Return values and weights of a figure of the parameters, of the models that have it (figure not None)."""
+    values, weights = [np.empty(0)], [np.empty(0)]
+    for c in clouds:
+        v = figure(c.model, c.p)
+        if v is not None:
+            values.append(v)
+            weights.append(c.weight)
+    return np.concatenate(values), np.concatenate(weights)
+
+
+def quantile(values: Array, weights: Array, share: float) -> float:
+    """Return the weighted quantile of values (M,)."""
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    at = (reached - 0.5 * weights[order]) / reached[-1]
+    return float(np.interp(share, at, values[order]))
+
+
+def size_of(term: str) -> Callable[[Model, Array], Array | None]:
+    """Return the figure log variance of the first term of a name, of N the sum of white and readout noise."""
+
+    def figure(model: Model, p: Array) -> Array | None:
+        parts = [q[..., 0] for t, q in split(model, p) if t.name == term or (term == "white" and t.name == "readout")]
+        return np.logaddexp.reduce(parts, axis=0) if parts else None
+
+    return figure
+
+
+__all__ = ["Cloud", "draw", "quantile", "size_of", "volume", "weighted"]

@@ -1,0 +1,303 @@
+"""Search of the noise model: maximum of the posterior of a model, its evidence, and the models worth averaging."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy import special
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
+from gyrobench.reduction.noise_model.prior import PEAKS, SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.terms import NoiseTerm
+
+STEPS = 40  # of the search for a maximum
+PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
+MOST_MARKOV, MOST_RESONANCES = 3, 12
+N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
+SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
+#: starts of the parameters of a filter
+STARTS: dict[str, list[list[float]]] = {
+    "none": [[]],
+    "first": [[math.log(0.5)], [math.log(5.0)]],
+    "second": [[0.0, -0.3], [-2.0, -0.3]],
+    "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
+}
+WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
+CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Maximum of the posterior of a model: parameters p (q,), information (q, q), -2 log likelihood, log evidence."""
+
+    model: Model
+    p: Array
+    information: Array
+    value: float
+    evidence: float
+
+
+def maximize(data: Ordinates, prior: Prior, model: Model, start: Array) -> Fitted:
+    """Return the maximum of the posterior near ``start`` (q,), by scoring steps."""
+    low, high = prior.bounds(model)
+    p, h, q = np.clip(start, low, high), 1e-3, start.size
+    signs = np.concatenate([np.zeros((1, q)), h * np.eye(q), -h * np.eye(q)])
+
+    def at(p: Array) -> tuple[float, Array, Array]:
+        """Return -2 log posterior, its gradient and curvature."""
+        value, gradient, info = data.scoring(model, p)
+        v = -2.0 * prior.log(model, p + signs)
+        up, down = v[1 : 1 + q], v[1 + q :]
+        curve = np.maximum((up + down - 2.0 * v[0]) / h**2, 0.0)
+        return value + float(v[0]), gradient + (up - down) / (2.0 * h), info + np.diag(curve)
+
+    f, g, H = at(p)
+    damp = 1e-4
+    for _ in range(STEPS):
+        size = np.sqrt(np.diag(H) + 1e-6)
+        step = -np.linalg.solve(H / np.outer(size, size) + damp * np.eye(q), g / size) / size
+        step *= min(1.0, 2.0 / max(float(np.max(np.abs(step))), 1e-12))
+        trial = np.clip(p + step, low, high)
+        gain = -float(g @ (trial - p))
+        if gain < 1e-2:
+            break
+        f2, g2, H2 = at(trial)
+        if np.isfinite(f2) and f2 < f:
+            done = f - f2 < 3e-3
+            p, f, g, H = trial, f2, g2, H2
+            damp = max(0.1 * damp, 1e-7)
+            if done:
+                break
+        else:
+            damp = max(10.0 * damp, 1e-2)
+            if damp > 1e6:
+                break
+    information = 0.5 * H
+    evidence = -0.5 * f + volume(model, information)
+    return Fitted(model, p, information, f + 2.0 * float(prior.log(model, p[None])[0]), evidence)
+
+
+def volume(model: Model, information: Array) -> float:
+    """Return the logarithm of the volume of the posterior over the parameters of the terms; each of a filter or
+    a resonance costs PRICE.
+
+    Their prior is known to nobody: how sharply the record shows their parameters is no argument against them.
+    """
+    filters = np.concatenate([(np.arange(t.size) * (t.name == "white") > 0) | (t.name in PEAKS) for t in model])
+    H = information + 1e-3 * np.eye(filters.size)
+    logdet = float(np.linalg.slogdet(H)[1])
+    count = int(filters.sum())
+    if count:
+        logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
+    return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * count
+
+
+def canonical(model: Model, p: Array) -> tuple[Model, Array]:
+    """Return terms in a fixed order, Gauss-Markov processes by their tau."""
+    order = ("white", "readout", "quantization", "gauss_markov", "flicker", "walk", *PEAKS)
+    parts = sorted(split(model, p), key=lambda t: (order.index(t[0].name), t[1][1] if t[1].size > 1 else 0.0))
+    return tuple(t for t, _ in parts), np.concatenate([q for _, q in parts])
+
+
+@dataclass
+class ModelSearch:
+    """Models that were tried, by their terms; resonances are frozen in the spectrum of the data."""
+
+    data: Ordinates
+    prior: Prior
+    seen: dict[Model, Fitted] = field(default_factory=dict)
+    resonances: list[tuple[NoiseTerm, Array]] = field(default_factory=list)
+
+    def fit(self, model: Model, start: Array) -> Fitted:
+        """Fit a model from a start and keep the best of its fits."""
+        model, start = canonical(model, start)
+        found = maximize(self.data, self.prior, model, start)
+        if self.at_bound(found):
+            found = replace(found, evidence=found.evidence - 100.0)
+        if model not in self.seen or found.evidence > self.seen[model].evidence:
+            self.seen[model] = found
+        return self.seen[model]
+
+    def at_bound(self, found: Fitted) -> bool:
+        """Return whether a process is as fast as one may be: then it is the filter that lacks something."""
+        least = math.log(SHORTEST_TAU) + 1e-3
+        return any(t == GM and q[1] < least for t, q in split(found.model, found.p))
+
+    @property
+    def best(self) -> Fitted:
+        return max(self.seen.values(), key=lambda f: f.evidence)
+
+    @property
+    def ranked(self) -> list[Fitted]:
+        return sorted(self.seen.values(), key=lambda f: -f.evidence)
+
+    # ------------------------------------------------------------------ moves
+    def excess(self, at: Fitted) -> tuple[Array, Array]:
+        """Return the spectrum of a fit at all ordinates and their powers over it less their number."""
+        S, low = self.data.covariance(at.model, at.p[None])
+        S = np.concatenate([S[0], np.diagonal(low[0], axis1=-2, axis2=-1).ravel()])
+        return S, self.data.all_power / S - self.data.all_count
+
+    def starts(self, at: Fitted, term: NoiseTerm) -> list[Array]:
+        """Return starts of a term that is added to a model: its size by one step, at the best places of a scan."""
+        data = self.data
+        S, excess = self.excess(at)
+        scan = np.linspace(math.log(SHORTEST_TAU) + 0.1, self.prior.longest, 20)
+        found = list[tuple[float, Array]]()
+        for rest in [np.array([t]) for t in scan] if term == GM else [np.empty(0)]:
+            unit = term.unit(rest, data.grid) / S
+            info, score = float(data.all_count @ unit**2), float(unit @ excess)
+            v = max(score / info, 0.7 * info**-0.5)
+            found.append((max(score, 0.0) ** 2 / info, np.array([math.log(v), *rest])))
+        stat = np.pad([f[0] for f in found], 1, constant_values=-1.0)
+        peaks = np.flatnonzero((stat[1:-1] >= stat[:-2]) & (stat[1:-1] >= stat[2:]))
+        return [found[i][1] for i in peaks[np.argsort(-stat[1:-1][peaks])][:2]]
+
+    def neighbours(self, at: Fitted) -> Iterator[tuple[Model, list[Array]]]:
+        """Yield models with one term more or less, or another one in place of it."""
+        parts = split(at.model, at.p)
+        names = [t.name for t in at.model]
+        filtered = any(t.filter != "none" for t in at.model)
+        for term in (Q, B, K, GM, *([W] if filtered else [])):
+            if names.count(term.name) < (MOST_MARKOV if term == GM else 1):
+                yield (*at.model, term), [np.concatenate([at.p, s]) for s in self.starts(at, term)]
+        for i, (term, q) in enumerate(parts):
+            rest = parts[:i] + parts[i + 1 :]
+            if not rest or (term.name == "white" and filtered):
+                continue
+            model, less = joined(rest)
+            yield model, [less]
+            if term == GM:  # its slow end as a random walk, or flicker
+                for other, size in ((K, q[0] + math.log(2.0) - q[1]), (B, q[0])):
+                    if other.name not in names:
+                        yield (*model, other), [np.append(less, size)]
+            elif term in (B, K) and names.count(GM.name) < MOST_MARKOV:
+                tau = self.prior.longest - 2.0
+                yield (*model, GM), [np.append(less, [q[0] + (tau - math.log(2.0)) * (term is K), tau])]
+
+    def filters(self, at: Fitted, names: tuple[str, ...]) -> Iterator[tuple[Model, list[Array]]]:
+        """Yield models with another filter of the white noise."""
+        parts = split(at.model, at.p)
+        if parts[0][0].name != "white":
+            return
+        (term, q), rest = parts[0], parts[1:]
+        if (
+            term.filter == "average"
+            and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02
+            and whole > 1
+        ):
+            names = (*names, f"mean{whole}")
+        for name in names:
+            if name == term.filter or (name == "none" and W in at.model):
+                continue
+            new = NoiseTerm("white", name)
+            for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
+                made = joined([(new, np.append(q[0], guess)), *rest])
+                yield made[0], [made[1]]
+
+    def climb(self, at: Fitted, names: tuple[str, ...]) -> Fitted:
+        """Go to the best neighbour, until there is none."""
+        visited = set()
+        tried = set()
+        while at.model not in visited:
+            visited.add(at.model)
+            for moves in (self.neighbours(at), self.filters(at, names)):
+                for model, starts in moves:
+                    for start in starts:
+                        key = canonical(model, start)
+                        mark = (key[0], tuple(np.round(key[1], 0)))
+                        if mark not in tried and (key[0] not in self.seen or len(starts) > 1):
+                            tried.add(mark)
+                            self.fit(model, start)
+            at = self.best
+        return at
+
+    # ------------------------------------------------------------------ resonances
+    def peak(self, at: Fitted) -> Array | None:
+        """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear."""
+        data = self.data
+        order = np.argsort(data.grid.omega[: data.b])
+        S, _ = self.excess(at)
+        omega, count = data.grid.omega[order], data.count[order]
+        ratio = data.power[order] / S[order]
+        total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
+        best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
+        for width in WIDTHS:
+            m, x = number[width:] - number[:-width], total[width:] - total[:-width]
+            z = np.where(x > m, (np.cbrt(x / m) - 1.0 + 2.0 / (9.0 * m)) / np.sqrt(2.0 / (9.0 * m)), 0.0)
+            p = special.log_ndtr(-z)
+            i = int(np.argmin(p))
+            if p[i] < best and omega[i + width - 1] < 1.6 * omega[i]:
+                part = slice(i, i + width)
+                centre = float(np.average(omega[part], weights=np.maximum(ratio[part], 1e-9)))
+                spread = max(0.3 * float(omega[i + width - 1] - omega[i]), 2.0 * math.pi / data.n.max())
+                power = float(np.sum((ratio[part] - count[part]) * S[order][part]) / data.samples)
+                best, found = float(p[i]), np.array([math.log(power), -math.log(spread), math.log(centre)])
+        return found
+
+    def add_resonances(self) -> None:
+        """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
+        while len(self.resonances) < MOST_RESONANCES:
+            at = self.best
+            start = self.peak(at)
+            if start is None:
+                break
+            tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
+            found = max(tried, key=lambda f: f.evidence)
+            if found.evidence < at.evidence + 2.0:
+                break
+            self._freeze(found)
+        for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
+            term, p = self.resonances.pop(0)
+            self.data.fixed = np.maximum(self.data.fixed - term.spectrum(p, self.data.grid), 0.0)
+            at = self.best
+            without = maximize(self.data, self.prior, at.model, at.p)
+            found = self._with(at, term, p)
+            if found.evidence > without.evidence:
+                self._freeze(found)
+            else:
+                self.seen = {without.model: without}
+
+    def _with(self, at: Fitted, term: NoiseTerm, start: Array) -> Fitted:
+        return maximize(self.data, self.prior, (*at.model, term), np.concatenate([at.p, start]))
+
+    def _freeze(self, found: Fitted) -> None:
+        """Keep the last term of a fit as it is, forget what was tried without it."""
+        term, p = found.model[-1], found.p[-3:]
+        self.resonances.append((term, p))
+        self.data.fixed = self.data.fixed + term.spectrum(p, self.data.grid)
+        self.seen = {}
+        self.fit(found.model[:-1], found.p[:-3])
+
+    @property
+    def whole(self) -> tuple[Model, Array]:
+        """Return the best model with its resonances."""
+        b = self.best
+        return joined([*split(b.model, b.p), *self.resonances])
+
+
+def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
+    """Return the models tried for a record that differs little from another one, from the best models of that."""
+    data.fixed = before.data.fixed
+    found = ModelSearch(data, Prior(data), resonances=before.resonances)
+    for f in before.ranked[:3]:
+        found.fit(f.model, f.p)
+    found.climb(found.best, SIMPLE + SHAPES)
+    return found
+
+
+def search(data: Ordinates) -> ModelSearch:
+    """Return the models tried for a record."""
+    found = ModelSearch(data, Prior(data))
+    found.fit((N,), np.array([math.log(float(np.median(found.prior.level)))]))
+    found.climb(found.best, SIMPLE)
+    found.add_resonances()
+    found.climb(found.best, SIMPLE + SHAPES)
+    if found.resonances:
+        found.add_resonances()
+        found.climb(found.best, SIMPLE + SHAPES)
+    return found

@@ -1,0 +1,313 @@
+"""Terms of the noise of a sampled rate: power spectrum and Allan variance of each, exact with aliasing.
+
+Unit time is the sampling interval T, omega = 2 pi f T; a spectrum S is two-sided, its mean over |omega| < pi is the
+variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2 z cos omega + z^2), complex z too.
+
+    term             S(omega)                                        parameters (logarithms)
+    white            N^2 |H|^2, H of the sensor's filter, H(0) = 1    N^2, those of the filter
+    readout          white noise that the filter does not see        its level
+    quantization     Q^2 4 sin^2(omega/2)                             Q^2
+    gauss_markov     sigma^2 P(e^(-1/tau))                            sigma^2, tau
+    flicker          B^2/omega, means over T                          B^2
+    walk             K^2/(4 sin^2(omega/2))                           K^2
+    resonance        sigma^2 Re P(e^(-1/tau + i omega0))              sigma^2, tau, omega0
+    band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
+
+Filters: "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
+"mean4" over 4 of them; "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
+(``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
+[DRIFT-NOISE-MODEL; own derivation]
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from gyrobench.arrays import Array
+
+FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
+LAGS = 4096  # of the covariance of a filter "shape"
+
+
+class Grid:
+    """Frequencies (b,) at which spectra are wanted, with what all terms need of them.
+
+    half_width of bins (b,), samples (b,) of the stretch they are of: infinite for the spectrum itself.
+    """
+
+    def __init__(
+        self, omega: Array, means: bool = False, half_width: Array | None = None, samples: Array | float = math.inf
+    ) -> None:
+        self.omega, self.means, self.samples = omega, means, samples
+        self.half_width = np.zeros_like(omega) if half_width is None else half_width
+
+    @functools.cached_property
+    def cos(self) -> Array:
+        return np.cos(self.omega)
+
+    @functools.cached_property
+    def sine(self) -> Array:
+        """4 sin^2(omega/2)."""
+        return 4.0 * np.sin(0.5 * self.omega) ** 2
+
+    @functools.cached_property
+    def flicker(self) -> Array:
+        return folded_flicker(self.omega / (2.0 * math.pi))
+
+    @functools.cached_property
+    def walk(self) -> Array:
+        return 1.0 / self.sine - (1.0 / 6.0 if self.means else 0.0)
+
+
+def folded_flicker(nu: Array) -> Array:
+    """Spectrum of means of flicker of S = 1/(2 pi f) over unit time, sampled at unit time, at 0 < nu <= 1/2."""
+    out: Array = np.sin(np.pi * nu) ** 2 / (2.0 * np.pi**3) * (special.zeta(3.0, nu) + special.zeta(3.0, 1.0 - nu))
+    return out
+
+
+def poisson(z: Any, cos: Array) -> Any:
+    """P(z) = sum of z^|h| cos(h omega) over all h; z (..., 1), real or complex, cos (b,)."""
+    return (1.0 - z * z) / (1.0 - 2.0 * z * cos + z * z)
+
+
+def markov_parts(tau: Array, means: bool) -> tuple[Array, Array, Array]:
+    """Return z, amplitude and nugget: covariance of a Gauss-Markov process of unit variance amplitude z^|h| - nugget at
+    h = 0, of instants or of means over unit time.
+    """
+    r = 1.0 / tau
+    z = np.exp(-r)
+    if not means:
+        return z, np.ones_like(z), np.zeros_like(z)
+    small = r < 1e-3
+    safe = np.where(small, 1.0, np.minimum(r, 500.0))
+    amplitude = np.where(small, 1.0 + r * r / 12.0, (2.0 * np.cosh(safe) - 2.0) / safe**2)
+    nugget = np.where(small, r / 3.0, (2.0 * np.sinh(safe) - 2.0 * safe) / safe**2)
+    return z, amplitude, nugget
+
+
+# ------------------------------------------------------------------ filters: |H|^2, |H(0)| = 1, covariance of unit N^2
+def _second_poles(p: Array) -> tuple[Any, Any, Any]:
+    """Return z1, z2 and the share a: covariance Re(a z1^h + (1 - a) z2^h) of a second-order low-pass, p: log omega_n,
+    log zeta.
+    """
+    w, zeta = np.exp(p[..., 0:1]), np.exp(p[..., 1:2])
+    root = np.sqrt((zeta * zeta - 1.0 + 1e-9).astype(complex))
+    s1, s2 = -w * (zeta - root), -w * (zeta + root)
+    share = s2 / (s2 - s1)  # of the covariance, from that of white noise through 1/((s - s1)(s - s2))
+    return np.exp(s1), np.exp(s2), share
+
+
+def _first(p: Array, grid: Grid) -> Array:
+    z = np.exp(-np.exp(-p[..., 0:1]))
+    out: Array = ((1.0 - z) ** 2) / (1.0 - 2.0 * z * grid.cos + z * z)
+    return out
+
+
+def _second(p: Array, grid: Grid) -> Array:
+    z1, z2, share = _second_poles(p)
+    at_zero = share * poisson(z1, np.ones(1)) + (1.0 - share) * poisson(z2, np.ones(1))
+    out: Array = np.real(share * poisson(z1, grid.cos) + (1.0 - share) * poisson(z2, grid.cos)) / np.real(at_zero)
+    return out
+
+
+def _average_parts(p: Array) -> tuple[Array, Array, Array]:
+    """Return m = floor(w) and the shares of the triangles over m and m + 1 in max(0, 1 - |h|/w), h whole, p: log w."""
+    w = np.exp(p[..., 0:1])
+    m = np.maximum(np.floor(w), 1.0)
+    upper = (m + 1.0) * (1.0 - m / w)
+    return m, 1.0 - upper, upper
+
+
+def _average(p: Array, grid: Grid) -> Array:
+    """Mean of white noise over w samples, w any real number from 1 on: covariance max(0, 1 - |h|/w)."""
+    m, lower, upper = _average_parts(p)
+    s = np.sin(0.5 * grid.omega) ** 2
+    fejer = [np.sin(0.5 * k * grid.omega) ** 2 / (k * s) for k in (m, m + 1.0)]
+    out: Array = (lower * fejer[0] + upper * fejer[1]) / (lower * m + upper * (m + 1.0))
+    return out
+
+
+def _mean(count: int) -> Callable[[Array, Grid], Array]:
+    def mean(p: Array, grid: Grid) -> Array:
+        """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
+        s = np.sin(0.5 * grid.omega) ** 2
+        fejer = np.sin(0.5 * count * grid.omega) ** 2 / (count * s)
+        h = np.arange(1.0, count)[:, None]
+        wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
+        leak = -2.0 * np.sum((1.0 - h / count) * wave, axis=0) / grid.samples
+        out: Array = np.broadcast_to((fejer + np.maximum(leak, 0.0)) / count, (*p.shape[:-1], grid.omega.size))
+        return out
+
+    return mean
+
+
+def _shape(p: Array, grid: Grid) -> Array:
+    waves = np.array([np.cos((j + 1) * grid.omega) - 1.0 for j in range(p.shape[-1])])
+    out: Array = np.exp(np.clip(p @ waves, -40.0, 40.0))
+    return out
+
+
+FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
+    "none": (lambda p, grid: np.ones(np.shape(p[..., :1])[:-1] + grid.omega.shape), 0),
+    "first": (_first, 1),
+    "second": (_second, 2),
+    "average": (_average, 1),
+}
+
+
+def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
+    """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none."""
+    if name.startswith("mean"):
+        return _mean(int(name[4:])), 0
+    return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """One term of a model; ``name`` as above, of white noise "white" with its ``filter``.
+
+    The first parameter is the logarithm of the variance-like size, in which the spectrum is linear.
+    """
+
+    name: str
+    filter: str = "none"
+
+    @property
+    def size(self) -> int:
+        """Return the number of parameters."""
+        if self.name == "white":
+            return 1 + filter_of(self.filter)[1]
+        return {"gauss_markov": 2, "resonance": 3, "band": 3}.get(self.name, 1)
+
+    def unit(self, p: Array, grid: Grid) -> Array:
+        """Return the spectrum (..., b) for a unit first parameter; p (..., size - 1) are the others."""
+        if self.name == "white":
+            return filter_of(self.filter)[0](p, grid)
+        if self.name == "gauss_markov":
+            z, amplitude, nugget = markov_parts(np.exp(p[..., 0:1]), grid.means)
+            out: Array = amplitude * poisson(z, grid.cos) - nugget
+            return out
+        if self.name == "resonance":
+            return _resonance(p, grid)
+        if self.name == "band":
+            return _band(p, grid)
+        if self.name == "readout":
+            return np.ones((*p.shape[:-1], grid.omega.size))
+        fixed = {"quantization": grid.sine, "flicker": grid.flicker, "walk": grid.walk}[self.name]
+        return np.broadcast_to(fixed, (*p.shape[:-1], fixed.size))
+
+    def spectrum(self, p: Array, grid: Grid) -> Array:
+        """Return S (..., b) for parameters p (..., size)."""
+        return np.exp(p[..., 0:1]) * self.unit(p[..., 1:], grid)
+
+    def allan(self, p: Array, m: Array, means: bool = False) -> Array:
+        """Return the Allan variance (..., k) of means over m (k,) samples, m whole numbers."""
+        v = np.exp(p[..., 0:1])
+        if self.name == "white":
+            return v * _allan_white(self.filter, p[..., 1:], m)
+        if self.name == "readout":
+            return v / m
+        if self.name == "quantization":
+            return v * 3.0 / m**2
+        if self.name == "flicker":
+            return v * FLICKER * np.ones_like(m)
+        if self.name == "walk":
+            return v * m / 3.0 * (1.0 if means else 1.0 + 0.5 / m**2)
+        if self.name == "gauss_markov":
+            z, amplitude, nugget = markov_parts(np.exp(p[..., 1:2]), means)
+            return np.asarray(v * (amplitude * _allan_pole(z, m) - nugget / m))
+        if self.name == "band":
+            lag = np.arange(math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0)
+            gamma = np.exp(-0.5 * (lag * np.exp(-p[..., 1:2])) ** 2) * np.cos(lag * np.exp(p[..., 2:3]))
+            return v * _allan_covariance(gamma, m)
+        z = np.exp(-np.exp(-p[..., 1:2]) + 1j * np.exp(p[..., 2:3]))
+        return np.asarray(v * np.real(_allan_pole(z, m)))
+
+
+def _resonance(p: Array, grid: Grid) -> Array:
+    """Mean of Re P over each bin: of the antiderivative 2 arctan((1 + r)/(1 - r) tan(x/2)) where a bin has a width."""
+    r, centre = np.exp(-np.exp(-p[..., 0:1])), np.exp(p[..., 1:2])
+    if not grid.half_width.any():
+        return np.asarray(0.5 * (poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre))))
+    h = np.maximum(grid.half_width, 1e-9)
+    out: Array = np.zeros(np.broadcast_shapes(centre.shape, grid.omega.shape))
+    for shift in (-centre, centre):
+        x = np.remainder(grid.omega + shift + np.pi, 2.0 * np.pi) - np.pi
+        t1, t0 = (2.0 * np.arctan((1.0 + r) / (1.0 - r) * np.tan(0.5 * np.clip(x + s * h, -3.14159, 3.14159)))
+                  for s in (1.0, -1.0))  # fmt: skip
+        out += 0.5 * (t1 - t0) / (2.0 * h)
+    return out
+
+
+def _band(p: Array, grid: Grid) -> Array:
+    """Mean over each bin of a normal density about both centres, with what is folded."""
+    tau, centre = np.exp(p[..., 0:1]), np.exp(p[..., 1:2])
+    h = np.maximum(grid.half_width, 1e-9)
+    out: Array = np.zeros(np.broadcast_shapes(centre.shape, grid.omega.shape))
+    for shift in (-centre, centre, 2.0 * np.pi - centre, centre - 2.0 * np.pi):
+        x = grid.omega + shift
+        out += special.ndtr(tau * (x + h)) - special.ndtr(tau * (x - h))
+    return 0.5 * 2.0 * np.pi * out / (2.0 * h)
+
+
+def _allan_pole(z: Any, m: Array) -> Any:
+    """Allan variance of covariance z^|h| for means over m samples."""
+    log_z = np.log(z)
+    power = np.exp(m * log_z)
+    q = -np.expm1(log_z)  # 1 - z
+    # variance of a mean, and covariance of neighbouring ones
+    variance = ((1.0 + z) / q - 2.0 * z * (1.0 - power) / (m * q * q)) / m
+    both = z * (1.0 - power) ** 2 / (m * q) ** 2
+    exact = variance - both
+    # of a slow process the difference of the two is that of neighbouring levels: |log z| m (2/3)
+    x = -m * log_z
+    series = 2.0 * x / 3.0 * (1.0 + 0.5 / m**2) - 0.5 * x * x
+    return np.where(np.abs(x) < 1e-5, series, exact)
+
+
+def _allan_white(name: str, p: Array, m: Array) -> Array:
+    if name == "none":
+        return 1.0 / m * np.ones((*p.shape[:-1], 1))
+    if name == "first":
+        z = np.exp(-np.exp(-p[..., 0:1]))
+        return np.asarray((1.0 - z) / (1.0 + z) * _allan_pole(z, m))
+    if name == "second":
+        z1, z2, share = _second_poles(p)
+        level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
+        return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
+    if name.startswith("mean"):
+        count = int(name[4:])
+        lag = np.arange(count + 1.0)
+        return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
+    if name == "average":
+        k, lower, upper = _average_parts(p)
+        lag = np.arange(float(np.max(k)) + 2.0)
+        gamma = lower * np.maximum(1.0 - lag / k, 0.0) + upper * np.maximum(1.0 - lag / (k + 1.0), 0.0)
+        gamma = gamma / (lower * k + upper * (k + 1.0))
+    else:
+        S = filter_of(name)[0](p, Grid(np.pi * np.arange(LAGS + 1) / LAGS))
+        gamma = np.fft.irfft(S, axis=-1)[..., : LAGS // 2]
+    return _allan_covariance(gamma, m)
+
+
+def _allan_covariance(gamma: Array, m: Array) -> Array:
+    """Allan variance of a covariance (..., lags) that is 0 beyond them, for means over m (k,) samples."""
+    lag = np.arange(float(gamma.shape[-1]))
+    first = np.cumsum(gamma, axis=-1)  # of gamma_0 .. gamma_h
+    moment = np.cumsum(lag * gamma, axis=-1)
+
+    def total(k: Array) -> Array:
+        """Variance of the sum of k samples."""
+        last = np.minimum(k.astype(int) - 1, lag.size - 1)
+        return k * (2.0 * first[..., last] - gamma[..., 0:1]) - 2.0 * moment[..., last]
+
+    out: Array = (4.0 * total(m) - total(2.0 * m)) / (2.0 * m * m)
+    return out

@@ -1,0 +1,194 @@
+"""A record made ready for its noise model: gaps, wild samples, spectral lines, steps of the level - taken out and told.
+
+A gap of more than LONG samples ends a stretch; what is missing in shorter ones, and wild samples, is completed by what
+the noise around says of it (:mod:`completion`).  Lines are found in the longest stretch and taken off the samples that
+are there, in each stretch with an amplitude and phase of its own, by least squares.  [DRIFT-NOISE-MODEL,
+DRIFT-PERIODIC]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.completion import Completed, complete
+from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
+from gyrobench.reduction.noise_model.steps import LevelStep, without
+from gyrobench.reduction.series.checks import SeriesError
+from gyrobench.reduction.series.lines import SpectralLine, find_lines
+
+LONG = 1000  # samples of a gap that ends a stretch
+MOST = 64  # stretches that are used, the longest
+LEAST = 64  # samples of a record
+LEVELS = 32  # parts of a record whose noise is compared
+DEPARTS = 1e-4  # probability below which the noise level changes
+CHUNK = 1 << 17  # samples of a sine computed at a time
+
+
+@dataclass(frozen=True)
+class TreatedStretch:
+    """Samples from ``start`` on without a long gap, lines and steps taken out: x (n,) completed, ``own`` with NaN."""
+
+    start: int
+    own: Array
+    done: Completed
+    steps: tuple[LevelStep, ...] = ()
+
+    @property
+    def clean(self) -> Array:
+        """Return the completed samples without the steps."""
+        x = self.done.x
+        for s in self.steps:
+            x = without(x, s)
+        return x
+
+
+@dataclass(frozen=True)
+class Treated:
+    """Stretches of a record of ``samples`` samples on the grid, and what was taken out of it.
+
+    spread: variance of the mean square of the noise over that of even normal noise, 1 where the level is even; levels
+    (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of
+    them.
+    """
+
+    samples: int
+    stretches: tuple[TreatedStretch, ...]
+    lines: tuple[SpectralLine, ...]
+    complete_lines: bool
+    spread: float
+    levels: Array
+    p_level: float
+
+    @property
+    def there(self) -> int:
+        """Return the samples that are there and not wild, in the stretches."""
+        return sum(s.own.size - s.done.missing - s.done.wild.size for s in self.stretches)
+
+    @property
+    def wild(self) -> NDArray[np.int64]:
+        """Return the indices of the wild samples on the grid."""
+        return np.concatenate([s.start + s.done.wild for s in self.stretches])
+
+    @property
+    def filled(self) -> int:
+        return sum(s.done.missing for s in self.stretches)
+
+    @property
+    def steps(self) -> list[LevelStep]:
+        """Return the steps, at their place on the grid."""
+        return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.steps]
+
+    def ordinates(self, means: bool, keep_wild: bool = False) -> Ordinates:
+        """Return the ordinates of the stretches; keep_wild: with the wild samples left in."""
+        weight = self.there / sum(s.own.size for s in self.stretches) / self.spread
+        x, extra = [], list[Array | None]()
+        for s in self.stretches:
+            y = s.clean
+            if keep_wild and s.done.wild.size:
+                y = y.copy()
+                y[s.done.wild] += s.own[s.done.wild] - s.done.x[s.done.wild]
+            x.append(y)
+            extra.append(None if keep_wild else s.done.extra)
+        return Ordinates(x, means, extra, weight)
+
+    def cleaned(self) -> Array:
+        """Return the record (samples,) without lines, wild samples and steps, NaN where nothing is or was taken out."""
+        out = np.full(self.samples, np.nan)
+        for s in self.stretches:
+            y = s.clean.copy()
+            y[~np.isfinite(s.own)] = np.nan
+            y[s.done.wild] = np.nan
+            out[s.start : s.start + y.size] = y
+        return out
+
+
+def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
+    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long``."""
+    there = np.flatnonzero(np.isfinite(rate))
+    if not there.size:
+        return []
+    cuts = np.flatnonzero(np.diff(there) > long)
+    begin, end = np.append(there[0], there[cuts + 1]), np.append(there[cuts], there[-1]) + 1
+    found = [slice(a, b) for a, b in zip(begin.tolist(), end.tolist(), strict=True)
+             if np.count_nonzero(np.isfinite(rate[a:b])) >= SHORTEST]  # fmt: skip
+    return sorted(sorted(found, key=lambda s: s.start - s.stop)[:MOST], key=lambda s: s.start)
+
+
+def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Treated:
+    """Return a rate (n,), NaN where a sample is missing, ready for its model.
+
+    Raises SeriesError for fewer samples than LEAST in stretches without long gaps, and for a constant record.
+    """
+    parts = stretches_of(rate)
+    if sum(s.stop - s.start for s in parts) < LEAST:
+        raise SeriesError(f"no stretch of {SHORTEST} samples without a gap of more than {LONG}")
+    if not float(np.nanstd(rate)) > 0.0:
+        raise SeriesError("the record is constant; it has no noise to fit")
+    done = [complete(rate[s], find_wild) for s in parts]
+    longest = int(np.argmax([s.stop - s.start for s in parts]))
+    lines: tuple[SpectralLine, ...] = ()
+    full = True
+    own = [rate[s].copy() for s in parts]
+    if remove_lines:
+        found = find_lines(done[longest].drawn, 1.0)
+        lines, full = found.lines, found.complete
+    if lines:
+        frequencies = np.array([x.frequency for x in lines])
+        for y, d in zip(own, done, strict=True):
+            used = np.isfinite(y)
+            used[d.wild] = False
+            y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
+        done = [complete(y, find_wild) for y in own]
+    stretches = tuple(TreatedStretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True))
+    return Treated(rate.size, stretches, lines, full, *_levels(np.concatenate([d.white for d in done])))
+
+
+def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
+    """Return the sines (n,) of the frequencies (per sample) by least squares in the samples used, beside a line."""
+    n, count = y.size, frequencies.size
+    if not count:
+        return np.zeros(n)
+
+    def columns(a: int, b: int) -> Array:
+        t = np.arange(a, b) - 0.5 * n
+        phase = 2.0 * math.pi * frequencies[:, None] * t
+        return np.concatenate([np.cos(phase), np.sin(phase), np.ones((1, t.size)), t[None] / n])
+
+    size = 2 * count + 2
+    M, right = np.zeros((size, size)), np.zeros(size)
+    for a in range(0, n, CHUNK):
+        b = min(a + CHUNK, n)
+        X = columns(a, b) * used[a:b]
+        M += X @ X.T
+        right += X @ np.where(used[a:b], y[a:b], 0.0)
+    beta = np.linalg.lstsq(M, right, rcond=1e-12)[0]
+    beta[-2:] = 0.0
+    out: Array = np.concatenate([beta @ columns(a, min(a + CHUNK, n)) for a in range(0, n, CHUNK)])
+    return out
+
+
+def _levels(z: Array) -> tuple[float, Array, float]:
+    """Return the spread of the mean square, the rms of parts over that of all, and p of so large differences of them.
+
+    z (n,): of unit variance and an even spectrum; NaN where a sample is missing.
+    """
+    z = z[np.isfinite(z)]
+    n = z.size
+    square = z * z / float(np.mean(z * z))
+    kurtosis = float(np.mean(square**2))
+    spread = 0.5 * (kurtosis - 1.0) if kurtosis > 3.0 + 4.0 * math.sqrt(24.0 / n) else 1.0
+    parts = max(2, min(LEVELS, n // 64))
+    edges = np.linspace(0, n, parts + 1).astype(int)
+    mean = np.add.reduceat(square, edges[:-1]) / np.diff(edges)
+    # of the part's own noise: heavy tails do not look like a change
+    u = np.sqrt(max(spread, 1.0) * 2.0 / np.diff(edges))
+    inner = np.sqrt(np.maximum([np.var(square[a:b]) / (b - a) for a, b in pairwise(edges.tolist())], 1e-12))
+    p = float(special.chdtrc(parts - 1, np.sum(((mean - 1.0) / np.minimum(np.maximum(inner, 0.3 * u), u)) ** 2)))
+    return spread, np.sqrt(mean), p

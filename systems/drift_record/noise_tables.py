@@ -1,0 +1,193 @@
+"""What the report says of the noise model: terms, Gauss-Markov processes, minimum of the deviation, agreement."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.agreement import ENOUGH
+from gyrobench.reduction.noise_model.model import NoiseModel
+from gyrobench.reduction.series.noise_coefficients import Estimate
+from gyrobench.reduction.series.noise_coefficients_table import TERMS
+from gyrobench.report.numbers import write_number, write_p
+from gyrobench.result import Table
+from gyrobench.units import DPH
+
+EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
+SHOWN = 6  # wild samples or steps that are listed
+NAMES = {
+    "white": "white noise", "readout": "white noise of the reading", "quantization": "angle noise of a reading",
+    "flicker": "flicker", "walk": "rate random walk",
+}  # fmt: skip
+
+
+def number(x: float, u: float | None = None) -> str:
+    return write_number(x, u, 3).text
+
+
+def range_text(e: Estimate, si: float = 1.0) -> str:
+    """Return a value with its interval, "25.3 (24.1 to 27.0)"."""
+    u = (e.high - e.low) / (2.0 * 1.96 * si) if math.isfinite(e.high) and e.high > e.low else None
+    return f"{number(e.value / si, u)} ({number(e.low / si, u)} to {number(e.high / si, u)})"
+
+
+def absent(term: str, noise: NoiseModel) -> str:
+    """Return why a coefficient has no value, and what stands in its place."""
+    if term in ("B", "K") and noise.processes:
+        of = ", ".join(f"{number(g.tau.value)} s" for g in noise.processes)
+        return f"not determined: slow drift here is Gauss-Markov, correlation time {of}"
+    return "not determined: the record is too short or other noise covers it"
+
+
+def contradicted(noise: NoiseModel) -> str:
+    """Return why no coefficient is stated."""
+    return f"not determined: {_disagreement(noise)}"
+
+
+def _disagreement(noise: NoiseModel) -> str:
+    a = min(noise.agreements, key=lambda a: min(a.share, a.octaves))
+    tau, ratio = a.worst
+    of = "record" if a is noise.agreement else "record without lines, steps and wild samples"
+    return (
+        f"the deviation of the best model leaves the 95 % interval of that of the {of} at {_percent(1.0 - a.share)} of "
+        f"{a.tau.size} averaging times, at {number(tau)} s it is {number(ratio)} times that"
+    )
+
+
+def _percent(x: float) -> str:
+    return f"{100.0 * x:.3g} %"
+
+
+def agreement_text(noise: NoiseModel) -> str:
+    """Return how far the deviation that the model implies is the record's own."""
+    if not noise.agrees:
+        text = _disagreement(noise)
+        return f"{text[0].upper()}{text[1:]}."
+    a = noise.agreement
+    return (
+        f"The deviation that the whole model implies lies in the record's own 95 % interval at {_percent(a.share)} of "
+        f"{a.tau.size} averaging times from {number(a.tau[0])} s to {number(a.tau[-1])} s, a tenth of the record."
+    )
+
+
+def agreement(noise: NoiseModel) -> Table:
+    """Return the deviation of the record as it was beside that of the model, an octave apart."""
+    a = noise.agreement
+    rows: list[list[Any]] = [
+        [float(t), *(float(v) / DPH for v in values), "inside" if inside else "outside"]
+        for t, *values, inside, shown in zip(
+            a.tau, a.deviation, a.low, a.high, a.implied, a.inside, a.octave, strict=True
+        )
+        if shown
+    ]
+    head = ["averaging time / s", "record / (°/h)", "95 % from", "95 % to", "model / (°/h)", "finding"]
+    caption = (
+        "Allan deviation of the record as it was, nothing taken out but missing samples, and that of the whole model "
+        f"with what was taken out; coefficients are stated where {_percent(ENOUGH)} agree"
+    )
+    return Table("agreement", "Record and model", caption, head, rows)
+
+
+def bias_instability(noise: NoiseModel) -> Table:
+    """Return the bias instability in its two senses."""
+    least, floor = noise.minimum, 2.0 * math.log(2.0) / math.pi
+    b = noise["B"]
+    rows: list[list[Any]] = [
+        ["coefficient of the flicker, B", *_range(b, DPH), None, None, None,
+         f"its floor: {number(math.sqrt(floor) * b.value / DPH)} °/h" if b.determined else "not determined"],
+        ["least Allan deviation, B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
+         "minimum" if least.reached else "no minimum: it falls to the longest averaging time"],
+    ]  # fmt: skip
+    head = ["sense", "value / (°/h)", "95 % from", "95 % to", "averaging time / s", "from / s", "to / s", "finding"]
+    caption = "The two figures that are called bias instability; data sheets mean the second, of the whole deviation"
+    return Table("bias_instability", "Bias instability", caption, head, rows)
+
+
+def _range(e: Estimate, si: float) -> list[float | None]:
+    return [e.value / si if e.determined else None, e.low / si if e.determined else None, e.high / si]
+
+
+def gauss_markov(noise: NoiseModel) -> list[Table]:
+    """Return the Gauss-Markov processes as a Kalman filter takes them."""
+    rows: list[list[Any]] = []
+    for k, g in enumerate(noise.processes, 1):
+        phi, w = g.discrete(noise.scale.tau0)
+        found = "determined" if g.tau.determined else f"in {_percent(g.present)} of the models"
+        ends = [v / si for e, si in ((g.sigma, DPH), (g.tau, 1.0)) for v in (e.value, e.low, e.high)]
+        rows.append([k, (g.sigma.value / DPH) ** 2, *ends, g.density / DPH, phi, w / DPH, found])
+    head = ["process", "variance / (°/h)²", "σ / (°/h)", "95 % from", "95 % to", "τ / s", "from / s", "to / s",
+            "√q / (°/h/√s)", "φ", "σ(w) / (°/h)", "finding"]  # fmt: skip
+    caption = (
+        "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
+        f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all"
+    )
+    return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
+
+
+def resonances(noise: NoiseModel) -> list[Table]:
+    """Return the narrow bands of noise that are no lines."""
+    rows = [[k, f, width, rms / DPH] for k, (f, width, rms) in enumerate(noise.peaks(), 1)]
+    head = ["band", "frequency / Hz", "bandwidth / Hz", "rms / (°/h)"]
+    caption = "Noise about a frequency: a resonance, a dither that wanders; bandwidth at half the power"
+    return [Table("resonances", "Bands of noise", caption, head, rows)] if rows else []
+
+
+def terms_text(noise: NoiseModel) -> str:
+    """Return of which terms the model is, and the filter of the sensor."""
+    words = [NAMES[t.name] for t in noise.shape[0] if t.name in NAMES]
+    if count := len(noise.processes):
+        words.append(f"{count} Gauss-Markov process{'es' if count > 1 else ''}")
+    if count := len(noise.peaks()):
+        words.append(f"{count} band{'s' if count > 1 else ''} of noise")
+    if noise["R"].determined:
+        words.append("a ramp")
+    shape = noise.filter_words()
+    passed = f" The white noise has passed a filter: {shape}." if shape else " No filter of the white noise is seen."
+    return f"Terms of the model: {', '.join(words)}; {noise.models} models were compared.{passed}"
+
+
+def wild_text(noise: NoiseModel, time: Array) -> str:
+    """Return how many samples are none of the noise, and the coefficients with and without them."""
+    at = noise.treatment.wild
+    if not at.size:
+        return ""
+    many = f"{at.size} samples are wild" if at.size > 1 else "A sample is wild"
+    first = ", ".join(f"{number(time[k])} s" for k in at[:SHOWN])
+    both = [
+        f"{term} {number(noise[term].value / si)} {unit} without them, {number(with_them / si)} with them"
+        for term, (unit, si, _) in TERMS.items()
+        if (with_them := noise.with_wild.get(term, 0.0)) and noise[term].determined
+    ]
+    told = f" {'; '.join(both)}." if both else ""
+    return (
+        f"{many}, beyond what the noise around makes, {'the first ' if at.size > SHOWN else ''}at {first}: taken out."
+        f"{told} Where they are the instrument's own, the coefficients are not all of its noise."
+    )
+
+
+def steps_text(noise: NoiseModel, time: Array) -> str:
+    """Return the steps of the level that were taken out."""
+    found = noise.steps
+    if not found:
+        return ""
+    said = ", ".join(f"{number(s.size / DPH, s.u / DPH)} °/h at {number(time[min(s.at, time.size - 1)])} s"
+                     for s in sorted(found, key=lambda s: s.at))  # fmt: skip
+    return (
+        f"The level steps by {said}: a step, which no noise of the rest makes, is taken out before the model; left in, "
+        "K and B take it for theirs. Find its cause."
+    )
+
+
+def levels_text(noise: NoiseModel) -> str:
+    """Return that the level of the noise changes along the record; "" where it does not."""
+    t = noise.treatment
+    low, high = float(t.levels.min()), float(t.levels.max())
+    if t.p_level > EVEN or high - low < SWING:
+        return ""
+    p = write_p(t.p_level).text
+    return (
+        f"The level of the noise changes: its rms is {low:.2f} to {high:.2f} of that of all in {t.levels.size} parts "
+        f"of the record (p {p if p.startswith('<') else f'= {p}'}). The coefficients are those of the mean; reduce the "
+        "parts one by one."
+    )
