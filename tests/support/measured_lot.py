@@ -64,7 +64,7 @@ def sheet(record: Record, k: int) -> str:
     out = io.StringIO()
     said = {"latitude": f"{LATITUDE}deg", "k": "17.2deg/h/mA", "instrument": instrument(k), "operator": "A. Tester"}
     said |= {"date": f"{date(2026, 3, 2) + timedelta(days=k)}", "u_scale_factor": "1e-4", "u_axis": "2arcsec"}
-    for key, value in {**said, "u_remount": "2e-3deg/h"}.items():
+    for key, value in {**said, "u_remount": "2e-3deg/h", "arrangement": "checked"}.items():
         out.write(f"# {key} = {value}\n")
     for p in record.run.plan:
         out.write(f"# phase {p.phase} = {p.face}\n")

@@ -13,6 +13,7 @@ from multipoint import G0, KS, NAME, estimates, load, module, polynomial, quiet,
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
+from gyrobench.reduction.diagnosis.unshown import of_plan
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -193,3 +194,10 @@ def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
             assert found["k4"] == pytest.approx(-k["k5"], abs=5e-6) and found["k5"] == pytest.approx(-k["k4"], abs=5e-6)
             asked = [r.text for r in result.reasons if r.id == "arrangement.unstated"]
             assert bool(asked) == (not said) and all("a and b exchanged" in text for text in asked)
+
+
+def test_a_plan_says_before_the_test_what_it_cannot_see(head: Session) -> None:
+    """The mounts exchanged are shown by no position of the head; the zero of the angles in one mount is theta_0."""
+    values = {"settle": 0.6, "dwell": 0.2, "accelerometer.k4": K4, "accelerometer.k5": K5}
+    said = of_plan(load().with_values(values), head.run(values, seed=2))
+    assert any(s.startswith("a and b exchanged: no residual of this plan shows it (") for s in said), said

@@ -124,13 +124,18 @@ def unshown(
 
 
 def of_plan(system: System, record: Record) -> list[str]:
-    """Return the mistakes that the record of a simulated plan would not show, as sentences: before it is measured."""
+    """Return the mistakes that the record of a simulated plan would not show, as sentences: before it is measured.
+
+    Of tests whose record is one fit.
+    """
     reduction = system.reduction_object()
     if not (isinstance(reduction, type) and issubclass(reduction, DriftReduction)) or reduction.handling is None:
         return []
-    result = reduction.of_record(record)
-    found = _not_shown(record, result, reduction.of_record, reduction.regression_of())
-    return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found]
+    regression_of = reduction.regression_of()
+    if regression_of is None:
+        return []  # each mistake would be a reduction of its own
+    found = _not_shown(record, reduction.of_record(record), reduction.of_record, regression_of)
+    return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found[:NAMED]]
 
 
 def _not_shown(

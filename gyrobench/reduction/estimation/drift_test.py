@@ -135,7 +135,9 @@ class DriftReduction(Generic[S]):
 
     @classmethod
     def regression_of(cls) -> Callable[[Record], Regression] | None:
-        """Return record -> its data with their linear model; None where it is not one setup and one fit."""
-        if cls.of_record.__func__ is not DriftReduction.of_record.__func__:  # type: ignore[attr-defined]
+        """Return record -> its data with their linear model; None of a test whose record is not one fit."""
+        own = cls.of_record.__func__, cls.reduce.__func__  # type: ignore[attr-defined]
+        base = DriftReduction.of_record.__func__, DriftReduction.reduce.__func__  # type: ignore[attr-defined]
+        if own != base or cls.regression is DriftReduction.regression:
             return None
         return lambda record: cls(record.windows, cls.setup_of(record.run)).regression()
