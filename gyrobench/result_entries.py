@@ -131,7 +131,7 @@ class BudgetLine:
 
 @dataclass(frozen=True)
 class TypeB:
-    """What one standard uncertainty of a source does to all estimates: a row for each of its independent parts."""
+    """Effect of one standard uncertainty of a source on all estimates: a row for each of its independent parts."""
 
     id: str  # of the source
     source: str
