@@ -193,7 +193,7 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class StepChange:
-    """What the communication step does to a measure; u: without it, ratio: of the change to u."""
+    """Effect of the communication step on a measure; u: without it, ratio: of the change to u."""
 
     name: str
     unit: str

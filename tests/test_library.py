@@ -25,6 +25,7 @@ from gyrobench.commands.cli import main
 from gyrobench.engine.session import RunError, Session
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult, Reason
+from gyrobench.system.system import System
 from gyrobench.workflow.user_errors import PostRunError
 
 NAME = "tumble_single_axis"
@@ -260,7 +261,7 @@ class Own(System):
 
 def test_a_system_does_not_judge_itself() -> None:
     with pytest.raises(TypeError, match=r"returned by findings\(record\)"):
-        type("Own", (gb.System,), {"reduce": lambda self, record: None})
+        type("Own", (System,), {"reduce": lambda self, record: None})
 
 
 def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
