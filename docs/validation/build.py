@@ -28,9 +28,9 @@ from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator, _
 
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "validation.md"
-PART = re.compile(r"(<!--table (\w+)-->\n).*?(<!--/table-->)", re.S)
+PART = re.compile(r"(<!--table (\w+)-->\n).*?(<!--end table-->)", re.S)
 sys.path.insert(0, str(HERE))
-from nonlinear_models import MODELS  # noqa: E402  (a script's neighbour)
+from nonlinear_models import MODELS  # type: ignore[import-not-found, unused-ignore]  # noqa: E402
 
 Row = tuple[str, ...]
 
@@ -125,7 +125,7 @@ def nonlinear() -> dict[str, tuple[int, float, float, float] | str]:
 
 def anova() -> dict[str, tuple[float, float]]:
     """Return the digits of F and s of each analysis of variance: a mean, and a column for each further treatment."""
-    found = {}
+    found: dict[str, tuple[float, float]] = {}
     for name, e in read("anova").items():
         n, k = e["rows"].shape
         y, group = e["rows"].ravel(), np.tile(np.arange(k), n)
@@ -138,7 +138,7 @@ def anova() -> dict[str, tuple[float, float]]:
 
 def univariate() -> dict[str, tuple[float, float, float]]:
     """Return the digits of mean, s and r(1) of each set."""
-    found = {}
+    found: dict[str, tuple[float, float, float]] = {}
     for name, e in read("univariate").items():
         x = e["rows"]
         of, digits = statistics(x.tolist()), math.nan
