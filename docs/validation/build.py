@@ -150,8 +150,12 @@ def univariate() -> dict[str, tuple[float, float, float]]:
 
 
 NBS14 = (892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0)
-PUBLISHED_NBS14 = {"allan": (91.22945, 85.95287), "modified": (91.22945, 74.78849), "hadamard": (70.80607, 85.61487)}
-PUBLISHED_1000 = {  # tau = 1, 10, 100, overlapping
+PUBLISHED_NBS14: dict[str, tuple[float, ...]] = {
+    "allan": (91.22945, 85.95287),
+    "modified": (91.22945, 74.78849),
+    "hadamard": (70.80607, 85.61487),
+}
+PUBLISHED_1000: dict[str, tuple[float, ...]] = {  # tau = 1, 10, 100, overlapping
     "allan": (2.922319e-01, 9.159953e-02, 3.241343e-02),
     "modified": (2.922319e-01, 6.172376e-02, 2.170921e-02),
     "hadamard": (2.943883e-01, 9.581083e-02, 3.237638e-02),
