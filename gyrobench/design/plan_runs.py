@@ -19,7 +19,8 @@ from gyrobench.design.predicted_uncertainty import predict
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.unshown import of_plan
+from gyrobench.reduction.diagnosis import unshown
+from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
 from gyrobench.system.system import System
@@ -95,7 +96,7 @@ class Workbench:
 
     def unseen(self, known: Sequence[str], values: Mapping[str, Any]) -> tuple[str, ...]:
         """Return what a plan does not determine or show: known, and mistakes in taking it (diagnosis.unshown)."""
-        return tuple(dict.fromkeys([*known, *of_plan(self.system.with_values(values), self.run(values)[0])]))
+        return tuple(dict.fromkeys([*known, *mistakes_unshown(self.system.with_values(values), self.run(values)[0])]))
 
     def count(self, values: Mapping[str, Any], names: Sequence[str], count: int) -> dict[str, tuple[float, float, int]]:
         """Return mean u and standard deviation of the estimates over ``count`` runs of a plan, and their number."""
@@ -170,3 +171,14 @@ def designed_values(
         )
         for n, v in trial.values.items()
     }  # fmt: skip
+
+
+def mistakes_unshown(system: System, record: Record) -> list[str]:
+    """Return mistakes that no residual of a plan would show, of tests whose record is one fit."""
+    reduction = system.reduction_object()
+    if not (isinstance(reduction, type) and issubclass(reduction, DriftReduction)) or reduction.handling is None:
+        return []
+    regression_of = reduction.regression_of()
+    if regression_of is None:
+        return []  # each mistake would be a reduction of its own
+    return unshown.sentences(record, reduction.of_record(record), reduction.of_record, regression_of)

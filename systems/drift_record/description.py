@@ -13,7 +13,7 @@ from gyrobench import units
 from gyrobench.record import sampling
 from gyrobench.record.drift_columns import ANGLE, harmonic_names
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.noise_model.model import NoiseModel
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.noise_coefficients_table import TERMS

@@ -7,7 +7,7 @@ from typing import Any
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import ENOUGH
-from gyrobench.reduction.noise_model.model import NoiseModel
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.report.numbers import write_number, write_p

@@ -13,7 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.fit import fit_noise
-from gyrobench.reduction.noise_model.model import NoiseModel
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines

@@ -23,7 +23,7 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.noise_model.model import NoiseModel
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate

@@ -26,7 +26,7 @@ from scipy import special
 
 from gyrobench import units
 from gyrobench.reduction.diagnosis import handling_candidates
-from gyrobench.reduction.diagnosis.handling_errors import examined
+from gyrobench.reduction.diagnosis.examination import examined
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.estimation.effects import correction_table, simulated_table, standard_changes
 from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, changes_by_source

@@ -277,7 +277,7 @@ def test_an_effect_that_may_be_there_counts_more_in_the_interval_than_in_the_rep
     z = np.abs(x) + x  # correlates with the constant and with the column x
     rng = np.random.default_rng(1)
     X = np.column_stack([np.ones(n), x])
-    block = nuisances.Block("z", z[:, None])
+    block = nuisance_states.NuisanceBlock("z", z[:, None])
     y = X @ [0.1, 0.2] + 0.01 * rng.normal(size=n)
     full = np.column_stack([X, z])
     with_it = np.linalg.lstsq(full, y, rcond=None)[0]

@@ -12,8 +12,8 @@ import pytest
 from multipoint import G0, KS, NAME, estimates, load, module, polynomial, quiet, windows
 
 from gyrobench import frames
+from gyrobench.design.plan_runs import mistakes_unshown
 from gyrobench.engine.session import Session
-from gyrobench.reduction.diagnosis.unshown import of_plan
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -199,5 +199,5 @@ def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
 def test_a_plan_says_before_the_test_what_it_cannot_see(head: Session) -> None:
     """The mounts exchanged are shown by no position of the head; the zero of the angles in one mount is theta_0."""
     values = {"settle": 0.6, "dwell": 0.2, "accelerometer.k4": K4, "accelerometer.k5": K5}
-    said = of_plan(load().with_values(values), head.run(values, seed=2))
+    said = mistakes_unshown(load().with_values(values), head.run(values, seed=2))
     assert any(s.startswith("a and b exchanged: no residual of this plan shows it (") for s in said), said

@@ -141,7 +141,7 @@ def test_table_errors_shift_as_the_budget_predicts(session: Session, source: str
 
 # ------------------------------------------------------------------------------------------ refusals
 REFUSED: list[tuple[list[str], list[str]]] = [
-    (["m=1", "n=1"], ["ratio 1:1", "rank 8 of 9", "not seen"]),
+    (["m=1", "n=1"], ["ratio 1:1", "rank 8 of 9", "not estimable"]),
     (["m=6", "n=2"], ["common divisor 2", "3:1 is the same path"]),
     (["latitude=90deg"], ["rank 5 of 9", "85°"]),
     (["latitude=86deg"], ["condition", "least determined", "85°"]),

@@ -41,13 +41,10 @@ from scipy import special
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis import plausibility
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.findings import RAW, WHITENED
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.nuisances import BOTH, NUISANCES, InTheModel
-from gyrobench.reduction.setup.run_metadata import Site
-from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Autocorrelation, DriftTestResult, Reason, Table
 
 Reduce = Callable[[Record], DriftTestResult]
@@ -88,37 +85,7 @@ class _Tried:
         return [self.words, self.scatter, "ordinary" if self.ordinary else "not ordinary", self.p]
 
 
-def examined(
-    record: Record, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]] | None,
-    regression_of: Callable[[Record], Any] | None = None,
-) -> DriftTestResult:  # fmt: skip
-    """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what
-    no residual shows where it does not state that it was checked.
-
-    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  regression_of: as of
-    :func:`unshown.unshown`.  Raises ReductionError.
-    """
-    if candidates is None or not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
-        return reduce(record)
-    try:
-        result = reduce(record)
-    except GyrobenchError as error:
-        if named := _cures(reduce, candidates(record)):
-            hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
-            raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
-        raise
-    if "latitude" in record.run.options:
-        near = plausibility.earth_rate_warnings(result, Site.of(record.run))
-        result = replace(result, reasons=[*result.reasons, *near])
-    found = _with_diagnosis(record, result, reduce, candidates)
-    if record.run.arrangement == "checked" or any(r.id == HANDLING for r in found.reasons):
-        return found
-    from gyrobench.reduction.diagnosis.unshown import unshown
-
-    return replace(found, reasons=[*found.reasons, *unshown(record, result, reduce, regression_of)])
-
-
-def _with_diagnosis(
+def with_diagnosis(
     record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]]
 ) -> DriftTestResult:
     """Return the result with the mistake that explains its residuals named, where they are not ordinary."""
@@ -180,7 +147,7 @@ def _freedom(result: DriftTestResult, windows: int) -> float:
     return max(windows - result.rank, 1.0) / (1.0 + 2.0 * total)
 
 
-def _cures(reduce: Reduce, candidates: Iterable[HandlingCandidate]) -> str:
+def cures(reduce: Reduce, candidates: Iterable[HandlingCandidate]) -> str:
     """Return the mistakes without which a record that is refused is an ordinary one; "" where there are several ways
     or none.
     """

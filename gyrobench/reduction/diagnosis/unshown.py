@@ -20,7 +20,6 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
@@ -43,15 +42,11 @@ from gyrobench.reduction.diagnosis.handling_errors import (
     undone,
     with_options,
 )
-from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
@@ -123,18 +118,11 @@ def unshown(
     return [Reason(ARRANGEMENT, text, ("pass",), names, severity="doubt")]
 
 
-def of_plan(system: System, record: Record) -> list[str]:
-    """Return the mistakes that the record of a simulated plan would not show, as sentences: before it is measured.
-
-    Of tests whose record is one fit.
-    """
-    reduction = system.reduction_object()
-    if not (isinstance(reduction, type) and issubclass(reduction, DriftReduction)) or reduction.handling is None:
-        return []
-    regression_of = reduction.regression_of()
-    if regression_of is None:
-        return []  # each mistake would be a reduction of its own
-    found = _not_shown(record, reduction.of_record(record), reduction.of_record, regression_of)
+def sentences(
+    record: Record, result: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Regression] | None
+) -> list[str]:
+    """Return the mistakes that the record of a simulated plan would not show: said before it is measured."""
+    found = _not_shown(record, result, reduce, regression_of)
     return [f"{words}: no residual of this plan shows it ({_largest(moved)})" for words, moved in found[:NAMED]]
 
 

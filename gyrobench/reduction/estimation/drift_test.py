@@ -129,7 +129,7 @@ class DriftReduction(Generic[S]):
         """Return what a record says; a measured one is examined for handling errors where its residuals are not
         ordinary.
         """
-        from gyrobench.reduction.diagnosis.handling_errors import examined
+        from gyrobench.reduction.diagnosis.examination import examined
 
         return examined(record, cls.of_record, cls.handling, cls.regression_of())
 

@@ -23,7 +23,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
-from gyrobench.reduction.noise_model.model import Minimum, NoiseModel, Process, Scale
+from gyrobench.reduction.noise_model.noise_model import Minimum, NoiseModel, Process, Scale
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
 from gyrobench.reduction.noise_model.prior import PEAKS

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.completion import Completed, complete
+from gyrobench.reduction.noise_model.gap_completion import Completed, complete
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
 from gyrobench.reduction.noise_model.steps import LevelStep, without
 from gyrobench.reduction.series.checks import SeriesError
