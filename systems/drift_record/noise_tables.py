@@ -91,11 +91,11 @@ def agreement(noise: NoiseModel) -> Table:
 
 def bias_instability(noise: NoiseModel) -> Table:
     """Return the bias instability in its two senses."""
-    least, floor = noise.minimum, 2.0 * math.log(2.0) / math.pi
+    least, floor = noise.minimum, math.sqrt(2.0 * math.log(2.0) / math.pi)
     b = noise["B"]
     rows: list[list[Any]] = [
         ["coefficient of the flicker, B", *_range(b, DPH), None, None, None,
-         f"floor of the deviation {number(math.sqrt(floor) * b.value / DPH)} °/h" if b.determined else "not determined"],
+         f"floor of the deviation {number(floor * b.value / DPH)} °/h" if b.determined else "not determined"],
         ["least Allan deviation, B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
          "minimum" if least.reached else "no minimum: it falls to the longest averaging time"],
     ]  # fmt: skip
@@ -120,7 +120,7 @@ def gauss_markov(noise: NoiseModel) -> list[Table]:
             "√q / (°/h/√s)", "φ", "σ(w) / (°/h)", "finding"]  # fmt: skip
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
-        f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model that is reported has them all"
+        f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes them all, as the model that is reported"
     )
     return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
 
@@ -187,7 +187,7 @@ def levels_text(noise: NoiseModel) -> str:
         return ""
     p = write_p(t.p_level).text
     return (
-        f"The level of the noise changes: its rms is {low:.2f} to {high:.2f} of that of all in {t.levels.size} parts of "
-        f"the record (p {p if p.startswith('<') else f'= {p}'}). The coefficients are those of the mean; reduce the "
+        f"The level of the noise changes: its rms is {low:.2f} to {high:.2f} of that of all in {t.levels.size} parts "
+        f"of the record (p {p if p.startswith('<') else f'= {p}'}). The coefficients are those of the mean; reduce the "
         "parts one by one."
     )

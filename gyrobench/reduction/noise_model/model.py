@@ -42,8 +42,7 @@ class Process:
 
 @dataclass(frozen=True)
 class Minimum:
-    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end ``tau``.
-    """
+    """Least Allan deviation of the model and its averaging time, s; reached: False where it falls to the end ``tau``."""
 
     deviation: Estimate
     tau: Estimate
@@ -52,8 +51,7 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Scale:
-    """Units of a fit: the interval tau0 of a sample, s, size and level of the rate; means: a sample is one over tau0.
-    """
+    """Units of a fit: the interval tau0 of a sample, s, size and level of the rate; means: a sample is one over tau0."""
 
     tau0: float
     size: float
@@ -160,10 +158,10 @@ class NoiseModel:
 
     def peaks(self) -> list[tuple[float, float, float]]:
         """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
-        out = []
+        out, tau0 = [], self.scale.tau0
         for t, q in split(*self.shape):
             if t.name in PEAKS:
                 width = 1.0 / math.pi if t.name == "resonance" else math.sqrt(2.0 * math.log(2.0)) / math.pi
-                out.append((math.exp(q[2]) / (2.0 * math.pi * self.scale.tau0), width / (math.exp(q[1]) * self.scale.tau0),
-                            self.scale.size * math.exp(0.5 * q[0])))  # fmt: skip
+                rms = self.scale.size * math.exp(0.5 * q[0])
+                out.append((math.exp(q[2]) / (2.0 * math.pi * tau0), width / (math.exp(q[1]) * tau0), rms))
         return out

@@ -110,8 +110,7 @@ class Treated:
 
 
 def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
-    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long`` samples.
-    """
+    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long`` samples."""
     there = np.flatnonzero(np.isfinite(rate))
     if not there.size:
         return []
@@ -152,8 +151,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
-    """Return the sines (n,) of the frequencies (per sample) of least squares in the samples used, with level and slope.
-    """
+    """Return the sines (n,) of the frequencies (per sample) of least squares in the samples used, with level and slope."""
     n, count = y.size, frequencies.size
     if not count:
         return np.zeros(n)
@@ -191,8 +189,6 @@ def _levels(z: Array) -> tuple[float, Array, float]:
     mean = np.add.reduceat(square, edges[:-1]) / np.diff(edges)
     # of the part's own noise: heavy tails do not look like a change
     u = np.sqrt(max(spread, 1.0) * 2.0 / np.diff(edges))
-    inner = np.sqrt(
-        np.maximum([np.var(square[a:b]) / (b - a) for a, b in pairwise(edges.tolist())], 1e-12)
-    )
+    inner = np.sqrt(np.maximum([np.var(square[a:b]) / (b - a) for a, b in pairwise(edges.tolist())], 1e-12))
     p = float(special.chdtrc(parts - 1, np.sum(((mean - 1.0) / np.minimum(np.maximum(inner, 0.3 * u), u)) ** 2)))
     return spread, np.sqrt(mean), p
