@@ -46,7 +46,7 @@ def contradicted(noise: NoiseModel) -> str:
 
 
 def _disagreement(noise: NoiseModel) -> str:
-    a = min(noise.agreements, key=lambda a: min(a.share, a.octaves))
+    a = min(noise.agreements, key=lambda a: a.share)
     tau, ratio = a.worst
     of = "record" if a is noise.agreement else "record without lines, steps and wild samples"
     return (
