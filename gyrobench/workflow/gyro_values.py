@@ -17,6 +17,7 @@ from gyrobench.reduction.series.gyro_noise import FLICKER_HIGH, FLICKER_LOW, gyr
 from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient, Result
+from gyrobench.units import DPH
 
 NEEDED = ("white", "flicker", "flicker_tau", "walk", "ramp", "quantization", "quantization_tau")
 SHARED = ("flicker_tau", "quantization_tau", "markov_tau")  # by the channels of a gyro
@@ -55,6 +56,18 @@ def estimate_of(c: Coefficient, si: float) -> Estimate:
     return Estimate(si * c.estimate, si * c.interval[0], si * c.interval[1], True)
 
 
+def processes_of(result: Result) -> list[list[tuple[float, float]]]:
+    """Return the Gauss-Markov processes of each column of a drift record, rms (rad/s) and correlation time (s), the
+    largest first.
+    """
+    out = []
+    for column in getattr(result, "columns", []):
+        tables = [t for t in column.tables.get("model", []) if t.id == "gauss_markov"]
+        rows = [(DPH * float(row[2]), float(row[5])) for t in tables for row in t.rows]
+        out.append(sorted(rows, reverse=True))
+    return out
+
+
 def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> None:
     """Write values with which a gyro of the bench has the noise of a record.  Raises UsageError.
 
@@ -79,16 +92,23 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
         *(f"# Warning of the reduction: {text}" for text in result.warnings),
         "[gyro]",
     ]
+    processes = processes_of(result)
     written: dict[str, str] = {}
     for number, channel in enumerate(channels):
-        coefficients = list(columns.values())[min(number, len(columns) - 1)]
+        column = min(number, len(columns) - 1)
+        coefficients = list(columns.values())[column]
+        found = processes[column] if column < len(processes) else []
         n, b, k, r, q = (estimate_of(coefficients[term], TERMS[term][1]) for term in "NBKRQ")
         noise = NoiseCoefficients(n, b, k, r, q)
-        for name, value in gyro_noise(noise, interval, duration).items():
+        for name, value in gyro_noise(noise, interval, duration, found[0] if found else (0.0, 0.0)).items():
             term = OF.get(name)
             said = f"  # {_words(coefficients[term])}" if term else ""
             if name == "flicker_tau":
                 said = f"  # flicker from {FLICKER_LOW / value:.2g} to {FLICKER_HIGH / value:.2g} Hz"
+            if name == "markov" and len(found) > 1:
+                said = f"  # the largest of {len(found)} processes; the gyro lacks " + ", ".join(
+                    f"{s!r} rad/s of {tau:.6g} s" for s, tau in found[1:]
+                )
             written.setdefault(named(name, channel), f"{named(name, channel)} = {value!r}{said}")
     write_whole(file, ("\n".join([*lines, *written.values()]) + "\n").encode())
 
@@ -97,5 +117,4 @@ def _words(c: Coefficient) -> str:
     if c.no_value:
         return f"{c.name}: {c.no_value}"
     low, high = c.interval
-    just = ", just determined" if estimate_of(c, 1.0).just_determined else ""
-    return f"{c.name} = {c.estimate:.4g} {c.unit} ({low:.4g} to {high:.4g}){just}"
+    return f"{c.name} = {c.estimate:.4g} {c.unit} ({low:.4g} to {high:.4g})"

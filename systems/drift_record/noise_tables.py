@@ -46,7 +46,7 @@ def contradicted(noise: NoiseModel) -> str:
 
 
 def _disagreement(noise: NoiseModel) -> str:
-    a = min(noise.agreements, key=lambda a: min(a.share, a.octaves))
+    a = min(noise.agreements, key=lambda a: a.share)
     tau, ratio = a.worst
     of = "record" if a is noise.agreement else "record without lines, steps and wild samples"
     return (
@@ -91,11 +91,11 @@ def agreement(noise: NoiseModel) -> Table:
 
 def bias_instability(noise: NoiseModel) -> Table:
     """Return the bias instability in its two senses."""
-    least, floor = noise.minimum, 2.0 * math.log(2.0) / math.pi
+    least, floor = noise.minimum, math.sqrt(2.0 * math.log(2.0) / math.pi)
     b = noise["B"]
     rows: list[list[Any]] = [
         ["coefficient of the flicker, B", *_range(b, DPH), None, None, None,
-         f"its floor: {number(math.sqrt(floor) * b.value / DPH)} °/h" if b.determined else "not determined"],
+         f"its floor: {number(floor * b.value / DPH)} °/h" if b.determined else "not determined"],
         ["least Allan deviation, B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
          "minimum" if least.reached else "no minimum: it falls to the longest averaging time"],
     ]  # fmt: skip

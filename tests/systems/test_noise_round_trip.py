@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -58,11 +58,14 @@ def reported(noise: NoiseCoefficients, column: str = "") -> list[Coefficient]:
     return found
 
 
-def written(path: Path, coefficients: list[Coefficient], part: str = "floated_gyro") -> Mapping[str, str]:
+def written(
+    path: Path, coefficients: list[Coefficient], part: str = "floated_gyro", columns: Sequence[Any] = ()
+) -> Mapping[str, str]:
     t = np.arange(float(SAMPLES))
     run = SimpleNamespace(data=SimpleNamespace(file="gyro 7.csv"), series=None)
     record: Any = SimpleNamespace(windows={"t_start": t, "t_end": t + 1.0}, run=run)
-    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients, warnings=["the test line"])
+    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients, warnings=["the test line"],
+                                  columns=columns)  # fmt: skip
     write_gyro_values(result, record, part, path)
     return read_settings(path)
 
@@ -100,6 +103,16 @@ def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
     assert {n.removeprefix("gyro."): float(x) for n, x in text.items()} == pytest.approx(expected, rel=1e-12)
     head = (tmp_path / "v.toml").read_text().partition("[gyro]")[0]
     assert "# Noise of gyro 7.csv (1500 s)" in head and "# Warning of the reduction: the test line" in head
+
+
+def test_the_largest_gauss_markov_process_goes_into_the_gyro(tmp_path: Path) -> None:
+    """0.5 deg/h of 200 s into the gyro, 0.1 deg/h of 20 s into the comment: the gyro has one process."""
+    some, none = Estimate(2e-7, 1e-7, 3e-7, True), Estimate(0.0, 0.0, 1e-7, False)
+    rows = [[1, 0.01, 0.1, 0.0, 0.0, 20.0], [2, 0.25, 0.5, 0.0, 0.0, 200.0]]
+    column = SimpleNamespace(tables={"model": [SimpleNamespace(id="gauss_markov", rows=rows)]})
+    text = written(tmp_path / "v.toml", reported(NoiseCoefficients(some, none, none, none, none)), columns=[column])
+    assert float(text["gyro.markov"]) == pytest.approx(0.5 * DPH) and float(text["gyro.markov_tau"]) == 200.0
+    assert "the largest of 2 processes" in (tmp_path / "v.toml").read_text("utf-8")
 
 
 def test_flicker_of_a_fast_record_goes_to_half_its_sampling_rate() -> None:

@@ -66,6 +66,11 @@ class DeviationAgreement:
 
     @property
     def holds(self) -> bool:
+        return self.share >= ENOUGH
+
+    @property
+    def holds_at_octaves(self) -> bool:
+        """Return whether it holds at 2, 4, 8 ... samples too: of so few one may be outside by chance."""
         return min(self.share, self.octaves) >= ENOUGH
 
     @property

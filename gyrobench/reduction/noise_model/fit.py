@@ -198,7 +198,7 @@ class _Judge:
     def share(self, variance: Array) -> float:
         """Return the least share of averaging times that agree; 1 where enough do."""
         both = self.both(variance)
-        return 1.0 if all(a.holds for a in both) else min(min(a.share, a.octaves) for a in both)
+        return 1.0 if all(a.holds_at_octaves for a in both) else min(min(a.share, a.octaves) for a in both)
 
     def choose(self, clouds: Sequence[Cloud]) -> Fitted:
         """Return the model to be reported: of greatest evidence, terms paid for, among those that agree with the

@@ -131,7 +131,7 @@ def level(x: Array) -> Array:
     return out
 
 
-def local_scale(z: Array, gone: NDArray[np.bool_]) -> Array:
+def local_scale(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -> Array:
     """Return the scatter of a series (n,), by the size that BULK of all samples do not exceed, wild ones among the
     others.
 
@@ -141,9 +141,10 @@ def local_scale(z: Array, gone: NDArray[np.bool_]) -> Array:
     n = z.size
     size = max(LOCAL, n // PARTS)
     if n < 2 * size:
-        return np.full(n, _bulk(z[~gone], n))
+        return np.full(n, _bulk(z[~(missing | wild)], int(np.count_nonzero(~missing))))
     edges = np.linspace(0, n, n // size + 1).astype(int)
-    found = np.array([_bulk(z[a:b][~gone[a:b]], b - a) for a, b in pairwise(edges.tolist())])
+    parts = [slice(a, b) for a, b in pairwise(edges.tolist())]
+    found = np.array([_bulk(z[s][~(missing | wild)[s]], int(np.count_nonzero(~missing[s]))) for s in parts])
     out: Array = np.interp(np.arange(n), 0.5 * (edges[1:] + edges[:-1]), found)
     return out
 
@@ -215,7 +216,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         y = _filled(x, missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
             z = P(y) / math.sqrt(P.diagonal)
-            fresh = _wildest(z, missing | wild) if find_wild else np.zeros(1, dtype=bool)
+            fresh = _wildest(z, missing, wild) if find_wild else np.zeros(1, dtype=bool)
             if not fresh.any():
                 break
             wild |= fresh
@@ -230,7 +231,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         lost = fft.dct(noise, norm="ortho") ** 2
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
-        excess = core_excess((z / local_scale(z, missing | wild))[~(missing | wild)]) / P.diagonal
+        excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
     white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
     return Completed(
@@ -250,10 +251,11 @@ def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:
     return y
 
 
-def _wildest(z: Array, gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _wildest(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which samples exceed the limit and all within three of them."""
+    gone = missing | wild
     size = np.abs(np.where(gone, 0.0, z))
-    scale = local_scale(z, gone)
+    scale = local_scale(z, missing, wild)
     if not np.all(scale > 0.0):  # most samples are the same
         return np.zeros(z.size, dtype=bool)
     size /= scale

@@ -158,11 +158,11 @@ class NoiseModel:
 
     def peaks(self) -> list[tuple[float, float, float]]:
         """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
-        out = []
+        out, tau0 = [], self.scale.tau0
         for t, q in split(*self.shape):
             if t.name in PEAKS:
                 width = 1.0 / math.pi if t.name == "resonance" else math.sqrt(2.0 * math.log(2.0)) / math.pi
-                frequency = math.exp(q[2]) / (2.0 * math.pi * self.scale.tau0)
-                wide = width / (math.exp(q[1]) * self.scale.tau0)
+                frequency = math.exp(q[2]) / (2.0 * math.pi * tau0)
+                wide = width / (math.exp(q[1]) * tau0)
                 out.append((frequency, wide, self.scale.size * math.exp(0.5 * q[0])))
         return out

@@ -98,7 +98,7 @@ def _second_poles(p: Array) -> tuple[Any, Any, Any]:
     """Return z1, z2 and the share a: covariance Re(a z1^h + (1 - a) z2^h) of a second-order low-pass, p: log omega_n,
     log zeta.
     """
-    w, zeta = np.exp(p[..., 0:1]), np.exp(p[..., 1:2])
+    w, zeta = np.exp(np.clip(p[..., 0:1], -15.0, 5.0)), np.exp(np.clip(p[..., 1:2], -5.0, 5.0))
     root = np.sqrt((zeta * zeta - 1.0 + 1e-9).astype(complex))
     s1, s2 = -w * (zeta - root), -w * (zeta + root)
     share = s2 / (s2 - s1)  # of the covariance, from that of white noise through 1/((s - s1)(s - s2))

@@ -11,12 +11,13 @@ from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoeffic
 FLICKER_TAU = 1e5  # s, or the length of the record: flicker begins at 0.46 / tau, below its first frequency
 FLICKER_LOW, FLICKER_HIGH = 0.46, 0.055 * 4.0**11  # over tau: from and to where the PSD is that of flicker
 ANGLE_TAU = 0.2  # of a sample: errors of readings one sample apart are correlated by e^-5 < 1 %
-#: noise of the part that is none of the five terms, or that the record has in them already
-OFF = ("markov", "pickoff")
 
 
-def gyro_noise(noise: NoiseCoefficients, interval: float, duration: float) -> dict[str, float]:
-    """Return parameters of ``floated_gyro`` by name, SI; interval, duration: s, of a sample and of the record.
+def gyro_noise(
+    noise: NoiseCoefficients, interval: float, duration: float, markov: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, float]:
+    """Return parameters of ``floated_gyro`` by name, SI; interval, duration: s, of a sample and of the record.  markov:
+    rms (rad/s) and correlation time (s) of its Gauss-Markov process, 0: none.
 
     A coefficient that the record does not determine is 0.  Flicker goes to half the sampling rate or, of more samples
     than 460,000, from the length of the record as far as the gyro has it, 5.7 decades.  The noise of a loop's current
@@ -35,7 +36,9 @@ def gyro_noise(noise: NoiseCoefficients, interval: float, duration: float) -> di
         "ramp": size(noise.R),
         "quantization": size(noise.Q),
         "quantization_tau": ANGLE_TAU * interval,
-        **dict.fromkeys(OFF, 0.0),
+        "markov": markov[0],
+        **({"markov_tau": markov[1]} if markov[0] else {}),
+        "pickoff": 0.0,  # the record has it in N and Q
     }
 
 

@@ -1,0 +1,84 @@
+"""Coverage of the noise model on simulated records: intervals of N, Gauss-Markov processes, K, Q; absent terms stated.
+
+    python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing]
+
+Truths are white noise through a low-pass or a mean, up to three Gauss-Markov processes, K, Q; unit time is a sample.
+wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
+missing: a tenth of the samples.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.fit import fit_noise
+
+TRUTHS: dict[str, dict[str, Any]] = {
+    "low-pass, one process, walk": {"N": 1.0, "lag": 0.56, "markov": [(0.05, 200.0)], "K": 3e-4},
+    "one process": {"N": 1.0, "markov": [(0.0444, 270.0)]},
+    "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
+    "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
+}
+
+
+def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Generator) -> Array:
+    """Return a record (n,) of a truth."""
+    x = truth["N"] * rng.normal(size=n + 500)
+    if "lag" in truth:
+        a = math.exp(-1.0 / truth["lag"])
+        x = lfilter([1.0 - a], [1.0, -a], x)
+    if count := truth.get("mean", 0):
+        x = lfilter(np.full(count, 1.0 / count), [1.0], x)
+    x = x[500:]
+    for sigma, tau in truth.get("markov", []):
+        a = math.exp(-1.0 / tau)
+        w = sigma * math.sqrt(1.0 - a * a) * rng.normal(size=n)
+        x = x + lfilter([1.0], [1.0, -a], w, zi=[a * sigma * rng.normal()])[0]
+    x = x + np.cumsum(truth.get("K", 0.0) * rng.normal(size=n)) + np.diff(truth.get("Q", 0.0) * rng.normal(size=n + 1))
+    sd = math.sqrt(0.5 * float(np.mean(np.diff(x) ** 2)))
+    if "wild" in kinds:
+        x = x + 20.0 * sd * rng.choice([-1.0, 1.0], n) * (rng.random(n) < 1e-3)
+    if "step" in kinds:
+        x = x + sd * (np.arange(n) > rng.integers(n // 10, 9 * n // 10))
+    if "line" in kinds:
+        x = x + 0.3 * sd * np.sin(2.0 * math.pi * 0.2317 * np.arange(n) + 1.0)
+    if "missing" in kinds:
+        x = np.where(rng.random(n) < 0.1, math.nan, x)
+    return np.asarray(x)
+
+
+def main(records: int, n: int, kinds: list[str]) -> None:
+    for name, truth in TRUTHS.items():
+        inside, stated = defaultdict(list), defaultdict(list)
+        agreed, began = [], time.process_time()
+        for i in range(records):
+            model = fit_noise(simulated(n, truth, kinds, np.random.default_rng([11, i, n])), 1.0, means=False)
+            agreed.append(model.agrees)
+            for term in "NBKRQ":
+                e, true = model[term], truth.get(term, 0.0)
+                inside[term].append(e.low <= true <= e.high)
+                stated[term].append(e.determined)
+            left = list(truth.get("markov", []))
+            for g in (g for g in model.processes if g.tau.determined):
+                if not left:
+                    stated["one process too many"].append(True)
+                    continue
+                sigma, tau = left.pop(min(range(len(left)), key=lambda k: abs(math.log(left[k][1] / g.tau.value))))
+                inside["sigma"].append(g.sigma.low <= sigma <= g.sigma.high)
+                inside["tau"].append(g.tau.low <= tau <= g.tau.high)
+        print(f"{name}, {n} samples {' '.join(kinds)}: agree {np.mean(agreed):.3f}, "
+              f"{(time.process_time() - began) / records:.2f} s")  # fmt: skip
+        print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} of {len(v)}" for k, v in inside.items()))
+        print("   stated:", ", ".join(f"{k} {np.sum(v) / records:.3f}" for k, v in stated.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(float(sys.argv[2])), sys.argv[3:])

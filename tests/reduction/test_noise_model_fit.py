@@ -1,0 +1,106 @@
+"""Noise model of a rate record: truth of simulated records, steps, wild samples, missing ones, a real record."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from gyrobench.reduction.noise_model.fit import fit_noise
+from gyrobench.reduction.noise_model.terms import Grid, Term
+from gyrobench.reduction.series.checks import SeriesError
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def markov(n: int, sigma: float, tau: float, rng: np.random.Generator) -> np.ndarray:
+    a = math.exp(-1.0 / tau)
+    start = [a * sigma * rng.normal()]
+    out: np.ndarray = lfilter([1.0], [1.0, -a], sigma * math.sqrt(1.0 - a * a) * rng.normal(size=n), zi=start)[0]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("term", "p", "expected"),
+    [
+        # sigma_A2 of means over m: white 1/m; quantization 3/m2; flicker 2 ln 2/pi; walk m/3 (1 + 1/(2 m2)) of instants
+        (Term("white"), [0.0], [1.0, 0.5, 0.25]),
+        (Term("quantization"), [0.0], [3.0, 0.75, 3.0 / 16.0]),
+        (Term("flicker"), [0.0], [0.441271] * 3),
+        (Term("walk"), [0.0], [0.5, 0.75, 1.375]),
+        # covariance 0.5^h: m = 1: 1 - 0.5; m = 2: (2 2 (1 + 0.5) - half of var of 4)/4 with var of four = 4 + 6 0.5 +
+        # 4 0.25 + 2 0.125 = 8.25: (4 3 - 8.25)/8
+        (Term("gauss_markov"), [0.0, math.log(1.0 / math.log(2.0))], [0.5, 3.75 / 8.0]),
+    ],
+)
+def test_allan_variances_by_hand(term: Term, p: list[float], expected: list[float]) -> None:
+    m = 2.0 ** np.arange(len(expected))
+    assert np.ravel(term.allan(np.array(p), m)) == pytest.approx(expected, rel=1e-5)
+
+
+def test_spectra_have_the_variance_of_a_sample() -> None:
+    """The mean of S over -pi..pi: of quantization 2, of Gauss-Markov drift 1, of white noise averaged over 4: 1/4."""
+    grid = Grid(math.pi * (np.arange(20_000) + 0.5) / 20_000)
+    for term, p, expected in (
+        (Term("quantization"), [0.0], 2.0),
+        (Term("gauss_markov"), [0.0, math.log(8.0)], 1.0),
+        (Term("white", "average"), [0.0, math.log(4.0)], 0.25),
+    ):
+        assert float(np.mean(term.spectrum(np.array(p), grid))) == pytest.approx(expected, rel=1e-3)
+
+
+def test_white_noise_through_a_filter_and_drift() -> None:
+    """Low-pass of 2 samples, Gauss-Markov drift of 0.3, 100 samples: N is that of the noise before the filter."""
+    rng = np.random.default_rng(1)
+    n, a = 40_000, math.exp(-0.5)
+    x = lfilter([1.0 - a], [1.0, -a], rng.normal(size=n)) + markov(n, 0.3, 100.0, rng)
+    model = fit_noise(3.0 + 2.0 * x, 0.01, means=False)
+    assert model.agrees and model["N"].determined and model["N"].low < 2.0 * 0.1 < model["N"].high
+    assert model["N"].high / model["N"].low < 1.1
+    (process,) = (g for g in model.processes if g.tau.determined)
+    assert process.sigma.low < 0.6 < process.sigma.high and process.tau.low < 1.0 < process.tau.high
+    assert not any(model[name].determined for name in "BKRQ")
+    phi, w = process.discrete(0.01)
+    assert w**2 / (1.0 - phi**2) == pytest.approx(process.sigma.value**2)
+
+
+def test_steps_wild_and_missing_samples() -> None:
+    """A step of 1, 20 samples off by 20, a twentieth missing: N of the rest; with the wild ones N2 is 1 + 0.001 400."""
+    rng = np.random.default_rng(3)
+    n = 20_000
+    x = rng.normal(size=n)
+    x[8000:] += 1.0
+    wild = np.sort(rng.choice(n, 20, replace=False))
+    x[wild] += 20.0
+    x[np.setdiff1d(rng.choice(n, n // 20, replace=False), wild)] = np.nan
+    model = fit_noise(x, 1.0)
+    assert model["N"].low < 1.0 < model["N"].high and model["N"].high < 1.05
+    assert set(wild) <= set(model.treatment.wild.tolist()) and model.treatment.wild.size <= 21
+    assert model.with_wild["N"] == pytest.approx(math.sqrt(1.4), rel=0.05)
+    (step,) = model.steps
+    assert abs(step.at - 8000) < 50 and step.size == pytest.approx(1.0, abs=4.0 * step.u) and step.u < 0.05
+    assert model.agrees, "with what was taken out the deviation is that of the record as it was"
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(SeriesError, match="constant"):
+        fit_noise(np.ones(1000), 1.0)
+    with pytest.raises(SeriesError, match="no stretch of 64 samples"):
+        fit_noise(np.full(1000, np.nan), 1.0)
+    with pytest.raises(ValueError, match="must be positive"):
+        fit_noise(np.arange(100.0), 0.0)
+
+
+def test_a_real_gyro() -> None:
+    """ADIS16405, 100 Hz: data sheet 2 deg/sqrt(h) and 25 deg/h; a tenth of a million samples keep the test short."""
+    file = DATA / "adis16405_unit1.parquet"
+    if not file.is_file():
+        pytest.skip("no folder ../shared/data with real records beside the checkout")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    x = parquet.read_table(file)["gyro_x"].to_numpy()[:200_000].astype(float)
+    model = fit_noise(3600.0 * x, 0.01, means=False)  # deg/h
+    assert model.agrees and model["N"].value / 60.0 == pytest.approx(2.0, rel=0.3)
+    assert model["B"].high < 100.0 and model.filter_words()
