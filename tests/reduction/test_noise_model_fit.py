@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model.fit import fit_noise
-from gyrobench.reduction.noise_model.terms import Grid, Term
+from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -27,16 +27,16 @@ def markov(n: int, sigma: float, tau: float, rng: np.random.Generator) -> np.nda
     ("term", "p", "expected"),
     [
         # sigma_A2 of means over m: white 1/m; quantization 3/m2; flicker 2 ln 2/pi; walk m/3 (1 + 1/(2 m2)) of instants
-        (Term("white"), [0.0], [1.0, 0.5, 0.25]),
-        (Term("quantization"), [0.0], [3.0, 0.75, 3.0 / 16.0]),
-        (Term("flicker"), [0.0], [0.441271] * 3),
-        (Term("walk"), [0.0], [0.5, 0.75, 1.375]),
+        (NoiseTerm("white"), [0.0], [1.0, 0.5, 0.25]),
+        (NoiseTerm("quantization"), [0.0], [3.0, 0.75, 3.0 / 16.0]),
+        (NoiseTerm("flicker"), [0.0], [0.441271] * 3),
+        (NoiseTerm("walk"), [0.0], [0.5, 0.75, 1.375]),
         # covariance 0.5^h: m = 1: 1 - 0.5; m = 2: (2 2 (1 + 0.5) - half of var of 4)/4 with var of four = 4 + 6 0.5 +
         # 4 0.25 + 2 0.125 = 8.25: (4 3 - 8.25)/8
-        (Term("gauss_markov"), [0.0, math.log(1.0 / math.log(2.0))], [0.5, 3.75 / 8.0]),
+        (NoiseTerm("gauss_markov"), [0.0, math.log(1.0 / math.log(2.0))], [0.5, 3.75 / 8.0]),
     ],
 )
-def test_allan_variances_by_hand(term: Term, p: list[float], expected: list[float]) -> None:
+def test_allan_variances_by_hand(term: NoiseTerm, p: list[float], expected: list[float]) -> None:
     m = 2.0 ** np.arange(len(expected))
     assert np.ravel(term.allan(np.array(p), m)) == pytest.approx(expected, rel=1e-5)
 
@@ -45,9 +45,9 @@ def test_spectra_have_the_variance_of_a_sample() -> None:
     """The mean of S over -pi..pi: of quantization 2, of Gauss-Markov drift 1, of white noise averaged over 4: 1/4."""
     grid = Grid(math.pi * (np.arange(20_000) + 0.5) / 20_000)
     for term, p, expected in (
-        (Term("quantization"), [0.0], 2.0),
-        (Term("gauss_markov"), [0.0, math.log(8.0)], 1.0),
-        (Term("white", "average"), [0.0, math.log(4.0)], 0.25),
+        (NoiseTerm("quantization"), [0.0], 2.0),
+        (NoiseTerm("gauss_markov"), [0.0, math.log(8.0)], 1.0),
+        (NoiseTerm("white", "average"), [0.0, math.log(4.0)], 0.25),
     ):
         assert float(np.mean(term.spectrum(np.array(p), grid))) == pytest.approx(expected, rel=1e-3)
 

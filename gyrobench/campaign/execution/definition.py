@@ -95,7 +95,7 @@ class CampaignFile(BaseModel):
     data: File | list[File] | None = None
     step: float | str | None = None
     check_step: bool | None = None
-    fixed_design: bool = False
+    fixed_design: Any = False  # Definition checks it
     spec: File | None = None
     keep: Text = "failures"
     time_limit: float | str = "1h"

@@ -191,5 +191,5 @@ AFTER: dict[str, Callable[[Reader, Done], None]] = {
     r"site CAMPAIGN": site,
     r"run tumble\.ssp": archive,
     r"compare alone stated corrected": corrected,
-    r"--out (first|judged)$": usable,
+    r"run tumble_single_axis .*--out (first|judged)$": usable,
 }

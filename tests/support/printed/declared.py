@@ -42,11 +42,17 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.record.record import Record
+from gyrobench.reduction.toolkit import DriftReduction, SiteSetup
 from gyrobench.result import Result, Specification
 from gyrobench.system.families.option_groups import SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option
+
+
+class MySetup(SiteSetup):
+    pass
+
 
 """,
     "report.write(result": """\
