@@ -22,9 +22,8 @@ MOVED = "imu_tk"  # records of moved instruments
 
 
 def main(folder: Path, parts: list[str]) -> None:
-    print(
-        "| record | channel | samples | within, as recorded | cleaned | stated | N / (unit·√s) | wild | steps | lines | CPU / s |"
-    )
+    head = "record | channel | samples | within, as recorded | cleaned | stated | N / (unit·√s) | wild | steps | lines"
+    print(f"| {head} | CPU / s |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for file in sorted(folder.glob("*.parquet")):
         if MOVED in file.name or (parts and not any(p in file.name for p in parts)):

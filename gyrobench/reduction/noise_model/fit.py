@@ -232,7 +232,7 @@ class _Judge:
 
 # ------------------------------------------------------------------ figures of the draws
 def _coefficient(name: str, at: Fitted, found: Search, clouds: Sequence[Cloud]) -> Estimate:
-    """Return a coefficient in units of the record: value of the model that is reported, interval of all draws with it."""
+    """Return a coefficient in units of the fit: value of the model that is reported, interval of all draws with it."""
     figure = size_of(CALLED[name])
     values, weights = weighted(clouds, figure)
     if not values.size:

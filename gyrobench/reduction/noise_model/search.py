@@ -240,7 +240,7 @@ class Search:
         return found
 
     def add_resonances(self) -> None:
-        """Add resonances while the powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
+        """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
         while len(self.resonances) < MOST_RESONANCES:
             at = self.best
             start = self.peak(at)

@@ -110,7 +110,7 @@ class Treated:
 
 
 def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
-    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long`` samples."""
+    """Return the stretches of a rate (n,), NaN in gaps, of SHORTEST samples or more, without a gap of ``long``."""
     there = np.flatnonzero(np.isfinite(rate))
     if not there.size:
         return []
@@ -151,7 +151,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
-    """Return the sines (n,) of the frequencies (per sample) of least squares in the samples used, with level and slope."""
+    """Return the sines (n,) of the frequencies (per sample), of least squares beside level and slope."""
     n, count = y.size, frequencies.size
     if not count:
         return np.zeros(n)
