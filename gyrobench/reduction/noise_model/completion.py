@@ -141,10 +141,10 @@ def local_scale(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -
     n = z.size
     size = max(LOCAL, n // PARTS)
     if n < 2 * size:
-        return np.full(n, _bulk(z[~(missing | wild)], np.count_nonzero(~missing)))
+        return np.full(n, _bulk(z[~(missing | wild)], int(np.count_nonzero(~missing))))
     edges = np.linspace(0, n, n // size + 1).astype(int)
     parts = [slice(a, b) for a, b in pairwise(edges.tolist())]
-    found = np.array([_bulk(z[s][~(missing | wild)[s]], np.count_nonzero(~missing[s])) for s in parts])
+    found = np.array([_bulk(z[s][~(missing | wild)[s]], int(np.count_nonzero(~missing[s]))) for s in parts])
     out: Array = np.interp(np.arange(n), 0.5 * (edges[1:] + edges[:-1]), found)
     return out
 
