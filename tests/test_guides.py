@@ -137,7 +137,7 @@ def test_your_own_drift_record(command: Callable[[str], None], tmp_path: Path) -
         assert c.no_value or float(estimate) == pytest.approx(c.estimate, rel=0.006)
         if truth != "–":  # N is just outside, as the page says
             assert printed[0] <= 1.01 * float(truth) <= 1.01 * printed[1], "the interval holds the true value"
-    (slope,) = result.columns[0].tables["regression"][0]["rows"]
+    (slope,) = result.columns[0].tables["regression"][0].rows
     assert f"explains {slope[1]:.4f}".rstrip("0") in page and abs(slope[1] - 0.05) < 2.0 * slope[2]
     assert (GUIDES / "drift_record" / "gyro.csv").stat().st_size < 300_000
     values = tomllib.loads((tmp_path / "fitted" / "floated_gyro.toml").read_text(encoding="utf-8"))["gyro"]
