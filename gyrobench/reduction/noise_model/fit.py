@@ -247,7 +247,7 @@ def _coefficient(name: str, at: Fitted, found: Search, clouds: Sequence[Cloud]) 
         having = [(c, v) for c in clouds if (v := figure(c.model, c.p)) is not None]
         most = max(float(c.weight.sum()) for c, _ in having)
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
-        return Estimate(0.0, 0.0, max(high, *(math.exp(0.5 * e) for e in ends)), False)
+        return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
     return Estimate(value, min(low, value), max(high, value), True)
 
