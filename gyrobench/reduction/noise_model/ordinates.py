@@ -260,13 +260,13 @@ def _factor(low: Array) -> Array:
     no number is a variance that nothing has.
     """
     try:
-        return np.linalg.cholesky(low)
+        return np.asarray(np.linalg.cholesky(low), dtype=float)
     except np.linalg.LinAlgError:
         sound = np.isfinite(low).all(axis=(-2, -1), keepdims=True)
         values, vectors = np.linalg.eigh(np.where(sound, low, HUGE * np.eye(LOW)))
         values = np.maximum(values, 1e-9 * np.abs(values).max(axis=-1, keepdims=True))
         lifted = vectors * values[..., None, :] @ np.swapaxes(vectors, -1, -2)
-        return np.linalg.cholesky(lifted)
+        return np.asarray(np.linalg.cholesky(lifted), dtype=float)
 
 
 def split(model: Model, p: Array) -> list[tuple[Term, Array]]:
