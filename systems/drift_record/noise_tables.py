@@ -34,6 +34,8 @@ def range_text(e: Estimate, si: float = 1.0) -> str:
 
 def absent(term: str, noise: NoiseModel) -> str:
     """Return why a coefficient has no value, and what stands in its place."""
+    if term == "K" and any(t.name == "walk" for t in noise.shape[0]):
+        return "not determined: the record does not tell a random walk from slow Gauss-Markov drift"
     if term in ("B", "K") and noise.processes:
         of = ", ".join(f"{number(g.tau.value)} s" for g in noise.processes)
         return f"not determined: slow drift here is Gauss-Markov, correlation time {of}"

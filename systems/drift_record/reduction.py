@@ -147,7 +147,7 @@ def _stated(
     a: Analysed, name: str, meaning: str, unit: str, e: Estimate, si: float, why: str, truth: float | None,
     relative: float,
 ) -> Coefficient:  # fmt: skip
-    """Return a coefficient with its interval; without a value where there is none or the model is not right."""
+    """Return a coefficient with its interval; without a value where ``why`` says why, or the model is not right."""
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not a.noise.agrees:

@@ -31,8 +31,8 @@ def markov(n: int, sigma: float, tau: float, rng: np.random.Generator) -> np.nda
         (NoiseTerm("quantization"), [0.0], [3.0, 0.75, 3.0 / 16.0]),
         (NoiseTerm("flicker"), [0.0], [0.441271] * 3),
         (NoiseTerm("walk"), [0.0], [0.5, 0.75, 1.375]),
-        # covariance 0.5^h: m = 1: 1 - 0.5; m = 2: (2 2 (1 + 0.5) - half of var of 4)/4 with var of four = 4 + 6 0.5 +
-        # 4 0.25 + 2 0.125 = 8.25: (4 3 - 8.25)/8
+        # covariance 0.5^h: m = 1: 1 - 0.5; m = 2: (4 var of two - var of four)/8, var of two = 2 + 2 0.5 = 3, of four
+        # = 4 + 6 0.5 + 4 0.25 + 2 0.125 = 8.25
         (NoiseTerm("gauss_markov"), [0.0, math.log(1.0 / math.log(2.0))], [0.5, 3.75 / 8.0]),
     ],
 )
@@ -42,7 +42,7 @@ def test_allan_variances_by_hand(term: NoiseTerm, p: list[float], expected: list
 
 
 def test_spectra_have_the_variance_of_a_sample() -> None:
-    """The mean of S over -pi..pi: of quantization 2, of Gauss-Markov drift 1, of white noise averaged over 4: 1/4."""
+    """The mean of S over -pi..pi: quantization 2, a Gauss-Markov process 1, white noise over 4 samples 1/4."""
     grid = Grid(math.pi * (np.arange(20_000) + 0.5) / 20_000)
     for term, p, expected in (
         (NoiseTerm("quantization"), [0.0], 2.0),
@@ -53,7 +53,7 @@ def test_spectra_have_the_variance_of_a_sample() -> None:
 
 
 def test_white_noise_through_a_filter_and_drift() -> None:
-    """Low-pass of 2 samples, Gauss-Markov drift of 0.3, 100 samples: N is that of the noise before the filter."""
+    """Low-pass of 2 samples, Gauss-Markov drift of 0.3 and 100 samples: N is of the white noise unfiltered."""
     rng = np.random.default_rng(1)
     n, a = 40_000, math.exp(-0.5)
     x = lfilter([1.0 - a], [1.0, -a], rng.normal(size=n)) + markov(n, 0.3, 100.0, rng)

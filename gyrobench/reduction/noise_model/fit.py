@@ -36,6 +36,7 @@ from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 ABSENT = 0.025  # probability of its absence below which a term is determined
+WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
 STEPS = 5
@@ -232,7 +233,7 @@ class _Judge:
 
 # ------------------------------------------------------------------ figures of the draws
 def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
-    """Return a coefficient in units of the record: value of the model reported, interval of all draws."""
+    """Return a coefficient in units of the fit: value of the model that is reported, interval of all draws with it."""
     figure = size_of(CALLED[name])
     values, weights = weighted(clouds, figure)
     if not values.size:
@@ -242,8 +243,11 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
-    if own is None or absent > ABSENT:
-        return Estimate(0.0, 0.0, high, False)
+    if own is None or absent > ABSENT:  # below what any model of weight with the term allows
+        having = [(c, v) for c in clouds if (v := figure(c.model, c.p)) is not None]
+        most = max(float(c.weight.sum()) for c, _ in having)
+        ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
+        return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
     return Estimate(value, min(low, value), max(high, value), True)
 

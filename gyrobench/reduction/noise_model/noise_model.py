@@ -51,7 +51,7 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Scale:
-    """Units of a fit: tau0 of a sample, s, size and level of the rate; means: a sample is one over tau0."""
+    """Units of a fit: interval tau0 of a sample, s, size and level of the rate; means: samples are means over tau0."""
 
     tau0: float
     size: float

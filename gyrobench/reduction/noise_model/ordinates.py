@@ -31,6 +31,7 @@ from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicke
 LOW = 16  # first ordinates of each parity that are kept singly
 WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
 SHORTEST = 64  # samples of a stretch
+HUGE = 1e30
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
 Model = tuple[NoiseTerm, ...]
@@ -255,14 +256,17 @@ class Ordinates:
 
 
 def _factor(low: Array) -> Array:
-    """Return the Cholesky factors of covariances (..., LOW, LOW); rounding that makes one indefinite is lifted."""
-    size = np.trace(low, axis1=-2, axis2=-1)[..., None, None] / LOW * np.eye(LOW)
-    for bump in (0.0, 1e-9, 1e-6, 1e-3, 1.0):
-        try:
-            return np.linalg.cholesky(low + bump * size)
-        except np.linalg.LinAlgError:
-            continue
-    raise AssertionError("a covariance is indefinite by more than its size")
+    """Return the Cholesky factors of covariances (..., LOW, LOW); rounding that makes one indefinite is lifted, what is
+    no number is a variance that nothing has.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(low), dtype=float)
+    except np.linalg.LinAlgError:
+        sound = np.isfinite(low).all(axis=(-2, -1), keepdims=True)
+        values, vectors = np.linalg.eigh(np.where(sound, low, HUGE * np.eye(LOW)))
+        values = np.maximum(values, 1e-9 * np.abs(values).max(axis=-1, keepdims=True))
+        lifted = vectors * values[..., None, :] @ np.swapaxes(vectors, -1, -2)
+        return np.asarray(np.linalg.cholesky(lifted), dtype=float)
 
 
 def split(model: Model, p: Array) -> list[tuple[NoiseTerm, Array]]:

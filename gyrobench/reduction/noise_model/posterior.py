@@ -103,7 +103,9 @@ def weighted(clouds: Sequence[Cloud], figure: Callable[[Model, Array], Array | N
 
 
 def quantile(values: Array, weights: Array, share: float) -> float:
-    """Return the weighted quantile of values (M,)."""
+    """Return the weighted quantile of values (M,); of models that all lack weight, each draw counts the same."""
+    if not weights.sum() > 0.0:
+        weights = np.ones_like(weights)
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     at = (reached - 0.5 * weights[order]) / reached[-1]

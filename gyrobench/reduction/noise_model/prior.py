@@ -16,10 +16,6 @@ GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum
 FEWEST = 12.0  # ordinates of a group
 SHORTEST_TAU = 6.0  # samples, of a Gauss-Markov process: what is faster is the filter
 APART = math.log(3.0)  # least distance of the logarithms of two tau: nearer ones are one process to any record
-#: what a term costs beside the prior of its parameters, of the logarithm of the evidence: the ranges of sigma and tau
-#: are wider than anybody expects, so a Gauss-Markov process costs less
-TERM = {"gauss_markov": -1.5}
-OTHER = 1.0
 #: logarithms of the least and largest value of the parameters of filters; their prior is even
 FILTERS = {
     "first": [(0.05, 30.0)],
@@ -95,7 +91,7 @@ class Prior:
         """Return the logarithm of the prior density (M,) of parameters (M, q), steep walls instead of ends."""
         low, high = self.bounds(model)
         beyond = np.maximum(p - high, 0.0) + np.maximum(low - p, 0.0)
-        out = -HARD * np.sum(beyond**2, axis=-1) - sum(TERM.get(t.name, OTHER) for t in model)
+        out = -HARD * np.sum(beyond**2, axis=-1)
         taus = []
         for term, q in split(model, p):
             if term.name in PEAKS:  # anywhere

@@ -151,7 +151,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
-    """Return the sines (n,) of the frequencies (per sample) by least squares in the samples used, beside a line."""
+    """Return the sines (n,) of the frequencies (per sample), of least squares beside level and slope."""
     n, count = y.size, frequencies.size
     if not count:
         return np.zeros(n)
