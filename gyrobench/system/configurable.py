@@ -144,8 +144,8 @@ def load_configurable(name: str, bench: Path | None = None) -> Configurable:
     check_attributes(classes[0], base, file, {"options": Option})
     with blamed(file):
         loaded = classes[0]()
+        loaded.name, loaded.folder = name, folder
         lacks = loaded.unfinished()
-    loaded.name, loaded.folder = name, folder
     if lacks:
         raise InvalidConfigurationError(name, [f"{file}: {lack}" for lack in lacks])
     return loaded

@@ -197,7 +197,7 @@ def test_a_floated_gyro_on_its_servo_table_is_compensated() -> None:
         c = run(system, seed=3).channels
         late = np.asarray(c["time"]) > 60.0
         found[name] = {n: np.asarray(x)[late] for n, x in c.items()}
-    m = closed_form().Model(10.0 * DPH, 100.0, 0.05, 0.06 * ARCSEC)
+    m = closed_form().CompensatedDrift(10.0 * DPH, 100.0, 0.05, 0.06 * ARCSEC)
     expected = closed_form().expected(m, m, 1.0, 300, 10.0)
     rms = lambda x: float(np.sqrt(np.mean(np.square(x))))  # noqa: E731
     assert np.array_equal(found["with"]["gyro.drift"], found["without"]["gyro.drift"])

@@ -148,7 +148,7 @@ def test_part_of_a_turn_is_enough_for_least_squares(day: Any, degrees: float) ->
     assert result.rank == 9
     for c in result.coefficients:
         assert c.closed is None and abs(c.estimate - c.truth) < 1e-6, c.name
-    assert [h["n"] for h in result.harmonics if h["n"] < 3] == []
+    assert [h.n for h in result.harmonics if h.n < 3] == []
     assert any("harmonics want a whole turn; polar S turned by" in w for w in result.warnings)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
@@ -99,10 +99,14 @@ class DriftReduction(Generic[S]):
     @classmethod
     def reduce(cls, windows: Mapping[str, Array], setup: S) -> DriftTestResult:
         """Return what the windows of a record say.  Raises ReductionError with everything that is wrong."""
+        return cls._checked(windows, setup).result()
+
+    @classmethod
+    def _checked(cls, windows: Mapping[str, Array], setup: S) -> Self:
         test = cls(windows, setup)
-        if problems := test.problems():
+        if problems := test.problems():  # many set what the regression reads
             raise ReductionError(problems)
-        return test.result()
+        return test
 
     def result(self) -> DriftTestResult:
         """Return what the data say, without the checks of :meth:`problems`."""
@@ -140,4 +144,4 @@ class DriftReduction(Generic[S]):
         base = DriftReduction.of_record.__func__, DriftReduction.reduce.__func__  # type: ignore[attr-defined]
         if own != base or cls.regression is DriftReduction.regression:
             return None
-        return lambda record: cls(record.windows, cls.setup_of(record.run)).regression()
+        return lambda record: cls._checked(record.windows, cls.setup_of(record.run)).regression()
