@@ -15,6 +15,8 @@ import tempfile
 import time
 import zipfile
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +109,17 @@ def logged(run: Callable[..., Any], *args: Any, **options: Any) -> tuple[Any, li
             errors.append(text)
 
     return run(*args, **options, logger=logger), errors
+
+
+def apart(file: Path, **options: Any) -> tuple[Any, list[str]]:
+    """Return what FMPy gives of a container, and the errors that it logs, from a process of its own.
+
+    A container is a foreign library that loads others; where it crashes it would take the tests' process with it.
+    """
+    from fmpy import simulate_fmu
+
+    with ProcessPoolExecutor(1, get_context("spawn")) as process:
+        return process.submit(logged, simulate_fmu, str(file), **options).result()
 
 
 def one_fmu(file: Path, names: Names, step: float, steps: int, every: int) -> Series:
