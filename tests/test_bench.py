@@ -307,10 +307,6 @@ def test_no_two_modules_of_one_name() -> None:
     assert len(set(names)) == len(names), sorted({n for n in names if names.count(n) > 1})
 
 
-#: public classes whose name another class has; one that is renamed leaves the list
-NAMED_TWICE = {"GaussMarkov", "Site"}  # a part, or a block of parts, and what a reduction calls so
-
-
 def test_no_two_public_classes_of_one_name() -> None:
     places: dict[str, list[str]] = {}
     bench = standard_folder()
@@ -321,9 +317,7 @@ def test_no_two_public_classes_of_one_name() -> None:
                     places.setdefault(node.name, []).append(f"{top.name}/{file.relative_to(top)}")
     assert len(places) > 500, "the classes are read"
     twice = {name: files for name, files in places.items() if len(files) > 1}
-    new = {name: files for name, files in twice.items() if name not in NAMED_TWICE}
-    assert not new, f"two classes of one name: {new}"
-    assert set(twice) == NAMED_TWICE, f"no longer named twice: {NAMED_TWICE - set(twice)}"
+    assert not twice, f"two classes of one name: {twice}"
 
 
 def test_docstrings_open_with_what_is_returned_or_done() -> None:

@@ -13,7 +13,7 @@ from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import Sentence, plus_minus, told
-from gyrobench.reduction.setup.run_metadata import Site, number, truth_of
+from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, Setup, SiteSetup, attitude_of
 from gyrobench.reduction.setup.sources import Effect, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
@@ -29,6 +29,7 @@ __all__ = [
     "Effect",
     "Findings",
     "Group",
+    "Location",
     "Quantity",
     "Reason",
     "RebalanceSetup",
@@ -38,7 +39,6 @@ __all__ = [
     "RunDocument",
     "Sentence",
     "Setup",
-    "Site",
     "SiteSetup",
     "Source",
     "Table",

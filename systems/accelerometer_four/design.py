@@ -13,7 +13,7 @@ from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
@@ -38,7 +38,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
                float(system["dwell"]), 0.5)
         for n, t in each
     ]  # fmt: skip
-    gamma = Site.of(record.run).gravity / G0
+    gamma = Location.of(record.run).gravity / G0
     white = np.array([float(p[f"accelerometer_{i}.white"]) for i in geometry.SENSORS])
     scale = np.array([float(p[f"accelerometer_{i}.K_I"]) for i in geometry.SENSORS])
     names = tuple(f"{k},{i}" for i in geometry.SENSORS for k in geometry.TERMS)

@@ -29,13 +29,13 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Reason,
     ReductionError,
     Regression,
     RunDocument,
     Setup,
-    Site,
     Source,
     Table,
     told,
@@ -85,7 +85,7 @@ class Reduction(DriftReduction[FourSetup]):
     @classmethod
     def setup_of(cls, run: RunDocument) -> FourSetup:
         o = run.options
-        gravity = float(o["gravity"]) if run.measured else Site.of(run).gravity
+        gravity = float(o["gravity"]) if run.measured else Location.of(run).gravity
         D1 = None if o.get("d1_unknown") else (float(o["D1c"]), float(o["D1s"]))
         site = {"gravity / (m/s²)": gravity}
         return FourSetup.of(run, gravity=gravity, points=int(o["points"]), truth=sensor_truth(run), D1=D1, site=site)
@@ -265,7 +265,7 @@ def sensor_truth(run: RunDocument) -> dict[str, float] | None:
     if run.measured or not all(f"accelerometer_{i}.K_I" in p for i in geometry.SENSORS):
         return None
     zero = float(np.mean(np.asarray(p["table.error"])[: int(run.options["points"])]))
-    site = Site.of(run)
+    site = Location.of(run)
     found: dict[str, float] = {}
     for i in geometry.SENSORS:
         F, I, O, IO, II = (float(p[f"accelerometer_{i}.{k}"]) for k in geometry.TERMS)  # noqa: E741

@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench.design.visit_protocol import Channel, DataNoise, VisitProtocol, phases_of
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
@@ -34,7 +34,7 @@ def protocol_of(system: System, record: Record) -> VisitProtocol:
     mount = np.repeat(np.array(mounts), STATIONS)
     angle = np.tile(np.arange(STATIONS) * TURN / STATIONS, len(mounts))
     zeros = {m: geometry.zero_angle(m, p["accelerometer.mount"]) for m in mounts}
-    model, gamma = Polynomial(mounts, False), Site.of(record.run).gravity / G0
+    model, gamma = Polynomial(mounts, False), Location.of(record.run).gravity / G0
     k = np.array([float(p[f"accelerometer.{n}"]) for n in model.terms])
     v = Visits(mount, angle, angle, angle, np.zeros_like(angle), math.nan)
     slopes = model.slopes(v, zeros, gamma, k)

@@ -33,12 +33,12 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Reason,
     ReductionError,
     Regression,
     RunDocument,
-    Site,
     Table,
     number,
     told,
@@ -85,7 +85,7 @@ class Reduction(DriftReduction[MultipointSetup]):
     @classmethod
     def setup_of(cls, run: RunDocument) -> MultipointSetup:
         """Return the setup that a run.json describes.  Truth only where the accelerometer has the coefficients."""
-        site = Site.of(run)
+        site = Location.of(run)
         mounts = {p: row.face for p, row in phases(run, ("a", "b")).items()}
         truth, zeros = truth_of(run, KS, "accelerometer"), None
         if truth is not None and set(truth) == set(KS):

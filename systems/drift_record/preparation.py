@@ -85,7 +85,7 @@ def columns_of(record: Record) -> Columns:
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
     k = run_metadata.number(run, "k", "gyro.k", "torquer scale factor")
-    site = run_metadata.Site.of(run)
+    site = run_metadata.Location.of(run)
     input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
     rate = input_rate - k * np.asarray(w["mean"], dtype=float)
     step = float(np.mean(np.asarray(w["t_end"]) - np.asarray(w["t_start"])))

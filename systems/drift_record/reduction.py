@@ -86,7 +86,7 @@ def from_record(record: Record) -> DriftRecordResult:
         reasons=[r for a in analysed for r in _reasons(a, run, several)],
         summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
         instrument=run.instrument,
-        site={} if run.measured else run_metadata.Site.of(run).shown(),
+        site={} if run.measured else run_metadata.Location.of(run).shown(),
         simulated=not run.measured,
         columns=[_column(a, run) for a in analysed],
     )  # fmt: skip

@@ -34,13 +34,13 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Reason,
     Record,
     ReductionError,
     Regression,
     RunDocument,
-    Site,
     SiteSetup,
     Source,
     Table,
@@ -377,7 +377,7 @@ def method_of(run: RunDocument) -> str:
 def _truth(run: RunDocument) -> dict[str, float] | None:
     if run.measured:
         return None
-    site, p = Site.of(run), run.parameters
+    site, p = Location.of(run), run.parameters
     truth = {"ψ": float(run.options["heading"]), "A": site.earth_rate * math.cos(site.latitude)}
     if "gyro.bias" in p and not np.any(np.asarray(p.get("gyro.ramp", 0.0))):
         truth["b"] = float(np.asarray(p["gyro.bias"])[1])

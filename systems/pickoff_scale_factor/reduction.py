@@ -43,6 +43,7 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Reason,
     Record,
@@ -50,7 +51,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     Setup,
-    Site,
     Source,
     told,
     truth_of,
@@ -248,7 +248,7 @@ reduce = Reduction.reduce
 def setup_of(record: Record) -> PickoffSetup:
     """Return the setup that the run.json of a record describes: options and the parameters of the gyro."""
     run, options = record.run, record.run.options
-    site = Site.of(run)
+    site = Location.of(run)
     known = truth_of(run, ("H", "C", "K_sg"))
     gain = float(options.get("gain") or 0.0)
     truth: dict[str, float] | None = None

@@ -16,7 +16,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, MeasureReduction, told
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 
 from . import plans, shown
 from .record import Alignment, AlignmentColumns
@@ -63,7 +63,7 @@ class Reduction(MeasureReduction):
         found.tables += shown.tables(self.a)
         hit = ", ".join(slot for slot, limited in self.limited.items() if np.any(limited))
         found.warn("limit", f"At a limit during the run: {hit}. The alignment took longer for it." if hit else "")
-        found.facts["site"] = Site.of(self.run).shown()
+        found.facts["site"] = Location.of(self.run).shown()
         return Account(
             method="Levelling, coarse heading and gyrocompass by the platform's own gyros and accelerometers; standard "
             "deviations of the linear error model in closed loop",

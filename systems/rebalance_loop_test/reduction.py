@@ -42,11 +42,11 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Reason,
     Regression,
     RunDocument,
-    Site,
     SiteSetup,
     Source,
     Table,
@@ -119,7 +119,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             labels={n: row.label if row.face == FACE else f"{row.label}, phase {n}" for n, row in plan.items()},
             rest=frozenset(n for n, row in plan.items() if row.mode == "hold"),
             limit=float(p.get("rebalance.I") or p.get("rebalance.i_max") or 0.0),
-            truth=true_values(p, k, Site.of(run).g, largest / k),
+            truth=true_values(p, k, Location.of(run).g, largest / k),
         )  # fmt: skip
 
     def problems(self) -> list[str]:

@@ -19,7 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 
 FOUR = ("D_F", "D_I", "D_S", "D_IS")
 ROUTES = ("dwells", "equal", "combination")
@@ -60,7 +60,7 @@ class PolarModel:
             gone = {"D_II"}
         return cls(names, tuple(n for n in names if n not in gone), mixed, equal)
 
-    def columns(self, held: servo_regression.HeldWindows, site: Site) -> Array:
+    def columns(self, held: servo_regression.HeldWindows, site: Location) -> Array:
         """Return the columns (n, len(fitted)) of windows."""
         X = servo_regression.design(held, site, self.names)
         if self.equal:
@@ -68,7 +68,7 @@ class PolarModel:
         return X[:, [self.names.index(n) for n in self.fitted]]
 
     def quantities(
-        self, site: Site, truth: Mapping[str, float] | None, book: Mapping[str, float]
+        self, site: Location, truth: Mapping[str, float] | None, book: Mapping[str, float]
     ) -> tuple[list[Quantity], list[Quantity]]:
         """Return the quantities of what is fitted, and of what is reported."""
         share = site.g * math.sin(site.latitude)

@@ -14,7 +14,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, on_servo_table
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.units import DPH
 
 from .model import ROUTES, PolarModel
@@ -38,7 +38,7 @@ def held(
 def examine(latitude: float, phases: Sequence[str], names: tuple[str, ...], g: float = 1.0) -> regression.Design:
     """Return what phases at a latitude can tell apart: rank, condition, lost combinations."""
     windows, _ = held(latitude, phases)
-    return regression.examine(servo_regression.design(windows, Site(latitude, g * 9.80665), names), names)
+    return regression.examine(servo_regression.design(windows, Location(latitude, g * 9.80665), names), names)
 
 
 def latitude_problems(latitude: float) -> list[str]:
@@ -53,7 +53,7 @@ def latitude_problems(latitude: float) -> list[str]:
     where = f"latitude {math.degrees(latitude):.4g}° (10° to 80° north or south is possible): "
     if found.short:
         return [f"{where}{found.weakness}"]
-    X = servo_regression.design(held(latitude, phases)[0], Site(latitude, 9.80665), names)
+    X = servo_regression.design(held(latitude, phases)[0], Location(latitude, 9.80665), names)
     return [f"{where}condition {np.linalg.cond(X):.3g}, least determined: {found.weakest}"]
 
 

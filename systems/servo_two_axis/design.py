@@ -25,7 +25,7 @@ from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.visit_protocol import DataNoise, gyro_noise, gyro_unseen
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
@@ -67,7 +67,7 @@ class TestModel:
     """
 
     own: tuple[int, ...]
-    site: Site
+    site: Location
     terms: int
     window: float
     settle: float
@@ -105,7 +105,7 @@ class TestModel:
         lost = (float(w["t_end"][-1]) - held.size * float(system["time"]) - moved) / held.size
         own = tuple(refusals.numbers(str(system["mounts"])) or ())
         return cls(
-            own, Site.of(record.run), int(system["terms"]), float(system["window"]), float(system["settle"]), lost,
+            own, Location.of(record.run), int(system["terms"]), float(system["window"]), float(system["settle"]), lost,
             {c: gyro_noise(p, meter="", axis=f"_{c}") for c in "xy"}, reading, rates, *limits,
         )  # fmt: skip
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.window_regressors import reading_spline
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 
 from . import geometry
 
@@ -43,7 +43,7 @@ class Track:
     body: Array | None = None
     square: float = 0.0
     wobble: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    _seen: dict[Site, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _seen: dict[Location, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def turns(self) -> list[tuple[Array, Array]]:
         """Return, from the mount to the gyro, passive rotations (..., 3, 3) in turn and the rate (..., 3) each adds."""
@@ -69,11 +69,11 @@ class Track:
         cross = np.cross(turned[..., None, :], np.eye(3))  # rows: turned x e_k, so that [turned x] is its transpose
         return np.eye(3) - np.swapaxes(cross, -1, -2), 2.0 * self.rate[..., axis, None] * rate
 
-    def inertial(self, site: Site) -> Array:
+    def inertial(self, site: Location) -> Array:
         """Return the means of the inertial rate along the gyro axes (n, 3), rad/s: what the drift is equal to."""
         return self._along(site)[0]
 
-    def _along(self, site: Site) -> tuple[Array, Array]:
+    def _along(self, site: Location) -> tuple[Array, Array]:
         """Return the means of the inertial rate (n, 3) and -f/g0 at the nodes (n, nodes, 3), which both channels ask
         for.
         """
@@ -92,11 +92,11 @@ class Track:
         x, y, x_rate, y_rate = np.einsum("nkj,k->jn", at, MIDDLE)
         return x, y, x_rate, y_rate
 
-    def force(self, site: Site) -> Array:
+    def force(self, site: Location) -> Array:
         """Return -f/g0 along the gyro axes at the nodes (n, nodes, 3)."""
         return self._along(site)[1]
 
-    def design(self, site: Site, names: tuple[str, ...]) -> Array:
+    def design(self, site: Location, names: tuple[str, ...]) -> Array:
         """Return the means (n, p) of the regressors ``names`` of a channel."""
         return average(drift.regressors(self.force(site), names))
 

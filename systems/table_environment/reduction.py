@@ -28,10 +28,10 @@ from gyrobench.reduction.toolkit import (
     Effect,
     Findings,
     Group,
+    Location,
     Quantity,
     Regression,
     RunDocument,
-    Site,
     SiteSetup,
     Table,
     number,
@@ -89,7 +89,7 @@ class Reduction(DriftReduction[EnvironmentSetup]):
     @classmethod
     def setup_of(cls, run: RunDocument) -> EnvironmentSetup:
         k = number(run, "k", "gyro.k", "torquer scale factor")
-        truth = None if run.measured else true_values(run.parameters, Site.of(run).g)
+        truth = None if run.measured else true_values(run.parameters, Location.of(run).g)
         return EnvironmentSetup.of(run, k=k, options=run.options, seed=run.seed or 1, truth=truth)
 
     def problems(self) -> list[str]:

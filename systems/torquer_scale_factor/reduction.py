@@ -35,10 +35,10 @@ from gyrobench.reduction.toolkit import (
     Array,
     Coefficient,
     DriftTestResult,
+    Location,
     Reason,
     Record,
     ReductionError,
-    Site,
     Table,
     told,
 )
@@ -92,7 +92,7 @@ class Reduction:
                     "corrections: a table of rates has no angles to correct; correct its currents and rates"
                 )
             return cls.reduce(record.windows, setup)
-        rows, site = marks.rows(record.windows, run.plan), Site.of(run)
+        rows, site = marks.rows(record.windows, run.plan), Location.of(run)
         if wrong := row_checks.problems(rows):
             raise ReductionError(wrong)
         currents = np.asarray(rows["current"])

@@ -28,11 +28,11 @@ from gyrobench.reduction.toolkit import (
     Account,
     Array,
     Findings,
+    Location,
     Quantity,
     Reason,
     Regression,
     RunDocument,
-    Site,
     window_problems,
 )
 
@@ -68,7 +68,7 @@ class Reduction(TurningTest[TumbleSetup]):
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> TumbleSetup:
-        faces = frames.tumble_faces(Site.of(run).latitude)
+        faces = frames.tumble_faces(Location.of(run).latitude)
         return TumbleSetup.of_plan(run, faces, terms=int(run.options.get("terms", 9)))
 
     def problems(self) -> list[str]:

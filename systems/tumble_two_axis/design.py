@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.design.visit_protocol import Channel, VisitProtocol, gyro_noise, gyro_unseen, phases_of
 from gyrobench.record.record import Record
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
@@ -26,7 +26,7 @@ def protocol_of(system: System, record: Record) -> VisitProtocol:
 
     Most of the moving is the inner axis: it is the input axis, and the torquer follows its rate.
     """
-    p, site = record.run.parameters, Site.of(record.run)
+    p, site = record.run.parameters, Location.of(record.run)
     outer, inner = (a.ravel() for a in np.meshgrid(*2 * [np.arange(STEPS) * TURN / STEPS], indexing="ij"))
     at = {
         (round(math.degrees(a), 3), round(math.degrees(b), 3)): j

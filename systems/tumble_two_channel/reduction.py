@@ -31,10 +31,10 @@ from gyrobench.reduction.toolkit import (
     Array,
     Coefficient,
     Findings,
+    Location,
     Quantity,
     Reason,
     RunDocument,
-    Site,
     Table,
     number,
     truth_of,
@@ -167,7 +167,7 @@ class Reduction(ChannelTests[TwoChannelSetup]):
         model = str(run.options.get("model", "nine"))
         return TwoChannelSetup.of_plan(
             run,
-            geometry.faces(model, Site.of(run).latitude),
+            geometry.faces(model, Location.of(run).latitude),
             k={a: number(run, f"k_{a}", f"gyro.k_{a}", f"scale factor of the torquer about {a}") for a in "xy"},
             model=model,
             truth=truth_of(run, (n for c in "xy" for n in drift.NAMES_2DOF[c])),

@@ -20,7 +20,7 @@ from coverage import CASES, Noise
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import noise
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.result import Result, Specification
 from gyrobench.system.system import System, load_system
 
@@ -82,7 +82,7 @@ class Sheet:
             case "accelerometer_multipoint":
                 comments |= {
                     "scale": f"{p['accelerometer.scale']!r} m/s2/A",
-                    "gravity": f"{Site.of(run).gravity!r} m/s2",
+                    "gravity": f"{Location.of(run).gravity!r} m/s2",
                 }
             case "pickoff_scale_factor":
                 names += ["mean"]

@@ -300,9 +300,9 @@ def test_what_a_run_says() -> None:
         plan=[PlanRow(phase=2, face="up")],
         parameters={"gyro.k": 3.0, "gyro.D_F": 1e-6, "site.gravity": 9.81},
     )
-    site = run_metadata.Site.of(document)
+    site = run_metadata.Location.of(document)
     assert (site.latitude, site.gravity) == (0.8, 9.81) and site.shown()["gravity / (m/s²)"] == 9.81
-    assert run_metadata.Site.of(RunDocument(options={"latitude": 0.8})).gravity == pytest.approx(9.8067, abs=1e-3)
+    assert run_metadata.Location.of(RunDocument(options={"latitude": 0.8})).gravity == pytest.approx(9.8067, abs=1e-3)
     assert run_metadata.number(document, "k", "gyro.k") == 3.0
     assert run_metadata.truth_of(document, ("D_F", "D_I")) == {"D_F": 1e-6}
     assert run_metadata.truth_of(RunDocument(), ("D_F",)) is None
@@ -313,7 +313,7 @@ def test_what_a_run_says() -> None:
     with pytest.raises(ReductionError, match="scale factor unknown: the gyro has no parameter K; give the option K"):
         run_metadata.number(document, "K", "gyro.K", "scale factor")
     with pytest.raises(ReductionError, match="latitude"):
-        run_metadata.Site.of(RunDocument())
+        run_metadata.Location.of(RunDocument())
 
 
 def test_windows_of_two_channels() -> None:

@@ -15,7 +15,7 @@ from gyrobench.reduction.estimation.regression import Fit, RegressionError, leas
 from gyrobench.reduction.series import quantization
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.column_regression import backward, joint_test, orthonormal
-from gyrobench.reduction.series.gauss_markov import GaussMarkov, _Likelihood, settling
+from gyrobench.reduction.series.gauss_markov import GaussMarkovEstimate, _Likelihood, settling
 from gyrobench.reduction.series.smoothing import smooth_drift
 
 
@@ -165,7 +165,7 @@ def test_values_until_a_filter_is_steady() -> None:
 def test_smoother_is_the_dense_estimate() -> None:
     """25 readings, three of them missing: values and standard deviations of the estimate of all states at once."""
     n, tau, sigma, density, dt = 25, 7.0, 1.3, 0.8, 0.5
-    drift = GaussMarkov(tau, 0.0, math.inf, sigma, density, 100.0, n, dt)
+    drift = GaussMarkovEstimate(tau, 0.0, math.inf, sigma, density, 100.0, n, dt)
     z = 4.0 + np.random.default_rng(8).normal(size=n)
     z[[3, 10, 11]] = np.nan
     P = sigma**2 * linalg.toeplitz(np.exp(-dt / tau * np.arange(n)))
@@ -184,7 +184,7 @@ def test_smoothed_drift_is_half_as_uncertain_as_filtered() -> None:
     truth = signal.lfilter([math.sqrt(1 - phi**2)], [1.0, -phi], rng.normal(size=n + 200))[200:]
     z = unit * (truth + rng.normal(size=n)) + 3e-7
     z[1000:1010] = np.nan
-    drift = GaussMarkov(-1.0 / math.log(phi), 0.0, math.inf, unit, unit, 100.0, n, 1.0)
+    drift = GaussMarkovEstimate(-1.0 / math.log(phi), 0.0, math.inf, unit, unit, 100.0, n, 1.0)
     level, sd = smooth_drift(z, 1.0, drift, mean=3e-7)
     assert np.mean(((level - 3e-7) / unit - truth) ** 2) == pytest.approx(0.165, abs=0.012)
     assert (sd[500] / unit) ** 2 == pytest.approx(0.162, abs=5e-4) and sd[1005] > 1.5 * sd[500]
@@ -193,4 +193,4 @@ def test_smoothed_drift_is_half_as_uncertain_as_filtered() -> None:
         P = phi**2 * P / (P + 1.0) + 1.0 - phi**2
     assert pytest.approx(0.245, abs=5e-4) == P / (P + 1.0) and pytest.approx((sd[-1] / unit) ** 2) == P / (P + 1.0)
     with pytest.raises(SeriesError, match="nothing to smooth"):
-        smooth_drift(z, 1.0, GaussMarkov(18.0, 0.0, math.inf, unit, 0.0, 100.0, n, 1.0))
+        smooth_drift(z, 1.0, GaussMarkovEstimate(18.0, 0.0, math.inf, unit, 0.0, 100.0, n, 1.0))

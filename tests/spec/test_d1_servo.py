@@ -274,7 +274,7 @@ def test_condition_with_two_dwells(degrees: float, condition: float) -> None:
     """SERVO-C3-SING: rank 8, N = 36 a mount and the two dwells."""
     phi = math.radians(degrees)
     windows, _ = REFUSALS.held(phi, ("x east, y up", "x east, y down", "polar S", "polar N"))
-    X = servo_regression.design(windows, run_metadata.Site(phi, frames.G0), drift.terms(8))
+    X = servo_regression.design(windows, run_metadata.Location(phi, frames.G0), drift.terms(8))
     assert np.linalg.matrix_rank(X) == 8
     assert float(np.linalg.cond(X)) == pytest.approx(condition, rel=0.006)
 
@@ -300,7 +300,7 @@ def test_uncertainties_per_unit_noise() -> None:
     """36 points a mount and two dwells at 45.75 degrees: the eight numbers of SERVO-C3-SING."""
     phi = math.radians(45.75)
     windows, _ = REFUSALS.held(phi, ("x east, y up", "x east, y down", "polar S", "polar N"))
-    X = servo_regression.design(windows, run_metadata.Site(phi, frames.G0), drift.terms(8))
+    X = servo_regression.design(windows, run_metadata.Location(phi, frames.G0), drift.terms(8))
     u = dict(zip(drift.terms(8), np.sqrt(np.diag(np.linalg.inv(X.T @ X))).tolist(), strict=True))
     expected = {
         "D_F": 0.707,

@@ -76,7 +76,7 @@ SEEDS = range(6)
 
 def ideal_record(true: dict[str, float], phi: float, g: float) -> Any:
     """Two short dwells at angle 0 and 28 h in each mount, by integration of 3-59."""
-    site = run_metadata.Site(phi, g * frames.G0)
+    site = run_metadata.Location(phi, g * frames.G0)
     rows: list[list[float]] = []
     plan = []
     t = 0.0

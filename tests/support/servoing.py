@@ -70,7 +70,7 @@ def expected_rate(record: Any) -> Array:
     The gyro turns in the base that turns with the Earth; what the Earth gives along its output axis changes with theta.
     """
     windows, _ = held(record)
-    site, parameters = run_metadata.Site.of(record.run), record.run.parameters
+    site, parameters = run_metadata.Location.of(record.run), record.run.parameters
     true = np.array([parameters[f"gyro.{n}"] for n in NAMES])
     omega_d = servo_regression.design(windows, site, NAMES) @ true
     earth = windows.axes @ frames.earth_rate_local(site.latitude, site.earth_rate)

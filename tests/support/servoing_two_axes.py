@@ -48,9 +48,9 @@ def gyro(rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-def held(record: Any) -> tuple[Any, run_metadata.Site, Array]:
+def held(record: Any) -> tuple[Any, run_metadata.Location, Array]:
     """Windows of the held phases as the reduction sees them, the site, and which rows of the record they are."""
-    site = run_metadata.Site.of(record.run)
+    site = run_metadata.Location.of(record.run)
     mounts = {r.phase: int(r.label.split()[1]) for r in record.run.plan if r.mode == "servo"}
     rows = np.isin(record.windows["phase"], list(mounts))
     phase = record.windows["phase"][rows].astype(int)

@@ -11,7 +11,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis import plausibility
 from gyrobench.reduction.diagnosis.handling_errors import HANDLING, HandlingCandidate, Reduce, cures, with_diagnosis
 from gyrobench.reduction.diagnosis.unshown import unshown
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult
 
@@ -36,7 +36,7 @@ def examined(
             raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
         raise
     if "latitude" in record.run.options:
-        near = plausibility.earth_rate_warnings(result, Site.of(record.run))
+        near = plausibility.earth_rate_warnings(result, Location.of(record.run))
         result = replace(result, reasons=[*result.reasons, *near])
     found = with_diagnosis(record, result, reduce, candidates)
     if record.run.arrangement == "checked" or any(r.id == HANDLING for r in found.reasons):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DPH
 
@@ -18,7 +18,7 @@ RATES = ("°/h", "°/h/g", "°/h/g²")
 LEAST = 3.0  # deg/h: smaller multiples (near the pole, at the equator) are the size of drifts
 
 
-def earth_rate_warnings(result: DriftTestResult, site: Site) -> list[Reason]:
+def earth_rate_warnings(result: DriftTestResult, site: Location) -> list[Reason]:
     """Return which coefficients (deg/h, deg/h/g ...) are close to a component of the Earth rate or to twice of it."""
     whole = site.earth_rate / DPH
     rates = {

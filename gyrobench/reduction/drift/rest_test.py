@@ -32,7 +32,7 @@ from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.sources import TURNED, Effect
 from gyrobench.reduction.setup.window_checks import window_problems
 
@@ -48,7 +48,7 @@ class RestSetup(OneLoopSetup):
     @classmethod
     def of_plan(cls, run: RunDocument, **own: Any) -> Self:
         """Return the setup of a plan whose faces name the attitudes, as gyrobench.attitudes.parse reads them."""
-        latitude = Site.of(run).latitude
+        latitude = Location.of(run).latitude
         return cls.of(run, faces={row.phase: parse(row.face, latitude) for row in run.plan}, **own)
 
 

@@ -31,7 +31,7 @@ from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup import window_checks
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.sources import (
     ANGLE_ONCE,
     ANGLE_TWICE,
@@ -122,7 +122,7 @@ def held_windows(
     return HeldWindows(start, end, t0, t1, axes), phase, rows
 
 
-def drift_rate(held: HeldWindows, site: Site) -> Array:
+def drift_rate(held: HeldWindows, site: Location) -> Array:
     """Return the data (n,): inertial rate along the input axis, which is the drift omega_d, rad/s."""
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
@@ -130,7 +130,7 @@ def drift_rate(held: HeldWindows, site: Site) -> Array:
     return out
 
 
-def design(held: HeldWindows, site: Site, names: tuple[str, ...]) -> Array:
+def design(held: HeldWindows, site: Location, names: tuple[str, ...]) -> Array:
     """Return the window means (n, p) of the drift regressors ``names``."""
     return window_regressors.average(drift.regressors(held.seen(np.array([0.0, 0.0, -site.g])), names))
 
@@ -169,7 +169,7 @@ def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gai
 
 
 def effects(
-    held: HeldWindows, site: Site, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
+    held: HeldWindows, site: Location, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
     sizes: Any,
 ) -> list[Effect]:  # fmt: skip
     """Return the effects of type B of the set-up of a held table.
@@ -237,7 +237,7 @@ def _mounted(held: HeldWindows, k: int) -> HeldWindows:
 
 def candidates(
     held: HeldWindows,
-    site: Site,
+    site: Location,
     columns: Callable[[HeldWindows], Array],
     phase: NDArray[np.int_],
     windows: Mapping[str, Array],

@@ -18,7 +18,7 @@ from numpy.polynomial.legendre import leggauss
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.frames import G0, pole
-from gyrobench.reduction.setup.run_metadata import Site
+from gyrobench.reduction.setup.run_metadata import Location
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -140,7 +140,7 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     return out
 
 
-def wobbles(turning: Turning, base: Array, site: Site, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
+def wobbles(turning: Turning, base: Array, site: Location, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
     """Return what a table axis that goes round a cone twice a turn does, per rad, at the phases 0 and 90 degrees.
 
     Rates (n, 3) along the gyro axes that are there beside those of a true axis, and means (n, p) of the regressors of a

@@ -35,7 +35,7 @@ from gyrobench.reduction.series.arima import Arima310, arima310
 from gyrobench.reduction.series.autoregression import Autoregression, fit_ar, yule_walker
 from gyrobench.reduction.series.checks import block_means, checked, checked_step
 from gyrobench.reduction.series.correlation import Correlation, correlation
-from gyrobench.reduction.series.gauss_markov import GaussMarkov
+from gyrobench.reduction.series.gauss_markov import GaussMarkovEstimate
 from gyrobench.reduction.series.lines import Lines, find_lines
 from gyrobench.reduction.series.moving_average import Arma, fit_arma
 from gyrobench.reduction.series.normality import Normality, normality
@@ -73,7 +73,7 @@ class DriftModel:
     arma: Arma | None = None  # ARMA(1,1): Gauss-Markov with white noise
     ma: Arma | None = None  # MA(1)
     arima: Arima310 | None = None
-    gauss_markov: GaussMarkov | None = None
+    gauss_markov: GaussMarkovEstimate | None = None
     whiteness: dict[str, LjungBox] = field(default_factory=dict)  # "block means", "burg", "arma"
     recommended: str = "none"  # "white noise", "AR(p)", "ARMA(1,1)", "local level", "none"
     sentences: list[str] = field(default_factory=list)

@@ -35,7 +35,7 @@ LONG, PART = 20_000, 20  # from so many samples on the filter's steady state is 
 
 
 @dataclass(frozen=True)
-class GaussMarkov:
+class GaussMarkovEstimate:
     """Correlation time with its 95 % interval, and what goes with the best one."""
 
     tau: float  # s
@@ -183,7 +183,7 @@ def settling(phi: float, s: float) -> int:
     return 0 if not r < 1.0 else 2 if r < 1e-9 else 2 + math.ceil(math.log(1e-18) / (2.0 * math.log(r)))
 
 
-def gauss_markov(x: Any, dt: float, white: bool = True, means: bool = False) -> GaussMarkov:
+def gauss_markov(x: Any, dt: float, white: bool = True, means: bool = False) -> GaussMarkovEstimate:
     """Return the correlation time of ``x`` (n,) sampled every ``dt`` s; trend and lines must be removed before.
 
     white: the record may hold white noise too; without it and without ``means`` the time does not grow with the length.
@@ -207,7 +207,7 @@ def gauss_markov(x: Any, dt: float, white: bool = True, means: bool = False) -> 
     ends = [_crossing(profile, u, top, side) for side in (low, high)]
     value, variance, reading = likelihood.best(u)
     nothing = -0.5 * (math.log(n) + (n - 1) * math.log(float(n)))  # y has unit variance and no mean
-    return GaussMarkov(
+    return GaussMarkovEstimate(
         dt * math.exp(u), dt * math.exp(ends[0]) if math.isfinite(ends[0]) else 0.0,
         dt * math.exp(ends[1]) if math.isfinite(ends[1]) else math.inf, scale * math.sqrt(variance),
         scale * math.sqrt(reading * dt), value - nothing, n, dt,
@@ -229,7 +229,7 @@ def _crossing(profile: Callable[[float], float], u: float, top: float, end: floa
         inside, step = outside, 1.6 * step
 
 
-def check_length(found: GaussMarkov) -> str | None:
+def check_length(found: GaussMarkovEstimate) -> str | None:
     """Return what a record of this length cannot say of the correlation time, or None."""
     times = found.n * found.dt / found.tau
     if not found.determined:

@@ -16,10 +16,10 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.series.checks import SeriesError, checked_step
-from gyrobench.reduction.series.gauss_markov import GaussMarkov
+from gyrobench.reduction.series.gauss_markov import GaussMarkovEstimate
 
 
-def smooth_drift(x: Any, dt: float, drift: GaussMarkov, mean: float | None = None) -> tuple[Array, Array]:
+def smooth_drift(x: Any, dt: float, drift: GaussMarkovEstimate, mean: float | None = None) -> tuple[Array, Array]:
     """Return the Gauss-Markov part of a record (n,) and its standard deviation, given what was found in it.
 
     mean: level the drift is about (default: mean of the record).  NaN readings are bridged by the model.

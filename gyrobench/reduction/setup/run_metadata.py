@@ -1,6 +1,6 @@
 """What the run.json of a record says about a test: site, scale factor, truth, phases, sizes of the uncertainties.
 
-site = Site.of(record.run)
+site = Location.of(record.run)
 k = number(record.run, "k", "gyro.k")             # the option, else the parameter of the part
 truth = truth_of(record.run, drift.NAMES)         # None for measured data
 """
@@ -25,7 +25,7 @@ class Remount(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Site:
+class Location:
     """Where the test took place: latitude rad, gravity m/s2, earth_rate rad/s."""
 
     latitude: float
@@ -33,7 +33,7 @@ class Site:
     earth_rate: float = frames.EARTH_RATE
 
     @classmethod
-    def of(cls, run: RunDocument) -> Site:
+    def of(cls, run: RunDocument) -> Location:
         """From the options latitude, gravity and height and the site part; without gravity: WGS84 normal gravity."""
         options, parameters = run.options, run.parameters
         if "latitude" not in options:

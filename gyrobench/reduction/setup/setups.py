@@ -21,7 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
 from gyrobench.component.set_up import Errors
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.setup.run_metadata import Remount, Site, phases, remount_of, sizes
+from gyrobench.reduction.setup.run_metadata import Location, Remount, phases, remount_of, sizes
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.window_checks import ReductionError
 
@@ -70,14 +70,14 @@ class SiteSetup(Setup):
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
-        site = Site.of(run)
+        site = Location.of(run)
         place: dict[str, Any] = {"latitude": site.latitude, "gravity": site.gravity, "earth_rate": site.earth_rate}
         place["nuisances"] = weighed(run)
         return super().of(run, **{**place, **own})
 
     @property
-    def place(self) -> Site:
-        return Site(self.latitude, self.gravity, self.earth_rate)
+    def place(self) -> Location:
+        return Location(self.latitude, self.gravity, self.earth_rate)
 
     @property
     def shown(self) -> dict[str, Any]:
@@ -244,6 +244,6 @@ def scale_factor_problems(k: float, name: str = "k") -> list[str]:
 def attitude_of(run: RunDocument) -> Array:
     """Return the option attitude of a run as rows I, O, S in (E, N, U).  Raises ReductionError."""
     try:
-        return parse(str(run.options.get("attitude", "")), Site.of(run).latitude)
+        return parse(str(run.options.get("attitude", "")), Location.of(run).latitude)
     except ValueError as error:
         raise ReductionError(str(error)) from None
