@@ -75,14 +75,14 @@ def _figures(report: Report[DriftRecordResult], k: int, key: str) -> tuple[Pictu
     allan = Picture(
         f"{key}-deviations", figures.deviations(c, f"{key}-deviations"),
         "Allan deviation with 95 % intervals (band), modified Allan and Hadamard deviation; dashed: Allan deviation of "
-        "the fitted noise coefficients. Slope −1: quantization; −½: angle random walk; 0: bias instability; +½: rate "
+        "the fitted model. Slope −1: quantization; −½: angle random walk; 0: bias instability; +½: rate "
         "random walk; +1: rate ramp, to which the Hadamard deviation is blind. Intervals hold for one averaging time.",
         "Deviations against averaging time, logarithmic axes, with the fitted model",
     )  # fmt: skip
     spectrum = Picture(
         f"{key}-spectrum", figures.spectrum(c, f"{key}-spectrum"),
         "One-sided power spectral density after the lines are removed, with 95 % intervals (band); dashed: the fitted "
-        "noise coefficients.", "Power spectral density against frequency, logarithmic axes, with the fitted model",
+        "model.", "Power spectral density against frequency, logarithmic axes, with the fitted model",
     )  # fmt: skip
     r = c.correlation
     both = (("rho", "Autocorrelation", r.rho), ("partial", "Partial autocorrelation", r.partial)) if r else ()

@@ -96,13 +96,16 @@ def bias_instability(noise: NoiseModel) -> Table:
     least, floor = noise.minimum, math.sqrt(2.0 * math.log(2.0) / math.pi)
     b = noise["B"]
     rows: list[list[Any]] = [
-        ["coefficient of the flicker, B", *_range(b, DPH), None, None, None,
-         f"its floor: {number(floor * b.value / DPH)} °/h" if b.determined else "not determined"],
-        ["least Allan deviation, B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
-         "minimum" if least.reached else "no minimum: it falls to the longest averaging time"],
+        ["B", *_range(b, DPH), None, None, None,
+         f"floor {number(floor * b.value / DPH)}" if b.determined else "not determined"],
+        ["B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
+         "minimum" if least.reached else "no minimum: it falls to the end"],
     ]  # fmt: skip
     head = ["sense", "value / (°/h)", "95 % from", "95 % to", "averaging time / s", "from / s", "to / s", "finding"]
-    caption = "The two figures that are called bias instability; data sheets mean the second, of the whole deviation"
+    caption = (
+        "Two figures are called bias instability: B, the coefficient of the flicker, and B_min, the least Allan deviation "
+        "of all noise together, which data sheets mean"
+    )
     return Table("bias_instability", "Bias instability", caption, head, rows)
 
 

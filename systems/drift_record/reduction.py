@@ -168,7 +168,8 @@ def _stated(
 
 def _column(a: Analysed, run: RunDocument) -> DriftColumn:
     p, m = a.of, a.of.model
-    tau = np.geomspace(p.step, max(d.tau[-1] for d in a.deviations.values()), 120)
+    longest = max(d.tau[-1] for d in a.deviations.values())
+    tau = p.step * np.unique(np.rint(np.geomspace(1.0, longest / p.step, 120)))  # of whole samples
     s, c = m.spectrum, m.correlation
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
     dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f) / DPH**2
