@@ -103,8 +103,8 @@ def bias_instability(noise: NoiseModel) -> Table:
     ]  # fmt: skip
     head = ["sense", "value / (°/h)", "95 % from", "95 % to", "averaging time / s", "from / s", "to / s", "finding"]
     caption = (
-        "Two figures are called bias instability: B, the coefficient of the flicker, and B_min, the least Allan deviation "
-        "of all noise together, which data sheets mean"
+        "Two figures are called bias instability: B, the coefficient of the flicker, and B_min, the least Allan "
+        "deviation of all noise together, which data sheets mean"
     )
     return Table("bias_instability", "Bias instability", caption, head, rows)
 
