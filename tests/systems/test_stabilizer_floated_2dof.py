@@ -239,7 +239,7 @@ def test_isolation_is_friction_and_with_a_real_motor_its_back_emf() -> None:
             wanted = np.abs(closed.LagLeadLoop(**DEFAULT).isolation(2j * np.pi * np.array(r.x), drag))
             np.testing.assert_allclose(r.y, wanted, rtol=0.03)
             linear = next(c for c in r.curves if c.label.startswith("linear, with step"))
-            there = np.interp(np.log(r.x), np.log(linear["x"]), linear["y"])
+            there = np.interp(np.log(r.x), np.log(linear.x), linear.y)
             np.testing.assert_allclose(r.y, there, rtol=2e-3)
 
 
