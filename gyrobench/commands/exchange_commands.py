@@ -26,7 +26,9 @@ def export(
     to: Annotated[
         Form,
         typer.Option(
-            "--to", help="ssp: FMUs and wiring in one archive; fmu: one native FMU; container: one FMU of the FMUs."
+            "--to",
+            help="ssp: FMUs and wiring in one archive; fmu: one native FMU; container: one FMU of the FMUs; "
+            "html: a web page that runs it.",
         ),
     ],
     values: Set = None,
@@ -38,8 +40,8 @@ def export(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="fmu, container: parameter, unwired input or output of a part (gyro.D_I), or option.  Repeatable.  "
-            "Default: the options that set values of parts and nothing else.",
+            help="fmu, container, html: parameter, unwired input or output of a part (gyro.D_I), or option.  "
+            "Repeatable.  Default: the options that set values of parts and nothing else.",
         ),
     ] = None,
     fmi: Annotated[int, typer.Option(metavar="2|3", help="fmu: FMI version.", min=2, max=3)] = 2,
@@ -56,6 +58,7 @@ def export(
     Examples:
       gyrobench export tumble_single_axis --to ssp --set windows=36
       gyrobench export tumble_single_axis --to fmu --expose gyro.D_I --expose gyro.temperature
+      gyrobench export stabilizer_sdf --to html --expose platform.J
     """
     from gyrobench.commands import export_system
     from gyrobench.commands.arguments import parse_settings, parse_swaps

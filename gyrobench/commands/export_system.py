@@ -1,4 +1,4 @@
-"""A system as an SSP archive, as one container FMU or as one native FMU."""
+"""A system as an SSP archive, as one container FMU, as one native FMU or as a web page."""
 
 from __future__ import annotations
 
@@ -24,29 +24,31 @@ def export(
     fmi: int = 2,
     platforms: Iterable[str] = (),
 ) -> Path:
-    """Write the system as "ssp", "container" or "fmu"; return the file.
+    """Write the system as "ssp", "container", "fmu" or "html"; return the file.
 
-    expose: of "container" and "fmu".  fmi, platforms: of "fmu".
+    expose: of all but "ssp".  fmi, platforms: of "fmu".
     """
-    from gyrobench.exchange import container, ssp_export, system_fmu
+    from gyrobench.exchange import container, html_page, ssp_export, system_fmu
 
     if to != "fmu" and (fmi != 2 or platforms):
         raise UsageError(f"--fmi and --platform belong to --to fmu, not to --to {to}")
     if to == "ssp" and expose:
-        raise UsageError("--expose belongs to --to fmu and container: an SSP archive offers all that its FMUs do")
+        raise UsageError("--expose belongs to --to fmu, container and html: an SSP archive offers all that its FMUs do")
     if unknown := [p for p in platforms if p not in PLATFORMS]:
         raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
-    suffix = ".ssp" if to == "ssp" else ".fmu"
+    suffix, kind = {"ssp": (".ssp", "an SSP archive"), "html": (".html", "a page")}.get(to, (".fmu", "an FMU"))
     system = require_slots(load_system(name, values))
     path = out or Bench.find().products / f"{system.name}{suffix}"
     if path.suffix != suffix:
-        raise UsageError(f"--out {path}: an {'SSP archive' if to == 'ssp' else 'FMU'} ends in {suffix}")
+        raise UsageError(f"--out {path}: {kind} ends in {suffix}")
     check_fmu_files(parts)
     bench = Bench.find().folder
     if to == "fmu":
         notes = system_fmu.export_fmu(
             system, path, parts, maps, None, seed, bench, expose=expose, fmi=fmi, platforms=tuple(platforms)
         )
+    elif to == "html":
+        notes = html_page.export_page(system, path, parts, maps, None, seed, bench, expose)
     elif to == "container":
         notes = container.export_container(system, path, parts, maps, None, seed, bench, expose)
     else:

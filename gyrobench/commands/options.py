@@ -117,3 +117,4 @@ class Form(StrEnum):
     ssp = "ssp"
     container = "container"
     fmu = "fmu"
+    html = "html"

@@ -16,7 +16,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gyrobench.component.component import Component
 from gyrobench.engine.linked_system import obstacle
@@ -57,22 +57,9 @@ def export_fmu(
     Raises ExportError where a slot holds another FMU than a native part of the bench or a name cannot be exposed,
     CompilerError, and what a run would raise before it runs.
     """
-    chosen = system.with_values(values or {})
-    assembly, starts, notes = prepare(chosen, parts, maps, None, seed, bench)
-    names = {slot: str((parts or {}).get(slot, declared.part)) for slot, declared in chosen.slots.items()}
-    names = {slot: name for slot, name in names.items() if not name.endswith(".fmu")}
-    program = build_program(assembly)
-    if why := obstacle(program, names, {s: d.guid for s, d in assembly.descriptions.items()}, bench):
-        raise ExportError(f"fmu: {why}; one library holds parts of the bench only, use --to container or ssp")
-    classes = {slot: (name, load_part(name, bench)) for slot, name in names.items()}
-    source = SystemSource(
-        chosen.name,
-        program,
-        classes,
-        [(slot, b.reference, float(v)) for slot, given in starts.items() for b, v in given],
-        _exposed(chosen, assembly, starts, classes, choose(chosen, assembly, seed, expose)),
-        chosen.step,
-    )
+    remedy = "one library holds parts of the bench only, use --to container or ssp"
+    linked = linked_source(system, parts, maps, values, seed, bench, expose, "fmu", remedy)
+    chosen, source = linked.system, linked.source
     draft = source_files(source, "", fmi)
     guid = guid_of(content_hash(*(f"{n}\n{t}" for n, t in sorted(draft.items()))))
     entries = native_entries(source_files(source, guid, fmi), chosen.name, platforms or (this_platform(),), fmi)
@@ -85,7 +72,35 @@ def export_fmu(
     if readme is not None and readme.is_file():
         entries["documentation/README.md"] = readme.read_bytes()
     write_archive(Path(path), entries)
-    return notes
+    return linked.notes
+
+
+class LinkedSource(NamedTuple):
+    """A system with its values, its C, and notes for the user."""
+
+    system: System
+    source: SystemSource
+    notes: list[str]
+
+
+def linked_source(
+    system: System, parts: Mapping[str, Path | str] | None, maps: Mapping[str, Path] | None,
+    values: Mapping[str, Any] | None, seed: int, bench: Path | None, expose: Iterable[str], to: str, remedy: str,
+) -> LinkedSource:  # fmt: skip
+    """Return the system as one C component, for the export ``to``.  Raises ExportError, which ends in the remedy, where
+    a slot holds another FMU than a native part of the bench, and what a run would raise before it runs.
+    """
+    chosen = system.with_values(values or {})
+    assembly, starts, notes = prepare(chosen, parts, maps, None, seed, bench)
+    names = {slot: str((parts or {}).get(slot, declared.part)) for slot, declared in chosen.slots.items()}
+    names = {slot: name for slot, name in names.items() if not name.endswith(".fmu")}
+    program = build_program(assembly)
+    if why := obstacle(program, names, {s: d.guid for s, d in assembly.descriptions.items()}, bench):
+        raise ExportError(f"{to}: {why}; {remedy}")
+    classes = {slot: (name, load_part(name, bench)) for slot, name in names.items()}
+    settings = [(slot, b.reference, float(v)) for slot, given in starts.items() for b, v in given]
+    exposed = _exposed(chosen, assembly, starts, classes, choose(chosen, assembly, seed, expose), to)
+    return LinkedSource(chosen, SystemSource(chosen.name, program, classes, settings, exposed, chosen.step), notes)
 
 
 def _exposed(
@@ -94,6 +109,7 @@ def _exposed(
     starts: Starts,
     classes: Mapping[str, tuple[str, type[Component]]],
     choices: Iterable[ExposedVariable],
+    to: str,
 ) -> list[Exposed]:
     """Return the variables of the FMU, numbered in the order parameters, inputs, outputs.  Raises ExportError."""
     scalars = {f"{slot}.{s.name}": s for slot, (_, cls) in classes.items() for s in cls.layout}
@@ -101,7 +117,7 @@ def _exposed(
     chosen = list(choices)
     for name, (slot, bound) in recorded(assembly).items():
         if bound.gain != 1.0 or bound.offset != 0.0:
-            raise ExportError(f"fmu: {name} is mapped with a factor or offset, which its outputs do not apply")
+            raise ExportError(f"{to}: {name} is mapped with a factor or offset, which its outputs do not apply")
         chosen.append(ExposedVariable(name, "output", ((slot, bound.variable),)))
     named: dict[str, Exposed] = {}
     for choice in chosen:

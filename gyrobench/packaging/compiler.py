@@ -17,6 +17,7 @@ from gyrobench.errors import GyrobenchError
 #: No vector code: these programs store numbers one by one and would wait for them when loading them in pairs.
 SCALAR = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
 FLAGS = ("-O3", *SCALAR, "-std=c11", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC")
+WASM_FLAGS = ("-O3", "-std=c11", "-ffp-contract=off", "-fvisibility=hidden")
 #: FMI 2 platform folder -> (library suffix, zig target)
 PLATFORMS = {
     "linux64": (".so", "x86_64-linux-gnu.2.17"),
@@ -82,6 +83,20 @@ def compile_library(
 def compile_object(source: Path, output: Path, includes: tuple[Path, ...], platform: str) -> None:
     """Compile one C file of a library that has others, which then is APART.  Raises CompilerError."""
     _compile(source, output, includes, platform, "-DAPART", "-c")
+
+
+def compile_wasm(source: Path) -> bytes:
+    """Return a C file as WebAssembly that asks its host for nothing.  Raises CompilerError, also without ziglang."""
+    if not importlib.util.find_spec("ziglang"):
+        raise CompilerError("a page that runs needs ziglang's compiler: `pip install gyrobench[cross]`")
+    output = source.with_suffix(".wasm")
+    cc = (sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", "-s", "-w")
+    done = subprocess.run(
+        [*cc, *WASM_FLAGS, str(source), "-o", str(output)], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise CompilerError(f"{source.name}: the C compiler failed:\n{done.stderr.strip()}")
+    return output.read_bytes()
 
 
 def _compile(source: Path, output: Path, includes: tuple[Path, ...], platform: str, *more: str) -> None:
