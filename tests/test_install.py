@@ -107,9 +107,8 @@ def test_licences_of_all_packages_are_listed() -> None:
 
 
 def test_constraints_are_within_the_requirements() -> None:
-    """A version for every package but ziglang, whose wheel of 90 MB the tests do without."""
+    """A version for every package."""
     lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
     pinned = {canonicalize_name(n): v for n, v in (line.split("==") for line in lines if not line.startswith("#"))}
     for name, requirement in requirements().items():
-        if name != "ziglang":
-            assert Requirement(requirement).specifier.contains(pinned[canonicalize_name(name)]), requirement
+        assert Requirement(requirement).specifier.contains(pinned[canonicalize_name(name)]), requirement
