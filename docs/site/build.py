@@ -26,10 +26,10 @@ CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
     "Tests and loops": ["docs/tests_and_loops", "docs/gallery", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
-    "Methods": ["docs/methods/README", "docs/methods/*", "docs/errata", "docs/references"],
+    "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "reports/README", "fmus/README"],
     "Python API": ["api/gyrobench", "api/*"],
-    "Figures": ["docs/speed", "tests/benchmarks/README", "tests/spec/README"],
+    "Figures": ["docs/speed", "docs/validation", "tests/benchmarks/README", "tests/spec/README"],
     "Project": ["CONTRIBUTING", "docs/architecture", "CHANGELOG", "docs/licences", "docs/README"],
 }
 

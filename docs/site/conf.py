@@ -13,6 +13,8 @@ from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx import addnodes
 
+# before autodoc has read its base class: pydantic cannot derive from that any more
+importlib.import_module("gyrobench.report.provenance")
 sys.path.insert(0, str(Path(__file__).parent))
 from docstrings import restructured
 from equations import with_subscripts
@@ -30,7 +32,8 @@ nitpicky = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_default_options = {"members": True, "show-inheritance": True}
+#: what a module hands on in ``__all__`` is documented where it is defined
+autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
 OPTIONAL = ("distributed", "dask", "fsspec", "psutil", "SALib", "pandas", "pygeomag", "fmu_manipulation_toolbox")
 autodoc_mock_imports = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
 python_use_unqualified_type_names = True
