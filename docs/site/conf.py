@@ -13,11 +13,12 @@ from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx import addnodes
 
-# before autodoc has read its base class: pydantic cannot derive from that any more
-importlib.import_module("gyrobench.report.provenance")
 sys.path.insert(0, str(Path(__file__).parent))
 from docstrings import restructured
 from equations import with_subscripts
+
+# before autodoc has read its base class: pydantic cannot derive from that any more
+importlib.import_module("gyrobench.report.provenance")
 
 project = "gyrobench"
 author = "the gyrobench authors"
