@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.record.circumstances import statement
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, for_arrow, header_places
 from gyrobench.record.sampling import Successive
 
@@ -52,10 +53,13 @@ def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterato
         raise DataError(file, problems)
     check_utf8(file)  # pyarrow would print the failure of its own decoding
     wrong: list[str] = []
+    late: list[str] = []
 
     def incomplete(row: Any) -> str:
         if not row.text.lstrip().startswith("#"):
             wrong.append(row.text)
+        elif (s := statement(row.text, 0)) and not s.remark:
+            late.append(row.text)
         return "skip"
 
     taken = {n: f"{k}" for n, (k, _) in places.items()}
@@ -69,6 +73,8 @@ def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterato
             problems = _not_numbers(file, head, taken)
         ended = file.stat().st_size < BLOCK and not rows  # a header without an end of its line
         raise DataError(file, problems or ["no rows below the header" if ended else str(error)]) from None
+    if late:
+        raise DataError(file, [f"'{late[0][:80]}' stands among the rows: write it above the header"])
     if wrong:
         many = f"{len(wrong)} rows have" if len(wrong) > 1 else "a row has"
         raise DataError(file, [f"{many} not the {len(head.names)} cells of the header; the first: '{wrong[0][:80]}'"])

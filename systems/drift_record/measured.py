@@ -10,6 +10,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record import sampling
+from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import (
     RATE,
@@ -26,7 +27,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator
 from gyrobench.reduction.series.quantization import angle_quantization, quantization
-from gyrobench.system.lab_record import TEXTS, measured_run
+from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import MeasuredData, System
 
 ATTITUDE = "at rest"
@@ -60,15 +61,17 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     for name in values:
         if name not in system.options and name not in (*TEXTS, "samples"):
             system.set(name, values[name])  # says which options there are
-    for name, value in said.items():
-        if name in system.options:
-            system.set(name, value)
+    problems = faults(table.head.statements, Keys((*system.options, *TEXTS, "samples")))
+    problems += set_options(system, table.head.statements, values)
     if system["counts"] not in ("cumulative", "increments"):
-        raise DataError(data, [f"counts = {system['counts']}: must be 'cumulative' or 'increments'"])
+        problems.append(f"counts = {system['counts']}: must be 'cumulative' or 'increments'")
+    kind = ""
     try:
         kind, _ = sampling.stated({k: v for k, v in said.items() if k == "samples"})
     except ValueError as error:
-        raise DataError(data, [str(error)]) from None
+        problems.append(str(error))
+    if problems:
+        raise DataError(data, problems)
     regressors = system["regressors"]
     if system["angle"]:
         table = with_harmonics(table, system["angle"], system["harmonics"])
