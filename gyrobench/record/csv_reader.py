@@ -233,7 +233,7 @@ def read_measured(
     places, of_header = header_places(header, expected)
     problems += of_header
     if short := [(n, len(r)) for n, r in rows if len(r) != len(header)]:
-        problems.append(f"{_rows([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
+        problems.append(f"{row_list([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
     if not rows:
         problems.append("no rows below the header")
     rows = [(n, r) for n, r in rows if len(r) == len(header)]
@@ -295,7 +295,7 @@ def header_places(
     return places, problems
 
 
-def _rows(numbers: list[int]) -> str:
+def row_list(numbers: list[int]) -> str:
     """Return row numbers as "row 3" or "rows 3, 4 and 58 more (60 rows)"."""
     if len(numbers) == 1:
         return f"row {numbers[0]}"
@@ -324,31 +324,33 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
     for what, where in invalid.items():
         cell = {"must": where[0][1], "is e": "a cell"}.get(what[:4], f"'{where[0][1]}'")
         others = "" if len({text for _, text in where}) == 1 else f" (row {where[0][0]}, and others alike)"
-        problems.append(f"{_rows([n for n, _ in where])}, column '{name}': {cell} {what}{others}")
+        problems.append(f"{row_list([n for n, _ in where])}, column '{name}': {cell} {what}{others}")
     array = np.array(values)
     return (array.astype(np.int64) if whole and not problems else array), problems
 
 
 def _repeats(columns: Mapping[str, np.ndarray[Any, Any]], numbers: list[int], time: str | None) -> list[str]:
-    """Return which rows are doubled, else where the time does not increase; rows that are not numbers apart."""
+    """Return which rows are doubled, else where the time does not increase; cells that are not numbers apart."""
     if not columns:
         return []
-    good = np.all([np.isfinite(c) for c in columns.values()], axis=0)
-    columns, numbers = {k: c[good] for k, c in columns.items()}, [n for n, g in zip(numbers, good, strict=True) if g]
+    good = np.all([np.isfinite(c) for c in columns.values()], axis=0).tolist()
     first_row: dict[tuple[float, ...], int] = {}
     twice = []
-    for n, row in zip(numbers, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
-        if row in first_row:
+    for n, whole, row in zip(numbers, good, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
+        if whole and row in first_row:
             twice.append((n, first_row[row]))
         first_row.setdefault(row, n)
     if twice:
-        return [f"{_rows([n for n, _ in twice])}: the same as row {twice[0][1]}" + (" and others" * (len(twice) > 1))]
+        return [
+            f"{row_list([n for n, _ in twice])}: the same as row {twice[0][1]}" + (" and others" * (len(twice) > 1))
+        ]
     if time is None or time not in columns:
         return []
-    t = columns[time]
+    there = np.flatnonzero(np.isfinite(columns[time]))
+    t, rows = columns[time][there], [numbers[k] for k in there.tolist()]
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if not back.size:
         return []
     k = int(back[0])
-    first = f"{time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {numbers[k]})"
-    return [f"{_rows([numbers[j + 1] for j in back.tolist()])}: {first}" + (", and others alike" * (back.size > 1))]
+    first = f"{time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {rows[k]})"
+    return [f"{row_list([rows[j + 1] for j in back.tolist()])}: {first}" + (", and others alike" * (back.size > 1))]

@@ -22,7 +22,7 @@ from gyrobench.record.circumstances import Keys, Statement, faults, values_of
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, read_head, read_measured, read_statements
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
-from gyrobench.system.lab_series import is_time_series, windows_of_series
+from gyrobench.system.lab_series import faults_of_series, is_time_series, windows_of_series
 from gyrobench.system.values import InvalidValueError
 
 if TYPE_CHECKING:
@@ -106,7 +106,9 @@ def read_record(
     problems += _type_b_problems(system, said.get("type_b", ""))
     if said.get("arrangement", "checked") != "checked":
         problems.append(f"arrangement = {said['arrangement']}: 'checked' or nothing is expected")
-    if series and not problems:
+    if series and problems:
+        problems += faults_of_series(data, head, columns)
+    elif series:
         named = attitudes(system) if attitudes else None
         windows, said, notes = windows_of_series(system, data, head, columns, said, named)
     plan: list[PlanRow] = []

@@ -15,6 +15,7 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import (
     RATE,
     TIME,
+    DriftTable,
     Signal,
     find_signals,
     harmonic_names,
@@ -70,14 +71,15 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
         kind, _ = sampling.stated({k: v for k, v in said.items() if k == "samples"})
     except ValueError as error:
         problems.append(str(error))
+    try:
+        table, signals, reader = _opened(system, table)
+        if problems:
+            for _ in table.blocks(reader.columns):  # what is wrong with the rows is in the same list
+                pass
+    except DataError as error:
+        problems += error.problems
     if problems:
         raise DataError(data, problems)
-    regressors = system["regressors"]
-    if system["angle"]:
-        table = with_harmonics(table, system["angle"], system["harmonics"])
-        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
-    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
-    reader = DriftReader(table, signals, regressors, system["sampling"])
     every = {s.name: _Every(reader) for s in signals}
     columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
     about = reader.about
@@ -104,6 +106,16 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     if reader.held.factor > 1:
         run.series["deviations"] = {name: e.result() for name, e in every.items()}
     return Record(windows, {}, run)
+
+
+def _opened(system: System, table: DriftTable) -> tuple[DriftTable, list[Signal], DriftReader]:
+    """Return the table with what is to be read of it.  Raises DataError."""
+    regressors = system["regressors"]
+    if system["angle"]:
+        table = with_harmonics(table, system["angle"], system["harmonics"])
+        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
+    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
+    return table, signals, DriftReader(table, signals, regressors, system["sampling"])
 
 
 def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:

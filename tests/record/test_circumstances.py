@@ -127,7 +127,7 @@ def test_time_series_and_what_stands_below_the_header(tmp_path: Path) -> None:
     (said,) = problems("fixed_position", file, f"# bandwith = 14Hz\n{head}{rows}")
     assert "did you mean 'bandwidth'?" in said
     (said,) = problems("fixed_position", file, f"{head}# window = 5s\n{rows}# u_attitude = 5arcsec\n")
-    assert said == "'# u_attitude = 5arcsec' stands among the rows: write it above the header"
+    assert said == "row 17: '# u_attitude = 5arcsec' stands among the rows: write it above the header"
     (said,) = problems("drift_record", file, f"{rows.replace('current [mA]', 'rate [deg/h]')}# sampling = 1Hz\n")
     assert "stands among the rows" in said
 
