@@ -88,9 +88,10 @@ def fit(
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; default: print it.")] = None,
 ) -> None:
-    """Write a first mapping file of a third-party FMU, or a first column map of a laboratory's data file.
+    """Write a first mapping of a vendor's FMU or a data file.
 
-    Its lines are proposals from names, units and descriptions; units and signs are to be checked.
+    A mapping file names the variables of an FMU, a column map the columns of a laboratory's file.  Their lines
+    are proposals from names, units and descriptions; units and signs are to be checked.
 
     \b
     Examples:

@@ -10,7 +10,7 @@ from pathlib import Path
 from gyrobench import units
 from gyrobench.bench import UsageError
 from gyrobench.record.circumstances import statement, values_of
-from gyrobench.record.column_proposal import LONG, FileColumn, Layout, find_layout, match_columns, series_columns
+from gyrobench.record.column_proposal import LONG, FileColumn, FileLayout, find_layout, match_columns, series_columns
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
@@ -64,7 +64,7 @@ def _is(column: FileColumn, unit: str) -> bool:
     return units.same_dimension(column.unit or "1", unit)
 
 
-def _any_names(layout: Layout) -> dict[str, FileColumn]:
+def _any_names(layout: FileLayout) -> dict[str, FileColumn]:
     """Return the columns of a drift record: time, and rates, angles and temperatures under their own names."""
     found: dict[str, FileColumn] = {}
     for c in layout.columns:
@@ -76,7 +76,7 @@ def _any_names(layout: Layout) -> dict[str, FileColumn]:
 
 
 def map_text(
-    file: Path, test: System | Suite, layout: Layout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
+    file: Path, test: System | Suite, layout: FileLayout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
     stated: Mapping[str, str],
 ) -> tuple[str, list[str]]:  # fmt: skip
     """Return the text of a map, and what it lacks: units that the file does not tell."""

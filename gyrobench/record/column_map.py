@@ -161,7 +161,7 @@ def _is_time(unit: str) -> bool:
 
 
 @dataclass
-class Translation:
+class MappedRows:
     """Rows of a file under a map, as lines of the bench's CSV; what was wrong and what was left out.
 
     faults: what -> rows, each with the first text.  skipped, endless: rows left out.
@@ -371,9 +371,9 @@ def cells_of_file(file: Path, encoding: str, delimiter: str) -> Iterator[tuple[i
         raise DataError(file, [f"after row {number}: not text in {encoding} ({error}); give its encoding"]) from None
 
 
-def translate(file: Path, columns: ColumnMap, to: Path) -> Translation:
+def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
     """Write a file under its map as the bench's CSV, and return what was wrong and left out.  Raises DataError."""
-    done = Translation(columns, file)
+    done = MappedRows(columns, file)
     with to.open("w", encoding="utf-8", newline="\n") as out:
         for line in done.lines(cells_of_file(file, columns.encoding, columns.delimiter)):
             out.write(line + "\n")

@@ -66,8 +66,8 @@ class FileColumn:
 
 
 @dataclass(frozen=True)
-class Layout:
-    """What the text of a file shows."""
+class FileLayout:
+    """Layout of a text file, as its text shows it."""
 
     encoding: str
     delimiter: str
@@ -98,7 +98,7 @@ def _share(cells: Sequence[str]) -> float:
     return len(like) / len(there) if there else 0.0
 
 
-def find_layout(file: Path) -> Layout:
+def find_layout(file: Path) -> FileLayout:
     """Return the layout of a text file.  Raises UsageError where there is no table with names above it."""
     with regular(file).open("rb") as data:
         begin = data.read(SAMPLE)
@@ -136,7 +136,7 @@ def find_layout(file: Path) -> Layout:
     rows = [c for c in lines[start:] if len(c) == width]
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
     columns = _columns(names, lines[start - 1] if below else [], rows)
-    return Layout(encoding, delimiter, "," if comma else ".", start - 1 - below, below, len(rows), columns)
+    return FileLayout(encoding, delimiter, "," if comma else ".", start - 1 - below, below, len(rows), columns)
 
 
 def _read_unit(text: str) -> str | None:
@@ -204,7 +204,7 @@ def _likeness(wanted: str, unit: str, column: FileColumn) -> int:
     return 1 if column.unit and unit not in ("", "1", "s") else 0
 
 
-def match_columns(wanted: Sequence[tuple[str, str]], layout: Layout) -> dict[str, FileColumn]:
+def match_columns(wanted: Sequence[tuple[str, str]], layout: FileLayout) -> dict[str, FileColumn]:
     """Return name of the bench -> column of the file: the best fits first, those by dimension where they are alone."""
     scores = sorted(
         ((_likeness(n, u, c), -a, -b) for a, (n, u) in enumerate(wanted) for b, c in enumerate(layout.columns)),

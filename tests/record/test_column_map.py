@@ -8,14 +8,14 @@ import pytest
 
 from gyrobench.bench import UsageError
 from gyrobench.commands.fit_columns import write_columns
-from gyrobench.record.column_map import Translation, read_map, translate
+from gyrobench.record.column_map import MappedRows, read_map, translate
 from gyrobench.record.column_proposal import find_encoding, find_layout
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import load_system
 from gyrobench.workflow.measured_run import reduce_measured
 
 
-def mapped(folder: Path, text: str, columns: str, encoding: str = "utf-8") -> tuple[list[str], Translation]:
+def mapped(folder: Path, text: str, columns: str, encoding: str = "utf-8") -> tuple[list[str], MappedRows]:
     """Return the lines of a file under a map."""
     (folder / "data.txt").write_bytes(text.encode(encoding))
     (folder / "map.toml").write_text(columns, encoding="utf-8")
