@@ -10,7 +10,15 @@ from pathlib import Path
 from gyrobench import units
 from gyrobench.bench import UsageError
 from gyrobench.record.circumstances import statement, values_of
-from gyrobench.record.column_proposal import LONG, FileColumn, FileLayout, find_layout, match_columns, series_columns
+from gyrobench.record.column_proposal import (
+    CALLED,
+    LONG,
+    FileColumn,
+    FileLayout,
+    find_layout,
+    match_columns,
+    series_columns,
+)
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
@@ -18,6 +26,8 @@ from gyrobench.workflow.measured_run import empty_record
 
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
+#: what columns without a unit are called -> unit that may be meant
+LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"temp.*": "degC"}
 
 
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:
@@ -39,13 +49,15 @@ def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[
     wanted, stated = wanted_columns(test)
     layout = find_layout(file)
     if "channel" in test.options:
-        found, missing = _any_names(layout), []
+        found, wanted = _any_names(layout)
+        missing = [] if any(u not in ("s", "K", "degC") for _, u in wanted) else ["rate"]
     else:
         if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
             wanted = series_columns(wanted)
         found = match_columns(wanted, layout)
         missing = [n for n, _ in wanted if n not in found and n.split("_")[0] not in OPTIONAL]
-    for k, c in enumerate(c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")):
+    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
+    for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c
     text, problems = map_text(file, test, layout, found, dict(wanted), stated)
     for name in missing:
@@ -64,15 +76,22 @@ def _is(column: FileColumn, unit: str) -> bool:
     return units.same_dimension(column.unit or "1", unit)
 
 
-def _any_names(layout: FileLayout) -> dict[str, FileColumn]:
-    """Return the columns of a drift record: time, and rates, angles and temperatures under their own names."""
+def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
+    """Return the columns of a drift record, and their names with units that fit: time, then rates, angles and
+    temperatures under their own names, those without a unit by what they are called."""
     found: dict[str, FileColumn] = {}
+    wanted = []
     for c in layout.columns:
-        if "time" not in found and (c.time or _is(c, "s")):
-            found["time"] = c
-        elif any(_is(c, k) for k in KINDS):
-            found[re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"] = c
-    return found
+        name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
+        likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")
+        timed = c.time or _is(c, "s") or (not c.unit and re.fullmatch(CALLED["time"], name, re.I))
+        kind = next((k for k in KINDS if c.unit and _is(c, k)), likely if not c.unit else "")
+        if timed and "time" not in found:
+            name, kind = "time", "s"
+        if kind and name not in found and not (timed and name != "time"):
+            found[name] = c
+            wanted.append((name, kind))
+    return found, wanted
 
 
 def map_text(

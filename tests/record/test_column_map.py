@@ -196,6 +196,19 @@ def test_proposal_for_a_drift_record_of_a_logger(tmp_path: Path) -> None:
     assert outcome.record.run.series["unused"] == []
 
 
+def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
+    """Their units are not guessed: each is asked for."""
+    rows = "".join(f"{0.01 * k:.2f},{k % 7},{k % 5},{20 + k % 3}\n" for k in range(600))
+    text, problems = proposed(tmp_path, f"time,gyro_x,acc_x,temperature\n{rows}", "drift_record")
+    assert "[columns.time]" in text and '[columns.gyro_x]\nfrom = "gyro_x"\n# unit = "deg/s"' in text
+    assert "# Not used: acc_x" in text
+    assert [p.split(";")[0] for p in problems] == [
+        f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "temperature")
+    ]
+    _, problems = proposed(tmp_path, "a,b\n1,2\n3,4\n", "drift_record")
+    assert problems == ["column 'rate': none of the file fits by name and unit; not used so far: 'a', 'b'"]
+
+
 def test_proposal_for_a_tumble_names_what_it_lacks(tmp_path: Path) -> None:
     """One angle for two columns, a unit that the bench does not know: said, not guessed."""
     rows = "".join(f"1,{60 * k},{60 * k + 60},{k},{0.1 + 0.01 * k}\n" for k in range(20))
