@@ -93,7 +93,11 @@ def _is_template(file: Path) -> bool:
     """Return whether a file is a record without rows, as --template prints it."""
     if file.suffix != ".csv":
         return False
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    lines = [
+        line
+        for line in file.read_text(encoding="utf-8", errors="replace").splitlines()
+        if line and not line.startswith("#")
+    ]
     return len(lines) == 1
 
 
