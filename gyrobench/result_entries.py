@@ -10,11 +10,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from gyrobench import units
 from gyrobench.result_content import EMPTY
 
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
 Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
+
+
+class StatedLimit(tuple[float | None, float | None]):
+    """A limit of a file, in the unit that is written there; ``entry``: of which file and coefficient."""
+
+    unit: str
+    entry: str
+
+    @classmethod
+    def of(cls, low: float | None, high: float | None, unit: str, entry: str) -> StatedLimit:
+        limit = cls((low, high))
+        limit.unit, limit.entry = unit, entry
+        return limit
+
+    def in_unit(self, unit: str) -> Limit:
+        """Return the limit in another unit of the same dimension.  Raises UnitError."""
+        low, high = self
+        if units.display(self.unit) == units.display(unit):
+            return low, high
+        try:
+            ends = [None if v is None else units.convert(v, self.unit, unit) for v in (low, high)]
+        except units.UnitError as error:
+            raise units.UnitError(
+                f"{self.entry} is given in {self.unit!r}; the report uses {unit!r}, which is of another kind: {error}"
+            ) from None
+        return ends[0], ends[1]
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ _define(_dim(K=1), K=1.0, mK=1e-3)
 _define(_dim(mol=1), mol=1.0)
 _define(_dim(cd=1), cd=1.0)
 _define(_dim(rad=1), rad=1.0, mrad=1e-3, urad=1e-6, deg=DEG, arcmin=DEG / 60, arcsec=DEG / 3600, rev=2 * math.pi)
-_define(_dim(rad=1, s=-1), ERU=EARTH_RATE, mERU=EARTH_RATE * 1e-3, rpm=2 * math.pi / 60)
+_define(_dim(rad=1, s=-1), ERU=EARTH_RATE, mERU=EARTH_RATE * 1e-3, rpm=2 * math.pi / 60, dps=DEG, mdps=DEG * 1e-3)
 _define(_dim(s=-1), Hz=1.0, kHz=1e3, MHz=1e6, mHz=1e-3)
 _define(_dim(m=1, s=-2), g=G0, mg=G0 * 1e-3, ug=G0 * 1e-6, Gal=1e-2, mGal=1e-5)
 _define(_dim(kg=1, m=1, s=-2), N=1.0, mN=1e-3, uN=1e-6, gf=G0 * 1e-3)
@@ -97,7 +97,11 @@ _TABLE["g.cm"] = (G0 * 1e-5, _dim(kg=1, m=2, s=-2))
 _TABLE["g.cm2"] = (1e-7, _dim(kg=1, m=2))
 _OFFSET = {"degC": (1.0, 273.15, _dim(K=1))}  # only alone, never in a composite
 
+#: spellings of loggers, read and never printed
+_SPELLED = {"sec": "s", "hr": "h"}
 _READ = {
+    "℃": "degC",
+    "º": "deg",
     "°": "deg",
     "″": "arcsec",
     "′": "arcmin",
@@ -106,7 +110,6 @@ _READ = {
     "·": ".",
     "²": "2",
     "³": "3",
-    "√Hz": "sqrt(Hz)",
     "Ω": "Ohm",
     "^": "",
     "**": "",
@@ -118,6 +121,7 @@ def _clean(name: str) -> str:
     text = name.strip()
     for printed, plain in _READ.items():
         text = text.replace(printed, plain)
+    text = re.sub(r"√([A-Za-z]+)", r"sqrt(\1)", text)
     return re.sub(r"\s+", "", text)
 
 
@@ -160,7 +164,7 @@ def _product(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...],
 def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], list[str]]:
     if not tokens:
         raise UnitError(f"unit '{name}': a symbol is missing at the end")
-    head, rest = tokens[0], tokens[1:]
+    head, rest = _SPELLED.get(tokens[0], tokens[0]), tokens[1:]
     if head in ("sqrt(", "("):
         f, p, rest = _product(rest, name)
         if not rest:
@@ -192,7 +196,8 @@ def fitting(name: str) -> tuple[str, ...]:
     """Units of the same dimension as ``name``: its SI spelling, usual compounds of this trade, single symbols."""
     u = unit(name)
     compounds = [s for s in USUAL if unit(s).exponents == u.exponents]
-    return (u.dimension, *compounds, *(s for s, (_, p) in _TABLE.items() if p == u.exponents and s != u.dimension))
+    single = [*_TABLE.items(), *((s, (f, p)) for s, (f, _, p) in _OFFSET.items())]
+    return (u.dimension, *compounds, *(s for s, (_, p) in single if p == u.exponents and s != u.dimension))
 
 
 def same_dimension(a: str, b: str) -> bool:

@@ -8,7 +8,8 @@ import pytest
 from fuzzing import attacks
 
 INPUTS = {
-    "csv": 1200, "numbers": 40, "series": 400, "set": 900, "settings": 500, "units": 900, "axes": 900, "mapping": 300,
+    "csv": 1200, "columns": 80, "numbers": 40, "series": 400, "set": 900, "settings": 500, "units": 900, "axes": 900,
+    "mapping": 300,
     "spec": 200, "record": 200, "result": 300, "stored": 250, "campaign": 400, "api": 400, "user": 250,
     "environment": 2, "fmu": 75, "ssp": 10, "other": 75,
 }  # fmt: skip

@@ -70,9 +70,9 @@ def test_what_a_command_names_exists(step: Step) -> None:
         parse_axis(*axis.split("=", 1))
     if given.get("spec"):
         find_specification(given["spec"])
-    if "system" not in given or given["system"].endswith(".ssp"):
+    if not given.get("system") or given["system"].endswith(".ssp"):
         return
-    values = parse_settings([v for v in given["values"] or [] if not v.startswith("@")])
+    values = parse_settings([v for v in given.get("values") or [] if not v.startswith("@")])
     test = load_with_values(given["system"], values)
     if isinstance(test, Suite):
         return

@@ -40,7 +40,7 @@ REFUSED = [
     ),
     ([*POWER, "--set", "K_m=-5"], "K_m = -5: must be >= 0 N.m/rad\n"),
     ([*POWER, "--set", "profile=unsorted.csv"], "row 4: time = 0.5 s does not come after 1 s (row 3)"),
-    ([*POWER, "--set", "profile=gap.csv"], "row 3, column 'roll': '' is not a finite number"),
+    ([*POWER, "--set", "profile=gap.csv"], "row 3, column 'roll': a cell is empty"),
     ([*POWER, "--set", "profile=bare.csv"], "column 'time': no unit; write 'time [s]'"),
     ([*POWER, "--set", "profile=metre.csv"], "column 'roll': wrong unit [m]: units that fit: rad"),
     ([*PLATFORM, "--set", "platform.J=0"], "platform does not start: parameter J = 0 kg.m2 must be > 0"),

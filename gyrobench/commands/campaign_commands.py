@@ -11,6 +11,7 @@ import typer
 from gyrobench.bench import UsageError
 from gyrobench.commands.app import app, echo
 from gyrobench.commands.options import (
+    Columns,
     Json,
     Map,
     Part,
@@ -46,6 +47,7 @@ def sweep(
         Path | None, typer.Option(metavar="FILE.csv", help='One row a point, columns "name [unit]".')
     ] = None,
     data: Annotated[str | None, typer.Option(metavar="'DIR/*.csv'", help="Reduce measured files, a run each.")] = None,
+    columns: Columns = None,
     values: Set = None,
     part: Part = None,
     mapping: Map = None,
@@ -85,7 +87,7 @@ def sweep(
     from gyrobench.commands import run_campaign
 
     more = {
-        "runs": runs, "design": design, "table": table, "data": data, "spec": spec, "keep": keep,
+        "runs": runs, "design": design, "table": table, "data": data, "columns": columns, "spec": spec, "keep": keep,
         "fixed_design": fixed_design or None, "time_limit": time_limit, "memory_limit": memory_limit,
     }  # fmt: skip
     axes = run_campaign.require_over(over, seeds, data, table)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import Bench, display_path
+from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.app import app, echo
-from gyrobench.commands.completion import complete_copy
+from gyrobench.commands.completion import complete_copy, complete_system
 from gyrobench.commands.options import (
     Form,
     Map,
@@ -70,24 +70,45 @@ def export(
 
 @app.command()
 def fit(
-    fmu: Annotated[Path, typer.Argument(metavar="FMU", help="A co-simulation FMU, FMI 2.0 or 3.0.")],
-    slot: Annotated[
-        str, typer.Option("--slot", metavar="SYSTEM.SLOT|SOCKET", help="The slot, or the socket, that it is to fit.")
+    file: Annotated[
+        Path, typer.Argument(metavar="FMU|FILE", help="A co-simulation FMU, FMI 2.0 or 3.0, or a text file of data.")
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Mapping file to write; default: print it.")
+    slot: Annotated[
+        str | None,
+        typer.Option("--slot", metavar="SYSTEM.SLOT|SOCKET", help="FMU: the slot, or the socket, that it is to fit."),
     ] = None,
+    system: Annotated[
+        str | None,
+        typer.Option(
+            "--system",
+            metavar="SYSTEM",
+            help="Data: the test that is to read the file, by gyrobench reduce SYSTEM --columns MAP.",
+            autocompletion=complete_system,
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; default: print it.")] = None,
 ) -> None:
-    """Write a first mapping file of a third-party FMU.
+    """Write a first mapping of a vendor's FMU or a data file.
 
-    Its lines are proposals from names, units and descriptions; units and signs are to be checked.
+    A mapping file names the variables of an FMU, a column map the columns of a laboratory's file.  Their lines
+    are proposals from names, units and descriptions; units and signs are to be checked.
 
     \b
-    Example: gyrobench fit vendor.fmu --slot tumble_single_axis.gyro --out vendor.toml
+    Examples:
+      gyrobench fit vendor.fmu --slot tumble_single_axis.gyro --out vendor.toml
+      gyrobench fit messung.csv --system fixed_position --out messung.toml
     """
-    from gyrobench.commands.fit_mapping import write_mapping
+    if (slot is None) == (system is None):
+        raise UsageError("fit: --slot SYSTEM.SLOT for an FMU, or --system SYSTEM for a file of data")
+    if slot is not None:
+        from gyrobench.commands.fit_mapping import write_mapping
 
-    text, problems = write_mapping(fmu, slot, out)
+        text, problems = write_mapping(file, slot, out)
+    else:
+        from gyrobench.commands.fit_columns import write_columns
+
+        assert system is not None
+        text, problems = write_columns(file, system, out)
     echo(text.rstrip("\n") if out is None else display_path(out))
     if problems:
         echo("to be completed by hand:", err=True)

@@ -60,6 +60,14 @@ Strict = Annotated[
 Data = Annotated[
     list[Path] | None, typer.Option(metavar="FILE.csv|RUN", help="Measured record; for a suite, its runs.  Repeatable.")
 ]
+Columns = Annotated[
+    Path | None,
+    typer.Option(
+        "--columns",
+        metavar="MAP",
+        help="Column map (.toml) of a --data file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
+    ),
+]
 From = Annotated[
     Path | None,
     typer.Option(

@@ -52,16 +52,19 @@ def reduce(
     as_json: bool = False,
     formats: Sequence[str] = FORMATS,
     fit_to: str | None = None,
+    columns: Path | None = None,
 ) -> str:
     """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict.
 
-    fit_to: gyro of the bench that is to have the noise of the record.
+    fit_to: gyro of the bench that is to have the noise of the record.  columns: column map of the file.
     """
     if isinstance(test, Suite):
         from gyrobench.workflow.suite_report import reduce_runs
 
         if fit_to:
             raise UsageError(f"--fit-to {fit_to}: {test.name} is a suite; only drift_record gives noise coefficients")
+        if columns:
+            raise UsageError(f"--columns {columns}: {test.name} compares runs; reduce each record by its own test")
         if not data:
             raise UsageError(f"no runs named; gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
@@ -75,7 +78,9 @@ def reduce(
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
     if fit_to:
         channels_of(fit_to)  # refuses another part before the work
-    outcome = reduce_measured(test, data[0], values, spec, out, force, formats=formats, feedback=FEEDBACK)
+    outcome = reduce_measured(
+        test, data[0], values, spec, out, force, formats=formats, feedback=FEEDBACK, columns=columns
+    )
     verdict = _print_outcome(outcome, as_json)
     if fit_to and outcome.result is not None and outcome.folder is not None:
         file = outcome.folder / f"{fit_to}.toml"

@@ -10,6 +10,7 @@ import typer
 from gyrobench.bench import UsageError, display_path
 from gyrobench.commands.app import app, echo, exit_on_fail
 from gyrobench.commands.options import (
+    Columns,
     Coupling,
     Data,
     Engine,
@@ -102,6 +103,7 @@ def run(
 def reduce(
     system: System,
     data: Data = None,
+    columns: Columns = None,
     source: From = None,
     values: Set = None,
     part: Part = None,
@@ -131,6 +133,7 @@ def reduce(
     Examples:
       gyrobench reduce tumble_single_axis --template > record.csv
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
+      gyrobench reduce fixed_position --data messung.csv --columns messung.toml --set latitude=48.1deg
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
       gyrobench reduce tumble_single_axis --from fmpy.csv --set latitude=45.75deg
       gyrobench reduce tumble_single_axis.ssp --from libcosim_output
@@ -150,16 +153,17 @@ def reduce(
     formats = ("json",) if no_report else FORMATS
     parts, maps = parse_swaps(part, mapping)
     if source is not None:
-        if data or fit_to:
+        if data or fit_to or columns:
             raise UsageError(
-                "--from: a run of another tool; --data and --fit-to are of measured data, name one of them"
+                "--from: a run of another tool; --data, --columns and --fit-to are of measured data, name one of them"
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
         exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
         return
     if parts or maps:
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
-    verdict = print_runs.reduce(test, data or [], parse_settings(values), spec, out, force, as_json, formats, fit_to)
+    given = parse_settings(values)
+    verdict = print_runs.reduce(test, data or [], given, spec, out, force, as_json, formats, fit_to, columns)
     exit_on_fail(verdict, strict)
 
 

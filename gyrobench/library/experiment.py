@@ -195,19 +195,21 @@ class Experiment:
         spec: File | None = None,
         out: File | None = None,
         force: bool = False,
+        columns: File | None = None,
         **circumstances: str,
     ) -> Run:
         """Reduce a laboratory's CSV file by the reduction of this system.
 
         The options that were set and the circumstances (phase, instrument, operator ...) replace comments of the file.
-        spec, out, force: as of :meth:`run`.  Raises errors of type GyrobenchError.
+        columns: column map of a file of another layout, as ``gyrobench fit FILE`` writes it.  spec, out, force: as
+        of :meth:`run`.  Raises errors of type GyrobenchError.
         """
         file = Path(data)
         if not file.exists():
             raise UsageError(f"{file}: no such file of measured data")
         outcome = reduce_measured(
             self.system.with_values({}), file, {**self._given, **circumstances}, spec,
-            path_of(out), force, out is None, KEPT,
+            path_of(out), force, out is None, KEPT, columns=path_of(columns),
         )  # fmt: skip
         return finished(outcome)
 

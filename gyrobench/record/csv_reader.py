@@ -6,8 +6,8 @@
     1,0,60,0,2.5,0.1432
 
 The first line that is not a comment is the header: ``name [unit]`` for each column, no unit for pure numbers.  Lines
-``# key = value`` give circumstances.  Comma, semicolon or tab separates; the decimal sign is a point or, where a
-semicolon or a tab separates, a comma.
+``# key = value`` give circumstances, see :mod:`gyrobench.record.circumstances`.  Comma, semicolon or tab separates; the
+decimal sign is a point or, where a semicolon or a tab separates, a comma.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.reading import require_regular
+from gyrobench.record.circumstances import Keys, Statement, faults, statement, values_of
 
 MAX_LISTED = 8  # row numbers listed before "and n more"
 SCANNED = 50  # lines below the header that tell the decimal sign
@@ -123,15 +124,20 @@ class Head:
     """Head of a CSV file: the lines above its rows, and how the rows are written."""
 
     names: list[str]  # of the columns, with units
-    comments: dict[str, str]
+    statements: list[Statement]  # of the comments above it
     line: int  # number of the header line, from 1
     delimiter: str
     decimal_comma: bool
 
+    @property
+    def comments(self) -> dict[str, str]:
+        """Return what the comments state: key -> value."""
+        return values_of(self.statements)
+
 
 def read_head(file: Path) -> Head:
     """Return header and comments of a file of any length.  Raises DataError for none, and for text not in UTF-8."""
-    comments: dict[str, str] = {}
+    stated: list[Statement | None] = []
     with regular(file).open("rb") as lines:
         for number, data in enumerate(lines, 1):
             try:
@@ -139,7 +145,7 @@ def read_head(file: Path) -> Head:
             except UnicodeDecodeError:
                 raise DataError(file, [not_utf8(number)]) from None
             if line.lstrip().startswith("#"):
-                _comment(line, comments)
+                stated.append(statement(line, number))
             elif line.strip():
                 delimiter, names = _split_header(line)
                 if all(_is_number(n) for n in names):
@@ -150,14 +156,9 @@ def read_head(file: Path) -> Head:
                     )  # fmt: skip
                 below = (next(lines, b"").decode("ascii", "replace") for _ in range(SCANNED))
                 cells = (c.strip() for text in below for c in text.split(delimiter))
-                return Head(names, comments, number, delimiter, delimiter != "," and _decimal_comma(cells))
+                said = [s for s in stated if s is not None]
+                return Head(names, said, number, delimiter, delimiter != "," and _decimal_comma(cells))
     raise DataError(file, ["no header line"])
-
-
-def _comment(line: str, into: dict[str, str]) -> None:
-    key, sign, value = line.lstrip("# \t").partition("=")
-    if sign:
-        into[key.strip()] = value.strip()
 
 
 def cells_of(line: str, delimiter: str = ",") -> list[str]:
@@ -167,6 +168,13 @@ def cells_of(line: str, delimiter: str = ",") -> list[str]:
     except csv.Error:
         cells = line.split(delimiter)
     return [c.strip() for c in cells]
+
+
+def read_statements(file: Path) -> list[Statement]:
+    """Return what the comments of a file state, wherever they stand.  Raises DataError for text not in UTF-8."""
+    lines = enumerate(read_lines(file), 1)
+    stated = (statement(line, number) for number, line in lines if line.lstrip().startswith("#"))
+    return [s for s in stated if s is not None]
 
 
 def _split_header(line: str) -> tuple[str, list[str]]:
@@ -197,20 +205,20 @@ def not_utf8(row: int) -> str:
 
 
 def read_measured(
-    file: Path, columns: tuple[CsvColumn, ...] = WINDOW_COLUMNS, time: str | None = "t_start"
+    file: Path, columns: tuple[CsvColumn, ...] = WINDOW_COLUMNS, time: str | None = "t_start", keys: Keys | None = None
 ) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
     """Return the columns of a CSV file in SI, and its comments.
 
-    time: the column that must increase strictly (None: none).  Raises DataError naming missing and doubled columns,
-    missing or wrong units, cells that are not a finite number, doubled rows and times that do not increase, with
-    the row numbers as an editor counts them.
+    time: the column that must increase strictly (None: none).  keys: what the comments may state (None: anything).
+    Raises DataError naming unknown and doubled keys, missing and doubled columns, missing or wrong units, cells that
+    are not a finite number, doubled rows and times that do not increase, all of them, with the row numbers as an
+    editor counts them.
     """
-    lines = read_lines(file)
-    meta: dict[str, str] = {}
+    stated: list[Statement | None] = []
     table: list[tuple[int, str]] = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_lines(file), 1):
         if line.lstrip().startswith("#"):
-            _comment(line, meta)
+            stated.append(statement(line, number))
         elif line.strip():
             table.append((number, line))
     if not table:
@@ -219,24 +227,25 @@ def read_measured(
     rows = [(n, cells_of(line, delimiter)) for n, line in table[1:]]
     if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
         rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
+    said = [s for s in stated if s is not None]
+    problems = faults(said, keys) if keys is not None else []
     expected = {c.name: c for c in (*columns, *conditions(header))}
-    places, problems = header_places(header, expected)
+    places, of_header = header_places(header, expected)
+    problems += of_header
     if short := [(n, len(r)) for n, r in rows if len(r) != len(header)]:
-        problems.append(f"{_rows([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
+        problems.append(f"{row_list([n for n, _ in short])}: {short[0][1]} cells, the header has {len(header)}")
     if not rows:
         problems.append("no rows below the header")
-    if problems:
-        raise DataError(file, problems)
+    rows = [(n, r) for n, r in rows if len(r) == len(header)]
     columns_si = {}
     for name, (k, factor) in places.items():
         values, invalid = _numbers(name, [(n, r[k]) for n, r in rows], expected[name].whole)
         columns_si[name] = values if expected[name].whole else factor.to_si(values)
         problems += invalid
-    if not problems:
-        problems += _repeats(columns_si, [n for n, _ in rows], time)
+    problems += _repeats(columns_si, [n for n, _ in rows], time)
     if problems:
         raise DataError(file, problems)
-    return columns_si, meta
+    return columns_si, values_of(said)
 
 
 def conditions(header: list[str]) -> list[CsvColumn]:
@@ -286,7 +295,7 @@ def header_places(
     return places, problems
 
 
-def _rows(numbers: list[int]) -> str:
+def row_list(numbers: list[int]) -> str:
     """Return row numbers as "row 3" or "rows 3, 4 and 58 more (60 rows)"."""
     if len(numbers) == 1:
         return f"row {numbers[0]}"
@@ -305,7 +314,7 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
             x = math.nan
         if not math.isfinite(x):
             comma = "; the decimal sign is a point" if DECIMAL_COMMA.fullmatch(text) else ""
-            invalid.setdefault(f"is not a finite number{comma}", []).append((n, text))
+            invalid.setdefault(f"is not a finite number{comma}" if text else "is empty", []).append((n, text))
         elif abs(x) > LARGEST:
             invalid.setdefault(f"is larger than {LARGEST:g}", []).append((n, text))
         elif whole and (x != math.floor(x) or abs(x) > 2.0**53):
@@ -313,30 +322,35 @@ def _numbers(name: str, cells: list[tuple[int, str]], whole: bool) -> tuple[np.n
         values.append(x)
     problems = []
     for what, where in invalid.items():
-        cell = where[0][1] if what.startswith("must") else f"'{where[0][1]}'"
+        cell = {"must": where[0][1], "is e": "a cell"}.get(what[:4], f"'{where[0][1]}'")
         others = "" if len({text for _, text in where}) == 1 else f" (row {where[0][0]}, and others alike)"
-        problems.append(f"{_rows([n for n, _ in where])}, column '{name}': {cell} {what}{others}")
+        problems.append(f"{row_list([n for n, _ in where])}, column '{name}': {cell} {what}{others}")
     array = np.array(values)
     return (array.astype(np.int64) if whole and not problems else array), problems
 
 
 def _repeats(columns: Mapping[str, np.ndarray[Any, Any]], numbers: list[int], time: str | None) -> list[str]:
+    """Return which rows are doubled, else where the time does not increase; cells that are not numbers apart."""
     if not columns:
         return []
+    good = np.all([np.isfinite(c) for c in columns.values()], axis=0).tolist()
     first_row: dict[tuple[float, ...], int] = {}
     twice = []
-    for n, row in zip(numbers, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
-        if row in first_row:
+    for n, whole, row in zip(numbers, good, zip(*(c.tolist() for c in columns.values()), strict=True), strict=True):
+        if whole and row in first_row:
             twice.append((n, first_row[row]))
         first_row.setdefault(row, n)
     if twice:
-        return [f"{_rows([n for n, _ in twice])}: the same as row {twice[0][1]}" + (" and others" * (len(twice) > 1))]
+        return [
+            f"{row_list([n for n, _ in twice])}: the same as row {twice[0][1]}" + (" and others" * (len(twice) > 1))
+        ]
     if time is None or time not in columns:
         return []
-    t = columns[time]
+    there = np.flatnonzero(np.isfinite(columns[time]))
+    t, rows = columns[time][there], [numbers[k] for k in there.tolist()]
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if not back.size:
         return []
     k = int(back[0])
-    first = f"{time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {numbers[k]})"
-    return [f"{_rows([numbers[j + 1] for j in back.tolist()])}: {first}" + (", and others alike" * (back.size > 1))]
+    first = f"{time} = {t[k + 1]:g} s does not come after {t[k]:g} s (row {rows[k]})"
+    return [f"{row_list([rows[j + 1] for j in back.tolist()])}: {first}" + (", and others alike" * (back.size > 1))]

@@ -19,6 +19,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
+from gyrobench.record.circumstances import Statement
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head, for_arrow, header_places, read_head, regular
 from gyrobench.record.record import Record
 from gyrobench.record.time_series import read_blocks
@@ -100,9 +101,9 @@ def _of_parquet(source: Path) -> DriftTable:
     for field in schema:
         unit = (field.metadata or {}).get(b"unit", b"").decode()
         names.append(f"{field.name} [{unit}]" if unit and "[" not in field.name else field.name)
-    comments = {k.decode(): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items()
-                if k not in (b"ARROW:schema", b"pandas")}  # fmt: skip
-    head = Head(names, comments, 0, ",", False)
+    stated = [Statement(0, k.decode("utf-8", "replace"), v.decode("utf-8", "replace"))
+              for k, v in (schema.metadata or {}).items() if k not in (b"ARROW:schema", b"pandas")]  # fmt: skip
+    head = Head(names, stated, 0, ",", False)
 
     def blocks(columns: Sequence[CsvColumn]) -> Blocks:
         places, wrong = header_places(names, {c.name: c for c in columns})
@@ -135,7 +136,8 @@ def _of_run(record: Record, source: Path, channel: str) -> DriftTable:
         columns = {TIME: 0.5 * (columns["t_start"] + columns["t_end"]), **columns}
         of = {**of, TIME: "s"}
     heads = [f"{n} [{of[n]}]" if of.get(n) not in ("", "1", None) else n for n in columns]
-    head = Head(heads, {"instrument": record.run.instrument} if record.run.instrument else {}, 0, ",", False)
+    about = [Statement(0, "instrument", record.run.instrument)] if record.run.instrument else []
+    head = Head(heads, about, 0, ",", False)
 
     def blocks(asked: Sequence[CsvColumn]) -> Blocks:
         yield {c.name: np.asarray(columns[c.name], dtype=float) for c in asked if c.name in columns}

@@ -9,12 +9,12 @@ A CSV file with the one column ``run`` names their folders (from where the file 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import DataError, read_head, read_lines
+from gyrobench.record.csv_reader import DataError, read_head, read_lines, read_statements
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import Day, RecordError
 
@@ -66,17 +66,21 @@ def _differences(first: Record, other: Record) -> list[str]:
     return problems
 
 
-def read_runs(file: Path, system: str) -> Record | None:
+def read_runs(file: Path, system: str, values: Mapping[str, str]) -> Record | None:
     """Return the runs that ``file`` lists as one record; None when it is not a list of runs.
 
-    Raises DataError for folders that are not runs of ``system``, a run named twice, or fewer than two.
+    values: as given to --set; each run has its own, so that none may be given here.  Raises DataError for folders that
+    are not runs of ``system``, a run named twice, fewer than two, and values in the file or in ``values``.
     """
     if read_head(file).names != ["run"]:
         return None
     lines = [t.strip() for t in read_lines(file)]
     lines = [t for t in lines if t and not t.startswith("#")]
     names = [t.strip('"') for t in lines[1:]]
-    problems = [f"{n}: named twice" for n in sorted({n for n in names if names.count(n) > 1})]
+    stated = [f"'{s.key}' (row {s.line})" for s in read_statements(file) if not s.remark]
+    problems = [f"{n} is given: a list of runs states nothing, each run has its own values; reduce the runs with it"
+                for n in (*stated, *(f"--set {v}" for v in values))]  # fmt: skip
+    problems += [f"{n}: named twice" for n in sorted({n for n in names if names.count(n) > 1})]
     if len(names) < 2:
         problems.append(f"{len(names)} run: at least two are needed, a day each")
     records = []

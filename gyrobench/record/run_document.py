@@ -168,6 +168,8 @@ class DataFile(Entry):
 
     file: str = ""
     sha256: str = ""
+    columns: str = Field(default="", description="column map of a laboratory's own file")
+    columns_sha256: str = ""
 
 
 class Day(Entry):

@@ -12,8 +12,6 @@ Memory: blocks of BLOCK bytes and the windows, whatever the length of the file.
 
 from __future__ import annotations
 
-import contextlib
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -24,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.record.circumstances import statement
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, for_arrow, header_places
+from gyrobench.record.row_faults import NOTHING, ROWS, row_faults
 from gyrobench.record.sampling import Successive
 
 Block = Mapping[str, Array]
 BLOCK = 1 << 20  # bytes of text read at a time
-DATE = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\s*\d{1,2}:\d{2}:")
 GAP = 1.5  # usual steps; a longer one is a gap
-NOTHING = ["", "nan", "NaN", "NAN", "NA", "n/a", "null", "-", "--", "#N/A"]  # cells without a value
 
 
 @dataclass(frozen=True)
@@ -49,12 +47,12 @@ def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterato
 
     places, problems = header_places(head.names, {c.name: c for c in columns})
     if problems:
-        raise DataError(file, problems)
+        raise DataError(file, problems + row_faults(file, head, places, most=ROWS))
     check_utf8(file)  # pyarrow would print the failure of its own decoding
     wrong: list[str] = []
 
     def incomplete(row: Any) -> str:
-        if not row.text.lstrip().startswith("#"):
+        if not row.text.lstrip().startswith("#") or ((s := statement(row.text, 0)) and not s.remark):
             wrong.append(row.text)
         return "skip"
 
@@ -65,13 +63,11 @@ def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterato
             rows += batch.num_rows
             yield {n: places[n][1].to_si(_floats(batch.column(c))) for n, c in taken.items()}
     except pa.ArrowInvalid as error:
-        with contextlib.suppress(pa.ArrowInvalid):  # not of its cells
-            problems = _not_numbers(file, head, taken)
         ended = file.stat().st_size < BLOCK and not rows  # a header without an end of its line
+        problems = row_faults(file, head, places)  # [] where it is not of the cells
         raise DataError(file, problems or ["no rows below the header" if ended else str(error)]) from None
     if wrong:
-        many = f"{len(wrong)} rows have" if len(wrong) > 1 else "a row has"
-        raise DataError(file, [f"{many} not the {len(head.names)} cells of the header; the first: '{wrong[0][:80]}'"])
+        raise DataError(file, row_faults(file, head, places))
     if not rows:
         raise DataError(file, ["no rows below the header"])
 
@@ -97,31 +93,6 @@ def _open(file: Path, head: Head, wanted: list[str], kind: Any, invalid: Callabl
 def _floats(column: Any) -> Array:
     values: Array = column.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
-
-
-def _not_numbers(file: Path, head: Head, taken: Mapping[str, str]) -> list[str]:
-    """Return for each column how many of its cells are not numbers, with the first."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    comma = "," if head.decimal_comma else r"\."
-    number = rf"^\s*[-+]?(\d+({comma}\d*)?|{comma}\d+)([eE][-+]?\d+)?\s*$|^\s*[-+]?(inf|nan)\s*$"
-    count = dict.fromkeys(taken, 0)
-    first: dict[str, str] = {}
-    for batch in _open(file, head, list(taken.values()), pa.string(), lambda row: "skip"):
-        for name, c in taken.items():
-            cells = batch.column(c)
-            bad = cells.filter(pc.invert(pc.match_substring_regex(cells, number)))
-            count[name] += len(bad.drop_null())
-            if len(bad.drop_null()):
-                first.setdefault(name, bad.drop_null()[0].as_py())
-    sign = f"the decimal sign of this file is {'a comma' if head.decimal_comma else 'a point'}"
-    return [
-        f"column '{n}': {k} cell{'s are' if k > 1 else ' is'} not a number, the first: '{first[n][:40]}' "
-        f"({'a date: write seconds from the first sample on' if DATE.match(first[n]) else sign})"
-        for n, k in count.items()
-        if k
-    ]
 
 
 @dataclass

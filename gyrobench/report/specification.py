@@ -1,4 +1,4 @@
-"""Acceptance specifications: TOML files with a limit per coefficient, in the unit of the report.
+"""Acceptance specifications: TOML files with a limit per coefficient, in any unit that fits that of the report.
 
 title = "Acceptance of the standard floated gyro"
 
@@ -15,10 +15,8 @@ from typing import Any
 
 from gyrobench import reading
 from gyrobench.errors import GyrobenchError
-from gyrobench.result import Specification
-
-_UNITS = {"deg/h": "°/h", "deg/h/g": "°/h/g", "deg/h/g2": "°/h/g²", "deg/h/g^2": "°/h/g²"}
-
+from gyrobench.result_entries import StatedLimit
+from gyrobench.units import UnitError
 
 LARGEST = 1e300  # of a limit
 
@@ -27,35 +25,34 @@ class SpecificationError(GyrobenchError, ValueError):
     """An acceptance specification that cannot be used; says file, entry and what would be right."""
 
 
-def surface_unit(unit: str) -> str:
-    """Return the report's spelling of a unit: "deg/h/g2" is "°/h/g²"."""
-    return _UNITS.get(unit, unit)
+def load_specification(path: str | Path) -> dict[str, StatedLimit]:
+    """Return the limits by coefficient name, ``(low, high)`` in the unit of the file; None where a side is open.
 
-
-def load_specification(path: str | Path) -> Specification:
-    """Return the limits by coefficient name, ``(low, high)`` in surface units; None where a side is open.
-
-    Raises SpecificationError for a file that is no TOML, an unknown key, a missing unit, a limit that
-    is no finite number, limits in the wrong order or an entry without a limit; FileNotFoundError when
-    there is no file.  Whether the unit is that of the reported coefficient is checked by
-    :func:`check_units` once the coefficients are known.
+    Raises SpecificationError for a file that is no TOML, an unknown key, a missing unit or one that there is not, a
+    limit that is no finite number, limits in the wrong order or an entry without a limit; FileNotFoundError when there
+    is no file.  Whether the unit fits the reported coefficient is known once there are coefficients.
     """
-    return {name: (entry.get("min"), entry.get("max")) for name, entry in _entries(Path(path)).items()}
+    return {
+        name: StatedLimit.of(entry.get("min"), entry.get("max"), entry["unit"], f"{path}: {name}")
+        for name, entry in _entries(Path(path)).items()
+    }
 
 
 def check_units(path: str | Path, units: dict[str, str]) -> None:
-    """Raise SpecificationError when an entry names no reported coefficient, or another unit than reported.
+    """Raise SpecificationError when an entry names no reported coefficient, or has a unit of another dimension.
 
     ``units`` maps coefficient names to the units of the report; an entry D_F also stands for a combination whose
     name begins with it, as "D_F + γ² D_OO".
     """
     units = {**{name.split(" ")[0]: unit for name, unit in units.items()}, **units}
-    for name, entry in _entries(Path(path)).items():
+    for name, limit in load_specification(path).items():
         if name not in units:
             known = ", ".join(units)
             raise SpecificationError(f"{path}: no coefficient {name!r} in this result; there are {known}")
-        if surface_unit(entry["unit"]) != surface_unit(units[name]):
-            raise SpecificationError(f"{path}: {name} is given in {entry['unit']!r}; the report uses {units[name]!r}")
+        try:
+            limit.in_unit(units[name])
+        except UnitError as error:
+            raise SpecificationError(str(error)) from None
 
 
 def _entries(path: Path) -> dict[str, dict[str, Any]]:

@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, read_head, read_measured
+from gyrobench.record.circumstances import Keys, Statement, faults, values_of
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, read_head, read_measured, read_statements
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
-from gyrobench.system.lab_series import is_time_series, windows_of_series
+from gyrobench.system.lab_series import faults_of_series, is_time_series, windows_of_series
+from gyrobench.system.values import InvalidValueError
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
@@ -29,10 +31,14 @@ if TYPE_CHECKING:
 SERIES = """\
 Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
 #   `voltage` of a pickoff), one `angle` for its two, and `flag`; `phase` is 0 while moving or settling.  Without the
-#   column `phase` phases are found in the motion of the table and must fit the plan.  # window = 60s: their length.
-#   Samples that may be aliased are warned of: say what they are by # samples = means (each since the one before) or
-#   points, and how far the signal reaches by # bandwidth = 14Hz."""
-TEXTS = ("instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b", "arrangement")
+#   column `phase` phases are found in the motion of the table and must fit the plan.  '# window = 60s': their length.
+#   Samples that may be aliased are warned of: say what they are by '# samples = means' (each since the one before) or
+#   points, and how far the signal reaches by '# bandwidth = 14Hz'."""
+TEXTS = (
+    "title", "source", "made", "note", "instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b",
+    "arrangement",
+)  # fmt: skip
+OF_SERIES = ("window", "samples", "bandwidth")  # keys of time series
 
 
 def explained(template: str, options: Iterable[str] = ()) -> str:
@@ -74,20 +80,23 @@ def read_record(
     phases.  columns, time: as of read_measured; where windows are expected, std, n and flagged are filled in.  texts:
     comments that are kept as they are.  Raises DataError, and InvalidValueError for an option that does not fit.
     """
-    head = read_head(data)
-    windows: dict[str, np.ndarray[Any, Any]] = {}
-    series, notes = is_time_series(head, columns), list[str]()
-    comments = head.comments
-    if not series:
-        windows, comments = read_measured(data, columns, time)
-    said = {**comments, **values}
     for name in values:
         if name not in system.options and name not in texts and not (attitudes and name.startswith("phase ")):
             system.set(name, values[name])  # says which options there are
-    for name, value in said.items():
-        if name in system.options:
-            system.set(name, value)
-    problems = []
+    head = read_head(data)
+    windows: dict[str, np.ndarray[Any, Any]] = {}
+    series, notes, problems = is_time_series(head, columns), list[str](), list[str]()
+    keys = Keys((*system.options, *texts, *(OF_SERIES if series else ())), phases=attitudes is not None or series)
+    stated = head.statements if series else read_statements(data)
+    if series:
+        problems += faults(stated, keys)
+    else:
+        try:
+            windows, _ = read_measured(data, columns, time, keys)
+        except DataError as error:
+            problems += error.problems
+    said = {**values_of(stated), **values}
+    problems += set_options(system, stated, values)
     for name, example in (needed or {}).items():
         default = system.options[name].default
         if name not in system.given or (not system[name] and not default):
@@ -97,7 +106,9 @@ def read_record(
     problems += _type_b_problems(system, said.get("type_b", ""))
     if said.get("arrangement", "checked") != "checked":
         problems.append(f"arrangement = {said['arrangement']}: 'checked' or nothing is expected")
-    if series and not problems:
+    if series and problems:
+        problems += faults_of_series(data, head, columns)
+    elif series:
         named = attitudes(system) if attitudes else None
         windows, said, notes = windows_of_series(system, data, head, columns, said, named)
     plan: list[PlanRow] = []
@@ -115,6 +126,25 @@ def read_record(
     run.window_units = {c.name: c.unit for c in columns if c.name in windows}
     run.notes = notes
     return Record(windows, {}, run)
+
+
+def set_options(system: System, stated: Sequence[Statement], values: Mapping[str, str]) -> list[str]:
+    """Set the options that a file or ``values`` say, which win; return what is wrong with those of the file.
+
+    Raises InvalidValueError for a wrong one of ``values``.
+    """
+    rows = {s.key: f"row {s.line}: " if s.line else "" for s in stated}
+    problems = []
+    for name, value in {**values_of(stated), **values}.items():
+        if name not in system.options:
+            continue
+        try:
+            system.set(name, value)
+        except InvalidValueError as error:
+            if name in values:
+                raise
+            problems.append(f"{rows[name]}{error}")
+    return problems
 
 
 def _type_b_problems(system: System, said: str) -> list[str]:

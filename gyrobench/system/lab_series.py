@@ -16,7 +16,8 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import AnyArray
 from gyrobench.record import sampling
-from gyrobench.record.csv_reader import CsvColumn, DataError, Head, conditions
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head, conditions, header_places
+from gyrobench.record.row_faults import ROWS, row_faults
 from gyrobench.record.time_series import Averager, Averaging, average, read_blocks
 from gyrobench.system import table_motion
 from gyrobench.system.plan import Phase
@@ -32,6 +33,13 @@ def is_time_series(head: Head, columns: Sequence[CsvColumn]) -> bool:
     names = {n.split("[")[0].strip() for n in head.names}
     known = {c.name for c in columns}
     return "time" in names and "t_start" not in names and "t_start" in known and any("mean" in n for n in known)
+
+
+def faults_of_series(file: Path, head: Head, columns: Sequence[CsvColumn]) -> list[str]:
+    """Return what is wrong with the columns and rows of a file whose circumstances are wrong already."""
+    asked = _Names.of((*columns, *conditions(head.names))).asked(head)
+    places, problems = header_places(head.names, {c.name: c for c in asked})
+    return problems + row_faults(file, head, places, "time", ROWS)
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,11 @@ class _Names:
             columns.append(CsvColumn(name, c.unit, c.meaning.removeprefix("mean "), c.required))
         return cls(signals, optional, angles, keys, [*columns, FLAG])
 
+    def asked(self, head: Head) -> list[CsvColumn]:
+        """Return the columns to read: those that must be there, and those that are."""
+        there = {n.split("[")[0].strip() for n in head.names}
+        return [c for c in self.columns if c.required or c.name in there]
+
 
 def windows_of_series(
     system: System, file: Path, head: Head, columns: Sequence[CsvColumn], said: Mapping[str, str],
@@ -84,7 +97,7 @@ def windows_of_series(
     names = _Names.of(columns)
     there = {n.split("[")[0].strip() for n in head.names}
     keys = [k for k in names.keys if k in there]
-    asked = [c for c in names.columns if c.required or c.name in there]
+    asked = names.asked(head)
     phases = [p for p in system.plan().phases if isinstance(p, Phase)]
     by_motion = "phase" in names.keys and not keys
     try:
@@ -106,7 +119,8 @@ def windows_of_series(
             blocks = (_numbered(b, stretches, phases, step) for b in blocks)
         series = average(blocks, averager)
     except ValueError as error:
-        raise DataError(file, [str(error)]) from None
+        places, _ = header_places(head.names, {c.name: c for c in asked})
+        raise DataError(file, [str(error), *row_faults(file, head, places)]) from None
     if not series:
         raise DataError(file, [f"no window is complete; {averager.sentence() or 'the time series is too short'}"])
     problems = _short(averager, phases) if by_motion else []

@@ -5,8 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.record import Record
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import DataFile
 from gyrobench.report import FORMATS
@@ -47,23 +50,28 @@ def reduce_measured(
     in_memory: bool = False,
     formats: Sequence[str] = FORMATS,
     feedback: Feedback = SILENT,
+    columns: Path | None = None,
 ) -> RunOutcome:
     """Reduce a laboratory's file; write record and report, unless they are kept in memory.
 
-    values: as given to --set, for the reader.  Raises UsageError, DataError, ReductionError and PostRunError.
+    values: as given to --set, for the reader.  columns: column map of a file of another layout.  Raises
+    UsageError, DataError, ReductionError and PostRunError.
     """
     measured = _measured_data(system)
     data = Bench.find().existing(data)
     file = find_specification(spec)
     limits = load_limits(file)
-    if measured.progress:
-        with feedback.progress("reading") as progress:
-            record = measured.read(system, data, values, progress)
+    if columns is not None:
+        record = _read_mapped(measured, system, data, values, columns, feedback)
     else:
-        record = measured.read(system, data, values)
+        record = _read(measured, system, data, values, feedback)
     with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
+    if columns is not None:
+        written = columns.read_bytes()
+        record.run.data.columns, record.run.data.columns_sha256 = columns.name, hashlib.sha256(written).hexdigest()
+        digest.update(written)
     digest.update(repr(sorted(values.items())).encode())
     identity = digest.hexdigest()[:8]
     folder = None if in_memory else out or Bench.find().out / system.name / f"measured-{identity}"
@@ -79,3 +87,31 @@ def reduce_measured(
     with record_kept(folder, record):
         paths = write_report(result, folder, record, file, formats)
     return RunOutcome(record, result, folder, paths)
+
+
+def _read(measured: MeasuredData, system: System, data: Path, values: Mapping[str, str], feedback: Feedback) -> Record:
+    if not measured.progress:
+        return measured.read(system, data, values)
+    with feedback.progress("reading") as progress:
+        return measured.read(system, data, values, progress)
+
+
+def _read_mapped(
+    measured: MeasuredData, system: System, data: Path, values: Mapping[str, str], columns: Path, feedback: Feedback
+) -> Record:
+    """Return the record of a file under its column map.  Raises DataError with all that is wrong with the file."""
+    from gyrobench.record.column_map import read_map, translate
+
+    found = read_map(columns)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "columns.csv"
+        done = translate(data, found, file)
+        problems = done.problems()
+        try:
+            record = _read(measured, system, file, {**found.values(), **values}, feedback)
+        except DataError as error:
+            raise DataError(data, [*problems, *error.problems]) from None
+    if problems:
+        raise DataError(data, problems)
+    record.run.notes = [*record.run.notes, *done.notes()]
+    return record

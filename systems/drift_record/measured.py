@@ -10,10 +10,12 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record import sampling
+from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import (
     RATE,
     TIME,
+    DriftTable,
     Signal,
     find_signals,
     harmonic_names,
@@ -26,7 +28,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator
 from gyrobench.reduction.series.quantization import angle_quantization, quantization
-from gyrobench.system.lab_record import TEXTS, measured_run
+from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import MeasuredData, System
 
 ATTITUDE = "at rest"
@@ -60,21 +62,24 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     for name in values:
         if name not in system.options and name not in (*TEXTS, "samples"):
             system.set(name, values[name])  # says which options there are
-    for name, value in said.items():
-        if name in system.options:
-            system.set(name, value)
+    problems = faults(table.head.statements, Keys((*system.options, *TEXTS, "samples")))
+    problems += set_options(system, table.head.statements, values)
     if system["counts"] not in ("cumulative", "increments"):
-        raise DataError(data, [f"counts = {system['counts']}: must be 'cumulative' or 'increments'"])
+        problems.append(f"counts = {system['counts']}: must be 'cumulative' or 'increments'")
+    kind = ""
     try:
         kind, _ = sampling.stated({k: v for k, v in said.items() if k == "samples"})
     except ValueError as error:
-        raise DataError(data, [str(error)]) from None
-    regressors = system["regressors"]
-    if system["angle"]:
-        table = with_harmonics(table, system["angle"], system["harmonics"])
-        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
-    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
-    reader = DriftReader(table, signals, regressors, system["sampling"])
+        problems.append(str(error))
+    try:
+        table, signals, reader = _opened(system, table)
+        if problems:
+            for _ in table.blocks(reader.columns):  # what is wrong with the rows is in the same list
+                pass
+    except DataError as error:
+        problems += error.problems
+    if problems:
+        raise DataError(data, problems)
     every = {s.name: _Every(reader) for s in signals}
     columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
     about = reader.about
@@ -101,6 +106,16 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     if reader.held.factor > 1:
         run.series["deviations"] = {name: e.result() for name, e in every.items()}
     return Record(windows, {}, run)
+
+
+def _opened(system: System, table: DriftTable) -> tuple[DriftTable, list[Signal], DriftReader]:
+    """Return the table with what is to be read of it.  Raises DataError."""
+    regressors = system["regressors"]
+    if system["angle"]:
+        table = with_harmonics(table, system["angle"], system["harmonics"])
+        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
+    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
+    return table, signals, DriftReader(table, signals, regressors, system["sampling"])
 
 
 def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:

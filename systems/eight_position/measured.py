@@ -11,7 +11,7 @@ from gyrobench.record.csv_reader import CsvColumn, DataError
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
-from gyrobench.system.lab_record import TEXTS, read_record
+from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData, System
 
 from . import positions
@@ -53,18 +53,10 @@ COLUMNS = (
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
-    runs = read_runs(data, system.name)
+    runs = read_runs(data, system.name, values)
     if runs is not None:
         return runs
-    record = read_record(
-        system,
-        data,
-        values,
-        needed={"latitude": "45.75deg"},
-        columns=COLUMNS,
-        time=None,
-        texts=(*TEXTS, "source", "note"),
-    )
+    record = read_record(system, data, values, needed={"latitude": "45.75deg"}, columns=COLUMNS, time=None)
     rows = record.windows
     wrong = sorted(set(rows["position"].tolist()) - set(positions.ATTITUDES))
     if wrong:

@@ -24,7 +24,7 @@ TEMPLATE = """\
 #
 # latitude, k (torquer scale factor), attitude: needed, here or by --set.  gravity, height: optional.
 # attitude: directions of the gyro axes I, O and S (S may be left out): E east, N north, U up, P pole of the sky,
-#   Q = E x P, or minus these; or a matrix [[..],[..],[..]] with the axes I, O, S as rows in east, north, up.
+#   Q along E x P, or minus these; or a matrix [[..],[..],[..]] with the axes I, O, S as rows in east, north, up.
 # mean: torquer current averaged over the reading, positive where it precesses positively (k i = input rate - drift).
 # day: optional; several days are reduced one by one and then together.  std, flagged (suspect samples): optional.
 # Units in brackets may be others of the same kind (min, uA ...).
@@ -45,7 +45,7 @@ COLUMNS = (
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
-    runs = read_runs(data, system.name)
+    runs = read_runs(data, system.name, values)
     if runs is not None:
         return runs
     needed = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from gyrobench.record.csv_reader import CsvColumn
-from gyrobench.record.run_document import ABOUT
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -25,5 +24,4 @@ COLUMNS = (
     CsvColumn("range_plus", "rad", "angle range with positive current", required=False),
     CsvColumn("range_minus", "rad", "angle range with negative current", required=False),
 )
-TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement")
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None, texts=TEXTS))
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None))

@@ -26,7 +26,7 @@ TEMPLATE = """\
 # polarity: project (k i = input rate - drift, positive current precesses positively) or book (the opposite sign).
 # phase: number of the position.  outer, inner: table angles at the start and the end of the average, right-handed,
 #   counted on through the turns; outer axis along the pole.  At 0, 0: output axis along the pole, spin axis west,
-#   inner axis = input axis = (0, -sin latitude, cos latitude) in east, north, up.
+#   inner axis and input axis along (0, -sin latitude, cos latitude) in east, north, up.
 # mean: torquer current averaged at rest.  std [mA], n (of the samples) and flagged (suspect samples): optional.
 # Units in brackets may be others of the same kind (min, arcsec, A ...).
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean [mA],n,flagged

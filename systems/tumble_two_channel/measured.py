@@ -27,12 +27,12 @@ TEMPLATE = """\
 # latitude, k_x, k_y (scale factors of the torquers about x and y): needed, here or by --set.  gravity, height: optional
 # (WGS84 normal gravity).  Axes x, y, z: outer gimbal, inner gimbal, spin.
 # polarity: project (k i = input rate - drift, positive current precesses positively) or book (the opposite sign).
-# phase N: which attitude the rows with this number were taken in.  model = nine:
+# phase N: which attitude the rows with this number were taken in.  Of model nine:
 #   mount 1   table turning, spin axis along +pole, x axis west at angle 0
 #   mount 2   table turning, spin axis along -pole, x axis west at angle 0
 #   static 3  table at rest at angle 0, y axis up, x axis east
 #   static 4  table at rest at angle 0, y axis down, x axis east
-# model = simple (no dwells):
+# Of model simple (no dwells):
 #   mount 1   table turning, spin axis along +pole, y axis west at angle 0
 #   mount 2   table turning, spin axis along -pole, y axis east at angle 0
 # angle: of the table, right-handed about the pole, counted on through the turns; against the Earth it decreases.

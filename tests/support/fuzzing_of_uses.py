@@ -295,4 +295,26 @@ def stored_files(folder: Path) -> dict[str, tuple[Callable[[], str], list[Path]]
     }
 
 
-OF_USES = (_stored, _campaign, _api, _user, _environment)
+def _columns(folder: Path) -> Callable[[random.Random], object]:
+    """Files of a laboratory and their column maps: proposed, read and used."""
+    from messy_file import messy
+
+    from gyrobench.commands.fit_columns import write_columns
+    from gyrobench.system.system import load_system
+    from gyrobench.workflow.measured_run import reduce_measured
+
+    file, columns, good = folder / "messy.csv", folder / "map.toml", messy()[0]
+    file.write_bytes(good)
+    proposed = write_columns(file, "fixed_position", None)[0].encode()
+    values = {"latitude": "45deg", "k": "17deg/h/mA", "attitude": "E U -N"}
+
+    def one(rng: random.Random) -> None:
+        file.write_bytes(changed(good, rng) if rng.random() < 0.5 else good)
+        columns.write_bytes(changed(proposed, rng))
+        write_columns(file, rng.choice(["fixed_position", "tumble_single_axis", "drift_record"]), None)
+        reduce_measured(load_system("fixed_position"), file, values, in_memory=True, columns=columns)
+
+    return one
+
+
+OF_USES = (_columns, _stored, _campaign, _api, _user, _environment)

@@ -160,8 +160,8 @@ class _Execution:
         self.name = uuid.uuid4().hex[:12]
         self.own = has_own_processes(client)
         settings = ExecutionSettings(
-            self.name, tool_digest(), d.system, tuple(plan.setups), plan.spec, d.step, d.check_step, plan.nominal,
-            d.keep, d.time_limit, d.memory_limit, self.own,
+            self.name, tool_digest(), d.system, tuple(plan.setups), plan.spec, plan.columns_map,
+            d.step, d.check_step, plan.nominal, d.keep, d.time_limit, d.memory_limit, self.own,
         )  # fmt: skip
         _add_engine(plan)
         self.plugin = BundlePlugin(settings, plan.bundle.packed())

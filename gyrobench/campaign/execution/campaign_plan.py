@@ -61,6 +61,7 @@ class CampaignPlan:
     setups: list[dict[str, Assigned]]
     bundle: Bundle
     spec: str | None  # in the bundle
+    columns_map: str | None  # in the bundle
     repeated: int  # points that are the same run as another one
     notes: list[str] = field(default_factory=list)
 
@@ -135,6 +136,7 @@ class _Planner:
         in_bundle = self.bundle.add(spec) if spec else None
         files = d.files()
         self.digests = {"tool": tool_digest(), "spec": sha256(spec) if spec else None}
+        columns_map = self._columns_map()
         self.data = {str(f): sha256(f) for f in files}
         if files:
             if isinstance(self.test, Suite):
@@ -160,7 +162,22 @@ class _Planner:
         elif len(seeds) > 1:
             described.append({"name": "seed", "kind": "seed", "unit": "", "values": seeds})
         repeated = len(points) - len(runs)
-        return CampaignPlan(d, described, list(runs.values()), setups, self.bundle, in_bundle, repeated, self.notes)
+        return CampaignPlan(
+            d, described, list(runs.values()), setups, self.bundle, in_bundle, columns_map, repeated, self.notes
+        )
+
+    def _columns_map(self) -> str | None:
+        """Return the column map of the measured files in the bundle; None where there is none."""
+        if self.definition.columns is None:
+            return None
+        from gyrobench.record.column_map import read_map
+
+        file = self.definition.path(self.definition.columns)
+        read_map(file)
+        if self.definition.data is None:
+            raise UsageError(f"columns = {self.definition.columns}: of measured files; data names none")
+        self.digests["columns"] = sha256(file)
+        return self.bundle.add(file, f"columns/{file.name}")
 
     # ------------------------------------------------------------------------------------------ points
     def _points(

@@ -19,7 +19,8 @@
 Every point of an axis is combined with every point of the others.  Distributions are drawn together, ``runs`` points by
 ``design`` ("random", "lhs", "sobol") and ``design_seed``.  ``table``: a CSV file, one row a point, columns
 "name [unit]", and "seed" if it is given; or "FILE.py:function", which returns such rows as dictionaries (values in SI
-or texts), called with the ``arguments``.  ``data``: pattern of measured files, one run a file.
+or texts), called with the ``arguments``.  ``data``: pattern of measured files, one run a file; ``columns``: their
+column map.
 
 fixed_design: what a system derives from its parts (the gain of a loop from an inertia) is derived once, at the values
 of ``set`` and of the parts; else it follows the parts to every point, which is then a design of its own.
@@ -93,6 +94,7 @@ class CampaignFile(BaseModel):
     table: File | list[dict[str, Any]] | tuple[dict[str, Any], ...] | None = None
     arguments: dict[str, Any] = {}
     data: File | list[File] | None = None
+    columns: File | None = None
     step: float | str | None = None
     check_step: bool | None = None
     fixed_design: Any = False  # Definition checks it
@@ -126,6 +128,7 @@ class Definition:
     table: Any = None
     arguments: dict[str, Any] = field(default_factory=dict)
     data: Any = None
+    columns: str | None = None
     step: Any = None
     check_step: bool | None = None
     fixed_design: bool = False

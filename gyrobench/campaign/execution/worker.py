@@ -68,6 +68,7 @@ class ExecutionSettings:
     system: str
     setups: tuple[Mapping[str, Assigned], ...]
     spec: str | None
+    columns_map: str | None
     step: float | None
     check_step: bool | None
     nominal: Mapping[str, Any] | None  # values of parts that the design is held at
@@ -288,8 +289,10 @@ class _WorkerState:
         if sent:
             file = self.inbox / file.name
             file.write_bytes(chunk.content[run.data])
+        columns = self.root / self.settings.columns_map if self.settings.columns_map else None
+        test = self.test.with_values({})
         try:
-            outcome = reduce_measured(self.test.with_values({}), file, values, spec, in_memory=True, formats=())
+            outcome = reduce_measured(test, file, values, spec, in_memory=True, formats=(), columns=columns)
         finally:
             if sent:
                 file.unlink()

@@ -27,6 +27,7 @@ from gyrobench.reduction.estimation.step_effect import with_step
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.setup import conditions
 from gyrobench.result import NO_VERDICT, Coefficient, Limit, Reason, Result, Specification, StepCheck
+from gyrobench.result_entries import StatedLimit
 
 R = TypeVar("R", bound=Result)
 PASS, FAIL, INCONCLUSIVE, VOID = "pass", "fail", "inconclusive", "void"
@@ -97,6 +98,8 @@ def _judged(
     judged = []
     for c in coefficients:
         limit = limits.get(c.name, limits.get(c.stands_for, c.limit))
+        if isinstance(limit, StatedLimit):
+            limit = limit.in_unit(c.unit)
         judged.append(replace(c, limit=limit, verdict=assess_conformity(c.interval, limit)))
     taken: list[Reason] = []
     for reason in reasons:

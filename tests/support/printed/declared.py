@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from messy_file import messy
+
 if TYPE_CHECKING:
     from printed.pages import Step
     from printed.reader import Reader
@@ -91,7 +93,11 @@ def _is_template(file: Path) -> bool:
     """Return whether a file is a record without rows, as --template prints it."""
     if file.suffix != ".csv":
         return False
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    lines = [
+        line
+        for line in file.read_text(encoding="utf-8", errors="replace").splitlines()
+        if line and not line.startswith("#")
+    ]
     return len(lines) == 1
 
 
@@ -232,7 +238,13 @@ def _environment(reader: Reader, name: str, step: Step) -> None:
     (reader.here / name).symlink_to(reader.installed.python.parents[1])
 
 
+def _messy_file(reader: Reader, name: str, step: Step) -> None:
+    """Write the file of a laboratory that knows nothing of the bench."""
+    (reader.here / name).write_bytes(messy()[0])
+
+
 PREPARED = [
+    Preparation(r"\bmessung\.csv\b", _messy_file),
     Preparation(r"(?<=--data )(?:record|day)s?\.csv\b|\bdata\.csv\b", _records),
     Preparation(r"\bdays\.csv\b", lambda r, n, s: (_records if "servo" in s.text else _runs_of_days)(r, n, s)),
     Preparation(r"reports/out/\w+/[0-9][0-9a-f]{7}\b", _saved_run),

@@ -1,0 +1,152 @@
+"""A first column map of a laboratory's file for a test."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from gyrobench import units
+from gyrobench.bench import UsageError
+from gyrobench.record.circumstances import statement, values_of
+from gyrobench.record.column_proposal import (
+    CALLED,
+    LONG,
+    FileColumn,
+    FileLayout,
+    find_layout,
+    match_columns,
+    series_columns,
+)
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.measured_run import empty_record
+
+OPTIONAL = ("std", "n", "flagged")
+KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
+#: what columns without a unit are called -> unit that may be meant
+LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"temp.*": "degC"}
+
+
+def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:
+    """Return names and units of the columns that a test reads, and its circumstances with an example each."""
+    *comments, header = empty_record(test).strip().splitlines()
+    found = [re.fullmatch(r"(\S+)(?: \[(.*)\])?", text.strip()) for text in header.split(",")]
+    stated = values_of(s for text in comments if (s := statement(text, 1)))
+    return [(m[1], m[2] or "") for m in found if m], stated
+
+
+def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:
+    """Return a first column map of a file, written to ``out`` where given, and what it still lacks.
+
+    Raises UsageError.
+    """
+    if not file.is_file():
+        raise UsageError(f"{file}: no such file")
+    test = load_test(system)
+    wanted, stated = wanted_columns(test)
+    layout = find_layout(file)
+    if "channel" in test.options:
+        found, wanted = _any_names(layout)
+        missing = [] if any(u not in ("s", "K", "degC") for _, u in wanted) else ["rate"]
+    else:
+        if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
+            wanted = series_columns(wanted)
+        found = match_columns(wanted, layout)
+        missing = [n for n, _ in wanted if n not in found and n.split("_")[0] not in OPTIONAL]
+    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
+    for k, c in enumerate(others):
+        found[f"temperature {k + 1}" if k else "temperature"] = c
+    text, problems = map_text(file, test, layout, found, dict(wanted), stated)
+    for name in missing:
+        if name == "t_end" and "t_start" in found:
+            continue
+        unused = ", ".join(f"'{c.name}'" for c in layout.columns if c not in found.values()) or "none"
+        problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
+    if out is not None:
+        if out.exists():
+            raise UsageError(f"--out {out}: the file exists; choose another name")
+        out.write_text(text, encoding="utf-8")
+    return text, problems
+
+
+def _is(column: FileColumn, unit: str) -> bool:
+    return units.same_dimension(column.unit or "1", unit)
+
+
+def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
+    """Return the columns of a drift record, and their names with units that fit: time, then rates, angles and
+    temperatures under their own names, those without a unit by what they are called."""
+    found: dict[str, FileColumn] = {}
+    wanted = []
+    for c in layout.columns:
+        name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
+        likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")
+        timed = c.time or _is(c, "s") or (not c.unit and re.fullmatch(CALLED["time"], name, re.I))
+        kind = next((k for k in KINDS if c.unit and _is(c, k)), likely if not c.unit else "")
+        if timed and "time" not in found:
+            name, kind = "time", "s"
+        if kind and name not in found and not (timed and name != "time"):
+            found[name] = c
+            wanted.append((name, kind))
+    return found, wanted
+
+
+def map_text(
+    file: Path, test: System | Suite, layout: FileLayout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
+    stated: Mapping[str, str],
+) -> tuple[str, list[str]]:  # fmt: skip
+    """Return the text of a map, and what it lacks: units that the file does not tell."""
+    problems: list[str] = []
+    empty = sum(c.empty for c in found.values())
+    series = "t_start" not in wanted
+    lines = [
+        f"# Column map of {file.name}: gyrobench reduce {test.name} --data {file.name} --columns MAP",
+        "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
+        f"encoding = {_quoted(layout.encoding)}",
+        f"delimiter = {_quoted(layout.delimiter)}",
+        f"decimal = {_quoted(layout.decimal)}",
+        f"skip = {layout.skip}  # lines above the names of the columns",
+        f"below = {layout.below}  # lines between names and rows",
+        "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
+        f"empty = {_quoted('skip' if empty and not series else 'missing')}  # {empty} in the columns below",
+    ]
+    for name in sorted(found, key=lambda n: list(wanted).index(n) if n in wanted else len(wanted)):
+        lines += _entry(name, found[name], wanted.get(name, ""), problems)
+        if name == "t_start" and "t_end" in wanted and "t_end" not in found:
+            lines += ["", "[columns.t_end]  # readings without a pause; else from = the column with their end",
+                      'next = "t_start"', '# last = "60s"  # length of the last one, else left out']  # fmt: skip
+    used = {s for c in found.values() for s in c.sources}
+    unused = [c.name for c in layout.columns if not used & {*c.sources}]
+    lines += [
+        "",
+        f"# Not used: {', '.join(unused) or 'none'}",
+        "#",
+        "# [set]  # what the test needs to know, here or by --set",
+    ]
+    lines += [f"# {n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")]
+    return "\n".join(lines) + "\n", problems
+
+
+def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str]:
+    sources: Sequence[str | int] = c.sources
+    shown = ", ".join(_quoted(s) for s in sources)
+    key = name if re.fullmatch(r"[\w-]+", name, re.ASCII) else _quoted(name)
+    lines = ["", f"[columns.{key}]", f"from = {shown}" if len(sources) == 1 else f"from = [{shown}]"]
+    if c.time:
+        lines.append(f"time = {_quoted(c.time)}")
+        if c.time.startswith(("%d/%m", "%m/%d")):
+            problems.append(f"column '{name}': day and month may be exchanged in {c.time}")
+    elif c.unit:
+        lines.append(f"unit = {_quoted(c.unit)}")
+    elif unit not in ("", "1"):
+        lines.append(f"# unit = {_quoted(unit)}")
+        said = f"'{c.written}' is unknown" if c.written else "the file tells none"
+        problems.append(f"column '{name}': its unit: {said}; write unit = {_quoted(unit)}, or what it is")
+    return lines
+
+
+def _quoted(value: str | int) -> str:
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,382 @@
+"""Column maps: a laboratory's file of any layout as the bench's own CSV, row for row.
+
+    encoding = "cp1252"                    # default utf-8; utf-16 ...
+    delimiter = ";"                        # , ; tab or space
+    decimal = ","
+    skip = 9                               # lines above the names of the columns
+    below = 1                              # lines between names and rows (units)
+    empty = "skip"                         # missing (default): see the reader; skip: the row; previous: as above it
+
+    [columns.t_start]
+    from = ["Datum", "Uhrzeit"]            # joined by a blank; a number: the column at that place, from 1
+    time = "%d.%m.%Y %H:%M:%S"             # becomes seconds since the first row
+
+    [columns.t_end]
+    next = "t_start"                       # that column in the next row; last = "60s": length of the last one
+
+    [columns.mean]
+    from = "Strom / mA"
+    unit = "mA"
+    factor = -1                            # value in the unit = factor times what is written
+
+    [set]                                  # as --set, which wins
+    latitude = "48.1deg"
+
+Clock times without a date go on after midnight.  The rows keep their numbers, so that messages name those of the file.
+Not modelled: separators of thousands (refused), changes to summer time (times that run back are refused).
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from gyrobench import reading, units
+from gyrobench.bench import UsageError, suggest_names
+from gyrobench.record.csv_reader import DataError, regular, row_list
+from gyrobench.record.row_faults import NOTHING
+
+Empty = Literal["missing", "skip", "previous"]
+HALF_DAY = 43200.0  # s
+DATED = re.compile(r"%[djyYxcmbB]")
+BINARY_KINDS = {b"PK": "a spreadsheet or an archive", b"PA": "a Parquet file", b"\xd0\xcf": "an old spreadsheet"}
+BINARY = tuple(BINARY_KINDS)
+COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+
+
+class MappedColumn(BaseModel):
+    """Where a column of the bench comes from."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    source: str | int | list[str | int] = Field(default="", alias="from")
+    unit: str = ""
+    factor: float = 1.0
+    time: str = ""
+    next: str = ""
+    last: str = ""
+    empty: Empty | None = None
+
+    @property
+    def sources(self) -> list[str | int]:
+        return self.source if isinstance(self.source, list) else [self.source]
+
+
+class ColumnMap(BaseModel):
+    """The keys of a map; see the module."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    encoding: str = "utf-8"
+    delimiter: Literal[",", ";", "\t", " "] = ","
+    decimal: Literal[".", ","] = "."
+    skip: int = Field(default=0, ge=0)
+    below: int = Field(default=0, ge=0)
+    empty: Empty = "missing"
+    absent: list[str] = NOTHING  # texts of cells without a value
+    columns: dict[str, MappedColumn]
+    set: dict[str, str | int | float | bool] = {}
+
+    def values(self) -> dict[str, str]:
+        """Return what is set, as texts of --set."""
+        return {k: str(v).lower() if isinstance(v, bool) else str(v) for k, v in self.set.items()}
+
+
+def read_map(file: Path) -> ColumnMap:
+    """Return the map of a TOML file.  Raises UsageError naming all that is wrong with it."""
+    data = reading.toml(reading.read_text(file, UsageError), file, UsageError)
+    try:
+        found = ColumnMap.model_validate(data)
+    except ValidationError as error:
+        problems = [_problem(e) for e in error.errors()]
+    else:
+        problems = _contradictions(found)
+        if not problems:
+            return found
+    raise UsageError("\n".join([f"{file}: not a column map:", *(f"  - {p}" for p in problems)]))
+
+
+def _problem(error: Any) -> str:
+    place = ".".join(map(str, error["loc"]))
+    if error["type"] == "extra_forbidden":
+        model = MappedColumn if error["loc"][0] == "columns" else ColumnMap
+        known = [f.alias or n for n, f in model.model_fields.items()]
+        return f"{place}: unknown key; {suggest_names(str(error['loc'][-1]), known)}"
+    given = "" if error["type"] == "missing" else f" = {reading.shorten(repr(error['input']))}"
+    return f"{place}{given}: {error['msg'][:1].lower()}{error['msg'][1:]}"
+
+
+def _contradictions(found: ColumnMap) -> list[str]:
+    problems = []
+    try:
+        codecs.lookup(found.encoding)
+    except LookupError:
+        problems.append(f"encoding = {found.encoding}: unknown; utf-8, cp1252, utf-16, latin-1 ...")
+    if found.delimiter == found.decimal:
+        problems.append(f"delimiter and decimal are both '{found.decimal}'")
+    if not found.columns:
+        problems.append("columns: none is named")
+    for name, c in found.columns.items():
+        if re.search(r"[\[\],\"]", name):
+            problems.append(f"columns.{name}: a name of the bench has no unit, comma or quote")
+        if bool(c.next) == (c.sources != [""]):
+            problems.append(f"columns.{name}: either 'from' or 'next' is expected")
+        of = found.columns.get(c.next)
+        if c.next and (of is None or of.next):
+            problems.append(f"columns.{name}: next = {c.next}: no column of this map with 'from'")
+        elif c.last and (of is None or not (of.time or _is_time(of.unit))):
+            problems.append(f"columns.{name}: last = {c.last}: only beside next = a column of times, in a unit of time")
+        if len(c.sources) > 1 and not c.time:
+            problems.append(f"columns.{name}: several columns are joined for a date and a clock time: time is missing")
+        if c.time and (c.unit or c.factor != 1.0):
+            problems.append(f"columns.{name}: time gives seconds; leave out unit and factor")
+        for key, text in (("unit", c.unit), ("last", c.last)):
+            try:
+                if text and key == "unit":
+                    units.unit(text)
+                elif text:
+                    units.parse_quantity(text, "s")
+            except units.UnitError as error:
+                problems.append(f"columns.{name}.{key}: {error}")
+    dated = {n: (bool(DATED.search(c.time)), "%z" in c.time) for n, c in found.columns.items() if c.time}
+    if len(set(dated.values())) > 1:
+        problems.append(f"columns {', '.join(dated)}: all with a date or none, all with a zone (%z) or none")
+    return problems
+
+
+def _is_time(unit: str) -> bool:
+    try:
+        return units.same_dimension(unit or "1", "s")
+    except units.UnitError:  # named already
+        return True
+
+
+@dataclass
+class MappedRows:
+    """Rows of a file under a map, as lines of the bench's CSV; what was wrong and what was left out.
+
+    faults: what -> rows, each with the first text.  skipped, endless: rows left out.
+    """
+
+    map: ColumnMap
+    file: Path
+    faults: dict[str, tuple[str, list[int]]] = field(default_factory=dict)
+    skipped: list[int] = field(default_factory=list)
+    endless: list[int] = field(default_factory=list)  # without a row after it
+    read: list[tuple[str, MappedColumn, Empty, list[int]]] = field(default_factory=list)  # with their places in a row
+    origin: datetime | None = None
+    before: dict[str, str] = field(default_factory=dict)  # last value of each column, as written
+    clock: dict[str, float] = field(default_factory=dict)  # last time of each column, s
+
+    def lines(self, rows: Iterable[tuple[int, list[str]]]) -> Iterator[str]:
+        """Yield a line for each line of the file: remarks, the header, then the rows, "#" for what is left out.
+
+        rows: number and cells of each line.  Raises DataError for columns that the file does not have.
+        """
+        width = 0
+        waiting: list[tuple[int, dict[str, str] | None]] = []  # a row whose end is in the next one, and lines left out
+        for number, cells in rows:
+            if number <= self.map.skip:
+                yield self._remark(cells)
+            elif number == self.map.skip + 1:
+                width = len(cells)
+                self._place(cells)
+                yield _line([self._header(n, c.unit) for n, c in self.map.columns.items()])
+            elif number <= self.map.skip + 1 + self.map.below or not any(cells) or cells[0].startswith("#"):
+                waiting.append((number, None))
+            else:
+                row, left_out = self._row(number, cells, width)
+                for before in waiting:
+                    yield self._ended(*before, row)
+                waiting = [(number, None if left_out else row)]
+        for before in waiting:
+            yield self._ended(*before, {})
+
+    def _remark(self, cells: Sequence[str]) -> str:
+        """Return a line above the names: its own comments state circumstances, all else is left out."""
+        return self.map.delimiter.join(cells) if cells and cells[0].startswith("#") else "#"
+
+    def _header(self, name: str, unit: str) -> str:
+        c = self.map.columns[name]
+        if c.time:
+            unit = "s"
+        if c.next:
+            of = self.map.columns[c.next]
+            unit = "s" if of.time else of.unit
+        return f"{name} [{unit}]" if unit else name
+
+    def _place(self, names: list[str]) -> None:
+        problems = []
+        for name, c in self.map.columns.items():
+            if c.next:
+                continue
+            places: list[int] = []
+            self.read.append((name, c, c.empty or self.map.empty, places))
+            for source in c.sources:
+                if isinstance(source, int):
+                    if not 1 <= source <= len(names):
+                        problems.append(f"columns.{name}: from = {source}: the file has {len(names)} columns")
+                    places.append(source - 1)
+                elif names.count(source) == 1:
+                    places.append(names.index(source))
+                else:
+                    many = (
+                        "no such column" if source not in names else "several columns have this name: give its number"
+                    )
+                    near = f"; {suggest_names(source, [n for n in names if n])}" if source not in names else ""
+                    problems.append(f"columns.{name}: from = '{source}': {many} in row {self.map.skip + 1}{near}")
+        if problems:
+            raise DataError(self.file, problems)
+
+    def _row(self, number: int, cells: list[str], width: int) -> tuple[dict[str, str], bool]:
+        """Return the values by column, "" where one is missing, and whether the row is left out."""
+        while len(cells) > width and not cells[-1]:
+            cells = cells[:-1]
+        if len(cells) != width:
+            self._fault(f"not the {width} cells of the names in row {self.map.skip + 1}", " ".join(cells), number)
+            return {}, True
+        row, left_out = {}, False
+        for name, c, rule, places in self.read:
+            parts = [cells[k] for k in places]
+            text = "" if any(p in self.map.absent for p in parts) else " ".join(parts)
+            if not text and rule == "previous":
+                text = self.before.get(name, "")
+            elif not text and rule == "skip":
+                left_out = True
+            self.before[name] = text
+            row[name] = self._value(number, name, c, text) if text else ""
+        if left_out:
+            self.skipped.append(number)
+        return row, left_out
+
+    def _value(self, number: int, name: str, c: MappedColumn, text: str) -> str:
+        if c.time:
+            try:
+                moment = datetime.strptime(text, c.time)
+            except ValueError:
+                self._fault(f"column '{name}': not of the form {c.time}", text, number)
+                return text
+            self.origin = self.origin or moment
+            t = (moment - self.origin).total_seconds()
+            if not DATED.search(c.time):
+                last = self.clock.get(name, 0.0)
+                while t < last - HALF_DAY:
+                    t += 2.0 * HALF_DAY
+                if t < last:
+                    self._fault(
+                        f"column '{name}': runs back, or after half a day and more: a date is needed", text, number
+                    )
+                self.clock[name] = max(t, last)
+            return repr(t)
+        if not text.isascii():
+            text = text.replace("−", "-")
+        if self.map.decimal == ",":
+            if "." in text:
+                self._fault(f"column '{name}': a point, where the decimal sign is a comma", text, number)
+            if "," in text and COMMA.fullmatch(text):
+                text = text.replace(",", ".")
+        if c.factor == 1.0:
+            return text
+        try:
+            return repr(float(text) * c.factor)
+        except ValueError:
+            return text
+
+    def _ended(self, number: int, row: Mapping[str, str] | None, following: Mapping[str, str]) -> str:
+        """Return the line of a row, with the values that the next one has; of None one that is left out."""
+        left_out = "#" if len(self.map.columns) > 1 else ""  # beside one column a remark would be a cell
+        if row is None:
+            return left_out
+        cells = []
+        for name, c in self.map.columns.items():
+            if not c.next:
+                cells.append(row[name])
+            elif following:
+                cells.append(following[c.next])
+                if _runs_back(row[c.next], following[c.next]):
+                    self._fault(f"column '{c.next}': the next row has {following[c.next]}", row[c.next], number)
+            elif c.last:
+                cells.append(self._last(c, row[c.next]))
+            else:
+                self.endless.append(number)
+                return left_out
+        return _line(cells)
+
+    def _last(self, c: MappedColumn, start: str) -> str:
+        unit = self.map.columns[c.next].unit or "s"
+        try:
+            return repr(float(start) + units.convert(units.parse_quantity(c.last, "s"), "s", unit))
+        except ValueError:  # the reader names the start
+            return ""
+
+    def _fault(self, what: str, text: str, row: int) -> None:
+        self.faults.setdefault(what, (text, []))[1].append(row)
+
+    def problems(self) -> list[str]:
+        """Return what was wrong, each with its rows."""
+        return [f"{row_list(rows)}: '{text[:60]}': {what}" for what, (text, rows) in self.faults.items()]
+
+    def notes(self) -> list[str]:
+        """Return what was left out, for the report."""
+        said = [f"Left out for an empty cell: {row_list(self.skipped)}."] if self.skipped else []
+        last = "Left out, since no row after it tells its end"
+        return said + ([f'{last}: {row_list(self.endless)}; last = "60s" in the map gives it.'] if self.endless else [])
+
+
+def _runs_back(now: str, following: str) -> bool:
+    try:
+        return float(following) <= float(now)
+    except ValueError:  # the reader names it
+        return False
+
+
+def _line(cells: Sequence[str]) -> str:
+    line = ",".join(cells)
+    if line.count(",") == len(cells) - 1 and '"' not in line:
+        return line
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
+    return text.getvalue()
+
+
+def cells_of_file(file: Path, encoding: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and cells of each line.  Raises DataError for text in another encoding."""
+    codec = "utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding
+    number = 0
+    if file.is_dir():
+        raise DataError(file, ["a folder; a column map is of a text file"])
+    with regular(file).open("rb") as data:
+        if (begin := data.read(4)).startswith(BINARY):
+            raise DataError(file, [f"{BINARY_KINDS[begin[:2]]}; save the table as CSV"])
+    try:
+        with file.open(encoding=codec) as lines:
+            for number, line in enumerate(lines, 1):
+                text = line.rstrip("\n")
+                if delimiter == " ":
+                    yield number, text.split()
+                elif '"' in text:
+                    yield number, [c.strip() for c in next(csv.reader([text], delimiter=delimiter), [])]
+                else:
+                    yield number, [c.strip() for c in text.split(delimiter)]
+    except (UnicodeError, csv.Error) as error:
+        raise DataError(file, [f"after row {number}: not text in {encoding} ({error}); give its encoding"]) from None
+
+
+def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
+    """Write a file under its map as the bench's CSV, and return what was wrong and left out.  Raises DataError."""
+    done = MappedRows(columns, file)
+    with to.open("w", encoding="utf-8", newline="\n") as out:
+        for line in done.lines(cells_of_file(file, columns.encoding, columns.delimiter)):
+            out.write(line + "\n")
+    if not done.read:
+        raise DataError(file, [f"no names of columns in row {columns.skip + 1} (skip = {columns.skip})"])
+    return done

@@ -1,0 +1,234 @@
+"""A first column map of a laboratory's text file: its layout, and which of its columns is which of a test.
+
+Found from the text alone: encoding, separator, decimal sign, the row of names (the one above the numbers), a row of
+units below it, dates and clock times, units in or below the names.  Which column is which follows from names (English,
+German) and dimensions; what a name does not tell (signs, factors, which of two currents) is for the reader to check.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from gyrobench import units
+from gyrobench.bench import UsageError
+from gyrobench.record.column_map import BINARY, cells_of_file
+from gyrobench.record.csv_reader import DECIMAL_COMMA, regular
+from gyrobench.record.row_faults import NOTHING
+
+SAMPLE = 1 << 22  # bytes that are looked at
+LONG = 2000  # rows from which on a file is taken for time series
+DAYS = ("%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y")
+CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M")
+FORMATS = (*(f"{d}{joint}{c}" for d in DAYS for joint in (" ", "T") for c in CLOCKS), *DAYS, *CLOCKS)
+NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
+WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))\s*")
+SPELLED = {"grad": "deg", "sek": "s", "std": "h", "c": "degC", "°c": "degC", "volt": "V", "ampere": "A", "kelvin": "K"}
+#: name of the bench, or its beginning -> what laboratories call it
+CALLED = {
+    "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
+    "t_end": r"t_?end|ende?|bis|stop|to|until",
+    "time": r"time.*|zeit.*|datum.*|date.*|uhrzeit|t",
+    "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
+    "day": r"day|tag",
+    "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
+    "current": r"strom.*|current.*|i",
+    "voltage": r"spannung.*|voltage.*|u",
+    "std": r"std.*|streuung.*|standardabw.*|sigma.*",
+    "angle": r"angle.*|winkel.*",
+    "position": r"position.*|stellung.*|winkel.*",
+    "rate": r"rate.*|dreh.*|omega.*",
+    "flag": r"flag.*|g[uü]ltig.*",
+    "n": r"n|anzahl.*|count.*",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FileColumn:
+    """A column of the file, or a date and a clock time side by side."""
+
+    sources: tuple[str | int, ...]
+    name: str
+    unit: str  # "": none, or one that is unknown
+    written: str  # unit as it is written
+    time: str  # format
+    empty: int
+
+    @property
+    def exponents(self) -> object:
+        return units.unit("s" if self.time else self.unit or "1").exponents
+
+
+@dataclass(frozen=True)
+class FileLayout:
+    """Layout of a text file, as its text shows it."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    skip: int
+    below: int
+    rows: int
+    columns: tuple[FileColumn, ...]
+
+
+def find_encoding(data: bytes) -> str:
+    """Return the likely encoding of a text: by its mark, UTF-8 where it is that, UTF-16 by zeros, else cp1252."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    if data[:400].count(0) > 0.3 * len(data[:400]):
+        return "utf-16-le" if data[:400:2].count(0) < data[1:400:2].count(0) else "utf-16-be"
+    for name in ("utf-8", "cp1252"):
+        with suppress(UnicodeDecodeError):
+            codecs.getincrementaldecoder(name)().decode(data)
+            return name
+    return "latin-1"
+
+
+def _share(cells: Sequence[str]) -> float:
+    """Return which part of the cells that are not empty are numbers, dates or clock times."""
+    there = [c for c in cells if c not in NOTHING]
+    like = [c for c in there if NUMBER.fullmatch(c) or (c[0].isdigit() and re.fullmatch(r"[\d.:,/T -]+", c))]
+    return len(like) / len(there) if there else 0.0
+
+
+def find_layout(file: Path) -> FileLayout:
+    """Return the layout of a text file.  Raises UsageError where there is no table with names above it."""
+    with regular(file).open("rb") as data:
+        begin = data.read(SAMPLE)
+    if begin.startswith(BINARY):
+        raise UsageError(f"{file}: not a text file; save the table as CSV")
+    encoding = find_encoding(begin)
+    best: tuple[float, str, int, list[list[str]]] | None = None
+    for delimiter in (";", "\t", ",", " "):
+        lines = []
+        for number, cells in cells_of_file(file, encoding, delimiter):
+            lines.append(cells)
+            if number > LONG + 200:
+                break
+        shares = [_share(c) if len(c) > (delimiter != ",") else 0.0 for c in lines]
+        numeric = [k for k, share in enumerate(shares) if share > 0.5]
+        width = Counter(len(lines[k]) for k in numeric).most_common(1)[0][0] if numeric else 0
+        good = [k for k in numeric if len(lines[k]) == width]
+        score = sum(shares[k] for k in good) * (1.0 if width > 1 else 0.5)
+        if good and (best is None or score > best[0] * 1.0001):
+            start = next(
+                (k for a, k in enumerate(good) if good[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), good[0]
+            )
+            best = score, delimiter, start, lines
+    if best is None or best[2] == 0:
+        raise UsageError(f"{file}: no table of numbers with a row of names above it")
+    _, delimiter, start, lines = best
+    width = len(lines[start])
+    below = int(start > 1 and len(lines[start - 2]) == width and _are_units(lines[start - 1]))
+    names = lines[start - 1 - below]
+    if len(names) != width or _share(names) > 0.5:
+        raise UsageError(
+            f"{file}: {width} columns of numbers from row {start + 1} on, without a row of as many names above it: "
+            "write that row, with the same separator"
+        )
+    rows = [c for c in lines[start:] if len(c) == width]
+    comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
+    columns = _columns(names, lines[start - 1] if below else [], rows)
+    return FileLayout(encoding, delimiter, "," if comma else ".", start - 1 - below, below, len(rows), columns)
+
+
+def _read_unit(text: str) -> str | None:
+    """Return the unit of a text, None for one that is unknown."""
+    text = text.strip("[]() ")
+    text = SPELLED.get(text.casefold(), text)
+    with suppress(units.UnitError):
+        if text in ("", "-"):
+            return ""
+        units.unit(text)
+        return text
+    return None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    found = [_read_unit(c) for c in cells]
+    return any(found) and all(f is not None or not c for f, c in zip(found, cells, strict=True))
+
+
+def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[FileColumn, ...]:
+    found = []
+    for k, text in enumerate(names):
+        match = WITH_UNIT.fullmatch(text)
+        written = next((g for g in match.groups()[1:] if g), "") if match else ""
+        name = match[1] if match and match[1] else text
+        if below:
+            written = below[k] or written
+        cells = [r[k] for r in rows if r[k] not in NOTHING]
+        time = next((f for f in FORMATS if cells and all(_fits(c, f) for c in cells[:200])), "")
+        unit = "" if time else _read_unit(written) or ""
+        source: str | int = text if names.count(text) == 1 and text else k + 1
+        found.append(FileColumn((source,), name, unit, written, time, len(rows) - len(cells)))
+    joined: list[FileColumn] = []
+    for c in found:
+        last = joined[-1] if joined else None
+        if last is not None and last.time in DAYS and c.time in CLOCKS:
+            both = FileColumn((*last.sources, *c.sources), last.name, "", "", f"{last.time} {c.time}", c.empty)
+            joined[-1] = both
+        else:
+            joined.append(c)
+    return tuple(joined)
+
+
+def _fits(text: str, form: str) -> bool:
+    with suppress(ValueError):
+        datetime.strptime(text, form)
+        return True
+    return False
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\s_.-]+", "_", name.strip()).casefold()
+
+
+def _likeness(wanted: str, unit: str, column: FileColumn) -> int:
+    """Return how well a column of the file fits one of the bench: 0 not at all, 1 by its dimension only."""
+    if (column.unit or column.time) and column.exponents != units.unit(unit or "1").exponents:
+        return 0
+    if _plain(column.name) == wanted:
+        return 4
+    base = next((b for b in (wanted, wanted.rsplit("_", 1)[0], wanted.split("_")[0]) if b in CALLED), "")
+    if base and re.fullmatch(CALLED[base], _plain(column.name)):
+        ending = wanted[len(base) :]
+        return 3 if not ending or _plain(column.name).endswith(ending) else 0
+    return 1 if column.unit and unit not in ("", "1", "s") else 0
+
+
+def match_columns(wanted: Sequence[tuple[str, str]], layout: FileLayout) -> dict[str, FileColumn]:
+    """Return name of the bench -> column of the file: the best fits first, those by dimension where they are alone."""
+    scores = sorted(
+        ((_likeness(n, u, c), -a, -b) for a, (n, u) in enumerate(wanted) for b, c in enumerate(layout.columns)),
+        reverse=True,
+    )
+    found: dict[str, FileColumn] = {}
+    for score, a, b in scores:
+        name, column = wanted[-a][0], layout.columns[-b]
+        if not score or name in found or column in found.values():
+            continue
+        alone = sum(s == 1 and i == a for s, i, _ in scores) == 1 == sum(s == 1 and i == b for s, _, i in scores)
+        if score > 1 or alone:
+            found[name] = column
+    return found
+
+
+def series_columns(wanted: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the columns of time series for those of windows: time, current for mean, one angle for its two."""
+    out: dict[str, str] = {"time": "s"}
+    for name, unit in wanted:
+        if name in ("t_start", "t_end", "n") or name.startswith(("std", "flagged")):
+            continue
+        kind = {"A": "current", "V": "voltage"}.get(units.unit(unit or "1").dimension.split("/")[0], "mean")
+        if units.same_dimension(unit or "1", "V"):
+            kind = "voltage"
+        out[re.sub(r"_(start|end)$", "", name.replace("mean", kind))] = unit
+    return list(out.items())

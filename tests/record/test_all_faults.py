@@ -1,0 +1,77 @@
+"""All faults of a measured file are in one list, with their rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gyrobench.record.csv_reader import DataError
+from gyrobench.system.system import load_system
+
+
+def problems(system: str, file: Path, text: str) -> list[str]:
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError) as error:
+        load_system(system).read_measured(file, {})
+    return error.value.problems
+
+
+def test_windows(tmp_path: Path) -> None:
+    """Ten faults: of a key, a value, a circumstance, the header (three), and the rows (four)."""
+    text = """# latitud = 45deg
+# k = 17mm
+t_start [s],t_end [kg],mean,day,stdd [mA],flagged
+0,60,0.1,1,0,0
+60,120,0.2,one,0,0
+120,180,0.3,2,0,
+100,160,0.4,2,0,0
+240,300,0.5,2,0
+"""
+    said = problems("open_loop_drift", tmp_path / "a.csv", text.replace("mean,day", "angel [deg],u [V]"))
+    wanted = [
+        "row 1: '# latitud = 45deg': unknown key 'latitud'; did you mean 'latitude'",
+        "unknown key 'k'",
+        "column 't_end': wrong unit [kg]",
+        "column 'angle [rad]' is missing",
+        "row 8: 5 cells, the header has 6",
+        "row 5, column 'u': 'one' is not a finite number",
+        "row 6, column 'flagged': a cell is empty",
+        "row 7: t_start = 100 s does not come after 120 s (row 6)",
+        "'latitude' is not given",
+        "'attitude' is not given",
+    ]
+    assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
+
+
+def test_time_series(tmp_path: Path) -> None:
+    head = "# latitude = 45deg\n# k = 17.2deg/h/mA\n# atitude = E U -N\n# window = 5s\n# u_current = 5arcsec\n"
+    rows = [f"{k},0.5,21" for k in range(40)]
+    rows[3], rows[7], rows[9], rows[20], rows[30] = "3,off,21", "7,0.5", "9,0.5,", "17.5,0.5,21", "# note = late"
+    said = problems("fixed_position", tmp_path / "a.csv", head + "time [s],current [mA],temperature [deg]\n"
+                    + "\n".join(rows))  # fmt: skip
+    wanted = [
+        "row 3: '# atitude = E U -N': unknown key 'atitude'; did you mean 'attitude' or 'latitude'",
+        "row 5: u_current: '5arcsec'",
+        "'attitude' is not given",
+        "column 'temperature': wrong unit [deg]",
+        "row 37: '# note = late' stands among the rows",
+        "a row has not the 3 cells of the header; the first: '7,0.5' (row 14)",
+        "column 'current': 1 cell is not a number, the first: 'off' (the decimal sign of this file is a point; row 10)",
+        "time does not increase in 1 row, the first: '17.5' (row 27)",
+    ]
+    assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
+
+
+def test_drift_record(tmp_path: Path) -> None:
+    rows = [f"{k},0.5,21" for k in range(40)]
+    rows[3], rows[5] = "3,off,21", "5,0.5"
+    said = problems("drift_record", tmp_path / "a.csv", "# chanel = rate\n# samples = averages\n"
+                    "time [s],rate [deg/h],temperature [degC]\n" + "\n".join(rows))  # fmt: skip
+    wanted = [
+        "row 1: '# chanel = rate': unknown key 'chanel'; did you mean 'channel'",
+        "samples = averages: must be 'means'",
+        "a row has not the 3 cells of the header; the first: '5,0.5' (row 9)",
+        "column 'rate': 1 cell is not a number, the first: 'off' (the decimal sign of this file is a point; row 7)",
+    ]
+    assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said

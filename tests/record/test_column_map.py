@@ -1,0 +1,240 @@
+"""Column maps: rows of any layout as those of the bench, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gyrobench.bench import UsageError
+from gyrobench.commands.fit_columns import write_columns
+from gyrobench.record.column_map import MappedRows, read_map, translate
+from gyrobench.record.column_proposal import find_encoding, find_layout
+from gyrobench.record.csv_reader import DataError
+from gyrobench.system.system import load_system
+from gyrobench.workflow.measured_run import reduce_measured
+
+
+def mapped(folder: Path, text: str, columns: str, encoding: str = "utf-8") -> tuple[list[str], MappedRows]:
+    """Return the lines of a file under a map."""
+    (folder / "data.txt").write_bytes(text.encode(encoding))
+    (folder / "map.toml").write_text(columns, encoding="utf-8")
+    done = translate(folder / "data.txt", read_map(folder / "map.toml"), folder / "out.csv")
+    return (folder / "out.csv").read_text(encoding="utf-8").splitlines(), done
+
+
+def test_rows_keep_their_numbers(tmp_path: Path) -> None:
+    """Line for line: header block, names, units, an empty line, a row without a value, one with the value above it."""
+    text = "Lab\n\nt;I;Lage\ns;nA;\n0;1,5;1\n\n10;-;\n20;−2,5e1;2\n"
+    columns = """delimiter = ";"
+decimal = ","
+skip = 2
+below = 1
+empty = "skip"
+[columns.t_start]
+from = "t"
+unit = "s"
+[columns.t_end]
+next = "t_start"
+last = "0.5min"
+[columns.mean]
+from = 2
+unit = "nA"
+factor = -2
+[columns.phase]
+from = "Lage"
+empty = "previous"
+"""
+    lines, done = mapped(tmp_path, text, columns)
+    assert lines == [
+        "#", "#", "t_start [s],t_end [s],mean [nA],phase", "#", "0,10,-3.0,1", "#", "#", "20,50.0,50.0,2",
+    ]  # fmt: skip
+    assert done.skipped == [7] and done.problems() == []
+    assert done.before["phase"] == "2"
+
+
+def test_dates_and_clock_times(tmp_path: Path) -> None:
+    """Seconds since the first row: over midnight without a date, over a month with one, from a zone to another."""
+    column = '[columns.{}]\nfrom = "{}"\ntime = "%H:%M:%S"\n'
+    clock = f'delimiter = ";"\n{column.format("t_start", "a")}{column.format("t_end", "b")}'
+    lines, _ = mapped(tmp_path, "a;b\n23:59:50;00:00:00\n00:00:00;00:00:10\n11:00:00;11:30:00\n", clock)
+    assert lines[1:] == ["0.0,10.0", "10.0,20.0", "39610.0,41410.0"]
+    _, done = mapped(tmp_path, "a;b\n12:00:00;12:00:10\n11:59:00;12:01:00\n", clock)
+    assert done.problems() == [
+        "row 3: '11:59:00': column 't_start': runs back, or after half a day and more: a date is needed"
+    ]
+    following = '[columns.t_start]\nfrom = "a"\n[columns.t_end]\nnext = "t_start"\n'
+    _, done = mapped(tmp_path, "a,b\n0,0\n5,0\n4,0\n", following)
+    assert done.problems() == ["row 3: '5': column 't_start': the next row has 4"]
+    dated = '[columns.time]\nfrom = ["d", "t"]\ntime = "%d.%m.%Y %H:%M:%S,%f"\n'
+    lines, _ = mapped(tmp_path, 'd,t\n31.01.2026,"23:59:59,500"\n01.02.2026,"00:00:00,250"\n', dated)
+    assert lines == ["time [s]", "0.0", "0.75"]
+    zone = '[columns.time]\nfrom = "t"\ntime = "%Y-%m-%dT%H:%M:%S%z"\n'
+    lines, _ = mapped(tmp_path, "t\n2026-03-29T01:59:59+0100\n2026-03-29T03:00:01+0200\n", zone)
+    assert lines[1:] == ["0.0", "2.0"]
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-16-le", "utf-8-sig", "latin-1"])
+def test_encodings(encoding: str, tmp_path: Path) -> None:
+    columns = f'encoding = "{encoding}"\n[columns.x]\nfrom = "Größe"\n'
+    assert mapped(tmp_path, "Größe,b\n1,2\n", columns, encoding)[0] == ["x", "1"]
+    with pytest.raises(DataError, match="after row 0: not text in utf-8"):
+        mapped(tmp_path, "Größe,b\n1,2\n", columns.replace(encoding, "utf-8"), "cp1252")
+    found = find_encoding(("Größe,b\n" + "1,2\n" * 50).encode(encoding))
+    assert found == {"latin-1": "cp1252", "utf-8-sig": "utf-8"}.get(encoding, encoding)
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ("", "columns: field required"),
+        ("colums = 1\n[columns.a]\nfrom = 1", "colums: unknown key; did you mean columns?"),
+        ("[columns.a]\nfrom = 1\nfacter = 2", "columns.a.facter: unknown key; did you mean factor?"),
+        ("[columns.a]\nfrom = 1\nunit = 'furlong'", "columns.a.unit: unit 'furlong': unknown symbol"),
+        ("[columns.a]\nfrom = 1\nunit = 's'\n[columns.b]\nnext = 'a'\nlast = '2 mm'\n", "columns.b.last: '2 mm'"),
+        (
+            "[columns.a]\nfrom = 1\nunit = 'mA'\n[columns.b]\nnext = 'a'\nlast = '1s'",
+            "only beside next = a column of times",
+        ),
+        ("[columns.a]\nunit = 's'", "columns.a: either 'from' or 'next' is expected"),
+        ("[columns.a]\nnext = 'b'", "next = b: no column of this map with 'from'"),
+        ("[columns.a]\nfrom = [1, 2]", "several columns are joined for a date and a clock time: time is missing"),
+        ("[columns.a]\nfrom = 1\ntime = '%H:%M'\nunit = 's'", "time gives seconds; leave out unit and factor"),
+        ("[columns.a]\nfrom = 1\ntime = '%H:%M'\n[columns.b]\nfrom = 2\ntime = '%d.%m.%Y'", "all with a date or none"),
+        ("encoding = 'klingon'\n[columns.a]\nfrom = 1", "encoding = klingon: unknown"),
+        ("decimal = ','\n[columns.a]\nfrom = 1", "delimiter and decimal are both ','"),
+        ("skip = '9'\n[columns.a]\nfrom = 1", "skip = '9': input should be a valid integer"),
+        ("empty = 'drop'\n[columns.a]\nfrom = 1", "empty = 'drop': input should be 'missing', 'skip' or 'previous'"),
+        ("[columns.'a [s]']\nfrom = 1", "a name of the bench has no unit, comma or quote"),
+    ],
+)
+def test_maps_that_are_refused(columns: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text(columns, encoding="utf-8")
+    with pytest.raises(UsageError) as error:
+        read_map(tmp_path / "map.toml")
+    assert words in str(error.value), str(error.value)
+
+
+def test_columns_that_the_file_does_not_have(tmp_path: Path) -> None:
+    columns = "[columns.a]\nfrom = 'Stromm'\n[columns.b]\nfrom = 'x'\n[columns.c]\nfrom = 7\n"
+    with pytest.raises(DataError) as error:
+        mapped(tmp_path, "Strom,x,x\n1,2,3\n", columns)
+    assert error.value.problems == [
+        "columns.a: from = 'Stromm': no such column in row 1; did you mean Strom?",
+        "columns.b: from = 'x': several columns have this name: give its number in row 1",
+        "columns.c: from = 7: the file has 3 columns",
+    ]
+    with pytest.raises(DataError, match="no names of columns in row 4"):
+        mapped(tmp_path, "a\n1\n", "skip = 3\n[columns.a]\nfrom = 1\n")
+
+
+def test_all_faults_of_a_mapped_file_are_in_one_list(tmp_path: Path) -> None:
+    """Of the map's own (a date, a point, cells) and of the reader's (text, unit, circumstances), rows of the file."""
+    rows = (
+        "01.01.2026 00:00;0,1",
+        "32.01.2026 00:00;0,2",
+        "03.01.2026 00:00;1.234",
+        "04.01.2026 00:00;aus",
+        ";",
+        "1;2;3",
+    )
+    text = "\n".join(["Kopf", "Zeit;Strom", *rows, ""])
+    columns = """delimiter = ";"
+decimal = ","
+skip = 1
+[columns.t_start]
+from = "Zeit"
+time = "%d.%m.%Y %H:%M"
+[columns.t_end]
+next = "t_start"
+last = "1h"
+[columns.mean]
+from = "Strom"
+unit = "mV"
+[set]
+latitude = "45deg"
+"""
+    (tmp_path / "data.csv").write_text(text, encoding="utf-8")
+    (tmp_path / "map.toml").write_text(columns, encoding="utf-8")
+    with pytest.raises(DataError) as error:
+        reduce_measured(
+            load_system("fixed_position"), tmp_path / "data.csv", {"k": "17deg/h/mA"}, in_memory=True,
+            columns=tmp_path / "map.toml",
+        )  # fmt: skip
+    wanted = [
+        "row 4: '32.01.2026 00:00': column 't_start': not of the form %d.%m.%Y %H:%M",
+        "row 5: '1.234': column 'mean': a point, where the decimal sign is a comma",
+        "row 8: '1 2 3': not the 2 cells of the names in row 2",
+        "column 'mean': wrong unit [mV]",
+        "row 4, column 't_start': '32.01.2026 00:00' is not a finite number",
+        "row 3, column 't_end': '32.01.2026 00:00' is not a finite number",
+        "'attitude' is not given",
+    ]
+    said = error.value.problems
+    assert str(error.value).startswith(f"{tmp_path / 'data.csv'}: not usable")
+    assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
+
+
+def proposed(folder: Path, text: str, system: str) -> tuple[str, list[str]]:
+    (folder / "log.txt").write_text(text, encoding="utf-8")
+    return write_columns(folder / "log.txt", system, None)
+
+
+def test_proposal_for_a_drift_record_of_a_logger(tmp_path: Path) -> None:
+    """Units in a row of their own, a blank as separator; the rates in dps become those of the record."""
+    rows = "".join(f"{0.01 * k:.2f} {0.001 * (k % 7 - 3):.3f} {0.002 * (k % 5 - 2):.3f} 21.5\n" for k in range(600))
+    text, problems = proposed(tmp_path, f"Logger 3\nt gx gy T\ns dps dps degC\n{rows}", "drift_record")
+    assert problems == []
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    outcome = reduce_measured(
+        load_system("drift_record"), tmp_path / "log.txt", {"type_b": "none"}, in_memory=True,
+        columns=tmp_path / "map.toml",
+    )  # fmt: skip
+    w = outcome.record.windows
+    assert {"gx", "gy"} <= set(w)
+    assert w["gx"][:3] == pytest.approx([k * 1e-3 * 3.14159265358979 / 180.0 for k in (-3, -2, -1)], rel=1e-12)
+    assert outcome.record.run.series["unused"] == []
+
+
+def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
+    """Their units are not guessed: each is asked for."""
+    rows = "".join(f"{0.01 * k:.2f},{k % 7},{k % 5},{20 + k % 3}\n" for k in range(600))
+    text, problems = proposed(tmp_path, f"time,gyro_x,acc_x,temperature\n{rows}", "drift_record")
+    assert "[columns.time]" in text and '[columns.gyro_x]\nfrom = "gyro_x"\n# unit = "deg/s"' in text
+    assert "# Not used: acc_x" in text
+    assert [p.split(";")[0] for p in problems] == [
+        f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "temperature")
+    ]
+    _, problems = proposed(tmp_path, "a,b\n1,2\n3,4\n", "drift_record")
+    assert problems == ["column 'rate': none of the file fits by name and unit; not used so far: 'a', 'b'"]
+
+
+def test_proposal_for_a_tumble_names_what_it_lacks(tmp_path: Path) -> None:
+    """One angle for two columns, a unit that the bench does not know: said, not guessed."""
+    rows = "".join(f"1,{60 * k},{60 * k + 60},{k},{0.1 + 0.01 * k}\n" for k in range(20))
+    text, problems = proposed(
+        tmp_path, f"Phase,Beginn [s],Ende [s],Winkel [deg],Strom [Digits]\n{rows}", "tumble_single_axis"
+    )
+    for line in ('[columns.t_start]\nfrom = "Beginn [s]"', '[columns.t_end]\nfrom = "Ende [s]"', "[columns.phase]"):
+        assert line in text
+    assert any(p.startswith("column 'mean': its unit: 'Digits' is unknown; write unit = \"mA\"") for p in problems)
+    assert any(p.startswith("column 'angle_end': none of the file fits") for p in problems)
+
+
+def test_proposal_takes_long_files_for_time_series(tmp_path: Path) -> None:
+    rows = "".join(f"{0.5 * k};{k % 3}\n" for k in range(2500))
+    text, problems = proposed(tmp_path, f"Zeit [s];Strom [mA]\n{rows}", "fixed_position")
+    assert problems == [] and "[columns.time]" in text and "[columns.current]" in text and "t_end" not in text
+
+
+@pytest.mark.parametrize("text", ["", "only words\nand more\n", "1,2\n3,4\n5,6\n", "a,b\n1,2,3\n4,5,6\n"])
+def test_files_without_a_table_are_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"row of (names|as many names)"):
+        find_layout(tmp_path / "a.csv")
+
+
+def test_spreadsheets_are_refused_with_a_word(tmp_path: Path) -> None:
+    (tmp_path / "a.xlsx").write_bytes(b"PK\x03\x04" + bytes(100))
+    with pytest.raises(UsageError, match="not a text file; save the table as CSV"):
+        find_layout(tmp_path / "a.xlsx")

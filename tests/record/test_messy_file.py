@@ -1,0 +1,67 @@
+"""The file of a laboratory as it is, to its report in two commands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from messy_file import messy
+from typer.testing import CliRunner
+
+from gyrobench.campaign.execution.store import Campaign
+from gyrobench.commands.cli import app
+from gyrobench.record.record import Record
+
+SETTINGS = ("latitude=45.75deg", "k=17.2deg/h/mA", "attitude=E U -N", "type_b=none")
+
+
+def gyrobench(*words: str) -> str:
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def test_lot_of_one_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two files under one map, in one command: a row each.  One of the 46 readings is 1 mA more in the second, which is
+    17.2 deg/h / 46 = 0.37 deg/h of the mean, less where the fit gives it less weight."""
+    monkeypatch.chdir(tmp_path)
+    data, mean = messy()
+    Path("lot").mkdir()
+    for k in range(2):
+        text = data.decode("cp1252")
+        if k == 1:
+            text = text.replace(f";{mean[10]:.6f};".replace(".", ","), f";{mean[10] + 1.0:.6f};".replace(".", ","))
+        Path(f"lot/kreisel{k}.csv").write_bytes(text.encode("cp1252"))
+    gyrobench("fit", "lot/kreisel0.csv", "--system", "fixed_position", "--out", "map.toml")
+    settings = [w for s in SETTINGS[:3] for w in ("--set", s)]
+    gyrobench(
+        "sweep", "fixed_position", "--data", "lot/*.csv", "--columns", "map.toml", *settings, "--workers", "1",
+        "--keep", "none", "--out", "out",
+    )  # fmt: skip
+    table = Campaign.open("out").table()
+    first, second = table.sort_values("data")["ω_d.estimate"]
+    assert 0.3 < first - second < 0.4
+
+
+def test_two_commands_to_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The map is used as it was proposed.  The row without a value and the last one, whose end is not told, are left
+    out and named; the record holds the others, with their ends at the start of the next row, whatever it holds."""
+    monkeypatch.chdir(tmp_path)
+    data, mean = messy()
+    Path("messung.csv").write_bytes(data)
+    gyrobench("fit", "messung.csv", "--system", "fixed_position", "--out", "map.toml")
+    settings = [w for s in SETTINGS for w in ("--set", s)]
+    gyrobench("reduce", "fixed_position", "--data", "messung.csv", "--columns", "map.toml", *settings, "--out", "out")
+    assert (tmp_path / "out/report.html").is_file() and (tmp_path / "out/report.pdf").is_file()
+    run = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
+    assert run["data"]["file"] == "messung.csv" and run["data"]["columns"] == "map.toml"
+    assert "Left out for an empty cell: row 18." in run["notes"]  # 9 lines, the names, the eighth row
+    assert any("row 58" in note for note in run["notes"])
+    w = Record.load(tmp_path / "out").windows
+    kept = [k for k in range(47) if k != 7]
+    np.testing.assert_allclose(w["mean"], mean[kept] * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(w["t_start"], [1800.0 * k for k in kept])
+    np.testing.assert_allclose(w["t_end"], [1800.0 * (k + 1) for k in kept])
+    np.testing.assert_allclose(w["temperature"], [294.15 + 0.1 * (k % 10) for k in kept])
