@@ -3,7 +3,8 @@
 The scale factor and the drift come from the differences of the readings; zero and straightness from the line of least
 squares through the readings with that drift taken away.  The scatter of the readings about a cubic through them (a
 bent pickoff does not scatter) is the standard uncertainty of each: not less for the zero, as the float's random drift
-is in all of them.
+is in all of them.  The largest departure is the largest of as many as there are readings: its interval holds for all of
+them at once (Bonferroni).
 """
 
 from __future__ import annotations
@@ -59,11 +60,17 @@ class Levels:
         straight = ("linearity", f"largest departure from the line, {where}, of the span", "%")
         return [
             self._one(*zero, self.zero * 1e3, self.scatter * 1e3),
-            self._one(*straight, float(self.departure[k]) / self.span * 100.0, self.scatter / self.span * 100.0),
+            self._one(
+                *straight, float(self.departure[k]) / self.span * 100.0, self.scatter / self.span * 100.0, self.u.size
+            ),
         ]
 
-    def _one(self, name: str, meaning: str, unit: str, value: float, u: float) -> Coefficient:
+    def _one(self, name: str, meaning: str, unit: str, value: float, u: float, of: int = 1) -> Coefficient:
+        """of: among how many residuals it was chosen, which are in the scatter themselves (Thompson's distribution)."""
         k = float(special.stdtrit(self.dof, 0.975))
+        if of > 1:
+            t = float(special.stdtrit(self.dof - 1, 1.0 - 0.025 / of))
+            k = t * math.sqrt(self.dof / (self.dof - 1 + t * t))
         interval = (value - k * u, value + k * u)
         return Coefficient(name, meaning, unit, value, u, k, interval, u_a=u, dof=float(self.dof))
 
