@@ -196,7 +196,8 @@ def assemble(windows: Mapping[str, Array], a: AngleSystemSetup) -> tuple[Rows, S
     d_2, n_2 = unslipped(w["reading_2"] - w["reference"], cycle, zero_2)
     use = np.where(turned | ((n == 0.0) & first), n_2, n)
     slipped = np.flatnonzero(use)
-    theta = np.where(at_rest, theta, w["reference"] + zero)
+    mounted = middle((theta - w["reference"])[first])  # the scale may read from any zero, and so may the reference
+    theta = np.where(at_rest, theta, w["reference"] + mounted)
     slips = Slips(theta[slipped] % (2.0 * math.pi), use[slipped], ~at_rest[slipped])
     rows, at = Rows(), At(w["t_end"], theta, rate)
     _positions(rows, a, at, d, d_2, first, turned)

@@ -14,12 +14,11 @@ P = plate + T e^(-j theta) + W e^(j theta).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.reduction.loops.loop_toolkit import (
@@ -35,6 +34,8 @@ from gyrobench.reduction.loops.scale_errors import truth, waves
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import Series, Table
 
+from .places_fit import PlacesFit, least_squares, visits, walk
+
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
 JITTER = 0.005  # of the variance of a rounding is left where the loop moves the table by a count while it is read
 HEADS = ("reader", "reader_2")
@@ -49,10 +50,10 @@ def within_turn(x: Array) -> Array:
 class Readings:
     """One row a position; angles in rad.
 
-    theta: commanded.  azimuth, mount: of polygon and level, and which of them.  sense: +1 on the way up, -1 back.
-    second, true: reading of the second head, and true position, less theta.  place, face: numbers of the position and
-    of the face that is seen, from 0; seen: faces seen at all.  rounding: variance of the difference of two counted
-    readings, rad2.
+    theta: commanded.  azimuth, mount: of polygon and level, and which of them.  t: middle of the reading, s.  sense: +1
+    on the way up, -1 back, 0 where the record shows no move since the reference was mounted.  second, true: reading of
+    the second head, and true position, less theta.  place, face: numbers of the position and of the face that is seen,
+    from 0; seen: faces seen at all.  rounding: variance of the difference of two counted readings, rad2.
     """
 
     def __init__(self, w: Mapping[str, Array], run: RunDocument) -> None:
@@ -68,9 +69,11 @@ class Readings:
         self.mount = np.array([names.index(row.face) for row in rows])
         self.azimuth = azimuths[self.mount]
         self.mounts = int(self.mount.max()) + 1
-        self.sense = np.ones(self.theta.size)  # of the last move, by the cumulative reading
+        self.t = (w["t_start"] + w["t_end"]) / 2.0
+        self.sense = np.zeros(self.theta.size)  # of the last move, by the cumulative reading
         for k, moved in enumerate(np.diff(w["angle_start"]), 1):
-            self.sense[k] = np.sign(moved) if abs(moved) > 1e-3 else self.sense[k - 1]
+            stays = self.sense[k - 1] if self.mount[k] == self.mount[k - 1] else 0.0
+            self.sense[k] = np.sign(moved) if abs(moved) > 1e-3 else stays
         self.deviation, self.tracking, self.level = w["mean"], w["tracking"], w["level_x"] + 1j * w["level_y"]
         self.second = within_turn(w["second"] - self.theta)
         self.true = within_turn(w["true"] - self.theta) if "true" in w else None
@@ -82,7 +85,21 @@ class Readings:
     @property
     def both_senses(self) -> bool:
         """Return whether a place was reached from both sides: lost motion looks like a face's error otherwise."""
-        return any(np.ptp(self.sense[self.place == x]) > 0.0 for x in np.unique(self.place))
+        return any(np.ptp(self.sense[self.place == x]) > 1.0 for x in np.unique(self.place))
+
+    def drifts(self) -> Array:
+        """Return the columns of a drift of the autocollimator, even with the time in each mount: from -1 to 1."""
+        columns = (self.mount[:, None] == np.arange(self.mounts)).astype(float)
+        for of in columns.T:
+            t = self.t[of > 0.0]
+            of[of > 0.0] = (2.0 * t - t.min() - t.max()) / max(float(np.ptp(t)), 1e-9)
+        return columns
+
+    def unknown_ways(self) -> Array:
+        """Return a column for each run of readings at a place that was reached in an unknown sense."""
+        unknown = self.sense == 0.0
+        run = np.cumsum(np.append(True, np.diff(self.mount) != 0)) * unknown
+        return np.asarray((run[:, None] == np.unique(run[unknown])).astype(float))
 
     def separated(self, n: int) -> bool:
         """Return whether an order is told from the errors of the polygon."""
@@ -90,111 +107,57 @@ class Readings:
         return bool(max(abs(1.0 - np.exp(1j * n * b)) for b in apart) > SEPARATED)
 
 
-@dataclass(frozen=True)
-class PlacesFit:
-    """Estimates with their standard uncertainties (type A) and degrees of freedom, of each value."""
+def position_fit(r: Readings) -> tuple[PlacesFit, list[int], bool]:
+    """Return the fit (a_1, b_1, a_2 ..., h, zeros of the mounts, constant of the second head, nuisances, p), its
+    orders, and whether it holds a drift of the autocollimator.
 
-    value: Array
-    u: Array
-    dof: Array
-    X: Array
-    residual: Array
-    gain: Array  # value = gain y
-    V: Array  # covariance of y
-
-
-def least_squares(
-    X: Array, y: Array, groups: Sequence[slice], place: NDArray[np.int64], floors: Sequence[float] = ()
-) -> PlacesFit:
-    """Return the generalized least squares solution with two variances for each group of rows.
-
-    Readings differ from visit to visit, and by an error that returns at each place (rounding of the counts, what the
-    harmonics leave): V = s2 I + t2 (same place).  Both follow from the residuals r: their squares within and between
-    the places have expectations linear in the variances.  floors: least t2 of each group; rounding of counts distorts a
-    wave of a few counts in its own harmonics too, which the residuals do not show.  The degrees of freedom of a value
-    are those of the variances that make its u (Welch and Satterthwaite); a floor is known.
+    Nuisances, as far as the places tell them from the errors of the faces: a drift that is even in each mount, which
+    else is taken for lost motion where all places are gone over there and back, and the readings whose way the record
+    does not show.
     """
-    n = y.size
-    parts = []  # of V, and what is squared in r to estimate them: within the places, between them
-    for g in groups:
-        inside = np.zeros(n)
-        inside[g] = 1.0
-        same = (place[:, None] == place[None, :]) * np.outer(inside, inside)
-        mean = same / np.maximum(same.sum(axis=1, keepdims=True), 1.0)
-        parts.append((np.diag(inside), np.diag(inside) - mean))
-        if np.any(same.sum(axis=1) > 1.5):
-            parts.append((same, mean))
-        else:
-            parts[-1] = (np.diag(inside), np.diag(inside))  # no place twice: one variance
-    own = np.array([np.count_nonzero(p) == np.count_nonzero(np.diag(p)) for p, _ in parts])
-    variances = np.where(own, 1.0, 0.0)
-    scale = float(np.var(y)) + 1e-30
-
-    def data(variances: Array) -> Array:
-        return sum((v * p for v, (p, _) in zip(variances, parts, strict=True)), 1e-12 * np.eye(n))
-
-    def weighed(V: Array) -> tuple[Any, Any]:
-        """Return the weights, and the covariance of the values."""
-        W = np.linalg.inv(V)
-        return W, np.linalg.inv(X.T @ W @ X)
-
-    least = np.where(own, 1e-9, 0.0)
-    if floors:  # of what returns at a place, or of all, where no place is visited twice
-        chosen = ~own if np.any(~own) else own
-        least[chosen] = np.maximum(least[chosen], np.array(floors) / scale)
-    for _ in range(6):
-        W, covariance = weighed(data(variances))
-        M = np.eye(n) - X @ covariance @ X.T @ W
-        r = M @ y
-        system = np.array([[np.sum((q @ M @ p) * M) for p, _ in parts] for _, q in parts])
-        squares = np.array([r @ q @ r for _, q in parts])
-        variances = np.maximum(np.linalg.lstsq(system, squares, rcond=None)[0] / scale, least)
-    V = data(variances) * scale
-    W, covariance = weighed(V)
-    gain = covariance @ X.T @ W
-    M = np.eye(n) - X @ gain
-    parted = zip(variances * scale, parts, strict=True)
-    shares = np.array([v * np.sum((gain @ p) * gain, axis=1) for v, (p, _) in parted])
-    free = np.array([max(float(np.sum(q * M.T)), 1.0) for _, q in parts])
-    found, u = variances > least, np.sqrt(np.diag(covariance))
-    dof = u**4 / np.maximum(np.sum(shares[found] ** 2 / free[found, None], axis=0), 1e-4 * u**4)
-    return PlacesFit(gain @ y, u, np.maximum(dof, 3.0), X, y - X @ gain @ y, gain, V)
-
-
-def position_fit(r: Readings) -> tuple[PlacesFit, list[int]]:
-    """Return the fit (a_1, b_1, a_2 ..., h, zeros of the mounts, constant of the second head, p) and its orders."""
     orders = [n for n in range(1, r.orders + 1) if r.separated(n)]
     n, both = r.theta.size, r.both_senses
     zeros = (r.mount[:, None] == np.arange(r.mounts)).astype(float)
     seen = (r.face[:, None] == r.seen).astype(float)
     seen = seen[:, :-1] - seen[:, -1:]  # the sum of p is 0
     own = waves(orders, r.theta)
-    first = np.column_stack([own, *([0.5 * r.sense] if both else []), zeros, np.zeros(n), -seen])
-    second = np.zeros_like(first)
-    second[:, : own.shape[1]] = own - waves(orders, r.theta + r.head)
-    second[:, own.shape[1] + both + r.mounts] = 1.0
-    y = np.concatenate([r.deviation + r.tracking, r.second + r.tracking])
-    place = np.tile(r.place, 2)
-    X = np.vstack([first, second])
-    if np.linalg.matrix_rank(X) < X.shape[1]:
+    fixed = np.column_stack([own, *([0.5 * r.sense] if both else []), zeros, np.zeros(n)])
+    y, place = np.concatenate([r.deviation + r.tracking, r.second + r.tracking]), np.tile(r.place, 2)
+    ways = [r.unknown_ways()] if both else []
+    for nuisances in ([r.drifts(), *ways], ways, []):
+        first = np.column_stack([fixed, *nuisances, -seen])
+        second = np.zeros_like(first)
+        second[:, : own.shape[1]] = own - waves(orders, r.theta + r.head)
+        second[:, fixed.shape[1] - 1] = 1.0
+        X = np.vstack([first, second])
+        if np.linalg.matrix_rank(X) == X.shape[1]:
+            break
+    else:
         raise ReductionError(
             f"{np.unique(place).size} positions do not determine {len(orders)} harmonics and the errors of "
             f"{r.seen.size} faces: take more positions or mounts, or fewer orders"
         )
-    return least_squares(X, y, [slice(0, n), slice(n, 2 * n)], place, (0.0, r.rounding)), orders
+    of, t, mount = slice(0, n), np.tile(r.t, 2), np.tile(r.mount, 2)
+    parts = [*visits(of, place), *visits(slice(n, 2 * n), place, r.rounding), walk(of, t, mount)]
+    return least_squares(X, y, parts), orders, len(nuisances) > len(ways)
 
 
 def level_fit(r: Readings) -> tuple[PlacesFit, list[str]]:
-    """Return the fit of the level, real and imaginary parts in turn, and the names of its complex terms."""
-    turn = np.exp(-1j * r.azimuth)
+    """Return the fit of the level, real and imaginary parts in turn, and the names of its complex terms.
+
+    Its zero drifts evenly with the time, beside a random walk.
+    """
+    turn, n = np.exp(-1j * r.azimuth), r.theta.size
     columns = {"axis": turn * np.exp(-1j * r.theta), "wobble": turn * np.exp(1j * r.theta), "zero": np.ones(turn.size)}
     if np.unique(r.azimuth).size > 1:
         columns["plate"] = turn
+    columns["drift"] = (r.t - r.t.mean()) / max(float(np.ptp(r.t)), 1e-9)
     X = np.column_stack(list(columns.values()))
     real = np.block([[X.real, -X.imag], [X.imag, X.real]])
     y = np.concatenate([r.level.real, r.level.imag])
-    place = np.arange(y.size)
-    return least_squares(real, y, [slice(0, y.size)], place), list(columns)
+    of = slice(0, 2 * n)
+    parts = [*visits(of, np.arange(2 * n)), walk(of, np.tile(r.t, 2), np.repeat([0, 1], n))]
+    return least_squares(real, y, parts), list(columns)
 
 
 #: complex term of the level -> its imaginary part and its real one, negated: tilts about the axes of the base
@@ -204,6 +167,10 @@ TILTS = {
     "wobble": (("wobble cos", "wobble twice a turn, A cos φ"), ("wobble sin", "wobble twice a turn, A sin φ")),
 }  # fmt: skip
 UNKNOWN = (None, None)
+DRIFT = (
+    "Lost motion cannot be told from drift of the autocollimator in these positions: it and the errors of the faces "
+    "hold the drift of the whole test. Go over the positions there and back in each mount."
+)
 
 
 class Reduction(MeasureReduction):
@@ -218,17 +185,19 @@ class Reduction(MeasureReduction):
         if problems := window_problems(w) or [f"column {n} is missing" for n in NEEDED if n not in w]:
             raise ReductionError(problems)
         self.r = r = Readings(w, self.run)
-        self.fit, self.orders = fit, _ = position_fit(r)
+        self.fit, self.orders, drifts = position_fit(r)
+        fit = self.fit
         self._accuracy()
         self._harmonics()
-        spread = float(np.std(fit.residual[: r.theta.size], ddof=1))
-        least, u = float(np.min(fit.dof)), spread / math.sqrt(2.0 * r.theta.size)
-        self._add("repeatability", "standard deviation of a position", spread, u, least)
+        least = float(np.min(fit.dof))
+        self._repeatability()
+        if r.both_senses and not drifts:
+            self.found.warn("lost_motion.drift", DRIFT)
         self._level()
         self._polygon()
         self.found.facts |= {
             "series": [self._series(m) for m in range(r.mounts)], "dof": least,
-            "residual_std": spread / ARCSEC, "residual_unit": "arcsec",
+            "residual_std": math.sqrt(fit.variance) / ARCSEC, "residual_unit": "arcsec",
         }  # fmt: skip
         return Account(
             method="Polygon and autocollimator in several mounts, a second reading head, a level in the same mounts",
@@ -291,7 +260,18 @@ class Reduction(MeasureReduction):
                 self._add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], float(fit.dof[k]), true[j], none)
         if self.r.both_senses:
             k, meaning = 2 * len(orders), "position on the way up less that on the way back"
-            self._add("lost motion", meaning, fit.value[k], fit.u[k], float(fit.dof[k]))
+            none = "" if fit.redundant else "no place is visited often enough to show what a reading scatters by"
+            self._add("lost motion", meaning, fit.value[k], fit.u[k], float(fit.dof[k]), none=none)
+
+    def _repeatability(self) -> None:
+        """Measure the standard deviation of visits, with the interval of a variance (chi-squared)."""
+        fit, meaning = self.fit, "standard deviation of the visits of a position"
+        none = "" if fit.variance else "not told from drift and errors that return at a place: take more visits"
+        spread = math.sqrt(fit.variance) / ARCSEC
+        low, high = (spread * math.sqrt(fit.free / float(special.chdtri(fit.free, p))) for p in (0.025, 0.975))
+        u = spread / math.sqrt(2.0 * fit.free)
+        self.found.measure("repeatability", meaning, "arcsec", spread, u, dof=fit.free, no_value=none,
+                           interval=None if none else (low, high))  # fmt: skip
 
     def _level(self) -> None:
         """Measure tilt of the axis, wobble and squareness from the complex terms of the level."""

@@ -1,0 +1,140 @@
+"""Least squares over readings at places that are visited repeatedly, with the variances found from the residuals.
+
+A reading has an error of its visit, one that returns at its place (rounding of the counts, what harmonics leave), and,
+read by an autocollimator, a random walk with the time:
+
+    V = s2 I + t2 (same place) + w2 min(t, t')            each part of its own rows
+
+The variances are those of restricted maximum likelihood (Patterson and Thompson), none below its least.
+[TABLE-POSITION; derived]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from gyrobench.reduction.loops.loop_toolkit import Array
+
+ROUNDS = 30  # of variances and weights, at most
+REDUNDANT = 0.1  # rows more than values; fewer are rounding of the arithmetic
+ALONE = 1e-12  # of the largest information: less is none
+SAME = 1e-3  # relative change of the variances at which they stay
+NOTHING = 1e-9  # of the variance of the data: the least of a visit
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the covariance of the data: its shape (n, n), and its least variance, SI squared.
+
+    least: what is known of rounding, which distorts a wave of a few counts in its own harmonics too, where the
+    residuals do not show it.
+    """
+
+    shape: Array
+    least: float = 0.0
+
+
+def visits(rows: slice, place: NDArray[np.int64], least: float = 0.0) -> list[Part]:
+    """Return the parts of each visit and, where places are visited repeatedly, of what returns at them.
+
+    least: of what returns, or of all where no place is visited twice.
+    """
+    inside = np.zeros(place.size)
+    inside[rows] = 1.0
+    same = (place[:, None] == place[None, :]) * np.outer(inside, inside)
+    if not np.any(same.sum(axis=1) > 1.5):
+        return [Part(np.diag(inside), least)]
+    return [Part(np.diag(inside)), Part(same, least)]
+
+
+def walk(rows: slice, t: Array, group: NDArray[np.int64]) -> Part:
+    """Return the part of a random walk with the time t (n,), which starts anew in each group (n,)."""
+    start = np.zeros(t.size)
+    for g in np.unique(group):
+        start[group == g] = t[group == g].min()
+    inside = np.zeros(t.size)
+    inside[rows] = 1.0
+    since = t - start
+    shape = np.minimum(since[:, None], since[None, :]) * (group[:, None] == group[None, :]) * np.outer(inside, inside)
+    return Part(shape / max(float(np.max(shape)), 1e-300))
+
+
+@dataclass(frozen=True)
+class PlacesFit:
+    """Estimates with their standard uncertainties (type A) and degrees of freedom, of each value.
+
+    variance: of the visits of the first rows, SI squared, 0 if nothing is left for it beside the other parts, with its
+    degrees of freedom free.  redundant: the residuals of these rows show variances at all.
+    """
+
+    value: Array
+    u: Array
+    dof: Array
+    X: Array
+    residual: Array
+    gain: Array  # value = gain y
+    V: Array  # covariance of y
+    variance: float
+    free: float
+    redundant: bool
+
+
+def least_squares(X: Array, y: Array, parts: Sequence[Part]) -> PlacesFit:
+    """Return the generalized least squares solution with the variances of the parts; the first is that of a visit.
+
+    The degrees of freedom of a value are those of the variances that make its u (Satterthwaite); one that is at its
+    least is known.
+    """
+    scale = float(np.var(y)) + 1e-30
+    own = np.array([np.count_nonzero(p.shape) == np.count_nonzero(np.diag(p.shape)) for p in parts])
+    least = np.maximum(np.where(own, NOTHING, 0.0), np.array([p.least for p in parts]) / scale)
+    variances = np.maximum(np.where(own, 1.0, 0.0), least)
+    for _ in range(ROUNDS):
+        _, _, information, score = _weighed(X, y / math.sqrt(scale), parts, variances)
+        last, variances = variances, least + _not_negative(information, score - information @ least)
+        if np.allclose(variances, last, rtol=SAME, atol=0.0):
+            break
+    V, covariance, information, _ = _weighed(X, y, parts, variances * scale)
+    gain = covariance @ X.T @ np.linalg.inv(V)
+    u2, found = np.diag(covariance), variances > least
+    each = np.array([np.sum((gain @ p.shape) * gain, axis=1) for p in parts])[found]  # d u2 / d variance
+    error = 2.0 * np.linalg.pinv(information[np.ix_(found, found)])  # covariance of the variances
+    dof = 2.0 * u2**2 / np.maximum(np.sum(each * (error @ each), axis=0), 1e-4 * u2**2)
+    redundant = float(np.sum(np.diag(parts[0].shape) * (1.0 - np.sum(X * gain.T, axis=1)))) > REDUNDANT
+    told = redundant and bool(found[0])
+    free = max(2.0 * (variances[0] * scale) ** 2 / float(error[0, 0]), 1.0) if told else 1.0
+    return PlacesFit(
+        gain @ y, np.sqrt(u2), np.maximum(dof, 3.0), X, y - X @ gain @ y, gain, V,
+        float(variances[0]) * scale if told else 0.0, free, redundant,
+    )  # fmt: skip
+
+
+def _not_negative(F: Array, q: Array) -> Array:
+    """Return x >= 0 of the least x' F x / 2 - q' x."""
+    size, axes = np.linalg.eigh((F + F.T) / 2.0)
+    root = np.sqrt(np.where(size > ALONE * size[-1], size, 0.0))
+    away: Array = nnls(root[:, None] * axes.T, np.divide(axes.T @ q, root, out=np.zeros_like(q), where=root > 0.0))[0]
+    return away
+
+
+def _weighed(X: Array, y: Array, parts: Sequence[Part], variances: Array) -> tuple[Array, Array, Array, Array]:
+    """Return V, the covariance of the values, and information F and score q of the variances, F variances = q.
+
+    F_ij = tr(P V_i P V_j), q_i = y' P V_i P y, P = W - W X (X' W X)^-1 X' W.
+    """
+    V = sum(
+        (v * p.shape for v, p in zip(variances, parts, strict=True)), 1e-12 * float(np.max(variances)) * np.eye(y.size)
+    )
+    W = np.linalg.inv(V)
+    covariance = np.linalg.inv(X.T @ W @ X)
+    P = W - W @ X @ covariance @ X.T @ W
+    shaped = [P @ p.shape for p in parts]
+    information = np.array([[np.sum(a * b.T) for a in shaped] for b in shaped])
+    score = np.array([y @ a @ P @ y for a in shaped])
+    return V, covariance, information, score
