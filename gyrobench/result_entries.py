@@ -67,6 +67,9 @@ class Coefficient:
     no_value: str = ""  # why there is none: estimate and u are then NaN, and the interval where it has no bound
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
     stands_for: str = ""  # the coefficient whose name a limit may have, too; "": no other name
+    models: tuple[float, float] | None = (
+        None  # that of the linear models of a loop: with the communication step, without
+    )
 
 
 @dataclass(frozen=True)
@@ -220,13 +223,17 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class StepChange:
-    """Effect of the communication step on a measure; u: without it, ratio: of the change to u."""
+    """Effect of the communication step on a measure; u: without it, ratio: of what of it is in u to that.
+
+    taken: what of it is no longer in the estimate.
+    """
 
     name: str
     unit: str
     change: float
     u: float | None = None
     ratio: float | None = None
+    taken: float = 0.0
 
 
 @dataclass(frozen=True)

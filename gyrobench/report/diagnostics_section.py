@@ -188,7 +188,8 @@ def _repeatability(report: Report[RunResult]) -> list[Any]:
         return found + ([Text(text, quiet=True)] if report.result.simulated else [])
     caption = (
         "Step check: effect of the communication step on each coefficient, from runs without noise at two steps, "
-        "extrapolated to step zero; u: without it; ratio: effect / u."
+        "extrapolated to step zero; taken: what of it was taken out of the estimate, where the linear models with and "
+        "without the step differ by as much; u: without it; ratio: what is left / u."
     )
     sentence = step_sentence(check)
     text = f"{sentence[:1].upper()}{sentence[1:]}; step {step_text(check.step)}."

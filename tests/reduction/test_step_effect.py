@@ -71,6 +71,22 @@ def test_the_step_joins_u_interval_verdict_and_budget() -> None:
     assert r.step_check.rows[0].ratio == pytest.approx(change / 0.3) == r.step_check.worst
 
 
+@pytest.mark.parametrize(("change", "known"), [(-0.17, True), (-0.05, False), (0.174, False)])
+def test_an_effect_that_the_linear_models_have_is_taken_out(change: float, known: bool) -> None:
+    """f_c = 15.75 Hz, u = 0.003; the linear model has 15.752 with the step, 15.926 without: -0.174.  An effect of -0.17
+    agrees: 15.75 + 0.174 = 15.924 with a rest of 0.004, closed form 15.926.  One of -0.05, or of the other sign, is
+    another one: it stays in u, 0.05 / sqrt 3.
+    """
+    found = loop_result(coefficient(15.75, 0.003, "f_c", "Hz", closed=15.752, models=(15.752, 15.926)))
+    r = with_step(found, StepCheck(1e-4, [StepChange("f_c", "Hz", change)], 2e-4))
+    c, (row,) = r["f_c"], r.step_check.rows
+    assert row.taken == pytest.approx(-0.174 if known else 0.0) and row.change == change
+    assert c.estimate == pytest.approx(15.924 if known else 15.75) and c.closed == (15.926 if known else 15.752)
+    left = 0.004 if known else abs(change)
+    assert c.u == pytest.approx(math.hypot(0.003, left / math.sqrt(3.0))) and row.ratio == pytest.approx(left / 0.003)
+    assert sum(c.interval) / 2.0 == pytest.approx(c.estimate)
+
+
 def test_sentences_that_are_renewed_need_no_note() -> None:
     """u = 0.3 and a part of 0.4: the sentence has U = 0.98 as the table, and nothing is said of a missing effect."""
     r = loop_result(coefficient(10.0, 0.3))

@@ -10,6 +10,9 @@ The effect is what a measure at the step h is away from that at step zero, from 
 An effect of second order is overstated by it, by half at p = 1/2 and threefold at p = 2.  u takes it as the bound of a
 rectangular distribution (GUM 4.3.7): effect / sqrt(3).  Measures in dB are extrapolated as amplitudes.
 
+Where sign and size are known it is taken out of the estimate (GUM 3.2.4): the linear models of a loop with the step and
+without differ by as much, to AGREED.  That difference is subtracted, and the rest of the effect is the bound.
+
 Not modelled: what happens at steps at which the measure is not yet of first order, and the noise, which does not depend
 on the step.
 """
@@ -27,6 +30,7 @@ from gyrobench.result import BudgetLine, Coefficient, Reason, Result, StepChange
 R = TypeVar("R", bound=Result)
 STEP = "step"  # id of its line of the budget, and of the warning
 RELATIVE = 1e-3  # of the estimate: an effect below it is in u without a warning
+AGREED = 0.2  # of the difference of two linear models: an effect so near to it is known
 FLOOR = 0.1  # amplitude at step zero over that at the step: no extrapolation beyond, 20 dB
 LISTED = 3  # measures in a warning
 FINEST = 4  # the step recommended is at most that much shorter
@@ -68,15 +72,17 @@ def with_step(result: R, check: StepCheck) -> R:
         if row is None or c.no_value:
             widened.append(c)
             continue
-        rows.append(replace(row, u=c.u, ratio=abs(row.change) / c.u if c.u > 0.0 else None))
-        parts[c.name] = row.change / math.sqrt(3.0)
+        taken = _known(c, row.change)
+        left = row.change - taken
+        rows.append(replace(row, u=c.u, ratio=abs(left) / c.u if c.u > 0.0 else None, taken=taken))
+        parts[c.name] = left / math.sqrt(3.0)
         if c.u > 0.0 and not any(b.coefficient == c.name for b in budget):
             budget.append(
                 BudgetLine("type_a", "noise and evaluation", c.u, c.unit, 1.0, "1", c.u, c.unit, c.name, "type A")
             )
         size = (step, "s", parts[c.name] / step, f"{c.unit}/s", abs(parts[c.name]), c.unit, c.name)
         budget.append(BudgetLine(STEP, "coupling step", *size, "m(h) − m(0), rectangular"))
-        widened.append(_widened(c, abs(parts[c.name])))
+        widened.append(_widened(_corrected(c, taken), abs(parts[c.name])))
     worst = max((r.ratio for r in rows if r.ratio is not None), default=None)
     text = _warning(result, rows, step)
     more: dict[str, Any] = {"budget": budget} if hasattr(result, "budget") else {}
@@ -85,6 +91,22 @@ def with_step(result: R, check: StepCheck) -> R:
     reasons = [*result.reasons, Reason(STEP, text)] if text else result.reasons
     checked = replace(check, rows=rows, worst=worst)
     return replace(result, coefficients=widened, step_check=checked, reasons=reasons, **more)
+
+
+def _known(c: Coefficient, change: float) -> float:
+    """Return the part of an effect that is known: what the linear models differ by, where the effect is as large."""
+    if c.models is None:
+        return 0.0
+    difference = c.models[0] - c.models[1]
+    return difference if abs(change - difference) <= AGREED * abs(difference) else 0.0
+
+
+def _corrected(c: Coefficient, taken: float) -> Coefficient:
+    """Return the coefficient at step zero; a closed form that is the linear model with the step follows."""
+    if not taken or c.models is None:
+        return c
+    closed = c.models[1] if c.closed == c.models[0] else c.closed
+    return replace(c, estimate=c.estimate - taken, closed=closed)
 
 
 def _widened(c: Coefficient, part: float) -> Coefficient:
@@ -110,7 +132,7 @@ def _correlation(result: Result, widened: Sequence[Coefficient], parts: Mapping[
 def _warning(result: Result, rows: Sequence[StepChange], step: float) -> str:
     """Return what to do where the step moves measures by more than their u; "" where it does not."""
     sizes = {c.name: abs(c.estimate) for c in result.coefficients}
-    measured = [(abs(r.change), r.u or 0.0, r) for r in rows]
+    measured = [(abs(r.change - r.taken), r.u or 0.0, r) for r in rows]
     over = [(change / max(u, RELATIVE * sizes[r.name], 1e-300), change, u, r) for change, u, r in measured
             if change > max(u, RELATIVE * sizes[r.name])]  # fmt: skip
     if not over:

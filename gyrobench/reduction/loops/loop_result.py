@@ -10,7 +10,7 @@ found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -70,6 +70,7 @@ class LoopFindings(MeasureFindings):
         self.gates = gates(record, slot)
         self.linear = record.run.linear or LinearModels(missing="the record holds no linear model")
         self.margins: dict[str, dict[str, list[Any]]] = {}  # loop -> of what -> numbers of the row, see margins.COLUMNS
+        self.limits: dict[str, dict[str, m.Margins]] = {}  # loop -> kind of linear model -> its margins
         self.agreement: list[list[Any]] = []  # rows of the table of linear models and measured loops
         self.allan: AllanDeviation | None = None
         self.excluded: dict[str, list[float]] = {}  # loop -> measured frequencies that do not count, Hz
@@ -119,7 +120,7 @@ class LoopFindings(MeasureFindings):
         span = m.grid(0.2 * points[0].f, 5.0 * points[-1].f)
         at = [p.f for p in sure]
         shown = m.measured_margins(sure)
-        computed: dict[str, m.Margins] = {}
+        computed = self.limits[loop] = {}
         rows = {"measured": shown.row("measured")}
         for kind, label in NAMES.items():
             model = models.of(kind)
@@ -154,6 +155,10 @@ class LoopFindings(MeasureFindings):
             (f"PM{key}", "phase margin", "°", widened.get("phase", (None,)), closest[2]),
         ):
             self.measure(name, what, unit, *value, closed=closed, no_value=none)
+        if "phase" in values:
+            at = values["crossover"][0]
+            self.modelled(f"f_c{key}", loop, lambda limits: limits.near(at)[0])
+            self.modelled(f"PM{key}", loop, lambda limits: limits.near(at)[1])
         noisy = "" if self.unstable else excluded_words(title, points, counts)
         self.warn("loop.noisy", noisy)
         if "phase" in values:
@@ -162,6 +167,13 @@ class LoopFindings(MeasureFindings):
             causes = self._causes(sines, noisy)
             self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
+
+    def modelled(self, name: str, loop: str, of: Callable[[m.Margins], float | None]) -> None:
+        """Note what the linear models of a loop have of a coefficient, with the step and without; SI is its unit."""
+        pair = [of(self.limits[loop][kind]) for kind in NAMES if kind in self.limits.get(loop, {})]
+        if len(pair) == len(NAMES) and None not in pair:
+            models = float(pair[0] or 0.0), float(pair[1] or 0.0)
+            self.coefficients = [replace(c, models=models) if c.name == name else c for c in self.coefficients]
 
     def _causes(self, sines: Sequence[Gate], noisy: str) -> list[str]:
         """Return what may set measured and computed margins apart."""

@@ -82,6 +82,15 @@ class Margins:
     def lower(self) -> float | None:
         return max((g for _, g in self.gains if 0.0 < g < 1.0), default=None)
 
+    def near(self, f: float) -> tuple[float | None, float | None]:
+        """Return the crossover (Hz) next to f, and its phase margin (degrees)."""
+        return min(self.crossovers, key=lambda c: abs(math.log(c[0] / f)), default=(None, None))
+
+    @property
+    def f_lower(self) -> float | None:
+        """Return the frequency (Hz) of the lower limit."""
+        return next((f for f, g in self.gains if g == self.lower), None)
+
     def row(self, name: str) -> list[Any]:
         """Return the row of a table with :data:`COLUMNS`."""
 

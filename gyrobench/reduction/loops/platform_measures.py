@@ -90,3 +90,5 @@ def lower_limit(
         meaning = "share of the gain at which the loop becomes unstable"
         found.measure("lower limit", meaning, "1", *values["lower"], closed=share)
         found.measure("f_lower", "frequency at that limit", "Hz", *values["f_lower"], closed=f)
+        found.modelled("lower limit", "stabilizer", lambda limits: limits.lower)
+        found.modelled("f_lower", "stabilizer", lambda limits: limits.f_lower)
