@@ -110,10 +110,12 @@ class Reduction(LoopReduction):
         for gate in self.slowest:
             axis, base = XYZ[gate.axis - 1], gate[f"motion.angle[{gate.axis}]"]
             taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
-            meaning = f"platform over base, base about {axis} at {gate.f:g} Hz"
+            joints = ", ".join(f"{math.degrees(gate[f'platform.theta[{k}]'].mean()):.1f}°" for k in (1, 2, 3))
+            size = f"{math.degrees(gate.amplitude):.3g}° at {gate.f:g} Hz"
+            meaning = f"platform over base, base about {axis}, {size}, joints about {joints}".replace("-", "−")
             if taken:
-                size = 20.0 * math.log10(taken)
-                found.measure(f"isolation {axis}", meaning, "dB", size, 20.0 / math.log(10.0) * u / taken)
+                level = 20.0 * math.log10(taken)
+                found.measure(f"isolation {axis}", meaning, "dB", level, 20.0 / math.log(10.0) * u / taken)
                 cause = self._by(_motion(gate), ", carried over ")
                 taken_over.append(f"{{-isolation {axis}}} about {axis} ({gate.f:g} Hz{cause})")
         found.ratio(
