@@ -23,7 +23,7 @@ from gyrobench.reduction.loops.loop_toolkit import Array
 
 ROUNDS = 30  # of variances and weights, at most
 REDUNDANT = 0.1  # rows more than values; fewer are rounding of the arithmetic
-ALONE = 1e-12  # of the largest information: less is none
+ALONE = 1e-9  # of the largest information of a combination of variances: less is none
 SAME = 1e-3  # relative change of the variances at which they stay
 NOTHING = 1e-9  # of the variance of the data: the least of a visit
 
@@ -67,7 +67,7 @@ def walk(rows: slice, t: Array, group: NDArray[np.int64]) -> Part:
 
 @dataclass(frozen=True)
 class PlacesFit:
-    """Estimates with their standard uncertainties (type A) and degrees of freedom, of each value.
+    """Estimates with their standard uncertainties (type A).
 
     variance: of the visits of the first rows, SI squared, 0 if nothing is left for it beside the other parts, with its
     degrees of freedom free.  redundant: the residuals of these rows show variances at all.
@@ -75,7 +75,6 @@ class PlacesFit:
 
     value: Array
     u: Array
-    dof: Array
     X: Array
     residual: Array
     gain: Array  # value = gain y
@@ -83,13 +82,20 @@ class PlacesFit:
     variance: float
     free: float
     redundant: bool
+    shapes: list[Array]  # of the parts whose variances are found
+    error: Array  # covariance of these variances
+
+    def freedom(self, gain: Array) -> float:
+        """Return the degrees of freedom of gain y (n,): those of the variances that make its u (Satterthwaite)."""
+        each = np.array([gain @ shape @ gain for shape in self.shapes])  # d u2 / d variance
+        square = float(gain @ self.V @ gain) ** 2
+        return max(2.0 * square / max(float(each @ self.error @ each), 1e-4 * square), 3.0)
 
 
 def least_squares(X: Array, y: Array, parts: Sequence[Part]) -> PlacesFit:
     """Return the generalized least squares solution with the variances of the parts; the first is that of a visit.
 
-    The degrees of freedom of a value are those of the variances that make its u (Satterthwaite); one that is at its
-    least is known.
+    A variance that is at its least is known.
     """
     scale = float(np.var(y)) + 1e-30
     own = np.array([np.count_nonzero(p.shape) == np.count_nonzero(np.diag(p.shape)) for p in parts])
@@ -103,24 +109,33 @@ def least_squares(X: Array, y: Array, parts: Sequence[Part]) -> PlacesFit:
     V, covariance, information, _ = _weighed(X, y, parts, variances * scale)
     gain = covariance @ X.T @ np.linalg.inv(V)
     u2, found = np.diag(covariance), variances > least
-    each = np.array([np.sum((gain @ p.shape) * gain, axis=1) for p in parts])[found]  # d u2 / d variance
-    error = 2.0 * np.linalg.pinv(information[np.ix_(found, found)])  # covariance of the variances
-    dof = 2.0 * u2**2 / np.maximum(np.sum(each * (error @ each), axis=0), 1e-4 * u2**2)
+    known = information[np.ix_(found, found)]
+    unit = np.outer(_units(known), _units(known))
+    error = 2.0 * unit * np.linalg.pinv(known * unit, rcond=ALONE)  # covariance of the variances
     redundant = float(np.sum(np.diag(parts[0].shape) * (1.0 - np.sum(X * gain.T, axis=1)))) > REDUNDANT
     told = redundant and bool(found[0])
     free = max(2.0 * (variances[0] * scale) ** 2 / float(error[0, 0]), 1.0) if told else 1.0
+    variance = float(variances[0]) * scale if told else 0.0
+    shapes = [p.shape for p, is_found in zip(parts, found, strict=True) if is_found]
     return PlacesFit(
-        gain @ y, np.sqrt(u2), np.maximum(dof, 3.0), X, y - X @ gain @ y, gain, V,
-        float(variances[0]) * scale if told else 0.0, free, redundant,
+        gain @ y, np.sqrt(u2), X, y - X @ gain @ y, gain, V, variance, free, redundant, shapes, error
     )  # fmt: skip
 
 
 def _not_negative(F: Array, q: Array) -> Array:
     """Return x >= 0 of the least x' F x / 2 - q' x."""
-    size, axes = np.linalg.eigh((F + F.T) / 2.0)
+    unit = _units(F)  # the two readings may differ by orders in their variances
+    size, axes = np.linalg.eigh(F * np.outer(unit, unit))
     root = np.sqrt(np.where(size > ALONE * size[-1], size, 0.0))
-    away: Array = nnls(root[:, None] * axes.T, np.divide(axes.T @ q, root, out=np.zeros_like(q), where=root > 0.0))[0]
-    return away
+    y = np.divide(axes.T @ (unit * q), root, out=np.zeros_like(q), where=root > 0.0)
+    x: Array = unit * nnls(root[:, None] * axes.T, y)[0]
+    return x
+
+
+def _units(F: Array) -> Array:
+    """Return the units in which each variance has an information of 1; 0 where it has none."""
+    own = np.diag(F)
+    return np.asarray(np.divide(1.0, np.sqrt(np.maximum(own, 0.0)), out=np.zeros_like(own), where=own > 0.0))
 
 
 def _weighed(X: Array, y: Array, parts: Sequence[Part], variances: Array) -> tuple[Array, Array, Array, Array]:
@@ -128,11 +143,11 @@ def _weighed(X: Array, y: Array, parts: Sequence[Part], variances: Array) -> tup
 
     F_ij = tr(P V_i P V_j), q_i = y' P V_i P y, P = W - W X (X' W X)^-1 X' W.
     """
-    V = sum(
-        (v * p.shape for v, p in zip(variances, parts, strict=True)), 1e-12 * float(np.max(variances)) * np.eye(y.size)
-    )
-    W = np.linalg.inv(V)
-    covariance = np.linalg.inv(X.T @ W @ X)
+    V: Array = 1e-12 * float(np.max(variances)) * np.eye(y.size)
+    for v, p in zip(variances, parts, strict=True):
+        V = V + v * p.shape
+    W: Array = np.asarray(np.linalg.inv(V), dtype=np.float64)
+    covariance: Array = np.asarray(np.linalg.inv(X.T @ W @ X), dtype=np.float64)
     P = W - W @ X @ covariance @ X.T @ W
     shaped = [P @ p.shape for p in parts]
     information = np.array([[np.sum(a * b.T) for a in shaped] for b in shaped])

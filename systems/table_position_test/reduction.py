@@ -89,7 +89,7 @@ class Readings:
 
     def drifts(self) -> Array:
         """Return the columns of a drift of the autocollimator, even with the time in each mount: from -1 to 1."""
-        columns = (self.mount[:, None] == np.arange(self.mounts)).astype(float)
+        columns: Array = (self.mount[:, None] == np.arange(self.mounts)).astype(np.float64)
         for of in columns.T:
             t = self.t[of > 0.0]
             of[of > 0.0] = (2.0 * t - t.min() - t.max()) / max(float(np.ptp(t)), 1e-9)
@@ -189,14 +189,13 @@ class Reduction(MeasureReduction):
         fit = self.fit
         self._accuracy()
         self._harmonics()
-        least = float(np.min(fit.dof))
         self._repeatability()
         if r.both_senses and not drifts:
             self.found.warn("lost_motion.drift", DRIFT)
         self._level()
         self._polygon()
         self.found.facts |= {
-            "series": [self._series(m) for m in range(r.mounts)], "dof": least,
+            "series": [self._series(m) for m in range(r.mounts)], "dof": fit.free,
             "residual_std": math.sqrt(fit.variance) / ARCSEC, "residual_unit": "arcsec",
         }  # fmt: skip
         return Account(
@@ -242,7 +241,7 @@ class Reduction(MeasureReduction):
         at = mean @ self.error
         worst = int(np.argmax(np.abs(at)))
         g = mean[worst] @ (np.eye(n, 2 * n) - taken @ fit.gain)
-        dof, self.where = float(np.min(fit.dof)), 360.0 * visited[worst] / r.faces
+        dof, self.where = fit.freedom(g), 360.0 * visited[worst] / r.faces
         k = float(special.stdtrit(dof, 1.0 - 0.025 / visited.size))
         true = None if r.true is None else mean[worst] @ r.true
         meaning = f"position error of the largest magnitude, at {self.where:g}°"
@@ -257,11 +256,11 @@ class Reduction(MeasureReduction):
             for j, part in enumerate(("cos", "sin")):
                 k, none = (2 * orders.index(n) + j, "") if n in orders else (0, same)
                 meaning = f"position error, {part} {n if n > 1 else ''}θ"
-                self._add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], float(fit.dof[k]), true[j], none)
+                self._add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), true[j], none)
         if self.r.both_senses:
             k, meaning = 2 * len(orders), "position on the way up less that on the way back"
             none = "" if fit.redundant else "no place is visited often enough to show what a reading scatters by"
-            self._add("lost motion", meaning, fit.value[k], fit.u[k], float(fit.dof[k]), none=none)
+            self._add("lost motion", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), none=none)
 
     def _repeatability(self) -> None:
         """Measure the standard deviation of visits, with the interval of a variance (chi-squared)."""
@@ -276,7 +275,7 @@ class Reduction(MeasureReduction):
     def _level(self) -> None:
         """Measure tilt of the axis, wobble and squareness from the complex terms of the level."""
         level, terms = level_fit(self.r)
-        p, half, dof = self.run.parameters, len(terms), float(np.min(level.dof))
+        p, half = self.run.parameters, len(terms)
         known = {"axis": p.get("body.tilt", UNKNOWN), "wobble": UNKNOWN}
         if p.get("wobble.order") == 2.0 and "wobble.amplitude" in p:
             size, phase = float(p["wobble.amplitude"]), float(p["wobble.phase"])
@@ -284,12 +283,14 @@ class Reduction(MeasureReduction):
         for term, names in TILTS.items():
             at = terms.index(term)
             for (name, meaning), i, sign, true in zip(names, (half + at, at), (1.0, -1.0), known[term], strict=True):
-                self._add(name, meaning, sign * level.value[i], level.u[i], dof, true)
+                self._add(name, meaning, sign * level.value[i], level.u[i], level.freedom(level.gain[i]), true)
         same = "one mount: not told from the level's zero"
         at, none = (terms.index("plate"), "") if "plate" in terms else (0, same)
         for axis, i, true in zip("xy", (at, half + at), p.get("reference.plate", UNKNOWN), strict=True):
             meaning = f"tilt of the plate against the axis, {axis}"
-            self._add(f"squareness {axis}", meaning, level.value[i], level.u[i], dof, true, none)
+            self._add(
+                f"squareness {axis}", meaning, level.value[i], level.u[i], level.freedom(level.gain[i]), true, none
+            )
 
     def _polygon(self) -> None:
         """Show the errors of the faces that were seen, which the fit has last."""

@@ -12,6 +12,8 @@ from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DEG, Account, Array, 
 from gyrobench.units import G0
 
 SHOWN, MARKED = 1500, 60  # points of a drawn line, and of its marks
+FITTED = 20  # readings at least from which a settled tilt is taken
+SETTLED = "tilt at rest that the erection settles to"
 ANGLES = ("motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll")
 
 
@@ -133,7 +135,8 @@ class Reduction(LoopReduction):
 
     def _rest(self, gate: Gate) -> None:
         """Measure the tilt at rest: of switches the mean of the second half, chattering in the dead zone; of the linear
-        law what it settles to, A + B exp(-gain t) of either lean: the rest of the erection decays by the gain.
+        law what it settles to, A + (B + C t) exp(-gain t) of either lean: the rest of the erection decays by the gain,
+        which step and Earth rate change a little (C), once the law is not at its largest rate.
         """
         leans, o = _of(gate), self.run.options
         if not self.linear:
@@ -141,14 +144,25 @@ class Reduction(LoopReduction):
             u, meaning = float(np.std(half)) / math.sqrt(8.0), "mean tilt at rest, second half"
             self.found.measure("hang-off", meaning, "arcmin", float(half.mean()), u, scale=ARCMIN)
             return
-        t = gate.t - gate.t[0]
-        X = np.column_stack([np.ones_like(t), np.exp(-self.gain * t)])
+        limited = np.flatnonzero(np.abs(leans).max(axis=1) > self.rate / self.gain)
+        free = int(limited[-1]) + 1 if limited.size else 0
+        if free > len(leans) - FITTED:
+            why = f"the law is at its largest rate up to {gate.t[min(free, len(leans) - 1)]:.4g} s: take a longer time"
+            self.found.measure("hang-off", SETTLED, "arcmin", None, scale=ARCMIN, unsettled=why)
+            return
+        t, leans = gate.t[free:] - gate.t[free], leans[free:]
+        decay = np.exp(-self.gain * t)
+        X = np.column_stack([np.ones_like(t), decay, t * decay])
         settled, *_ = np.linalg.lstsq(X, leans, rcond=None)
         size, left = float(np.hypot(*settled[0])), float(np.std(leans - X @ settled))
-        u = math.hypot(self.gain * size * self.run.step / math.sqrt(3.0), left)  # what it moves in a step, as self.u
-        closed = float(o["earth_rate"]) * math.cos(float(o["latitude"])) / self.gain
-        meaning = "tilt at rest that the erection settles to"
-        self.found.measure("hang-off", meaning, "arcmin", size, u, scale=ARCMIN, closed=closed)
+        left *= math.sqrt(
+            t.size * float(np.linalg.pinv(X.T @ X)[0, 0])
+        )  # what is left changes slowly: it does not average
+        earth, step = float(o["earth_rate"]) / self.gain, self.gain * self.run.step
+        neglected = (size**2 + earth**2) / 2.0 + step**2  # second order; at rest a step moves nothing in first order
+        u = math.hypot(size * neglected / math.sqrt(3.0), left)
+        closed = earth * math.cos(float(o["latitude"]))
+        self.found.measure("hang-off", SETTLED, "arcmin", size, u, scale=ARCMIN, closed=closed)
 
     def _acceleration(self, gate: Gate) -> None:
         rows, o, c = _through(gate), self.run.options, gate.channels

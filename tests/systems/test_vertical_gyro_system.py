@@ -77,11 +77,24 @@ def test_hang_off_of_the_linear_law(session):
 def test_hang_off_holds_the_equilibrium(session, time):
     """T/H = omega x n with n = (tan e_x, tan e_y, 1): e = W cos(latitude)/gain to 1e-6 of it, 3.84071 arcmin.  A short
     rest has not settled (mean of its second half 3.91 with u 0.02); after a long one u was 6e-14 arcmin, the scatter.
+    u is what these equations neglect, of second order: (e2 + (W/gain)2)/2 + (gain step)2 = 2e-6 of 3.84, over sqrt 3.
     """
     known, _ = found(session, law="linear", time=time, phases="erection rest")
     hang = known["hang-off"]
-    assert 2e-4 < hang.u < 5e-3
-    assert abs(hang.estimate - 3.84071) < 2.5 * hang.u
+    true = 7.2921159e-5 * math.cos(math.radians(40.0)) / 0.05 / math.radians(1.0 / 60.0)
+    assert 3e-6 < hang.u < 1e-5
+    assert abs(hang.estimate - true) < 2.5 * hang.u
+
+
+def test_a_rest_that_begins_at_the_largest_rate(session):
+    """From 2 deg at 4 deg/min: 10 s to 4/60/0.05 = 1.33 deg, where the law begins to be linear.  The first part decays
+    by no exponential: with it the hang-off was 0.4 of itself off, with as large a u.
+    """
+    known, _ = found(session, law="linear", time=120.0, phases="rest", tilt="2deg")
+    true = 7.2921159e-5 * math.cos(math.radians(40.0)) / 0.05 / math.radians(1.0 / 60.0)
+    assert abs(known["hang-off"].estimate - true) < 2.5 * known["hang-off"].u < 1e-3
+    short, _ = found(session, law="linear", time=8.0, phases="rest", tilt="2deg")
+    assert "largest rate" in short["hang-off"].no_value
 
 
 def test_acceleration(session):

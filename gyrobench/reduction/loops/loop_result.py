@@ -156,9 +156,9 @@ class LoopFindings(MeasureFindings):
         ):
             self.measure(name, what, unit, *value, closed=closed, no_value=none)
         if "phase" in values:
-            at = values["crossover"][0]
-            self.modelled(f"f_c{key}", loop, lambda limits: limits.near(at)[0])
-            self.modelled(f"PM{key}", loop, lambda limits: limits.near(at)[1])
+            crosses = values["crossover"][0]
+            self.modelled(f"f_c{key}", loop, lambda limits: limits.near(crosses)[0])
+            self.modelled(f"PM{key}", loop, lambda limits: limits.near(crosses)[1])
         noisy = "" if self.unstable else excluded_words(title, points, counts)
         self.warn("loop.noisy", noisy)
         if "phase" in values:
