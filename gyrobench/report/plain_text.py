@@ -66,7 +66,8 @@ def step_sentence(check: StepCheck) -> str:
     most = "" if worst is None else f", at most {write_number(worst, significant=2).text} times the u without it"
     if worst is not None and worst > 1.0:  # by how much, of which, is a sentence of its own
         most = ", larger than the u without it for some measures: see the warnings and the table of the step check"
-    return f"step check{cost}: the effect of the communication step is in u{most}"
+    there = "taken out of estimates or in u" if any(row.taken for row in check.rows) else "in u"
+    return f"step check{cost}: the effect of the communication step is {there}{most}"
 
 
 def no_values(coefficients: Iterable[tuple[str, str]]) -> list[str]:
