@@ -94,6 +94,15 @@ def test_workers_and_order_change_no_bit_and_nothing_is_done_twice(two: Any, tmp
     assert rows(tmp_path / "two") == rows(tmp_path / "one") == rows(tmp_path / "parts")
 
 
+def test_nobody_else_reaches_the_scheduler_of_local_workers(two: Any) -> None:
+    """Neither without TLS nor with a certificate of one's own: whoever is let in can have code executed here."""
+    address = two.scheduler.address
+    assert all(a.startswith("tls://127.0.0.1:") for a in (address, *two.nthreads()))
+    for where, security in ((address.replace("tls:", "tcp:"), None), (address, distributed.Security.temporary())):
+        with pytest.raises(OSError):
+            distributed.Client(where, security=security, timeout="2s", set_as_default=False)
+
+
 def test_threads_of_this_process_are_workers_too(two: Any, tmp_path: Path) -> None:
     asked = {"system": "weighing", "over": AXES, "set": {"duration": "0.05s"}}
     with distributed.Client(processes=False, n_workers=2, threads_per_worker=2, dashboard_address=None) as client:

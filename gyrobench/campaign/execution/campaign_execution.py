@@ -106,6 +106,7 @@ def execute_campaign(
     hung or had no memory.  Raises UsageError, CampaignError, CampaignStopped (the same call goes on).
     """
     try:
+        import cryptography  # noqa: F401
         import psutil  # noqa: F401
         from distributed.comm.core import CommClosedError
     except ImportError:

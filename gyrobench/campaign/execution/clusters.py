@@ -58,13 +58,16 @@ def _without_bokeh() -> str:
 def local_cluster(workers: int) -> Iterator[Client]:
     """Yield a client of that many local processes, which end with this one.
 
+    They talk by TLS with a certificate that is made here and lies in the memory of these processes alone: another user
+    of the machine, who reaches the port, cannot send code.
+
     On Linux a process that has imported what a worker needs stays, and the workers are its forks: the next cluster, and
     a worker in place of one that a run has ended, need not import it again for a second.
     """
     import logging
 
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
     from distributed.utils import get_mp_context
 
     settings = {
@@ -93,6 +96,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
                 local_directory=str(temporary_folder()),
                 env=dict(os.environ),  # as it is now, not as it was when the first cluster began
                 silence_logs=logging.CRITICAL,
+                security=Security.temporary(),
             ) as cluster,
             Client(cluster, set_as_default=False) as client,
         ):
