@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import signal
@@ -225,13 +226,25 @@ def test_a_full_disk_ends_the_campaign_and_nothing_is_lost(
     assert exit_code(CampaignError("")) == 3
 
 
+def of_session(session: int) -> list[int]:
+    """The processes of a session that run."""
+    found = []
+    for pid in filter(str.isdigit, os.listdir("/proc") if os.path.isdir("/proc") else []):
+        with contextlib.suppress(OSError):
+            if os.getsid(int(pid)) == session:
+                found.append(int(pid))
+    return found
+
+
 def test_a_campaign_that_is_killed_goes_on_where_it_was(two: Any, tmp_path: Path) -> None:
     """A third of the runs waits for the kill: however fast the others are, the campaign has not ended by then."""
     times, file = tmp_path / "times", tmp_path / "c.toml"
     file.write_text(f'system = "weighing"\nseeds = 150\n[set]\nfault = "wait"\ntimes = "{times}"\n')
     command = [sys.executable, "-m", "gyrobench", "campaign", str(file), "--out", str(tmp_path / "c"), "--workers", "1"]
     env = {**os.environ, "PYTHONPATH": str(Path(gb.__file__).parents[1])}
-    process = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     try:
         while not list((tmp_path / "c" / "runs").glob("*.parquet")):
             assert process.poll() is None, process.communicate()
@@ -239,6 +252,10 @@ def test_a_campaign_that_is_killed_goes_on_where_it_was(two: Any, tmp_path: Path
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
+    deadline = time.monotonic() + 5.0
+    while left := of_session(process.pid):
+        assert time.monotonic() < deadline, f"workers outlive their campaign: {left}"
+        time.sleep(0.1)
     stored = Campaign.open(tmp_path / "c").arrow()
     assert 0 < stored.num_rows < 150
     begun = len(times.read_text().split())
