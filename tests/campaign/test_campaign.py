@@ -223,7 +223,7 @@ def test_a_full_disk_ends_the_campaign_and_nothing_is_lost(
     gb.campaign(asked, client=two, out=tmp_path / "c")
     gb.campaign(asked, client=two, out=tmp_path / "d")
     assert rows(tmp_path / "c") == rows(tmp_path / "d")
-    with pytest.raises(CampaignError, match=r"worker tcp.*: No space left on device; 0 of 8 runs are stored"):
+    with pytest.raises(CampaignError, match=r"worker tls:.*: No space left on device; 0 of 8 runs are stored"):
         gb.campaign({**asked, "set": {"fault": "disk"}}, client=two, out=tmp_path / "e")
     assert exit_code(CampaignError("")) == 3
 
@@ -313,8 +313,12 @@ def test_measured_files(two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_commands(two: Any, tmp_path: Path, command: Any) -> None:
     words = ["sweep", "weighing", "--over", "source.offset=1,2", "--seeds", 2, "--set", "duration=0.05s"]
-    code, out, err = command(*words, "--out", tmp_path / "c", "--scheduler", two.scheduler.address)
+    local = {"processes": False, "protocol": "tcp://", "dashboard_address": "127.0.0.1:0"}
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **local) as cluster:
+        code, out, err = command(*words, "--out", tmp_path / "c", "--scheduler", cluster.scheduler_address)
     assert code == 0 and "4 runs: 4 done" in out and "dashboard: http" in err
+    code, _, err = command(*words, "--out", tmp_path / "t", "--scheduler", two.scheduler.address)
+    assert code == 3 and "TLS needs certificates, distributed.comm.tls" in err  # those of local workers are nobody's
     code, out, _ = command(*words, "--out", tmp_path / "c")
     assert "4 runs: 4 done (4 were stored before)" in out and "mean" in out
     code, _, err = command("sweep", "weighing")

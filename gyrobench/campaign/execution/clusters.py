@@ -39,6 +39,9 @@ def connect(
             connected = Client(scheduler, timeout="20s", set_as_default=False)
         except (OSError, ValueError) as error:
             raise CampaignError(f"no scheduler at {scheduler}: {error}") from None
+        except TypeError:
+            keys = "distributed.comm.tls in the configuration of dask"
+            raise CampaignError(f"no scheduler at {scheduler}: TLS needs certificates, {keys}") from None
         with connected:
             notes([f"dashboard: {connected.dashboard_link}"])
             yield connected
