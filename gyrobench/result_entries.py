@@ -67,9 +67,8 @@ class Coefficient:
     no_value: str = ""  # why there is none: estimate and u are then NaN, and the interval where it has no bound
     combination: dict[str, float] = field(default_factory=dict)  # of model coefficients, printed units; {}: its name
     stands_for: str = ""  # the coefficient whose name a limit may have, too; "": no other name
-    models: tuple[float, float] | None = (
-        None  # that of the linear models of a loop: with the communication step, without
-    )
+    #: that of the linear models of a loop: with the communication step, without
+    models: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ import pytest
 from multipoint import KS, NAME, estimates, load, polynomial, quiet, windows
 from scipy.spatial.transform import Rotation
 
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 
@@ -231,14 +229,3 @@ def test_another_table(command: Command, tmp_path: Path) -> None:
     result = json.loads((tmp_path / "run" / "result.json").read_text("utf-8"))
     for c in result["coefficients"]:
         assert abs(c["z"]) < 5.0, c["name"]
-
-
-def test_readme() -> None:
-    """Every option with its default, unit and meaning."""
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
-    for name, option in load().options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows[name].strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name

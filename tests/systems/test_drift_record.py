@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record import block_means
 from gyrobench.record.record import Record
@@ -332,13 +331,3 @@ def test_missing_samples_are_completed_and_long_gaps_cut(monkeypatch: pytest.Mon
     assert p.stretch[there] == pytest.approx(x[p.first :][there], abs=1e-9)
     assert np.std(p.stretch[~there]) == pytest.approx(1.0, abs=4.0 / math.sqrt(2.0 * np.count_nonzero(~there)))
     assert p.noise.treatment.filled == np.count_nonzero(~there) + np.count_nonzero(np.isnan(x[1:3000]))
-
-
-def test_readme_lists_the_options() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]* \| [^|]+ \| .*$", text, re.M)}
-    for name, option in load().options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name

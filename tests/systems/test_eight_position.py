@@ -17,7 +17,6 @@ from scipy import stats
 from undiagnosed import reduce_undiagnosed
 
 from gyrobench import drift, frames
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.multi_day_record import combine
@@ -386,26 +385,3 @@ def test_days_that_do_not_go_together(session: Session, tmp_path: Path) -> None:
         (tmp_path / "days.csv").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=said):
             load().read_measured(tmp_path / "days.csv", {})
-
-
-def test_readme_lists_the_options() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| .*$", text, re.M)}
-    system = load()
-    for name, option in system.options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
-    assert not rows
-    for heading in (
-        "Principle",
-        "Positions",
-        "Plan",
-        "Reduction",
-        "Accuracy",
-        "Several days",
-        "Not modelled",
-        "Sources",
-    ):
-        assert f"\n## {heading}\n" in text

@@ -16,7 +16,6 @@ from scipy import stats
 
 from gyrobench import drift, frames
 from gyrobench.attitudes import parse
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.estimation import noise
@@ -254,29 +253,6 @@ def test_days(session: Session, tmp_path: Path) -> None:
     assert c.interval[1] - c.estimate == pytest.approx(stats.t.ppf(0.975, 7) * sigma / math.sqrt(8))
     assert result.tests[0].p is not None and result.tests[0].p < 1e-6
     assert "ω_d vary from day to day" in result.summary[0] or "ω_d" in result.summary[0]
-
-
-def test_readme_lists_the_options() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| .*$", text, re.M)}
-    system = load()
-    for name, option in system.options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
-    assert not rows
-    for heading in (
-        "Principle",
-        "Attitude",
-        "Plan",
-        "Reduction",
-        "Accuracy",
-        "Several days",
-        "Not modelled",
-        "Sources",
-    ):
-        assert f"\n## {heading}\n" in text
 
 
 # ------------------------------------------------------------------------------------------ noise coefficients

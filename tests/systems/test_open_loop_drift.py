@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from gyrobench import drift, frames
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import Record
@@ -223,17 +222,3 @@ def test_hand_that_nulls(tmp_path: Path) -> None:
     result = load().reduce(load().read_measured(tmp_path / "hand.csv", {}))
     # n steps of (rate / 360) arcmin in 10 s: rate / 360 * 60 arcsec / 10 s = rate / 60 arcsec/s
     assert result.coefficients[0].estimate == pytest.approx((0.4 - 15.041068732) / 60.0 + 15.041068732, abs=1e-6)
-
-
-def test_readme_lists_the_options() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| .*$", text, re.M)}
-    system = load()
-    for name, option in system.options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
-    assert not rows
-    for heading in ("Principle", "Plan", "Reduction", "Accuracy", "Not modelled", "Sources"):
-        assert f"\n## {heading}\n" in text

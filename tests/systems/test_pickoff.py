@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 from pickoffs import ARCMIN, DPH, NAME, R, load, made
 
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -239,14 +237,3 @@ def test_measured_data(command: Command, stepping: Session, tmp_path: Path) -> N
         assert code == 2 and out == "" and "Traceback" not in err, err
         for word in words:
             assert word in err, err
-
-
-def test_readme() -> None:
-    """Every option with its default, unit and meaning."""
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
-    for name, option in load().options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows[name].strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name

@@ -376,18 +376,8 @@ def test_laboratory_file(tmp_path: Any, day: Any) -> None:
         system.read_measured(file, {"nuisances": "none"})  # as the record without noise
 
 
-def test_readme_and_show(day: Any) -> None:
-    """What the README says of options is what there is."""
-    import re
-
-    system = load_system(NAME)
-    assert system.folder is not None
-    text = (system.folder / "README.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
-    assert named == set(system.options)
-    for name, option in system.options.items():
-        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
-        assert option.doc in row, name
+def test_delays(day: Any) -> None:
+    """The loops are cut where the table holds."""
     assert day.run.delays == {
         "gyro.u -> table.u": 2e-3, "cage.i -> gyro.i": 2e-3, "table.angle_read -> sequencer.angle": 2e-3,
         "table.in_position -> sequencer.in_position": 2e-3,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -200,15 +199,3 @@ def test_laboratory_file(tmp_path: Any, bench: Session) -> None:
     file.write_text(text.replace("# latitude = 45.75deg\n", ""), encoding="utf-8")
     with pytest.raises(Exception, match="'latitude' is not given"):
         load_system(NAME).read_measured(file, {})
-
-
-def test_readme() -> None:
-    """What the README says of options is what there is."""
-    system = load_system(NAME)
-    assert system.folder is not None
-    text = (system.folder / "README.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
-    assert named == set(system.options)
-    for name, option in system.options.items():
-        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
-        assert option.doc in row, name

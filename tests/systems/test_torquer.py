@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
-import re
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -203,14 +201,3 @@ def test_run_and_show(command: Command, tmp_path: Path) -> None:
     code, out, err = command("run", NAME, *more, "--out", tmp_path / "run", pages=True)
     assert code == 0 and "K_3/K_1" in out, err
     assert (tmp_path / "run" / "report.html").exists()
-
-
-def test_readme() -> None:
-    """Every option with its default, unit and meaning."""
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
-    for name, option in load().options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows[name].strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name

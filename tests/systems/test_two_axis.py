@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 
 from gyrobench import drift
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session, run
 from gyrobench.result import Result
 from gyrobench.system.part_values import PartValues
@@ -220,17 +218,3 @@ def test_report_and_plan(command: Command, tmp_path: Path) -> None:
     assert "Consistency of the harmonics" in page and "second angle" in page
     code, out, _ = command("show", NAME)
     assert code == 0 and "θ = 10°" in out
-
-
-def test_readme() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
-    system = load()
-    for name, option in system.options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
-    assert not rows
-    for heading in ("Principle", "Geometry", "Model", "Plan", "Reduction", "Accuracy", "Not modelled", "Sources"):
-        assert f"\n## {heading}\n" in text

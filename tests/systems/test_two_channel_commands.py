@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from typing import Any
 import pytest
 from two_channels import NAME, SHORT, load
 
-from gyrobench.bench import Bench
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 
@@ -135,17 +133,3 @@ def test_report_of_a_run(command: Command, tmp_path: Path) -> None:
     result = json.loads((tmp_path / "result.json").read_text("utf-8"))
     assert sum("outside 20° to 70°" in w for w in result["warnings"]) == 1
     assert any("not in the simple model" in w for w in result["warnings"])
-
-
-def test_readme() -> None:
-    text = (Bench.find().system_folder(NAME) / "README.md").read_text("utf-8")
-    rows = {m[1]: m[0] for m in re.finditer(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \| [^|]+ \|$", text, re.M)}
-    system = load()
-    for name, option in system.options.items():
-        unit = option.unit if isinstance(option.unit, str) else option.unit.__name__
-        cells = [c.strip() for c in rows.pop(name).strip("|").split("|")]
-        assert cells[2:] == [unit, option.doc], name
-        assert option.parse(name, cells[1]) == option.parse(name, option.default), name
-    assert not rows
-    for heading in ("Principle", "Geometry", "Model", "Plan", "Reduction", "Accuracy", "Not modelled", "Sources"):
-        assert f"\n## {heading}\n" in text
