@@ -87,6 +87,7 @@ def _settled(
     """
     length, power = max(choice.start, choice.least), 1.0
     before: tuple[float, float] | None = None
+    tried: list[tuple[float, Trial, float]] = []
     for _ in range(ROUNDS):
         trial = bench.trial(choice.options(length), protocol.covariances, draws)
         value = merit(trial)
@@ -106,13 +107,18 @@ def _settled(
                 power = -math.log(value / before[1]) / math.log(length / before[0])
                 power = min(max(power, 0.2), 3.0)
             before = length, value
+            tried.append((length, trial, value))
             following = length * value ** (1.0 / power)
         if not following < LONGEST:
             raise DesignError("not reached in any time: slow drift does not average out")
         length = max(following, choice.least)
-    if time is None and math.sqrt(value) > 1.0 + 4.0 * CLOSE:
+    if time is not None:
+        return before[0] if before else length, trial, value
+    # which effects a fit weighs changes from run to run, and u with it: the shortest run that got there counts
+    reached = [t for t in tried if math.sqrt(t[2]) <= 1.0 + 4.0 * CLOSE]
+    if not reached:
         raise DesignError(f"u/wanted stays at {math.sqrt(value):.3g}")
-    return before[0] if before else length, trial, value
+    return min(reached, key=lambda t: t[1].time)
 
 
 def _promising(

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from gyrobench.bench import UsageError
 from gyrobench.design import choice_search, plan_search, shortest_test
 from gyrobench.design.approximate_design import approximate_design, evaluate
 from gyrobench.design.designed_test import DesignedTest
-from gyrobench.design.option_protocol import OptionProtocol
+from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.plan_runs import DesignError, Stated, Trial, Workbench, last_time
 from gyrobench.design.plan_search import Search, Want, finish, rounded
 from gyrobench.design.predicted_uncertainty import predict
@@ -203,6 +204,33 @@ def test_the_dwell_is_that_of_the_run_where_u_falls_faster_than_the_noise() -> N
     assert plan.dwell == pytest.approx((200.0**1.2 / (0.1 * 2.0**0.5)) ** (1 / 1.7), rel=0.01)
     assert plan.dwell == dwells[-1] and cost == trial.time == 2.0 * plan.dwell  # what is stated is of the plan
     assert trial.values["k"].u == pytest.approx(0.1, rel=0.01) and len(dwells) < 9
+
+
+@pytest.mark.parametrize(
+    ("factors", "length"), [([1.06, 0.8, 0.98, 1.13, 1.04], 2), ([1.06, 1.03, 1.1, 1.05, 1.04], None)]
+)
+def test_the_shortest_length_that_got_there_counts(factors: list[float], length: int | None) -> None:
+    """The effects that a fit weighs change from run to run, and u jumps: one of five lengths was reached, or none."""
+    lengths: list[float] = []
+
+    class Bench:
+        def trial(self, values: dict[str, float], covariances: object, draws: int) -> Trial:
+            lengths.append(values["dwell"])
+            u = factors[len(lengths) - 1]
+            return Trial({"k": Stated(u, u, u, 0.0, "1", 1.0)}, values["dwell"], ())
+
+    def merit(trial: Trial) -> float:
+        return trial.values["k"].u ** 2
+
+    choice = Choice("one", lambda dwell: {"dwell": dwell}, 100.0)
+    offered = OptionProtocol((choice,), lambda fits, record: (), ("k",))
+    asked: Any = (Bench(), offered, choice, merit, None, 1)
+    if length is None:
+        with pytest.raises(DesignError, match=r"u/wanted stays at 1\.04"):
+            choice_search._settled(*asked)
+    else:
+        found = choice_search._settled(*asked)
+        assert found[0] == lengths[length] == found[1].time and found[2] == factors[length] ** 2
 
 
 def test_slow_drift_is_beaten_by_more_visits_and_not_by_longer_ones() -> None:
