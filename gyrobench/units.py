@@ -292,6 +292,18 @@ def display(name: str) -> str:
 
 
 FAST = 0.01  # rad/s; above it rates are shown in degrees a second
+#: SI unit -> units of the surface that other tools are offered
+OFFERED = {
+    "rad": ("deg", "arcmin", "arcsec"), "rad/s": ("deg/s", "deg/h", "ERU"), "rad/s2": ("deg/s2",), "m/s2": ("g", "mg"),
+    "A": ("mA",), "N.m": ("g.cm",), "T": ("uT",),
+}  # fmt: skip
+
+
+def shown_in(value: float, unit: str) -> str:
+    """Return the unit in which a person reads a value in SI: angles in degrees, rates in deg/h, fast ones in deg/s."""
+    if unit == "rad/s":
+        return "deg/s" if abs(value) > FAST else "deg/h"
+    return {"rad": "deg", "rad/s2": "deg/s2"}.get(unit, unit)
 
 
 def format_quantity(value: Any, unit: str) -> str:
@@ -305,6 +317,6 @@ def format_quantity(value: Any, unit: str) -> str:
     if unit == "rad":
         return f"{convert(value, 'rad', 'deg'):.9g}°"
     if unit == "rad/s":
-        name = "deg/s" if abs(value) > FAST else "deg/h"
-        return f"{convert(value, 'rad/s', name):.9g} {name.replace('deg', '°')}"
+        name = shown_in(value, unit)
+        return f"{convert(value, 'rad/s', name):.9g} {display(name)}"
     return f"{value:g}" if unit == "1" else f"{value:g} {unit}"

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 from gyrobench.exchange.exposure import choose
 from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
 from gyrobench.exchange.ssp_export import ExportError, experiment, for_system, prepare, recorded, slots_with_arrays
-from gyrobench.packaging.description import unit_definitions
+from gyrobench.packaging.description import unit_attributes, unit_definitions
 from gyrobench.packaging.description3 import xml_text
 from gyrobench.packaging.fmu import write_archive
 from gyrobench.system.fmu_variables import variables
@@ -133,7 +133,8 @@ def _described(text: bytes, system: System, outputs: Mapping[str, str], units: M
         if name in outputs and variable.get("causality") == "local":
             variable.attrib |= {"name": outputs[name], "causality": "output"}
         if (unit := units.get(variable.get("name", ""))) and variable[0].tag == "Real":
-            variable[0].set("unit", unit)
+            start = float(variable[0].get("start", "0")) if variable.get("causality") == "parameter" else None
+            variable[0].attrib |= unit_attributes(unit, start)
     root.insert(1, unit_definitions(set(units.values()) - {""}))
     places = [str(k) for k, variable in enumerate(declared, 1) if variable.get("causality") == "output"]
     structure.clear()

@@ -11,7 +11,7 @@ from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
 from gyrobench.packaging.source import PartCode
-from gyrobench.units import base_unit
+from gyrobench.units import OFFERED, base_unit, shown_in, unit
 
 #: section -> causality, variability, initial
 ATTRIBUTES = {
@@ -42,6 +42,12 @@ def unit_name(s: Scalar) -> str:
     return f"{s.decl.unit}/s" if s.section == "derivative" else s.decl.unit
 
 
+def unit_attributes(name: str, start: float | None = None) -> dict[str, str]:
+    """Return unit and unit of the display of a signal, or of a parameter with its start: a drift in degrees an hour."""
+    shown = shown_in(math.inf if start is None else start, name)
+    return {"unit": name} if shown == name else {"unit": name, "displayUnit": shown}
+
+
 def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     causality, variability, initial = ATTRIBUTES[s.section]
     d = s.decl
@@ -64,7 +70,7 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     if kind == "Real":
         if d.quantity:
             of_type["quantity"] = d.quantity
-        of_type["unit"] = unit_name(s)
+        of_type |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
     if s.section in ("parameter", "input", "state"):
         lo = d.min if d.min is not None else d.above
         hi = d.max if d.max is not None else d.below
@@ -96,6 +102,8 @@ def unit_definitions(names: Iterable[str]) -> ET.Element:
             if factor != 1.0:
                 attributes["factor"] = repr(factor)
             ET.SubElement(u, "BaseUnit", attributes)
+        for shown in OFFERED.get(name, ()):  # a value in it is the factor times the value in the unit
+            ET.SubElement(u, "DisplayUnit", {"name": shown, "factor": repr(unit(name).factor / unit(shown).factor)})
     return definitions
 
 

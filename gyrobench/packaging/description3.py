@@ -19,6 +19,7 @@ from gyrobench.packaging.description import (
     licence,
     number,
     summary,
+    unit_attributes,
     unit_name,
     units,
 )
@@ -77,7 +78,7 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, array: Seq
     if kind == "Float64":
         if s.decl.quantity:
             attributes["quantity"] = s.decl.quantity
-        attributes["unit"] = unit_name(s)
+        attributes |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
     if s.section == "derivative":
         attributes["derivative"] = reference(next(x for x in cls.states if x.name == s.name[4:-1]))
     if s.section in ("parameter", "input", "state"):

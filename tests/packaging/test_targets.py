@@ -17,7 +17,7 @@ from gyrobench.component import Component
 from gyrobench.packaging import build, compiler, load_part, reference
 from gyrobench.packaging.instance import Fmu, InstanceError, Unzipped
 from gyrobench.packaging.reference import Reference, compare, read_reference, run_reference, write_reference
-from gyrobench.units import base_unit, unit
+from gyrobench.units import base_unit, convert, unit
 
 
 def reference_of(part: str) -> Path:
@@ -126,6 +126,10 @@ def test_description(part: str, target: str, fmu: Callable) -> None:
             unit(v.unit)
             known = base_unit(v.unit)
             assert (units[v.unit].baseUnit is not None) == (known is not None)
+            offered = {u.name: float(u.factor) for u in units[v.unit].displayUnits}
+            assert v.displayUnit is None or v.displayUnit in offered
+            for name, factor in offered.items():
+                assert factor == pytest.approx(convert(1.0, v.unit, name), rel=1e-15)
         if s.section in ("parameter", "input", "state"):
             assert v.start is not None
             for bound, given in ((s.decl.min, v.min), (s.decl.max, v.max)):
@@ -137,6 +141,19 @@ def test_description(part: str, target: str, fmu: Callable) -> None:
     co = d.coSimulation
     assert co.canGetAndSetFMUstate and co.canSerializeFMUstate
     assert co.providesDirectionalDerivative == (target == "native")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_other_tools_show_degrees(fmu: Callable, fmi: int) -> None:
+    """A drift in deg/h, a signal of rate in deg/s; the values themselves are SI: 0.5 deg/h are 2.42e-6 rad/s."""
+    d = fmpy.read_model_description(str(fmu("floated_gyro", "native", fmi)), validate=False)
+    by_name = {v.name: v for v in d.modelVariables}
+    shown = {n: by_name[n].displayUnit for n in ("D_I", "i", "float_angle")}
+    assert shown == {"D_I": "deg/h", "i": None, "float_angle": "deg"}
+    assert by_name["omega[1]" if fmi == 2 else "omega"].displayUnit == "deg/s"
+    (offered,) = (u.displayUnits for u in d.unitDefinitions if u.name == "rad/s")
+    per_hour = next(float(u.factor) for u in offered if u.name == "deg/h")
+    assert 0.5 / per_hour == pytest.approx(2.42e-6, rel=2e-3)
 
 
 # --------------------------------------------------------------------------------------------- state
