@@ -184,6 +184,9 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
     if rest and re.fullmatch(r"-?\d+", rest[0]):
         if abs(n := int(rest[0][:4])) > LARGEST_POWER:
             raise UnitError(f"unit '{name}': power {shorten(rest[0], 20)}; {LARGEST_POWER} is the largest")
+        if n == 0:
+            known = "; g is the standard acceleration g0" if head == "g" else ""
+            raise UnitError(f"unit '{name}': power 0 of '{head}'{known}")
         f, p, rest = f**n, tuple(e * n for e in p), rest[1:]
     return f, p, rest
 

@@ -111,6 +111,7 @@ def test_per_g0_coefficients() -> None:
         ("1e999", "1", "finite"),
         ("3hz", "Hz", "did you mean Hz"),
         ("3rad//s", "rad/s", "unknown symbol '/'"),
+        ("1.001 g0", "m/s2", "power 0 of .g.; g is the standard acceleration g0"),
         ("3 rad/s)", "rad/s", "out of place"),
         ("3sqrt(Hz", "Hz", "is missing"),
         ("3degC/m", "K/m", "stands alone"),

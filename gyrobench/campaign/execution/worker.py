@@ -34,7 +34,6 @@ from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System
-from gyrobench.workflow.inputs import load_limits
 from gyrobench.workflow.measured_run import reduce_measured
 from gyrobench.workflow.run_execution import RunRequest, execute_run
 from gyrobench.workflow.user_errors import PostRunError, user_message
@@ -161,7 +160,6 @@ class _WorkerState:
             engine_library.provide(next((self.root / "engine").iterdir()))
         self.bench = self.root / "bench"
         self.test: System | Suite = load_test(self.settings.system, self.bench)
-        self.limits = load_limits(self.root / self.settings.spec) if self.settings.spec else None
         if self.settings.ends:
             logging.getLogger("gyrobench").setLevel(logging.ERROR)  # warnings are in the rows
             given = self.settings.memory_limit
