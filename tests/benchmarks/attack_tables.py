@@ -213,6 +213,7 @@ def table_rate_test(rng: Rng) -> tuple[str, dict[str, float]]:
     """The servo makes the counts follow a command whose clock is off; the scale errs once and twice a turn.
 
     The table moves about the command; its true angle is the count before rounding less the error of the scale there.
+    A mean rate is that from the end of the first window to the end of the last, as the test says.
     """
     quantum, clock = 0.18 * ARCSEC, float(rng.uniform(-20.0, 20.0)) * 1e-6
     sizes = {1: 0.4 * ARCSEC, 2: 0.2 * ARCSEC}
@@ -229,7 +230,7 @@ def table_rate_test(rng: Rng) -> tuple[str, dict[str, float]]:
             stands = edges + jitter * rng.standard_normal(4)
             counts = quantum * np.round(stands / quantum)
             e = [sum(c * math.cos(n * x) + s * math.sin(n * x) for n, (c, s) in scale.items()) for x in edges]
-            errors.append(((stands[3] - e[3]) - (stands[0] - e[0])) / (180.0 * w) - 1.0)
+            errors.append(((stands[3] - e[3]) - (stands[1] - e[1])) / (120.0 * w) - 1.0)
             rows += [
                 [phase, t + 60.0 * k, t + 60.0 * k + 60.0, w, counts[k], counts[k + 1], 0.0, jitter] for k in range(3)
             ]

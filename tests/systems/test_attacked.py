@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import gyrobench as gb
+from gyrobench.system.system import load_system
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 QUICK = ("fixed_position", "open_loop_drift", "tumble_two_axis", "accelerometer_four", "table_rate_test")
@@ -69,3 +70,20 @@ def test_no_mistake_that_no_residual_shows_passes(test: str, benchmark_of: Any) 
         sheet.columns = {n: v.copy() for n, v in columns.items()}
         assert kinds.KINDS[name](sheet, np.random.default_rng(1))
         assert kinds.outcome(sheet, clean)[0] in ("asked", "named", "refused", "inconclusive"), name
+
+
+def test_noise_of_a_reader_is_asked_for(benchmark_of: Any, tmp_path: Path) -> None:
+    """Counts of 0.18" with ends that scatter by up to 0.3": from a noisy reader u was 27e-6 for an error of 150e-6."""
+    model = benchmark_of("attack").MODELS["table_rate_test"]
+    text, truth = model(np.random.default_rng(121))
+    limits = {n: (-1e6, 1e6) for n in truth}
+    file, said = tmp_path / "record.csv", tmp_path / "said.csv"
+    file.write_text(text, encoding="utf-8")
+    said.write_text(f"# u_reading = 0.3 arcsec\n{text}", encoding="utf-8")
+    systems = (load_system("table_rate_test") for _ in range(2))
+    silent, stated = (s.reduce(s.read_measured(f, {}), limits) for s, f in zip(systems, (file, said), strict=True))
+    assert silent["error 1 ERU"].verdict == "inconclusive" and "u_reading" in " ".join(silent.withheld)
+    assert stated["error 1 ERU"].verdict == "pass"
+    # two senses, two ends each: 0.3" of 120 s at 15"/s, 1805"
+    noise = 0.3 / 1805.0 * 1e6
+    assert stated["error 1 ERU"].u ** 2 - silent["error 1 ERU"].u ** 2 == pytest.approx(noise**2, rel=0.01)
