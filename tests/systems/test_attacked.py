@@ -56,9 +56,9 @@ def test_intervals_hold_truths_of_records_of_another_hand(system: str, benchmark
 
 
 @pytest.mark.parametrize("test", ["torquer_scale_factor", "pickoff_scale_factor"])
-def test_no_mistake_that_no_residual_shows_passes(test: str, benchmark_of: Any) -> None:
+def test_no_kind_of_mistake_passes(test: str, benchmark_of: Any) -> None:
     """A meter that is off by a factor passed, with estimates off by 580 u and more: it is asked for, like what else
-    nobody can see; stated as checked the clean record passes.
+    nobody can see; stated as checked the clean record passes.  All kinds in the pickoff test, which is quick.
     """
     kinds = benchmark_of("handling_kinds")
     sheet = importlib.import_module("laboratory").Laboratory(test, 5).sheet()
@@ -66,10 +66,13 @@ def test_no_mistake_that_no_residual_shows_passes(test: str, benchmark_of: Any) 
     assert sheet.reduce(kinds.wide(clean)).verdict == "pass"
     del sheet.comments["arrangement"]
     columns = {n: v.copy() for n, v in sheet.columns.items()}
-    for name in UNSEEN:
-        sheet.columns = {n: v.copy() for n, v in columns.items()}
-        assert kinds.KINDS[name](sheet, np.random.default_rng(1))
-        assert kinds.outcome(sheet, clean)[0] in ("asked", "named", "refused", "inconclusive"), name
+    comments, said = dict(sheet.comments), {}
+    for name in kinds.KINDS if test.startswith("pickoff") else UNSEEN:
+        sheet.columns, sheet.comments = {n: v.copy() for n, v in columns.items()}, dict(comments)
+        if kinds.KINDS[name](sheet, np.random.default_rng(1)):
+            said[name] = kinds.outcome(sheet, clean)[0]
+    assert set(said) >= set(UNSEEN) and set(said.values()) <= {"asked", "named", "refused", "inconclusive"}, said
+    assert said["a meter 2 % off"] == "asked"
 
 
 def test_noise_of_a_reader_is_asked_for(benchmark_of: Any, tmp_path: Path) -> None:
