@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from gyrobench import units
@@ -19,11 +20,13 @@ from gyrobench.record.column_proposal import (
     match_columns,
     series_columns,
 )
+from gyrobench.record.log_files import as_text, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.measured_run import empty_record
 
+MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
@@ -46,8 +49,27 @@ def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[
     if not file.is_file():
         raise UsageError(f"{file}: no such file")
     test = load_test(system)
+    tables = tables_of(file)[:MOST_TABLES] if is_log(file) else [""]
+    if len(tables) == 1:
+        tables = [""]
+    proposals = []
+    for table in tables:
+        with suppress(UsageError) if len(tables) > 1 else nullcontext():
+            proposals.append(_proposal(file, test, table))
+    if not proposals:
+        raise UsageError(f"{file}: no table of numbers with names in {', '.join(tables)}")
+    text, problems, _ = max(proposals, key=lambda p: p[2])
+    if out is not None:
+        if out.exists():
+            raise UsageError(f"--out {out}: the file exists; choose another name")
+        out.write_text(text, encoding="utf-8")
+    return text, problems
+
+
+def _proposal(file: Path, test: System | Suite, table: str) -> tuple[str, list[str], int]:
+    """Return the map of a table of a file, "" of the only one, what it lacks, and how many columns it has found."""
     wanted, stated = wanted_columns(test)
-    layout = find_layout(file)
+    layout = find_layout(as_text(file, table) if is_log(file) else file)
     if "channel" in test.options:
         found, wanted = _any_names(layout)
         missing = [] if any(u not in ("s", "K", "degC") for _, u in wanted) else ["rate"]
@@ -59,17 +81,13 @@ def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c
-    text, problems = map_text(file, test, layout, found, dict(wanted), stated)
+    text, problems = map_text(file, test, layout, found, dict(wanted), stated, table)
     for name in missing:
         if name == "t_end" and "t_start" in found:
             continue
         unused = ", ".join(f"'{c.name}'" for c in layout.columns if c not in found.values()) or "none"
         problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
-    if out is not None:
-        if out.exists():
-            raise UsageError(f"--out {out}: the file exists; choose another name")
-        out.write_text(text, encoding="utf-8")
-    return text, problems
+    return text, problems, len(found)
 
 
 def _is(column: FileColumn, unit: str) -> bool:
@@ -96,18 +114,16 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
 
 def map_text(
     file: Path, test: System | Suite, layout: FileLayout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
-    stated: Mapping[str, str],
+    stated: Mapping[str, str], table: str = "",
 ) -> tuple[str, list[str]]:  # fmt: skip
-    """Return the text of a map, and what it lacks: units that the file does not tell."""
+    """Return the text of a map, and what it lacks: units that the file does not tell.  table: of a log."""
     problems: list[str] = []
     empty = sum(c.empty for c in found.values())
     series = "t_start" not in wanted
     lines = [
         f"# Column map of {file.name}: gyrobench reduce {test.name} --data {file.name} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
-        f"encoding = {_quoted(layout.encoding)}",
-        f"delimiter = {_quoted(layout.delimiter)}",
-        f"decimal = {_quoted(layout.decimal)}",
+        *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
         f"skip = {layout.skip}  # lines above the names of the columns",
         f"below = {layout.below}  # lines between names and rows",
         "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
@@ -128,6 +144,11 @@ def map_text(
     ]
     lines += [f"# {n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")]
     return "\n".join(lines) + "\n", problems
+
+
+def _text_keys(layout: FileLayout) -> list[str]:
+    keys = {"encoding": layout.encoding, "delimiter": layout.delimiter, "decimal": layout.decimal}
+    return [f"{key} = {_quoted(value)}" for key, value in keys.items()]
 
 
 def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str]:
