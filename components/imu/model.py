@@ -30,7 +30,7 @@ class Imu(Component):
 
     Not modelled: nonlinearity, asymmetry, dynamics, quantization, lever arms between the accelerometers, temperature,
     g-squared sensitivity (see floated_gyro, accelerometer_pendulous, fixture).
-    Source: IEEE-1559, the linear part of its model equations; TEDALDI14, eq. 1..10; own quick form.
+    Source: IEEE 1559 (terms); Tedaldi 2014 (model of a triad); own quick form.
     """
 
     version = "1.0.0"
@@ -69,7 +69,9 @@ class Imu(Component):
         f = self.mount @ self.f
         drift = vector([self.x_gyro_bias_value, self.y_gyro_bias_value, self.z_gyro_bias_value])
         white = vector([self.noise.x_gyro, self.noise.y_gyro, self.noise.z_gyro])
-        self.rate = omega + self.gyro_scale @ omega + self.gyro_bias + self.g_sensitivity @ f * (1.0 / G0) + drift + white
+        self.rate = (
+            omega + self.gyro_scale @ omega + self.gyro_bias + self.g_sensitivity @ f * (1.0 / G0) + drift + white
+        )
         drift = vector([self.x_acc_bias_value, self.y_acc_bias_value, self.z_acc_bias_value])
         white = vector([self.noise.x_acc, self.noise.y_acc, self.noise.z_acc])
         self.f_read = f + self.acc_scale @ f + self.acc_bias + drift + white

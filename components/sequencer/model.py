@@ -43,9 +43,7 @@ class Sequencer(Component):
     targets_y = Parameter([0.0] * 99, "1", "target of each phase for a second axis, same mode: rad or rad/s")
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
     dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo; rate without travel)")
-    travel = Parameter(
-        [0.0] * 99, "rad", "angle turned while the gate is open (rate, 0: by dwell; servo: at least)"
-    )
+    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate, 0: by dwell; servo: at least)")
     windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo) or rad (rate)")
     face_of = Parameter([1] * 99, int, "which of the faces each phase uses, from 1")
     faces = Parameter([IDENTITY] * 12, "1", "mounts: rows of the face matrix one after the other")
@@ -96,7 +94,7 @@ class Sequencer(Component):
             )
             self.refuse(
                 not by_angle and self.dwell[p] <= 0.0,
-                "phase {bad_phase}: a hold, index or servo phase, and a rate phase without travel, needs a dwell above 0 s",
+                "phase {bad_phase}: a hold, index or servo phase, or a rate phase without travel, needs a dwell > 0 s",
             )
             self.refuse(self.windows[p] <= 0.0, "phase {bad_phase}: the window must be above 0")
             longest = (self.travel[p] if by_angle else self.dwell[p]) * (1.0 + 1e-9)

@@ -113,7 +113,10 @@ class Motion:
         rest = self.at_rest
         quarters = max(1, math.ceil(float(self.moved.max(initial=0.0)) / (TURN / 4.0)))
         x, w = np.polynomial.legendre.leggauss(NODES)
-        many = (np.arange(quarters)[:, None] + (x + 1.0) / 2.0).ravel() / quarters, np.tile(w / 2.0, quarters) / quarters
+        many = (
+            (np.arange(quarters)[:, None] + (x + 1.0) / 2.0).ravel() / quarters,
+            np.tile(w / 2.0, quarters) / quarters,
+        )
         for rows, (place, weight) in ((rest, (np.array([0.5]), np.ones(1))), (~rest, many)):
             if not rows.any():
                 continue
@@ -188,6 +191,7 @@ def unseen_rates(seen: Sequence[int]) -> list[str]:
     which = "any axis" if len(lost) == 3 else " and ".join(lost)
     columns = ", ".join(f"Sg_x{a}, Sg_y{a}, Sg_z{a}" for a in lost)
     return [
-        f"The plan does not turn about {which}: not estimable: {columns} (scale factors and misalignments of the gyros). "
-        "They are taken as zero; u_gyro_scale states their uncertainty, of which the Earth rate makes one of the biases."
+        f"The plan does not turn about {which}; not estimable: {columns} (scale factors and misalignments of the "
+        "gyros). They are taken as zero; u_gyro_scale states their uncertainty, which the Earth rate brings into the "
+        "biases."
     ]

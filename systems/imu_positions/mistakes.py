@@ -63,7 +63,7 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
     if off > SOUND:
         rows = "; ".join(" ".join(f"{x:.3g}" for x in row) for row in matrix)
         return [
-            f"{NAME[kind]}: the readings are not those of three axes in these positions (matrix, rows x, y, z: {rows}); "
+            f"{NAME[kind]}: the readings are not those of three axes in these positions (matrix by rows: {rows}): "
             "a position, an axis or the sense of an angle is mistaken"
         ]
     return [f"{NAME[kind]}: {text}" for text in (*_permuted(best, kind), *_scaled(size, kind))]

@@ -33,7 +33,6 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Group,
     Reason,
-    ReductionError,
     Regression,
     RunDocument,
     Table,
@@ -132,17 +131,21 @@ class ImuChannel(DriftReduction[ImuSetup]):
     def account(self, found: Findings) -> Account:
         c, s = self.channel, self.setup
         if c.gyro:
-            equation = f'omega_"read,{c.letter}" - omega_{c.letter} = b_g + sum_k S_(g,k) omega_k + sum_k G_k f_k \\/ g_0'
+            equation = (
+                f'omega_"read,{c.letter}" - omega_{c.letter} = b_g + sum_k S_(g,k) omega_k + sum_k G_k f_k \\/ g_0'
+            )
         else:
             equation = f'f_"read,{c.letter}" - f_{c.letter} = b_a + sum_k S_(a,k) f_k'
         return Account(
-            method="Positions and turns of an inertial measurement unit on a table with two axes; least squares of each "
-            "instrument under an estimated noise model [IMU-POSITIONS]",
-            sources=["IMU-POSITIONS; IEEE 1559, linear terms of its model", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
+            method="Positions and turns of an inertial measurement unit on a table with two axes; least squares of "
+            "each instrument under an estimated noise model [IMU-POSITIONS]",
+            sources=[
+                "IMU-POSITIONS; IEEE 1559 (terms); Tedaldi 2014 (model of a triad)",
+                "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
+            ],
             equation=equation,
             conventions=[
-                "Coefficients are departures of the readings: reading = rate or specific force + bias + matrix · input; "
-                "take them off to correct.",
+                "Coefficients are departures of the readings: reading = rate or specific force + bias + matrix · input.",
                 "Specific force f = a − g: an axis that points up reads +1 g; g0 = 9.80665 m/s².",
                 "Axes x, y, z of the case are those of the plate, which carries it; local frame east, north, up; outer "
                 "table axis level and east, table angles right-handed.",

@@ -62,7 +62,7 @@ class ImuPositions(TableTest):
     options = (
         SITE
         | {
-            "positions": Option(12, int, f"directions of the case that point up: {', '.join(map(str, geometry.POSITIONS))}"),
+            "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
             "windows": Option(4, int, "averages a position", 1, 100),
@@ -103,14 +103,20 @@ class ImuPositions(TableTest):
     channels = ("table.angle_x", "table.angle_y", *(f"imu.{c.output}[{c.axis + 1}]" for c in CHANNELS))
 
     def times(self) -> plans.Times:
-        return plans.Times(
-            self["settle"], self["dwell"], self["windows"], self["rate"], self["turns"], self["rate_axes"]
-        )
+        """Return dwells and turns.  Raises InvalidValueError."""
+        axes = self["rate_axes"]
+        if len(set(axes)) < len(axes) or set(axes) - set("xyz"):
+            raise InvalidValueError(f"rate_axes = {axes}: letters of xyz are expected, each once")
+        return plans.Times(self["settle"], self["dwell"], self["windows"], self["rate"], self["turns"], axes)
 
     def visits(self) -> list[Visit]:
         """Return the positions.  Raises InvalidValueError."""
-        given = parse_visits("visits", self["visits"], ("rad", "rad"), self["dwell"])
-        return given or plans.positions(self["positions"], self["dwell"])
+        if given := parse_visits("visits", self["visits"], ("rad", "rad"), self["dwell"]):
+            return given
+        if self["positions"] not in geometry.POSITIONS:
+            known = ", ".join(map(str, geometry.POSITIONS))
+            raise InvalidValueError(f"positions = {self['positions']}: {known} are possible, or visits")
+        return plans.positions(self["positions"], self["dwell"])
 
     def plan(self) -> Plan:
         """Return the positions, then the turns about x, y and z, each after a rest."""
@@ -120,18 +126,7 @@ class ImuPositions(TableTest):
         return {**super().parameters(parts), "table.index_rate": INDEX_RATE, "table.acceleration": ACCELERATION}
 
     def check(self) -> list[str]:
-        problems = super().check()
-        if self["positions"] not in geometry.POSITIONS:
-            known = ", ".join(map(str, geometry.POSITIONS))
-            return [*problems, f"positions = {self['positions']}: {known} are possible, or visits"]
-        axes = self["rate_axes"]
-        if len(set(axes)) < len(axes) or set(axes) - set("xyz"):
-            return [*problems, f"rate_axes = {axes}: letters of xyz are expected, each once"]
-        try:
-            self.visits()
-        except InvalidValueError as error:
-            return [*problems, str(error)]
-        return problems + geometry.force_problems(self._directions())
+        return super().check() + geometry.force_problems(self._directions())
 
     def _directions(self) -> np.ndarray[Any, Any]:
         """Return the directions of the case that point up in the phases at rest."""
