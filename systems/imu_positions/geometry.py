@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.arrays import Array
@@ -78,8 +79,8 @@ class Motion:
     @classmethod
     def of(cls, windows: Mapping[str, Array]) -> Motion:
         a = {n: np.asarray(windows[n], dtype=float) for n in (*ANGLES, "t_start", "t_end")}
-        ends = ((a[f"{n}_start"], a[f"{n}_end"]) for n in AXES)
-        return cls(*ends, a["t_end"] - a["t_start"])
+        outer, inner = ((a[f"{n}_start"], a[f"{n}_end"]) for n in AXES)
+        return cls(outer, inner, a["t_end"] - a["t_start"])
 
     @property
     def moved(self) -> Array:
@@ -87,7 +88,7 @@ class Motion:
         return np.maximum(*(np.abs(end - start) for start, end in (self.outer, self.inner)))
 
     @property
-    def at_rest(self) -> Array:
+    def at_rest(self) -> NDArray[np.bool_]:
         """True for windows at rest."""
         return np.asarray(self.moved <= STILL)
 

@@ -145,7 +145,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
             ],
             equation=equation,
             conventions=[
-                "Coefficients are departures of the readings: reading = rate or specific force + bias + matrix · input.",
+                "Coefficients are departures of the readings: reading = input + bias + matrix · input.",
                 "Specific force f = a − g: an axis that points up reads +1 g; g0 = 9.80665 m/s².",
                 "Axes x, y, z of the case are those of the plate, which carries it; local frame east, north, up; outer "
                 "table axis level and east, table angles right-handed.",

@@ -20,7 +20,7 @@ SCALE = {"ppm": 1e-6, "″": factor("arcsec"), "°/h": factor("deg/h"), "°/h/g"
 def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
     """Return the corrections in SI and the angles between the axes of each triad that the record determines."""
     si = {c.name: c.estimate * SCALE[c.unit] for c in coefficients if c.unit in SCALE}
-    type_a = {c.name: c.u_a * SCALE[c.unit] for c in coefficients if c.unit in SCALE}
+    type_a = {c.name: (c.u_a or 0.0) * SCALE[c.unit] for c in coefficients if c.unit in SCALE}
     corrections: list[list[Any]] = []
     angles: list[list[Any]] = []
     for kind, (words, unit) in TRIADS.items():

@@ -81,7 +81,8 @@ def test_co_simulation_recovers_the_unit() -> None:
     values: dict[str, Any] = {
         "imu.gyro_bias": unit.bg.tolist(), "imu.gyro_scale": unit.Sg.tolist(), "imu.g_sensitivity": unit.G.tolist(),
         "imu.acc_bias": unit.ba.tolist(), "imu.acc_scale": unit.Sa.tolist(), "positions": 6, "dwell": 4.0,
-        "settle": 1.0, "turns": 1, "rate": 1.0, "nuisances": "none", **{f"imu.{a}_{n}": 0.0 for a in "xyz" for n in ("gyro", "acc")},
+        "settle": 1.0, "turns": 1, "rate": 1.0, "nuisances": "none",
+        **{f"imu.{a}_{n}": 0.0 for a in "xyz" for n in ("gyro", "acc")},
     }  # fmt: skip
     run = gb.load("imu_positions", values).run(seed=1, check_step=False)
     truth = unit.coefficients()
