@@ -9,7 +9,7 @@ G0 = 9.80665  # m/s2
 NONE = [0.0, 0.0, 0.0]
 
 
-class AxisNoise(Block):
+class ImuAxisNoise(Block):
     """Random errors of one axis: white noise and a Gauss-Markov bias, of its gyro and of its accelerometer."""
 
     gyro_bias = GaussMarkov(0.0, "rad/s", "bias of the gyro", tau="gyro_bias_tau")
@@ -54,9 +54,9 @@ class Imu(Component):
     )  # fmt: skip
     gyro_bias_tau = Parameter(300.0, "s", "correlation time of the gyro biases", above=0.0)
     acc_bias_tau = Parameter(300.0, "s", "correlation time of the accelerometer biases", above=0.0)
-    x = AxisNoise()
-    y = AxisNoise()
-    z = AxisNoise()
+    x = ImuAxisNoise()
+    y = ImuAxisNoise()
+    z = ImuAxisNoise()
 
     omega = Input(NONE, "rad/s", "inertial rate")
     f = Input([0.0, 0.0, G0], "m/s2", "specific force a - G")

@@ -17,7 +17,7 @@ AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class Channel:
+class ImuInstrument:
     """One instrument.  kind: "g" gyro or "a" accelerometer.  axis: 0, 1, 2."""
 
     kind: str
@@ -66,7 +66,7 @@ class Channel:
         return Quantity.of(name, meaning, "arcsec", truth.get(name))
 
 
-CHANNELS = tuple(Channel(kind, axis) for kind in "ga" for axis in range(3))
+CHANNELS = tuple(ImuInstrument(kind, axis) for kind in "ga" for axis in range(3))
 BY_NAME = {c.name: c for c in CHANNELS}
 
 _PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba": "acc_bias", "Sa": "acc_scale"}
