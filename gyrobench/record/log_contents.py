@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import io
 import json
 import re
 import sys
@@ -225,7 +226,11 @@ def _write(columns: Columns, out: Path) -> None:
             arrays[name] = pa.array(array.astype(float) if array.dtype.kind in "bf" else array, from_pandas=True)
     if not arrays:
         sys.exit("no column of numbers")
-    arrow.write_csv(pa.table(arrays), str(out), arrow.WriteOptions(quoting_style="needed"))
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(arrays)
+    with out.open("wb") as text:  # the header apart: pyarrow would put every name in quotes
+        text.write(header.getvalue().encode())
+        arrow.write_csv(pa.table(arrays), text, arrow.WriteOptions(include_header=False))
 
 
 def main() -> None:
