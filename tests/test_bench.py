@@ -12,8 +12,8 @@ import pytest
 
 import gyrobench
 from gyrobench.bench import Bench, BenchError, display_path, standard_folder, suggest_names
-from gyrobench.commands import catalog
-from gyrobench.commands.catalog import init_bench, list_contents
+from gyrobench.workflow import catalog
+from gyrobench.workflow.catalog import init_bench, list_contents
 
 ODD = '''"""A module."""
 class Helper:

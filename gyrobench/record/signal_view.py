@@ -1,0 +1,81 @@
+"""Views of long signals: the samples that a picture of a stretch of a signal needs, and no more.
+
+Each level keeps of every bucket of samples the places of the smallest and the largest, so that every point that is
+shown is a sample of the record, and none that stands out is left out: minimum-maximum pyramid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gyrobench.arrays import AnyArray, Array
+
+FIRST, FACTOR = 16, 4  # samples in a bucket of the first level, buckets in one of the next
+
+
+@dataclass(frozen=True)
+class View:
+    """Samples of a stretch: times and values, in order; ``every``: samples of the record that stand behind a bucket."""
+
+    time: Array
+    values: Array
+    every: int
+
+
+class SignalPyramid:
+    """A signal over time that gives views of any stretch in a time that does not depend on its length.
+
+    time: s, ascending.  values: of the same length; what is not finite is kept as a gap.  Raises ValueError where the
+    lengths differ.
+    """
+
+    def __init__(self, time: AnyArray, values: AnyArray) -> None:
+        if len(time) != len(values):
+            raise ValueError(f"{len(time)} times, {len(values)} values")
+        self.time = time
+        self.values = np.asarray(values, dtype=float)
+        self.levels: list[tuple[int, AnyArray, AnyArray]] = []  # samples in a bucket, places of minima, of maxima
+        size, low, high = FIRST, np.arange(len(values)), np.arange(len(values))
+        factor = FIRST
+        while len(low) > factor:
+            low, high = _extremes(self.values, low, high, factor)
+            self.levels.append((size, low, high))
+            size, factor = size * FACTOR, FACTOR
+
+    def view(self, begin: float, end: float, points: int = 2000) -> View:
+        """Return at most about ``points`` samples of the stretch from ``begin`` to ``end``, s, its edges included.
+
+        Every sample of a short stretch; of a longer one the smallest and the largest of each bucket.
+        """
+        first = max(0, int(np.searchsorted(self.time, begin, "left")) - 1)
+        last = min(len(self.time), int(np.searchsorted(self.time, end, "right")) + 1)
+        every, at = 1, np.arange(first, last)
+        if last - first > points:
+            for size, low, high in self.levels:
+                b, e = first // size, -(-last // size)
+                if 2 * (e - b) <= points:
+                    break
+            else:
+                raise AssertionError("the last level has few buckets")  # its length is at most FIRST
+            every = size
+            at = np.sort(np.concatenate([low[b:e], high[b:e]]))
+            at = np.unique(np.clip(np.concatenate([[first], at, [last - 1]]), first, last - 1))
+        return View(np.asarray(self.time[at], dtype=float), self.values[at], every)
+
+
+def _extremes(values: Array, low: AnyArray, high: AnyArray, factor: int) -> tuple[AnyArray, AnyArray]:
+    """Return the places of minima and maxima of buckets of ``factor`` buckets each; the last may be shorter."""
+    found = []
+    for at, pick, worst in ((low, np.argmin, np.inf), (high, np.argmax, -np.inf)):
+        whole = len(at) - len(at) % factor
+        parts: list[Any] = []
+        for block in (at[:whole].reshape(-1, factor), at[whole:].reshape(1, -1)):
+            if block.size:
+                taken = values[block]
+                held = np.where(np.isfinite(taken), taken, worst)
+                parts.append(block[np.arange(len(block)), pick(held, axis=1)])
+        found.append(np.concatenate(parts).astype(np.int64))
+    return found[0], found[1]
