@@ -54,13 +54,9 @@ class SignalPyramid:
         last = min(len(self.time), int(np.searchsorted(self.time, end, "right")) + 1)
         every, at = 1, np.arange(first, last)
         if last - first > points:
-            for size, low, high in self.levels:
-                b, e = first // size, -(-last // size)
-                if 2 * (e - b) <= points:
-                    break
-            else:
-                raise AssertionError("the last level has few buckets")  # its length is at most FIRST
-            every = size
+            fitting = (level for level in self.levels if 2 * (last - first) // level[0] <= points)
+            every, low, high = next(fitting, self.levels[-1])
+            b, e = first // every, -(-last // every)
             at = np.sort(np.concatenate([low[b:e], high[b:e]]))
             at = np.unique(np.clip(np.concatenate([[first], at, [last - 1]]), first, last - 1))
         return View(np.asarray(self.time[at], dtype=float), self.values[at], every)

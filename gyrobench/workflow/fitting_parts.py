@@ -31,7 +31,7 @@ def declared_description(part: type[Component]) -> Any:
                 description=s.decl.doc, alias=None,
             )
         )  # fmt: skip
-    return SimpleNamespace(modelName=part.__name__, modelVariables=found)
+    return SimpleNamespace(modelName=part.__name__, modelVariables=found, unitDefinitions=[])
 
 
 def mismatch(wanted: Socket, part: type[Component], slot: str = "") -> list[str]:
