@@ -185,6 +185,8 @@ ROOMS["workflow"] = BELOW
 ROOMS["design"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
 ROOMS["library"] = BELOW | {"workflow", "design", "campaign"}
+#: the face in the browser; that of the shell is in FACES, and neither imports the other
+ROOMS["studio"] = BELOW | {"workflow", "library"}
 #: rooms inside a room -> rooms beside them that they may import
 INNER: dict[str, set[str]] = {
     "campaign.execution": set(),

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 
 from gyrobench.record.record import Record
 from gyrobench.record.signal_view import SignalPyramid
 from gyrobench.report.channel_figure import scaled
 
 POINTS = 2000  # of a signal
-PANEL, GAP, TOP, BOTTOM = 170, 46, 30, 70  # px
+PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
 FIRST = 4  # signals shown at first
 RECORDS = 4  # kept open
@@ -89,7 +90,7 @@ class SignalChart:
         """Draw these signals over the whole record."""
         self.names = list(names)
         self.view = (self.begin, self.end)
-        options = await run.io_bound(self.options)
+        options = await asyncio.to_thread(self.options)
         height = TOP + BOTTOM + max(1, len(options["grid"])) * (PANEL + GAP)
         self.chart.style(f"height: {height}px")
         self.chart.options.clear()
@@ -101,7 +102,7 @@ class SignalChart:
         units = list(dict.fromkeys(self._unit(n) for n in self.names))
         scales = {u: self._scale(u) for u in units}
         top = [TOP + k * (PANEL + GAP) for k in range(len(units))]
-        grids = [{"left": 64, "right": 18, "top": t + 16, "height": PANEL} for t in top]
+        grids = [{"left": 64, "right": 18, "top": t + 24, "height": PANEL} for t in top]
         axes = list(range(len(units)))
         last = len(units) - 1
         return {
@@ -109,7 +110,7 @@ class SignalChart:
             "legend": {"type": "scroll", "top": 0}, "tooltip": {"trigger": "axis"},
             "axisPointer": {"link": [{"xAxisIndex": "all"}]}, "grid": grids,
             "title": [
-                {"text": f"in {scales[u][1] or '1'}", "top": t, "left": 8, "textStyle": {"fontSize": 12}}
+                {"text": f"in {scales[u][1] or '1'}", "top": t, "left": 0, "textStyle": {"fontSize": 12}}
                 for u, t in zip(units, top, strict=True)
             ],
             "xAxis": [
@@ -162,5 +163,5 @@ class SignalChart:
         span = self.end - self.begin
         self.view = (self.begin + span * low / 100.0, self.begin + span * high / 100.0)
         units = list(dict.fromkeys(self._unit(n) for n in self.names))
-        series = await run.io_bound(lambda: self._series(units, {u: self._scale(u) for u in units}))
+        series = await asyncio.to_thread(lambda: self._series(units, {u: self._scale(u) for u in units}))
         self.chart.run_chart_method("setOption", {"series": series})

@@ -54,8 +54,12 @@ class Request:
             lines.append(f"run = test.reduce({', '.join([repr(self.data), *columns, *spec, *stated])})")
         else:
             seed = [str(self.seed)] if self.seed is not None else []
+            seed = ["'suite'", *seed] if suite else seed  # a suite keeps its tests in a folder
             lines.append(f"run = test.run({', '.join([*seed, *spec])})")
-        return "\n".join([*lines, "print(run)", "run.report('report')  # record, result.json, report.html, report.pdf"])
+        lines.append("print(run)")
+        if not suite:
+            lines.append("run.report('report')  # record, result.json, report.html, report.pdf")
+        return "\n".join(lines)
 
 
 def read_request(content: dict[str, Any]) -> Request:

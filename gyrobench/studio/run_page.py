@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from html import escape
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from nicegui import run, ui
+from nicegui import ui
 
 from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
@@ -112,8 +113,8 @@ def _add_run_page(studio: Studio) -> None:
     async def run_page(place: str) -> None:
         with frame(studio, "Run"):
             folder = studio.run_folder(place)
-            document = await run.io_bound(read_run, folder)
-            entry = next((r for r in await run.io_bound(list_runs, studio.bench.out) if r.place == place), None)
+            document = await asyncio.to_thread(read_run, folder)
+            entry = next((r for r in await asyncio.to_thread(list_runs, studio.bench.out) if r.place == place), None)
             _head(document, place, entry)
             lines_of = (
                 f"gyrobench report {display_path(folder)}\ngyrobench record {display_path(folder)} --to csv",
@@ -167,7 +168,7 @@ def _report(folder: Path, place: str) -> None:
     ui.html(
         f'<iframe class="report" src="{source}" title="Report" sandbox="allow-scripts allow-popups"></iframe>',
         sanitize=False,
-    )
+    ).classes("full")
 
 
 def _tests(document: SuiteDocument, place: str) -> None:
@@ -178,7 +179,7 @@ def _tests(document: SuiteDocument, place: str) -> None:
 
 
 async def _signals(folder: Path, document: RunDocument) -> None:
-    signals = await run.io_bound(signals_of, folder)
+    signals = await asyncio.to_thread(signals_of, folder)
     if not signals.names or not len(signals.time):
         ui.label("The record holds no signals over time.").classes("soft")
         return
@@ -207,7 +208,7 @@ def _add_runs_page(studio: Studio) -> None:
         with frame(studio, "Runs"):
             ui.html("<h1>Runs</h1>", sanitize=False)
             active = ui.element("div").classes("rows")
-            entries = await run.io_bound(list_runs, studio.bench.out)
+            entries = await asyncio.to_thread(list_runs, studio.bench.out)
             with ui.element("div").classes("bar"):
                 search = ui.input("Filter").props("dense outlined clearable").mark("filter")
                 compare = ui.button("Compare", icon="compare_arrows").mark("compare")
@@ -295,13 +296,13 @@ def _add_comparison_page(studio: Studio) -> None:
         with frame(studio, "Compare"):
             ui.html("<h1>Comparison</h1>", sanitize=False)
             folders = [inside(studio.bench.out, p) for p in asked]
-            found = await run.io_bound(compare_folders, folders)
+            found = await asyncio.to_thread(compare_folders, folders)
             if found.note:
                 ui.label(found.note).classes("soft")
             shown = [display_path(f) for f in folders]
             target = comparison_folder(folders)
             if not studio.read_only:
-                await run.io_bound(found.write, target)
+                await asyncio.to_thread(found.write, target)
             with ui.element("div").classes("bar"):
                 for place in asked:
                     ui.link(place, address("run", place))

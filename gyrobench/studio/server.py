@@ -22,7 +22,7 @@ from gyrobench.studio.jobs import Jobs
 from gyrobench.studio.run_page import add_run_pages
 from gyrobench.studio.system_page import add_system_page, wiring_of
 from gyrobench.studio.systems_page import add_systems_page
-from gyrobench.workflow.gallery import picture_of
+from gyrobench.workflow.gallery import gallery, picture_of
 
 PORT = 8765
 TRIED = 20  # ports, from the first
@@ -68,8 +68,10 @@ def build(studio: Studio) -> FastAPI:
                 await asyncio.sleep(LOOK)
 
         task = asyncio.create_task(advance())
+        warm = asyncio.create_task(asyncio.to_thread(gallery, studio.bench))
         yield
         task.cancel()
+        warm.cancel()
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=jobs_advance)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable
 from dataclasses import replace
 from html import escape
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from gyrobench.component.declarations import Declaration
 from gyrobench.errors import GyrobenchError
@@ -18,13 +19,14 @@ from gyrobench.studio.request import Request
 from gyrobench.system.configurable import Option
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
-from gyrobench.system.values import parse
+from gyrobench.system.values import flatten, parse
 from gyrobench.system.wire_text import parse_wires
 from gyrobench.units import format_quantity
-from gyrobench.workflow.fitting_parts import fitting_parts, load_parts, names_of, part_of, settable
+from gyrobench.workflow.fitting_parts import fitting_parts, load_parts, part_of, settable
 from gyrobench.workflow.inputs import load_test
 
 NONE = "none"
+SEVERAL = 9  # elements of an array that have a row each
 DRAWING = threading.Lock()  # the drawing library keeps one style at a time
 
 
@@ -88,7 +90,9 @@ class _Choice:
 
     def about(self, seed: float | None, spec: str | None) -> None:
         """Take seed and specification."""
-        self._now(replace(self.request, seed=None if seed is None else int(seed), spec=spec if spec != NONE else ""))
+        self._now(
+            replace(self.request, seed=None if seed is None else int(seed), spec=spec if spec and spec != NONE else "")
+        )
 
     def _now(self, request: Request) -> None:
         self.request = request
@@ -104,7 +108,7 @@ def _row(
     choice: _Choice, name: str, doc: str, unit: str | type, default: Any, limits: str, check: Callable[[str], Any]
 ) -> tuple[str, ui.element]:
     """Add a row for a value; return the text that the search looks through, and the row."""
-    with ui.element("div").classes("row") as row:
+    with ui.element("div").classes("setting") as row:
         with ui.element("div").classes("about"):
             ui.label(name).classes("option")
             ui.label(doc)
@@ -137,6 +141,21 @@ def _parameter_check(name: str, d: Declaration) -> Callable[[str], Any]:
     return check
 
 
+def _searched_options(choice: _Choice) -> None:
+    """Add the options, and a field that narrows them."""
+    ui.html("<h2>Options</h2>", sanitize=False)
+    search = ui.input("Search the options").props("dense outlined clearable").classes("full")
+    with ui.element("div").classes("rows"):
+        rows = _options(choice)
+
+    def narrow() -> None:
+        words = (search.value or "").lower().split()
+        for text, row in rows:
+            row.set_visibility(all(w in text for w in words))
+
+    search.on_value_change(narrow)
+
+
 def _options(choice: _Choice) -> list[tuple[str, ui.element]]:
     return [
         _row(
@@ -155,15 +174,13 @@ def _parameters(studio: Studio, choice: _Choice, system: System, slot: str) -> l
     owned = system.owned()
     rows = []
     for d in settable(part).values():
-        names = names_of(d)
-        for name in [f"{slot}.{n}" for n in (names if len(names) <= 9 else [d.name])]:
-            limits = _range(d.min, d.max, d.unit) or _range(d.above, d.below, d.unit, strict=True)
-            doc = f"{d.doc} (set by an option of the system)" if name in owned else d.doc
-            unit: str | type = d.unit if d.type is float else d.type
-            start = d.start if len(names) == 1 or len(names) > 9 else "as the part"
-            rows.append(
-                _row(choice, name, doc, unit if len(names) == 1 else str, start, limits, _parameter_check(name, d))
-            )
+        unit: str | type = d.unit if d.type is float else d.type
+        limits = _range(d.min, d.max, d.unit) or _range(d.above, d.below, d.unit, strict=True)
+        starts = flatten(d.name, d.start)
+        for name, start in starts.items() if len(starts) <= SEVERAL else ((d.name, d.start),):
+            full = f"{slot}.{name}"
+            doc = f"{d.doc} (set by an option of the system)" if full in owned else d.doc
+            rows.append(_row(choice, full, doc, unit, start, limits, _parameter_check(full, d)))
     if not rows:
         ui.label("no parameters").classes("soft")
     return rows
@@ -199,7 +216,7 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
         narrow()
 
     for slot, declared in system.all_slots().items():
-        with ui.element("div").classes("row"):
+        with ui.element("div").classes("setting"):
             with ui.element("div").classes("about"):
                 ui.label(slot).classes("option")
                 name = declared.socket if isinstance(declared.socket, str) else declared.socket.name
@@ -251,7 +268,7 @@ def add_system_page(studio: Studio) -> None:
             return test, {} if isinstance(test, Suite) else fitting_parts(test, load_parts(studio.bench))
 
         try:
-            test, fitting = await run.io_bound(load)
+            test, fitting = await asyncio.to_thread(load)
         except Exception as error:
             with frame(studio, "System"):
                 raise error
@@ -264,7 +281,7 @@ def add_system_page(studio: Studio) -> None:
             with ui.element("div").classes("two"):
                 with ui.element("div") as left:
                     pass
-                with ui.element("div"):
+                with ui.element("div").classes("aside"):
                     if not isinstance(test, Suite):
                         ui.html(f'<img class="wiring" src="/wiring/{name}" alt="Wiring of {name}">', sanitize=False)
                     lines = Lines()
@@ -272,18 +289,8 @@ def add_system_page(studio: Studio) -> None:
                     choice.show()
                     _start(studio, choice)
             with left:
-                if isinstance(test, System):
+                _searched_options(choice)
+                if isinstance(test, System) and test.slots:
                     ui.html("<h2>Parts</h2>", sanitize=False)
                     with ui.element("div").classes("rows"):
                         _slots(studio, choice, test, fitting)
-                ui.html("<h2>Options</h2>", sanitize=False)
-                search = ui.input("Search the options").props("dense outlined clearable").classes("full")
-                with ui.element("div").classes("rows"):
-                    rows = _options(choice)
-
-                def narrow() -> None:
-                    words = (search.value or "").lower().split()
-                    for text, row in rows:
-                        row.set_visibility(all(w in text for w in words))
-
-                search.on_value_change(narrow)

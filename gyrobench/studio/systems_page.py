@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from nicegui import run, ui
+import asyncio
+
+from nicegui import ui
 
 from gyrobench.studio.frame import Studio, frame
 from gyrobench.workflow.gallery import PURPOSES, Entry, gallery
@@ -31,7 +33,7 @@ def add_systems_page(studio: Studio) -> None:
 
     @ui.page("/", response_timeout=60)
     async def systems() -> None:
-        entries = await run.io_bound(gallery, studio.bench)
+        entries = await asyncio.to_thread(gallery, studio.bench)
         with frame(studio, "Systems"):
             ui.html("<h1>Systems</h1>", sanitize=False)
             ui.label("A system is a test method or a loop: parts in slots, wired, run and reduced to a report.")

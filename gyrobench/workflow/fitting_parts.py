@@ -9,7 +9,7 @@ from typing import Any
 
 from gyrobench.bench import Bench
 from gyrobench.component import Component, Noise, Parameter
-from gyrobench.component.declarations import Declaration, element_names
+from gyrobench.component.declarations import Declaration
 from gyrobench.packaging import load_part
 from gyrobench.packaging.description import ATTRIBUTES, TYPES, number, unit_name
 from gyrobench.system.binding import SocketMismatchError, fit
@@ -71,11 +71,6 @@ def fitting_parts(system: System, parts: Mapping[str, type[Component]]) -> dict[
 def settable(part: type[Component]) -> dict[str, Declaration]:
     """Return the parameters of a part and the sizes of its noises, by name."""
     return {n: d for n, d in part.declarations.items() if isinstance(d, Parameter | Noise)}
-
-
-def names_of(declaration: Declaration) -> list[str]:
-    """Return the names under which the elements of a declaration are set: ``tilt[1]``."""
-    return element_names(declaration.name, declaration.shape)
 
 
 def part_of(bench: Bench, name: str) -> type[Component] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,5 +72,11 @@ def entry(bench: Bench, name: str) -> Entry:
 
 
 def gallery(bench: Bench) -> list[Entry]:
-    """Return all systems of the bench, by title."""
-    return sorted((entry(bench, n) for n in bench.systems()), key=lambda e: e.title.lower())
+    """Return all systems of the bench, by title; one whose file has not changed is loaded once."""
+    found = (_known(bench, n, (f / "system.py").stat().st_mtime_ns) for n, f in bench.systems().items())
+    return sorted(found, key=lambda e: e.title.lower())
+
+
+@functools.lru_cache(maxsize=1024)
+def _known(bench: Bench, name: str, _changed: int) -> Entry:
+    return entry(bench, name)
