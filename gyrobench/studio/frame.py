@@ -80,7 +80,7 @@ def frame(studio: Studio, title: str) -> Iterator[None]:
             ui.label("read-only").classes("tag")
         button = ui.button(icon="contrast", on_click=change).props("flat dense round")
         button.props(f'title="{DARK[studio.dark][1]}" aria-label="{DARK[studio.dark][1]}"')
-    with ui.element("main").props("id=content").classes("content"):
+    with ui.element("div").props("id=content").classes("content"):
         try:
             yield
         except Exception as error:

@@ -159,12 +159,12 @@ def _head(document: RunDocument | SuiteDocument, place: str, entry: RunEntry | N
             ui.link(text, f"/files/{quote(place)}/{name}", new_tab=True)
 
 
-def _report(folder: Path, place: str) -> None:
+def _report(folder: Path, place: str, name: str = "report.html") -> None:
     """Add the report as it is; its scripts run without a way to the studio."""
-    if not (folder / "report.html").is_file():
+    if not (folder / name).is_file():
         ui.label("There is no report: the run has no reduction, or it did not come to its end.").classes("soft")
         return
-    source = f"/files/{quote(place)}/report.html"
+    source = f"/files/{quote(place)}/{name}"
     ui.html(
         f'<iframe class="report" src="{source}" title="Report" sandbox="allow-scripts allow-popups"></iframe>',
         sanitize=False,
@@ -307,5 +307,5 @@ def _add_comparison_page(studio: Studio) -> None:
                 for place in asked:
                     ui.link(place, address("run", place))
             if target.is_dir():
-                _report(target, target.relative_to(studio.bench.out).as_posix())
+                _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
             Lines().show(comparison_command(shown), comparison_python(shown))

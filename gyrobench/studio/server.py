@@ -26,7 +26,7 @@ from gyrobench.workflow.gallery import gallery, picture_of
 
 PORT = 8765
 TRIED = 20  # ports, from the first
-SERVED = ("report.html", "report.pdf", "result.json", "run.json", "comparison.json")  # of the folder of a run
+SERVED = ("report.html", "report.pdf", "result.json", "run.json", "comparison.html", "comparison.pdf")
 LOOK = 0.5  # s between two looks for jobs to start
 MESSAGE = 1 << 22  # bytes of a message of a page
 
