@@ -7,7 +7,6 @@ import hashlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -154,16 +153,16 @@ def _columns(mapping: _Mapping) -> None:
         with ui.element("div").classes("setting mapped"):
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
-                ui.label(f"as {wanted}" if wanted not in ("", "1") else "a number").classes("range")
+                ui.label(f"as {wanted}" if wanted not in ("", "1") else "").classes("range")
             with ui.element("div").classes("bar"):
                 held = mapping.proposal.found.get(name)
                 at = columns.index(held) if held in columns else -1
                 menu = ui.select({-1: NOT, **names}, value=at).props("dense outlined")
-                menu.props(f'aria-label="column for {escape(name)}"')
+                menu.props["aria-label"] = f"column for {name}"
                 unit = ui.input(value=held.unit if held else "", placeholder="unit").props(
                     "dense outlined debounce=250"
                 )
-                unit.props(f'aria-label="unit of {escape(name)}"').classes("narrow")
+                unit.classes("narrow").props["aria-label"] = f"unit of {name}"
                 sign = ui.checkbox("reversed").props("dense")
         _follow(mapping, name, menu, unit, sign)
 
@@ -207,7 +206,8 @@ def _stated(mapping: _Mapping) -> None:
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
                 ui.label(option.doc if option else "")
-            value = ui.input(placeholder=example).props(f'dense outlined debounce=250 aria-label="{escape(name)}"')
+            value = ui.input(placeholder=example).props("dense outlined debounce=250")
+            value.props["aria-label"] = name
             value.on_value_change(lambda e, n=name: take(n, e.value or ""))
 
 

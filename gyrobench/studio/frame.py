@@ -16,7 +16,7 @@ from gyrobench.studio.jobs import Jobs
 from gyrobench.workflow.user_errors import user_message
 
 STYLE = Path(__file__).with_name("studio.css")
-PAGES = (("Systems", "/"), ("Runs", "/runs"))
+PAGES = (("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"))
 DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
     None: (True, "Colours: as the system"),
     True: (False, "Colours: dark"),

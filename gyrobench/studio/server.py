@@ -16,6 +16,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock
+from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
 from gyrobench.studio.gate import TOKEN, Gate, is_loopback, refuse_remote
 from gyrobench.studio.jobs import Jobs
@@ -106,6 +107,7 @@ def build(studio: Studio) -> FastAPI:
     add_systems_page(studio)
     add_system_page(studio)
     add_run_pages(studio)
+    add_data_page(studio)
     ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=20)
     return app
 

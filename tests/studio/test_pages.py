@@ -15,7 +15,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from messy_file import messy
+
+from gyrobench.record.record import Record
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: the studio is not looked at")
@@ -140,6 +144,31 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.get_by_role("button", name="Resume").wait_for()
 
 
+def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
+    """The same record as by the two commands, tests/record/test_messy_file.py."""
+    data, mean = messy()
+    (tmp_path / "Messung <b>1</b>.csv").write_bytes(data)
+    page.goto(base_of(studio) + "/data?test=fixed_position")
+    page.locator("input[type=file]").set_input_files(tmp_path / "Messung <b>1</b>.csv")
+    page.get_by_text("Every column has its place").wait_for()
+    page.get_by_text("Strom / mA").first.wait_for()
+    page.get_by_label("unit of mean").fill("deg")
+    page.get_by_text("deg is no unit of").wait_for()
+    page.get_by_label("unit of mean").fill("uA")
+    page.get_by_role("button", name="Check the file").click()
+    page.get_by_text("faults:").wait_for()
+    page.get_by_text("'latitude' is not given").wait_for()
+    for name, value in (("latitude", "45.75deg"), ("k", "17.2deg/h/mA"), ("attitude", "E U -N")):
+        page.get_by_label(name, exact=True).fill(value)
+    page.wait_for_function("document.querySelector('.code').textContent.includes('attitude=E U -N')")
+    page.get_by_role("button", name="Check the file").click()
+    page.get_by_text("it can be reduced").wait_for()
+    page.get_by_role("button", name="Reduce").click()
+    folder = run_of(page, studio[1])
+    kept = [k for k in range(47) if k != 7]
+    np.testing.assert_allclose(Record.load(folder).windows["mean"], mean[kept] * 1e-6, rtol=1e-12)  # µA, as was said
+
+
 def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
     for seed in ("11", "12"):
         page.goto(base_of(studio) + "/system/fixed_position")
@@ -179,7 +208,7 @@ def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
 
 def test_every_page_fits_a_telephone(page: Any, studio: tuple[str, Path]) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
-    for path in ("/", "/system/fixed_position", "/runs"):
+    for path in ("/", "/system/fixed_position", "/data", "/runs"):
         page.goto(base_of(studio) + path)
         page.locator("h1").wait_for()
         page.wait_for_timeout(300)
