@@ -17,7 +17,7 @@ FIRST, FACTOR = 16, 4  # samples in a bucket of the first level, buckets in one 
 
 
 @dataclass(frozen=True)
-class View:
+class SignalView:
     """Samples of a stretch: times and values, in order; ``every``: samples of the record that stand behind a bucket."""
 
     time: Array
@@ -45,7 +45,7 @@ class SignalPyramid:
             self.levels.append((size, low, high))
             size, factor = size * FACTOR, FACTOR
 
-    def view(self, begin: float, end: float, points: int = 2000) -> View:
+    def view(self, begin: float, end: float, points: int = 2000) -> SignalView:
         """Return at most about ``points`` samples of the stretch from ``begin`` to ``end``, s, its edges included.
 
         Every sample of a short stretch; of a longer one the smallest and the largest of each bucket.
@@ -59,7 +59,7 @@ class SignalPyramid:
             b, e = first // every, -(-last // every)
             at = np.sort(np.concatenate([low[b:e], high[b:e]]))
             at = np.unique(np.clip(np.concatenate([[first], at, [last - 1]]), first, last - 1))
-        return View(np.asarray(self.time[at], dtype=float), self.values[at], every)
+        return SignalView(np.asarray(self.time[at], dtype=float), self.values[at], every)
 
 
 def _extremes(values: Array, low: AnyArray, high: AnyArray, factor: int) -> tuple[AnyArray, AnyArray]:

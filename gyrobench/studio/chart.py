@@ -22,7 +22,7 @@ FIRST = 4  # signals shown at first
 RECORDS = 4  # kept open
 
 
-class Signals:
+class RecordSignals:
     """The channels of a record, and a pyramid of each that was looked at."""
 
     def __init__(self, record: Record) -> None:
@@ -57,14 +57,14 @@ class Signals:
         ]
 
 
-def signals_of(folder: Path) -> Signals:
+def signals_of(folder: Path) -> RecordSignals:
     """Return the signals of a run; a record is read once while it stays the same."""
     return _signals(folder, (folder / "run.json").stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=RECORDS)
-def _signals(folder: Path, _changed: int) -> Signals:
-    return Signals(Record.load(folder))
+def _signals(folder: Path, _changed: int) -> RecordSignals:
+    return RecordSignals(Record.load(folder))
 
 
 def first_shown(names: Sequence[str], shown: Sequence[Any]) -> list[str]:
@@ -77,7 +77,7 @@ def first_shown(names: Sequence[str], shown: Sequence[Any]) -> list[str]:
 class SignalChart:
     """Panels of signals of one or several records, a panel a unit; zoomed stretches are read anew."""
 
-    def __init__(self, records: dict[str, Signals]) -> None:
+    def __init__(self, records: dict[str, RecordSignals]) -> None:
         self.records = records
         self.names: list[str] = []
         self.begin = min((s.span[0] for s in records.values() if len(s.time)), default=0.0)

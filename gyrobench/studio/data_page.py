@@ -20,11 +20,11 @@ from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.record.column_map import cells_of_file
 from gyrobench.record.column_proposal import FileColumn
-from gyrobench.studio.frame import Lines, Studio, frame, inside, told
+from gyrobench.studio.frame import CopyLines, Studio, frame, inside, told
 from gyrobench.studio.gate import UPLOAD
-from gyrobench.studio.request import Request
+from gyrobench.studio.request import JobRequest
 from gyrobench.system.system import System
-from gyrobench.workflow.fit_columns import Proposal, propose_columns
+from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.measured_run import find_faults
 from gyrobench.workflow.user_errors import user_message
@@ -68,8 +68,8 @@ def tests_of_data(studio: Studio) -> dict[str, str]:
 class _Mapping:
     """A file on its way to a report: its proposal, as it was changed, and what is stated."""
 
-    proposal: Proposal
-    lines: Lines
+    proposal: ColumnProposal
+    lines: CopyLines
     factors: dict[str, float] = field(default_factory=dict)
     stated: dict[str, str] = field(default_factory=dict)
     changed: list[Callable[[], None]] = field(default_factory=list)
@@ -86,13 +86,13 @@ class _Mapping:
             text = text.replace(head, f"{head}factor = {factor!r}\n") if factor != 1.0 else text
         return text, problems
 
-    def request(self) -> Request:
-        return Request(
+    def request(self) -> JobRequest:
+        return JobRequest(
             self.proposal.test.name, values=dict(self.stated), data=display_path(self.proposal.file),
             columns=display_path(self.map_file),
         )  # fmt: skip
 
-    def write(self) -> Request:
+    def write(self) -> JobRequest:
         """Write the map beside the file and return what reduces it."""
         write_whole(self.map_file, self.text()[0].encode())
         return self.request()
@@ -211,7 +211,7 @@ def _stated(mapping: _Mapping) -> None:
             value.on_value_change(lambda e, n=name: take(n, e.value or ""))
 
 
-def _mapped(studio: Studio, proposal: Proposal) -> None:
+def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
     """Add the mapping of a file, the list of its faults and the button that reduces it."""
     with ui.element("div").classes("two"):
         with ui.element("div") as left:
@@ -221,7 +221,7 @@ def _mapped(studio: Studio, proposal: Proposal) -> None:
             with ui.element("div").classes("bar"):
                 check = ui.button("Check the file", icon="rule")
                 go = ui.button("Reduce", icon="play_arrow")
-            mapping = _Mapping(proposal, Lines())
+            mapping = _Mapping(proposal, CopyLines())
             with ui.expansion("Column map").classes("full"):
                 text = ui.label().classes("code")
     with left:

@@ -1,4 +1,4 @@
-"""What all pages have: the state that they share, their frame, messages, lines to copy."""
+"""The frame of all pages: the state that they share, messages, lines to copy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nicegui import ui
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.reading import visible
-from gyrobench.studio.jobs import Jobs
+from gyrobench.studio.jobs import StudioJobs
 from gyrobench.workflow.user_errors import user_message
 
 STYLE = Path(__file__).with_name("studio.css")
@@ -26,10 +26,10 @@ DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, an
 
 @dataclass
 class Studio:
-    """What the pages of one studio share.  dark: None for what the browser prefers."""
+    """Things that the pages of one studio share.  dark: None for what the browser prefers."""
 
     bench: Bench
-    jobs: Jobs
+    jobs: StudioJobs
     read_only: bool = False
     dark: bool | None = None
     title: str = field(default="gyrobench studio")
@@ -104,7 +104,7 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
     return guarded
 
 
-class Lines:
+class CopyLines:
     """The command line and the lines of Python of what a page does, with a button each that copies them."""
 
     def __init__(self) -> None:

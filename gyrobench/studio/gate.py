@@ -64,7 +64,7 @@ def refuse_remote(host: str, remote: str | None) -> None:
         )
 
 
-class Gate:
+class StudioGate:
     """ASGI middleware; ``token`` opens it.
 
     names: of the host, as a browser writes them, with the port.  read_only: nothing is uploaded.

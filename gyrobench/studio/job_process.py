@@ -18,15 +18,15 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
-from gyrobench.studio.request import Request, read_request
+from gyrobench.studio.request import JobRequest, read_request
 
 REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
 WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
 
 
 @dataclass
-class Report:
-    """What the job says of itself, kept in ``state.json``.
+class JobReport:
+    """Account that a job gives of itself, kept in ``state.json``.
 
     state: running, done, stopped (it goes on with resume), failed.  fraction: 0 to 1, of the step named by ``label``.
     folder: of the run, once it is known.
@@ -42,10 +42,10 @@ class Report:
     verdict: str = ""
 
 
-def read_report(folder: Path) -> Report | None:
+def read_report(folder: Path) -> JobReport | None:
     """Return what a job says of itself; None before it has said anything."""
     try:
-        return Report(**json.loads((folder / STATE).read_text(encoding="utf-8")))
+        return JobReport(**json.loads((folder / STATE).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
 
@@ -54,7 +54,7 @@ class _Writer:
     """Receives notes and progress of the workflow and keeps the report on disk."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.report = folder, Report()
+        self.folder, self.report = folder, JobReport()
         self.write()
 
     def write(self) -> None:
@@ -77,7 +77,7 @@ class _Writer:
         yield show
 
 
-def _execute(request: Request, resume: bool, writer: _Writer) -> Any:
+def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     """Return the outcome of a request, as the workflow gives it."""
     from gyrobench.system.suite import Suite
     from gyrobench.workflow.feedback import Feedback
@@ -107,7 +107,7 @@ def _execute(request: Request, resume: bool, writer: _Writer) -> Any:
     return execute_run(run, test, feedback)
 
 
-def _finish(report: Report, request: Request, resume: bool, writer: _Writer) -> None:
+def _finish(report: JobReport, request: JobRequest, resume: bool, writer: _Writer) -> None:
     """Execute the request and put its end into the report."""
     from gyrobench.workflow.user_errors import CommandInterrupted, user_message
 

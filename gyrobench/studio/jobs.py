@@ -21,8 +21,8 @@ from pathlib import Path
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import LOCK, FolderLock, cores, write_whole
-from gyrobench.studio.job_process import REQUEST, STARTED, STATE, Report, read_report
-from gyrobench.studio.request import Request, read_request
+from gyrobench.studio.job_process import REQUEST, STARTED, STATE, JobReport, read_report
+from gyrobench.studio.request import JobRequest, read_request
 
 FOLDER = Path("studio", "jobs")  # below reports/out
 ENDED = ("done", "stopped", "failed", "lost")
@@ -30,18 +30,18 @@ SHOWN = 200  # jobs, the newest
 
 
 @dataclass(frozen=True)
-class Job:
+class StudioJob:
     """A job as it is now.
 
     state: waiting, starting, running, done, stopped, failed, lost (its process was killed).  created: s since 1970.
     """
 
     key: str
-    request: Request
+    request: JobRequest
     resume: bool
     created: float
     state: str
-    report: Report
+    report: JobReport
 
     @property
     def active(self) -> bool:
@@ -54,7 +54,7 @@ class Job:
         return self.state in ("stopped", "lost") and not self.request.data
 
 
-class Jobs:
+class StudioJobs:
     """The jobs of a bench.
 
     most: running at once.  read_only: nothing is started or stopped.
@@ -67,7 +67,7 @@ class Jobs:
         self.read_only = read_only
         self._started: dict[str, subprocess.Popen[bytes]] = {}  # by this studio
 
-    def submit(self, request: Request, resume: bool = False) -> str:
+    def submit(self, request: JobRequest, resume: bool = False) -> str:
         """Queue a request and return the key of its job.  Raises UsageError where nothing may be started."""
         self._require_writable()
         key = f"{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
@@ -90,20 +90,20 @@ class Jobs:
         self._require_writable()
         job = self.find(key)
         if job.state == "waiting":
-            stopped = Report(state="stopped", message="stopped before it began")
+            stopped = JobReport(state="stopped", message="stopped before it began")
             write_whole(self.folder / key / STATE, json.dumps(vars(stopped)).encode())
         elif job.active and (process := self._process(key)):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGINT)
 
-    def find(self, key: str) -> Job:
+    def find(self, key: str) -> StudioJob:
         """Return a job.  Raises UsageError where there is none of this key."""
         job = self._read(self.folder / key) if Path(key).name == key and key not in ("", ".", "..") else None
         if job is None:
             raise UsageError(f"no job {key!r}")
         return job
 
-    def all(self) -> list[Job]:
+    def all(self) -> list[StudioJob]:
         """Return the jobs, the newest first."""
         folders = sorted(self.folder.glob("*/"), reverse=True)[:SHOWN] if self.folder.is_dir() else []
         return [job for f in folders if (job := self._read(f)) is not None]
@@ -133,7 +133,7 @@ class Jobs:
                 env={**os.environ, "PYTHONPATH": paths}, start_new_session=os.name == "posix",
             )  # fmt: skip
 
-    def _read(self, folder: Path) -> Job | None:
+    def _read(self, folder: Path) -> StudioJob | None:
         try:
             content = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
             request = read_request(content["request"])
@@ -150,7 +150,7 @@ class Jobs:
         else:
             report = read_report(folder)  # it may have ended between the two looks
             state = report.state if report is not None and report.state in ENDED else "lost"
-        return Job(folder.name, request, resume, created, state, report or Report(state=state))
+        return StudioJob(folder.name, request, resume, created, state, report or JobReport(state=state))
 
     def _lives(self, folder: Path) -> bool:
         process = self._started.get(folder.name)

@@ -1,4 +1,4 @@
-"""What a page asks the bench to do, and the same as a command and as lines of Python, ready to copy."""
+"""Requests of a page to the bench, and the same as a command and as lines of Python, ready to copy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Request:
+class JobRequest:
     """A run of a system, or the reduction of a measured file.
 
     values: option or slot.parameter -> text with its unit.  parts: slot -> part or FMU.  maps: slot -> mapping file.
@@ -62,9 +62,9 @@ class Request:
         return "\n".join(lines)
 
 
-def read_request(content: dict[str, Any]) -> Request:
+def read_request(content: dict[str, Any]) -> JobRequest:
     """Return the request that :meth:`Request.as_dict` wrote."""
-    return Request(**content)
+    return JobRequest(**content)
 
 
 def comparison_command(runs: list[str]) -> str:

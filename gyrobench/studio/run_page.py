@@ -14,8 +14,8 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import SignalChart, first_shown, signals_of
-from gyrobench.studio.frame import Lines, Studio, address, frame, inside, told
-from gyrobench.studio.jobs import Job
+from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
+from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.request import comparison_command, comparison_python
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
@@ -65,7 +65,7 @@ def _add_job_page(studio: Studio) -> None:
                     "resume"
                 )
                 done = ui.link("Report and signals", "#").mark("result")
-            lines = Lines()
+            lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
             gone = {"there": False}
 
@@ -93,7 +93,7 @@ def _add_job_page(studio: Studio) -> None:
             show()
 
 
-def _show_state(job: Job, state: ui.label, words: ui.label, bar: ui.linear_progress) -> None:
+def _show_state(job: StudioJob, state: ui.label, words: ui.label, bar: ui.linear_progress) -> None:
     state.set_text(job.state)
     state.classes(replace=f"tag {job.state}")
     report = job.report
@@ -123,7 +123,7 @@ def _add_run_page(studio: Studio) -> None:
             if isinstance(document, SuiteDocument):
                 _tests(document, place)
                 _report(folder, place)
-                Lines().show(*lines_of)
+                CopyLines().show(*lines_of)
                 return
             with ui.tabs().props("no-caps align=left dense") as tabs:
                 names = ["Report", "Signals", "As a command"]
@@ -134,7 +134,7 @@ def _add_run_page(studio: Studio) -> None:
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
                 with ui.tab_panel(made["As a command"]):
-                    Lines().show(*lines_of)
+                    CopyLines().show(*lines_of)
             drawn: list[bool] = []
 
             async def opened() -> None:
@@ -308,4 +308,4 @@ def _add_comparison_page(studio: Studio) -> None:
                     ui.link(place, address("run", place))
             if target.is_dir():
                 _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
-            Lines().show(comparison_command(shown), comparison_python(shown))
+            CopyLines().show(comparison_command(shown), comparison_python(shown))

@@ -18,8 +18,8 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock
 from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
-from gyrobench.studio.gate import TOKEN, Gate, is_loopback, refuse_remote
-from gyrobench.studio.jobs import Jobs
+from gyrobench.studio.gate import TOKEN, StudioGate, is_loopback, refuse_remote
+from gyrobench.studio.jobs import StudioJobs
 from gyrobench.studio.run_page import add_run_pages
 from gyrobench.studio.system_page import add_system_page, wiring_of
 from gyrobench.studio.systems_page import add_systems_page
@@ -122,14 +122,14 @@ def serve(
     """
     refuse_remote(host, remote)
     bench = Bench.find()
-    studio = Studio(bench, Jobs(bench, read_only=read_only), read_only)
+    studio = Studio(bench, StudioJobs(bench, read_only=read_only), read_only)
     with contextlib.ExitStack() as stack:
         if not read_only:
             stack.enter_context(_only_one(studio.jobs.folder.parent))
         listener = listen(host, port)
         stack.callback(listener.close)
         number = listener.getsockname()[1]
-        gate = Gate(build(studio), host_names(host, number, remote), number, read_only=read_only)
+        gate = StudioGate(build(studio), host_names(host, number, remote), number, read_only=read_only)
         config = uvicorn.Config(
             gate, log_level="error", access_log=False, ws_max_size=MESSAGE, server_header=False, date_header=False,
             timeout_graceful_shutdown=2, lifespan="on", proxy_headers=False,

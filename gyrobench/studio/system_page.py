@@ -14,8 +14,8 @@ from nicegui import ui
 from gyrobench.component.declarations import Declaration
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import wiring_figure
-from gyrobench.studio.frame import Lines, Studio, frame, told
-from gyrobench.studio.request import Request
+from gyrobench.studio.frame import CopyLines, Studio, frame, told
+from gyrobench.studio.request import JobRequest
 from gyrobench.system.configurable import Option
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -58,11 +58,11 @@ def _range(low: float | None, high: float | None, unit: str | type, strict: bool
 
 
 class _Choice:
-    """What is chosen on a page: the request that it leads to, and what must be shown anew when it changes."""
+    """Choices on a page: the request that they lead to, and what must be shown anew when one changes."""
 
-    def __init__(self, test: System | Suite, lines: Lines) -> None:
+    def __init__(self, test: System | Suite, lines: CopyLines) -> None:
         self.test, self.lines = test, lines
-        self.request = Request(test.name)
+        self.request = JobRequest(test.name)
         self.wrong: dict[str, str] = {}  # name -> why its text is no value
         self.changed: list[Callable[[], None]] = []
 
@@ -94,7 +94,7 @@ class _Choice:
             replace(self.request, seed=None if seed is None else int(seed), spec=spec if spec and spec != NONE else "")
         )
 
-    def _now(self, request: Request) -> None:
+    def _now(self, request: JobRequest) -> None:
         self.request = request
         self.show()
         for call in self.changed:
@@ -284,7 +284,7 @@ def add_system_page(studio: Studio) -> None:
                 with ui.element("div").classes("aside"):
                     if not isinstance(test, Suite):
                         ui.html(f'<img class="wiring" src="/wiring/{name}" alt="Wiring of {name}">', sanitize=False)
-                    lines = Lines()
+                    lines = CopyLines()
                     choice = _Choice(test, lines)
                     choice.show()
                     _start(studio, choice)

@@ -7,10 +7,10 @@ import asyncio
 from nicegui import ui
 
 from gyrobench.studio.frame import Studio, frame
-from gyrobench.workflow.gallery import PURPOSES, Entry, gallery
+from gyrobench.workflow.gallery import PURPOSES, GalleryEntry, gallery
 
 
-def _card(entry: Entry) -> ui.link:
+def _card(entry: GalleryEntry) -> ui.link:
     with ui.link(target=f"/system/{entry.name}").classes("card") as card:
         ui.html(f'<img src="/picture/{entry.name}" alt="" loading="lazy">', sanitize=False)
         with ui.element("div").classes("text"):
@@ -23,7 +23,7 @@ def _card(entry: Entry) -> ui.link:
     return card
 
 
-def _found(entry: Entry, purpose: str, words: list[str]) -> bool:
+def _found(entry: GalleryEntry, purpose: str, words: list[str]) -> bool:
     text = f"{entry.name} {entry.title} {entry.summary}".lower()
     return purpose in ("All", *entry.purposes) and all(word in text for word in words)
 

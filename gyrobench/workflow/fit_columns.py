@@ -40,7 +40,7 @@ def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[st
 
 
 @dataclass(frozen=True)
-class Proposal:
+class ColumnProposal:
     """A first column map of a file for a test.
 
     found: column of the bench -> column of the file.  wanted: column of the bench -> unit, of those that the test
@@ -69,7 +69,7 @@ class Proposal:
         return text, problems
 
 
-def propose_columns(file: Path, system: str) -> Proposal:
+def propose_columns(file: Path, system: str) -> ColumnProposal:
     """Return a first column map of a file.  Raises UsageError where there is no such file, and no table in it."""
     if not file.is_file():
         raise UsageError(f"{file}: no such file")
@@ -85,7 +85,7 @@ def propose_columns(file: Path, system: str) -> Proposal:
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c
-    return Proposal(file, test, layout, found, dict(wanted), stated)
+    return ColumnProposal(file, test, layout, found, dict(wanted), stated)
 
 
 def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:

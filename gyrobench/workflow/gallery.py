@@ -19,7 +19,7 @@ FEW = 6  # slots: a system that can be seen at a glance
 
 
 @dataclass(frozen=True)
-class Entry:
+class GalleryEntry:
     """A system of the gallery.
 
     problem: why it does not load, "" where it does.  picture: a figure of its report, where the bench has one.
@@ -58,7 +58,7 @@ def purposes_of(test: System | Suite) -> tuple[str, ...]:
     return tuple(found)
 
 
-def entry(bench: Bench, name: str) -> Entry:
+def entry(bench: Bench, name: str) -> GalleryEntry:
     """Return a system of the bench as the gallery shows it."""
     picture = picture_of(bench, name)
     try:
@@ -66,17 +66,18 @@ def entry(bench: Bench, name: str) -> Entry:
         first = (type(test).__doc__ or "").strip().partition("\n\n")[0]
         summary = " ".join(first.split()).partition("  [")[0].partition(" [")[0]
         slots = 0 if isinstance(test, Suite) else len(test.slots)
-        return Entry(name, test.title or name, summary, purposes_of(test), slots, isinstance(test, Suite), "", picture)
+        suite, title = isinstance(test, Suite), test.title or name
+        return GalleryEntry(name, title, summary, purposes_of(test), slots, suite, picture=picture)
     except Exception as error:  # of the user's code: the others are shown all the same
-        return Entry(name, name, "", (), 0, False, user_message(error), picture)
+        return GalleryEntry(name, name, "", (), 0, False, user_message(error), picture)
 
 
-def gallery(bench: Bench) -> list[Entry]:
+def gallery(bench: Bench) -> list[GalleryEntry]:
     """Return all systems of the bench, by title; one whose file has not changed is loaded once."""
     found = (_known(bench, n, (f / "system.py").stat().st_mtime_ns) for n, f in bench.systems().items())
     return sorted(found, key=lambda e: e.title.lower())
 
 
 @functools.lru_cache(maxsize=1024)
-def _known(bench: Bench, name: str, _changed: int) -> Entry:
+def _known(bench: Bench, name: str, _changed: int) -> GalleryEntry:
     return entry(bench, name)

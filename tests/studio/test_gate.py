@@ -10,7 +10,7 @@ import pytest
 
 from gyrobench.bench import UsageError
 from gyrobench.studio import gate as gates
-from gyrobench.studio.gate import Gate, is_loopback, refuse_remote
+from gyrobench.studio.gate import StudioGate, is_loopback, refuse_remote
 
 PORT = 8765
 HOST = f"127.0.0.1:{PORT}"
@@ -38,7 +38,7 @@ class App:
 
 
 def ask(
-    gate: Gate, path: str = "/", method: str = "GET", headers: dict[str, str] | None = None, query: str = "",
+    gate: StudioGate, path: str = "/", method: str = "GET", headers: dict[str, str] | None = None, query: str = "",
     body: list[bytes] | None = None, kind: str = "http",
 ) -> list[dict[str, Any]]:  # fmt: skip
     """Return what the gate sends; headers replace those of a good request, "" leaves one out."""
@@ -66,25 +66,25 @@ def app() -> App:
 
 
 @pytest.fixture
-def gate(app: App) -> Gate:
-    return Gate(app, [HOST, f"localhost:{PORT}"], PORT)
+def gate(app: App) -> StudioGate:
+    return StudioGate(app, [HOST, f"localhost:{PORT}"], PORT)
 
 
 def status(sent: list[dict[str, Any]]) -> int:
     return int(sent[0]["status"])
 
 
-def test_the_token_becomes_a_cookie_once(gate: Gate, app: App) -> None:
+def test_the_token_becomes_a_cookie_once(gate: StudioGate, app: App) -> None:
     sent = ask(gate, "/runs", headers={"cookie": ""}, query=f"token={gate.token}&a=b%20c")
     headers = dict(sent[0]["headers"])
     assert status(sent) == 303 and headers[b"location"] == b"/runs?a=b+c" and app.calls == 0
     cookie = headers[b"set-cookie"].decode()
     assert cookie.startswith(f"{gate.cookie}={gate.token};") and "HttpOnly" in cookie and "SameSite=Strict" in cookie
     assert status(ask(gate)) == 200 and app.calls == 1
-    assert len(gate.token) > 30 and Gate(app, [HOST], PORT).token != gate.token
+    assert len(gate.token) > 30 and StudioGate(app, [HOST], PORT).token != gate.token
 
 
-def test_an_entrance_leads_nowhere_else(gate: Gate) -> None:
+def test_an_entrance_leads_nowhere_else(gate: StudioGate) -> None:
     for path in ("//evil.example/x", "/\\evil.example", "\\\\evil.example"):
         target = dict(ask(gate, path, query=f"token={gate.token}")[0]["headers"])[b"location"]
         assert target.startswith(b"/") and not target.startswith((b"//", b"/\\")), target
@@ -113,12 +113,12 @@ def test_an_entrance_leads_nowhere_else(gate: Gate) -> None:
         ({"content-length": "1e9"}, 413),
     ],
 )
-def test_refused(gate: Gate, app: App, headers: dict[str, str], expected: int) -> None:
+def test_refused(gate: StudioGate, app: App, headers: dict[str, str], expected: int) -> None:
     assert status(ask(gate, headers=headers)) == expected
     assert app.calls == 0
 
 
-def test_a_wrong_token_is_refused(gate: Gate, app: App) -> None:
+def test_a_wrong_token_is_refused(gate: StudioGate, app: App) -> None:
     for token in ("", "x", gate.token[:-1], gate.token + "x", "ü"):
         assert status(ask(gate, headers={"cookie": ""}, query=f"token={token}")) == 403
     good = {"cookie": "", "host": "evil.example"}
@@ -127,11 +127,11 @@ def test_a_wrong_token_is_refused(gate: Gate, app: App) -> None:
 
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "PATCH", "X"])
-def test_other_methods_are_refused(gate: Gate, app: App, method: str) -> None:
+def test_other_methods_are_refused(gate: StudioGate, app: App, method: str) -> None:
     assert status(ask(gate, method=method)) == 405 and app.calls == 0
 
 
-def test_a_body_is_counted_whatever_it_says(gate: Gate) -> None:
+def test_a_body_is_counted_whatever_it_says(gate: StudioGate) -> None:
     block = b"x" * (1 << 18)
     assert ask(gate, method="POST", body=[block] * 4)[1]["body"] == str(4 << 18).encode()
     assert status(ask(gate, method="POST", body=[block] * 5, headers={"content-length": "3"})) == 413
@@ -139,13 +139,13 @@ def test_a_body_is_counted_whatever_it_says(gate: Gate) -> None:
 
 def test_uploads_may_be_larger_but_not_in_a_show(app: App) -> None:
     block, path = b"x" * (1 << 20), "/_nicegui/client/abc/upload/3"
-    assert status(ask(Gate(app, [HOST], PORT), path, "POST", body=[block] * 3)) == 200
-    show = Gate(app, [HOST], PORT, read_only=True)
+    assert status(ask(StudioGate(app, [HOST], PORT), path, "POST", body=[block] * 3)) == 200
+    show = StudioGate(app, [HOST], PORT, read_only=True)
     assert status(ask(show, path, "POST", body=[b"x"])) == 403
     assert status(ask(show, "/_nicegui_ws/socket.io/", "POST", body=[b"x"])) == 200, "the pages still work"
 
 
-def test_sockets_need_cookie_and_origin(gate: Gate, app: App) -> None:
+def test_sockets_need_cookie_and_origin(gate: StudioGate, app: App) -> None:
     own = {"origin": f"http://{HOST}"}
     assert ask(gate, kind="websocket", headers=own)[0]["type"] == "websocket.accept"
     for headers in ({}, {"origin": "http://evil.example"}, {**own, "cookie": ""}, {**own, "host": "evil.example"}):
@@ -153,7 +153,7 @@ def test_sockets_need_cookie_and_origin(gate: Gate, app: App) -> None:
     assert app.calls == 1
 
 
-def test_answers_carry_the_policy(gate: Gate) -> None:
+def test_answers_carry_the_policy(gate: StudioGate) -> None:
     for sent in (ask(gate), ask(gate, headers={"cookie": ""})):
         headers = [(k, v) for k, v in sent[0]["headers"] if k == b"x-frame-options"]
         assert headers == [(b"x-frame-options", b"SAMEORIGIN")]
@@ -161,7 +161,7 @@ def test_answers_carry_the_policy(gate: Gate) -> None:
         assert "default-src 'self'" in policy and "http:" not in policy and "https:" not in policy
 
 
-def test_nothing_random_gets_in_or_crashes_it(gate: Gate, app: App) -> None:
+def test_nothing_random_gets_in_or_crashes_it(gate: StudioGate, app: App) -> None:
     """2,000 requests with something wrong in each; none reaches the pages, each is answered."""
     draw = random.Random(7)
 

@@ -17,21 +17,21 @@ import pytest
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.studio.job_process import REQUEST
-from gyrobench.studio.jobs import Job, Jobs
-from gyrobench.studio.request import Request, comparison_command, comparison_python, read_request
+from gyrobench.studio.jobs import StudioJob, StudioJobs
+from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
 
-SHORT = Request("fixed_position", {"dwell": "60s"}, seed=3)
-LONG = Request("fixed_position", {"dwell": "20000000s"})  # hours
+SHORT = JobRequest("fixed_position", {"dwell": "60s"}, seed=3)
+LONG = JobRequest("fixed_position", {"dwell": "20000000s"})  # hours
 LIMIT = 120.0  # s
 
 
 @pytest.fixture
-def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Jobs:
+def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StudioJobs:
     monkeypatch.chdir(tmp_path)
-    return Jobs(Bench.find(), most=1)
+    return StudioJobs(Bench.find(), most=1)
 
 
-def until(jobs: Jobs, key: str, there: Callable[[Job], bool]) -> Job:
+def until(jobs: StudioJobs, key: str, there: Callable[[StudioJob], bool]) -> StudioJob:
     """Return a job once it is as wanted."""
     end = time.monotonic() + LIMIT
     while not there(job := jobs.find(key)):
@@ -41,15 +41,15 @@ def until(jobs: Jobs, key: str, there: Callable[[Job], bool]) -> Job:
     return job
 
 
-def ended(job: Job) -> bool:
+def ended(job: StudioJob) -> bool:
     return not job.active
 
 
-def under_way(job: Job) -> bool:
+def under_way(job: StudioJob) -> bool:
     return job.state == "running" and job.report.fraction > 0.0
 
 
-def test_a_job_does_what_its_command_does(jobs: Jobs, tmp_path: Path) -> None:
+def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> None:
     done = until(jobs, jobs.submit(SHORT), ended)
     assert (done.state, done.report.message) == ("done", "")
     folder = Path(done.report.folder)
@@ -63,7 +63,7 @@ def test_a_job_does_what_its_command_does(jobs: Jobs, tmp_path: Path) -> None:
     assert json.loads(Path("report/run.json").read_text())["tables"] == digest, "the lines of Python are another run"
 
 
-def test_one_waits_for_the_other_and_can_be_stopped(jobs: Jobs) -> None:
+def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     first, second = jobs.submit(LONG), jobs.submit(SHORT)
     until(jobs, first, under_way)
     assert jobs.find(second).state == "waiting"
@@ -80,11 +80,11 @@ def test_one_waits_for_the_other_and_can_be_stopped(jobs: Jobs) -> None:
     assert until(jobs, again, ended).state == "stopped"
 
 
-def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: Jobs) -> None:
+def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs) -> None:
     """A new object has what a new studio has: the folders alone."""
     key = jobs.submit(LONG)
     until(jobs, key, under_way)
-    new = Jobs(Bench.find(), most=1)
+    new = StudioJobs(Bench.find(), most=1)
     assert new.find(key).state == "running" and not new._started
     waiting = new.submit(SHORT)
     new.advance()
@@ -101,15 +101,15 @@ def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: Jobs) -> N
     assert until(new, on.key, ended).state == "stopped"
 
 
-def test_what_cannot_run_says_why(jobs: Jobs) -> None:
-    failed = until(jobs, jobs.submit(Request("fixed_position", {"latitude": "3 kg"})), ended)
+def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:
+    failed = until(jobs, jobs.submit(JobRequest("fixed_position", {"latitude": "3 kg"})), ended)
     assert failed.state == "failed" and "latitude" in failed.report.message
-    missing = until(jobs, jobs.submit(Request("fixed_positio")), ended)
+    missing = until(jobs, jobs.submit(JobRequest("fixed_positio")), ended)
     assert "did you mean fixed_position?" in missing.report.message and not missing.resumable
 
 
-def test_a_show_starts_nothing(jobs: Jobs) -> None:
-    show = Jobs(Bench.find(), read_only=True)
+def test_a_show_starts_nothing(jobs: StudioJobs) -> None:
+    show = StudioJobs(Bench.find(), read_only=True)
     for action in (lambda: show.submit(SHORT), lambda: show.stop("x"), lambda: show.resume("x")):
         with pytest.raises(UsageError):
             action()
@@ -117,12 +117,12 @@ def test_a_show_starts_nothing(jobs: Jobs) -> None:
 
 
 @pytest.mark.parametrize("key", ["", ".", "..", "../..", "a/b", "/etc", "none", "x\0y"])
-def test_no_key_leads_out(jobs: Jobs, key: str) -> None:
+def test_no_key_leads_out(jobs: StudioJobs, key: str) -> None:
     with pytest.raises(UsageError, match="no job"):
         jobs.find(key)
 
 
-def test_damaged_jobs_are_left_out(jobs: Jobs) -> None:
+def test_damaged_jobs_are_left_out(jobs: StudioJobs) -> None:
     for name, text in (("a", "{"), ("b", "[]"), ("c", '{"request": {"x": 1}, "resume": false, "created": 1}')):
         (jobs.folder / name).mkdir(parents=True)
         (jobs.folder / name / REQUEST).write_text(text)
@@ -132,7 +132,7 @@ def test_damaged_jobs_are_left_out(jobs: Jobs) -> None:
 
 
 def test_lines_of_a_request() -> None:
-    request = Request(
+    request = JobRequest(
         "tumble", {"latitude": "45.75deg", "tests": "a b"}, {"gyro": "v 1.fmu"}, {"gyro": "m.toml"}, 0, "limits"
     )
     assert read_request(json.loads(json.dumps(request.as_dict()))) == request
@@ -141,7 +141,7 @@ def test_lines_of_a_request() -> None:
         "--map", "gyro=m.toml", "--seed", "0", "--spec", "limits",
     ]  # fmt: skip
     compile(request.python(), "lines", "exec")
-    measured = Request("tumble", {"latitude": "1deg"}, data="it's.csv", columns="m.toml")
+    measured = JobRequest("tumble", {"latitude": "1deg"}, data="it's.csv", columns="m.toml")
     assert shlex.split(measured.command())[:5] == ["gyrobench", "reduce", "tumble", "--data", "it's.csv"]
     for text in (measured.python(), comparison_python(["a", "b'c"]), request.python(suite=True)):
         compile(text, "lines", "exec")

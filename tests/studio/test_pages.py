@@ -147,9 +147,9 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
 def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
     """The same record as by the two commands, tests/record/test_messy_file.py."""
     data, mean = messy()
-    (tmp_path / "Messung <b>1</b>.csv").write_bytes(data)
+    (tmp_path / "Messung <b>1.csv").write_bytes(data)
     page.goto(base_of(studio) + "/data?test=fixed_position")
-    page.locator("input[type=file]").set_input_files(tmp_path / "Messung <b>1</b>.csv")
+    page.locator("input[type=file]").set_input_files(tmp_path / "Messung <b>1.csv")
     page.get_by_text("Every column has its place").wait_for()
     page.get_by_text("Strom / mA").first.wait_for()
     page.get_by_label("unit of mean").fill("deg")
