@@ -6,6 +6,7 @@ shown is a sample of the record, and none that stands out is left out: minimum-m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,10 +39,11 @@ class SignalPyramid:
         self.time = time
         self.values = np.asarray(values, dtype=float)
         self.levels: list[tuple[int, AnyArray, AnyArray]] = []  # samples in a bucket, places of minima, of maxima
-        size, low, high = FIRST, np.arange(len(values)), np.arange(len(values))
-        factor = FIRST
-        while len(low) > factor:
-            low, high = _extremes(self.values, low, high, factor)
+        size, factor = FIRST, FIRST
+        low: AnyArray | None = None  # every sample is the smallest and the largest of itself
+        high: AnyArray | None = None
+        while (len(self.values) if low is None else len(low)) > factor:
+            low, high = _extremes(self.values, low, factor, np.argmin), _extremes(self.values, high, factor, np.argmax)
             self.levels.append((size, low, high))
             size, factor = size * FACTOR, FACTOR
 
@@ -62,16 +64,16 @@ class SignalPyramid:
         return SignalView(np.asarray(self.time[at], dtype=float), self.values[at], every)
 
 
-def _extremes(values: Array, low: AnyArray, high: AnyArray, factor: int) -> tuple[AnyArray, AnyArray]:
-    """Return the places of minima and maxima of buckets of ``factor`` buckets each; the last may be shorter."""
-    found = []
-    for at, pick, worst in ((low, np.argmin, np.inf), (high, np.argmax, -np.inf)):
-        whole = len(at) - len(at) % factor
-        parts: list[Any] = []
-        for block in (at[:whole].reshape(-1, factor), at[whole:].reshape(1, -1)):
-            if block.size:
-                taken = values[block]
-                held = np.where(np.isfinite(taken), taken, worst)
-                parts.append(block[np.arange(len(block)), pick(held, axis=1)])
-        found.append(np.concatenate(parts).astype(np.int64))
-    return found[0], found[1]
+def _extremes(values: Array, at: AnyArray | None, factor: int, pick: Callable[..., Any]) -> AnyArray:
+    """Return the places of the extremes of buckets of ``factor`` places ``at`` each (None: of all samples, in order).
+
+    pick: argmin or argmax.  The last bucket may be shorter; a value that is not finite is none.
+    """
+    held = values if at is None else values[at]
+    if not np.isfinite(held).all():
+        held = np.where(np.isfinite(held), held, np.inf if pick is np.argmin else -np.inf)
+    whole = len(held) - len(held) % factor
+    first = pick(held[:whole].reshape(-1, factor), axis=1) + np.arange(0, whole, factor)
+    rest = [] if whole == len(held) else [whole + int(pick(held[whole:]))]
+    found = np.concatenate([first, rest]).astype(np.int64)
+    return found if at is None else at[found]
