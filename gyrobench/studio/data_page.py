@@ -159,12 +159,19 @@ def _columns(mapping: _Mapping) -> None:
                 at = columns.index(held) if held in columns else -1
                 menu = ui.select({-1: NOT, **names}, value=at).props("dense outlined")
                 menu.props["aria-label"] = f"column for {name}"
-                unit = ui.input(value=held.unit if held else "", placeholder="unit").props(
-                    "dense outlined debounce=250"
-                )
-                unit.classes("narrow").props["aria-label"] = f"unit of {name}"
+                check = _unit_check(mapping, name)
+                unit = ui.input(value=held.unit if held else "", placeholder="unit", validation=check)
+                unit.props("dense outlined hide-bottom-space debounce=250").classes("narrow")
+                unit.props["aria-label"] = f"unit of {name}"
                 sign = ui.checkbox("reversed").props("dense")
         _follow(mapping, name, menu, unit, sign)
+
+
+def _unit_check(mapping: _Mapping, name: str) -> Callable[[Any], str | None]:
+    def check(text: Any) -> str | None:
+        return mapping.unit(name, str(text or "").strip()) if name in mapping.proposal.found else None
+
+    return check
 
 
 def _follow(mapping: _Mapping, name: str, menu: Any, unit: Any, sign: Any) -> None:
@@ -173,21 +180,11 @@ def _follow(mapping: _Mapping, name: str, menu: Any, unit: Any, sign: Any) -> No
         mapping.put(name, column)
         unit.set_value(column.unit if column else "")
 
-    def named() -> None:
-        if name not in mapping.proposal.found:
-            return
-        problem = mapping.unit(name, (unit.value or "").strip())
-        unit.props(remove="error error-message")
-        if problem:
-            unit.props["error"], unit.props["error-message"] = True, problem
-        unit.update()
-
     def turned() -> None:
         mapping.factors[name] = -1.0 if sign.value else 1.0
         mapping.now()
 
     menu.on_value_change(chosen)
-    unit.on_value_change(named)
     sign.on_value_change(turned)
 
 

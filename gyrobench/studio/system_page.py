@@ -115,17 +115,10 @@ def _row(
             kind = _unit(unit)
             ui.label("; ".join(x for x in (kind if kind != "1" else "", limits) if x)).classes("range")
         shown = _shown(default, unit)
-        field = ui.input(placeholder=shown, value=choice.request.values.get(name, ""))
-        field.props(f'dense outlined stack-label aria-label="{escape(name)}" debounce=250').mark(name)
-        field.on_value_change(lambda e: _note(field, choice.set(name, e.value, check)))
+        given = choice.request.values.get(name, "")
+        field = ui.input(placeholder=shown, value=given, validation=lambda text: choice.set(name, text, check))
+        field.props(f'dense outlined hide-bottom-space aria-label="{escape(name)}" debounce=250')
     return f"{name} {doc}".lower(), row
-
-
-def _note(field: ui.input, problem: str | None) -> None:
-    field.props(remove="error error-message")
-    if problem:
-        field.props["error"], field.props["error-message"] = True, problem
-    field.update()
 
 
 def _option_check(name: str, option: Option) -> Callable[[str], Any]:

@@ -106,7 +106,7 @@ def test_from_the_first_page_to_a_report(page: Any, studio: tuple[str, Path]) ->
 def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("latitude", exact=True).fill("3 kg")
-    page.get_by_text(re.compile("latitude.*kg")).first.wait_for()
+    page.locator(".q-field__messages").get_by_text(re.compile("latitude.*kg")).wait_for()
     page.get_by_role("button", name="Run").click()
     page.locator(".q-notification").wait_for()
     assert "/system/" in page.url
