@@ -27,7 +27,7 @@ def studio(
         ),
     ] = None,
 ) -> None:
-    """Open the bench in the browser: choose, set, run, watch, compare.
+    """Open the bench in the browser.
 
     The address that is printed holds a token of this start: who has it may use the studio.  Runs go on when the studio
     is closed; Ctrl-C ends the studio.
