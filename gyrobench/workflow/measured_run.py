@@ -90,6 +90,22 @@ def reduce_measured(
     return RunOutcome(record, result, folder, paths)
 
 
+def find_faults(system: System, data: Path, values: Mapping[str, str], columns: Path | None = None) -> list[str]:
+    """Return all that is wrong with a file, as sentences; nothing where it can be reduced.  Nothing is reduced.
+
+    Arguments as of :func:`reduce_measured`.  Raises UsageError for what is wrong beside the file.
+    """
+    measured = _measured_data(system)
+    try:
+        if columns is not None:
+            _read_mapped(measured, system, data, values, columns, SILENT)
+        else:
+            _read(measured, system, data, values, SILENT)
+    except DataError as error:
+        return list(error.problems)
+    return []
+
+
 def _read(measured: MeasuredData, system: System, data: Path, values: Mapping[str, str], feedback: Feedback) -> Record:
     if not measured.progress:
         return measured.read(system, data, values)

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench import units
@@ -41,11 +42,39 @@ def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[st
     return [(m[1], m[2] or "") for m in found if m], stated
 
 
-def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:
-    """Return a first column map of a file, written to ``out`` where given, and what it still lacks.
+@dataclass(frozen=True)
+class ColumnProposal:
+    """A first column map of a file for a test.
 
-    Raises UsageError.
+    found: column of the bench -> column of the file.  wanted: column of the bench -> unit, of those that the test
+    reads.  stated: what the test needs to know, with an example each.
     """
+
+    file: Path
+    test: System | Suite
+    layout: FileLayout
+    found: Mapping[str, FileColumn]
+    wanted: Mapping[str, str]
+    stated: Mapping[str, str]
+    table: str = ""  # of a log with several
+
+    def text(self) -> tuple[str, list[str]]:
+        """Return the text of the map, and what it lacks."""
+        text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
+        if "channel" in self.test.options:
+            names = [] if any(u not in ("s", "K", "degC") for u in self.wanted.values()) else ["rate"]
+        else:
+            names = [n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL]
+        for name in names:
+            if name == "t_end" and "t_start" in self.found:
+                continue
+            unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
+            problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
+        return text, problems
+
+
+def propose_columns(file: Path, system: str) -> ColumnProposal:
+    """Return a first column map of a file.  Raises UsageError where there is no such file, and no table in it."""
     if not file.is_file():
         raise UsageError(f"{file}: no such file")
     test = load_test(system)
@@ -58,36 +87,36 @@ def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[
             proposals.append(_proposal(file, test, table))
     if not proposals:
         raise UsageError(f"{file}: no table of numbers with names in {', '.join(tables)}")
-    text, problems, _ = max(proposals, key=lambda p: p[2])
+    return max(proposals, key=lambda p: len(p.found))
+
+
+def _proposal(file: Path, test: System | Suite, table: str) -> ColumnProposal:
+    """Return the map of a table of a file, "" of the only one."""
+    wanted, stated = wanted_columns(test)
+    layout = find_layout(as_text(file, table) if is_log(file) else file)
+    if "channel" in test.options:
+        found, wanted = _any_names(layout)
+    else:
+        if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
+            wanted = series_columns(wanted)
+        found = match_columns(wanted, layout)
+    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
+    for k, c in enumerate(others):
+        found[f"temperature {k + 1}" if k else "temperature"] = c
+    return ColumnProposal(file, test, layout, found, dict(wanted), stated, table)
+
+
+def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:
+    """Return a first column map of a file, written to ``out`` where given, and what it still lacks.
+
+    Raises UsageError.
+    """
+    text, problems = propose_columns(file, system).text()
     if out is not None:
         if out.exists():
             raise UsageError(f"--out {out}: the file exists; choose another name")
         out.write_text(text, encoding="utf-8")
     return text, problems
-
-
-def _proposal(file: Path, test: System | Suite, table: str) -> tuple[str, list[str], int]:
-    """Return the map of a table of a file, "" of the only one, what it lacks, and how many columns it has found."""
-    wanted, stated = wanted_columns(test)
-    layout = find_layout(as_text(file, table) if is_log(file) else file)
-    if "channel" in test.options:
-        found, wanted = _any_names(layout)
-        missing = [] if any(u not in ("s", "K", "degC") for _, u in wanted) else ["rate"]
-    else:
-        if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
-            wanted = series_columns(wanted)
-        found = match_columns(wanted, layout)
-        missing = [n for n, _ in wanted if n not in found and n.split("_")[0] not in OPTIONAL]
-    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
-    for k, c in enumerate(others):
-        found[f"temperature {k + 1}" if k else "temperature"] = c
-    text, problems = map_text(file, test, layout, found, dict(wanted), stated, table)
-    for name in missing:
-        if name == "t_end" and "t_start" in found:
-            continue
-        unused = ", ".join(f"'{c.name}'" for c in layout.columns if c not in found.values()) or "none"
-        problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
-    return text, problems, len(found)
 
 
 def _is(column: FileColumn, unit: str) -> bool:
