@@ -2,11 +2,11 @@
 
     reasons = unshown(record, result, reduce, regression_of)       # of a record that does not state that it was checked
 
-A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another city
-are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of the record.  Where the copy can be
-fitted as well - no F test of the two scatters with p < LEVEL - and an estimate changes by more than its u, the record
-rests on that mistake not having been made, and passes only where it states so: ``arrangement = checked``.  A plan whose
-redundancy shows a mistake is not asked about it.
+A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another
+city, a meter that is off by a factor are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of
+the record.  Where the copy can be fitted as well - no F test of the two scatters with p < LEVEL - and an estimate
+changes by more than its u, the record rests on that mistake not having been made, and passes only where it states so:
+``arrangement = checked``.  A plan whose redundancy shows a mistake is not asked about it.
 
 The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
 mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
@@ -53,9 +53,9 @@ SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
 #: scales that nobody states, what begins their columns, and what states an uncertainty of them
 METERS = (
-    ("the readings", ("mean",), ("u_current", "u_voltage", "u_scale", "u_scale_factor")),
+    ("the readings", ("mean",), ("u_voltage",)),
     ("the currents", ("current",), ("u_current",)),
-    ("the rates", ("rate_",), ("u_rate",)),
+    ("the rates", ("rate_",), ("u_time",)),
     ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
     ("the times", ("t_",), ("u_time",)),
 )
@@ -98,11 +98,8 @@ def _meters(record: Record) -> Iterator[HandlingCandidate]:
     options, w = record.run.options, record.windows
     for what, beginnings, stated in METERS:
         names = [n for n in w if n.startswith(beginnings) and np.any(np.isfinite(w[n]) & (w[n] != 0.0))]
-        if (
-            not names
-            or any(options.get(n) for n in stated)
-            or (what == "the readings" and any(map(options.get, SCALES)))
-        ):
+        scaled = what == "the readings" and any(n in options for n in SCALES)  # mistaken by itself, above
+        if not names or scaled or any(map(options.get, stated)):
             continue
         columns = {n: TOO_LARGE * np.asarray(w[n], dtype=float) for n in names}
         yield HandlingCandidate(f"{what} wrong by 2 %", changed(record, **columns))
