@@ -108,9 +108,8 @@ def loop_plan(system: System, frequencies: Sequence[float]) -> tuple[LoopPlan, f
     slowest = min(frequencies)
     rest = LoopPhase("rest", "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
     steps = [replace(load, dwell=min(load.dwell, 20.0 / slowest), settle=2.0 / slowest)] if load else []
-    plan = LoopPlan(
-        [rest, *sweep("loop", "test", frequencies, amplitude, periods=PERIODS, settle=0.5 / slowest), *steps]
-    )
+    sines_ahead = sweep("loop", "test", frequencies, amplitude, periods=PERIODS, settle=0.5 / slowest)
+    plan = LoopPlan([rest, *sines_ahead, *steps])
     return plan, float(load.amplitude) if load else 0.0
 
 

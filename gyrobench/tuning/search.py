@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.measures import grid, measured
 from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.structures import Controller, Structure
@@ -24,6 +25,7 @@ LOOK = 512  # controllers of the coarse look
 STARTS = 4  # of the simplex
 SIMPLEX = 220  # evaluations of one
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
+ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
 CAP = np.log(100.0)  # more than that is no better
 
 
@@ -37,7 +39,7 @@ class Problem:
     box: Array  # (numbers, 2)
     f: Array
     evaluations: int = 0
-    _responses: list[Array] = field(default_factory=list)
+    _responses: list[Complex] = field(default_factory=list)
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -59,13 +61,13 @@ class Problem:
         held = HeldController(controller, step)
         shape = len(self.plants), len(self.wishes)
         growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
-        if np.any(growth >= 0.0):
-            return np.broadcast_to(UNSTABLE - 1e3 * np.maximum(growth, 0.0).sum(), shape).copy()
+        if np.any(growth >= ROUNDING):
+            return np.full(shape, UNSTABLE - 1e3 * float(np.maximum(growth, 0.0).sum()))
         loops = np.array(self._responses) * held.response(np.exp(2j * np.pi * self.f * step))
         got = measured(self.wishes, self.f, loops)
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
-        return np.clip(ratio, -9.0, CAP)
+        return np.asarray(np.clip(ratio, -9.0, CAP))
 
     def worst(self, x: Array) -> float:
         return float(self.ratios(x).min())

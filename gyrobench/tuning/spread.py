@@ -1,4 +1,4 @@
-"""How far the parts may be from nominal: "platform.J=±30%", "platform.J=0.7..1.3kg.m2"; the points that stand for it."""
+"""How far parts may be from nominal: "platform.J=±30%", "platform.J=0.7..1.3kg.m2"; the points that stand for it."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ class Structure:
             values |= {f"{key}_{again + 1}" if again else key: v for key, v in named.items()}
         size = abs(np.polyval(num, 1j * w) / np.polyval(den, 1j * w) * plant_at(w / (2.0 * math.pi)))
         K = 1.0 / size
-        return rounded(K * num[::-1], den[::-1], {"K": K, **values})
+        return rounded(K * num[::-1], den[::-1], {"K": float(K), **values})
 
 
 def rounded(num: Array, den: Array, values: dict[str, float]) -> Controller:

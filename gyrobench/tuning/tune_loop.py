@@ -150,9 +150,8 @@ def tunable() -> list[str]:
     for name in sorted(Bench.find().systems()):
         with contextlib.suppress(GyrobenchError):
             system = load_system(name)
-            if isinstance(system, System) and dict(system.loops) == LOOP and INSIDE in system.channels:
-                if "stabilizer -> platform: v" in system.wires:
-                    found.append(name)
+            if isinstance(system, System) and _has_loop(system):
+                found.append(name)
     return found
 
 

@@ -1,4 +1,4 @@
-"""A tuned loop: its controller as values and as a command, what came of each wish, its proof, and the text of it all."""
+"""A tuned loop: its controller as values and as a command, what came of each wish, its proof, and its text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.plant import SLOT
-from gyrobench.tuning.proof import Proof
+from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, Structure
 from gyrobench.tuning.wishes import Wish
@@ -101,7 +101,7 @@ class TunedLoop:
                 {
                     "at": dict(p.values), "holds": p.holds, "why_not": p.why_not, "sines": p.counted,
                     "wishes": [
-                        {"name": w.wish.name, "value": _finite(w.value), "U": _finite(w.U), "model": _finite(w.expected)}
+                        _measured(w)
                         for w in p.wishes
                     ],
                 }
@@ -115,6 +115,10 @@ class TunedLoop:
 
     def __str__(self) -> str:
         return "\n".join(_lines(self))
+
+
+def _measured(w: ProvenWish) -> dict[str, Any]:
+    return {"name": w.wish.name, "value": _finite(w.value), "U": _finite(w.U), "model": _finite(w.expected)}
 
 
 def _finite(x: float) -> float | None:
@@ -170,7 +174,7 @@ def _lines(t: TunedLoop) -> list[str]:
     return [*lines, "", f"{title}: {values}", "", t.command]
 
 
-def _margin(w: Any) -> str:
+def _margin(w: ProvenWish) -> str:
     """Return the expanded uncertainty of a measured wish as text."""
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""

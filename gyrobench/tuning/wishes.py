@@ -1,4 +1,4 @@
-"""What is wanted of a loop, as a person writes it: "phase margin=40deg", "bandwidth>20Hz", "peak S<6dB", "S at 1Hz<-40dB".
+"""What is wanted of a loop, as a person writes it: "phase margin=40deg", "bandwidth>20Hz", "S at 1Hz<-40dB".
 
 Inside all are SI: rad, s, Hz; ratios of amplitudes as factors (6dB = 1.995).
 """
@@ -70,8 +70,8 @@ def parse_wishes(texts: Sequence[str]) -> list[Wish]:
             raise UsageError(f"--want {w.name}: given twice")
     if not any(w.name == "bandwidth" or w.f for w in wishes):
         raise UsageError(
-            'margins are largest in a loop that does nothing: want what the loop is for, too, --want "bandwidth>20Hz" or '
-            '--want "S at 1Hz<-40dB"'
+            "margins are largest in a loop that does nothing: want what the loop is for, too, "
+            '--want "bandwidth>20Hz" or --want "S at 1Hz<-40dB"'
         )
     return wishes
 
@@ -95,9 +95,8 @@ def _wish(text: str) -> Wish:
     else:
         raise UsageError(f"--want {text}: no measure '{name}'; {suggest_names(name, [*MEASURES, 'S at 1Hz'])}")
     if sign[0] in "<>" and (sign[0] == ">") is not least:
-        raise UsageError(
-            f"--want {text}: of {name} {'more' if least else 'less'} is better; write {'>' if least else '<'} or ="
-        )
+        better, right = ("more", ">") if least else ("less", "<")
+        raise UsageError(f"--want {text}: of {name} {better} is better; write {right} or =")
     number = _factor(text, value) if unit == FACTOR else _positive(text, value, unit)
     if name in ("gain margin", "peak S") and number <= 1.0:
         raise UsageError(f"--want {text}: must be above 0 dB, a factor above 1")
