@@ -19,7 +19,7 @@ from gyrobench.tuning.wishes import Wish
 
 LARGEST = 1e3  # factor of a gain margin that still counts
 HALF_POWER = 0.5**0.5
-FLOOR = 0.01  # of |S| against -3 dB: two decades below a bandwidth no more is asked for
+FLOOR = 0.01  # of |S|: two decades below a bandwidth no more is asked for
 
 
 def peak(f: Array, size: Array) -> float:
@@ -66,9 +66,10 @@ def _wrapped(angle: Array) -> Array:
 
 
 def bandwidth(f: Array, S: Array) -> float:
-    """Return the largest b, Hz, with |S| <= max(f/b, FLOOR)/sqrt(2) up to where |S| first crosses -3 dB from below.
+    """Return the largest b, Hz, with |S| <= f / sqrt(f2 + b2), up to where |S| first crosses -3 dB from below.
 
-    0 where it does not cross.  With S falling by 20 dB a decade or faster below it, b is that crossing.
+    That is |S| of the loop b/(jf): at b it is -3 dB, below b it falls by 20 dB a decade.  Where |S| is below FLOOR no
+    more is asked.  0 where it does not cross.
     """
     above = S >= HALF_POWER
     rises = np.flatnonzero(~above[:-1] & above[1:])
@@ -77,8 +78,9 @@ def bandwidth(f: Array, S: Array) -> float:
     k = rises[0]
     share = np.log(HALF_POWER / S[k]) / np.log(S[k + 1] / S[k])
     crossing = f[k] * (f[k + 1] / f[k]) ** share
-    counts = S[: k + 1] > FLOOR * HALF_POWER
-    return float(min([crossing, *(f[: k + 1][counts] * HALF_POWER / S[: k + 1][counts])]))
+    counts = S[: k + 1] > FLOOR
+    bound = f[: k + 1][counts] * np.sqrt(np.maximum(S[: k + 1][counts] ** -2.0 - 1.0, 0.0))
+    return float(min([crossing, *bound]))
 
 
 def measure(wish: Wish, f: Array, L: Complex) -> float:

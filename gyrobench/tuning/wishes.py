@@ -20,7 +20,11 @@ MEASURES: dict[str, tuple[str, bool, str]] = {
     "gain margin": (FACTOR, True, "factor up or down that brings the loop to its limit, the smaller one"),
     "delay margin": ("s", True, "further delay that brings the loop to its limit"),
     "disk margin": ("1", True, "1 / largest |S - 1/2|: gain and phase together"),
-    "bandwidth": ("Hz", True, "up to it |S| is below -3 dB, and below a line of 20 dB a decade from there down"),
+    "bandwidth": (
+        "Hz",
+        True,
+        "up to it |S| is below that of an integrator that crosses there: -3 dB, and 20 dB a decade down",
+    ),
     "peak S": (FACTOR, False, "largest |S|, S = 1/(1 + L)"),
     "peak T": (FACTOR, False, "largest |T|, T = L/(1 + L)"),
 }
