@@ -91,7 +91,7 @@ def _connected(model: LinearModel, values: Mapping[str, float]) -> Plant:
 
 
 class HeldController:
-    """A continuous controller in the loop: exact for a held input, as stabilizer_lti and stabilizer_lead_lag are."""
+    """A continuous controller in the loop: exact for a held input, as the parts are."""
 
     def __init__(self, controller: Controller, step: float) -> None:
         from scipy.linalg import expm

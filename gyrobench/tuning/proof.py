@@ -24,7 +24,7 @@ from gyrobench.reduction.loops.margins import interpolate_response
 from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_loop_point
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import System
-from gyrobench.tuning.measures import crossovers, gain_limits, measured
+from gyrobench.tuning.robustness import crossovers, gain_limits, measured
 from gyrobench.tuning.wishes import Wish
 
 INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
@@ -61,7 +61,7 @@ class ProvenWish:
 
 @dataclass(frozen=True)
 class Proof:
-    """What a run at a point of the spread measured.  why_not: why nothing was, else ""."""
+    """Measures of a run at a point of the spread.  why_not: why nothing was, else ""."""
 
     values: Mapping[str, float]
     wishes: tuple[ProvenWish, ...]

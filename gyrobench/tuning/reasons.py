@@ -10,9 +10,9 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.measures import crossovers, gain_limits
+from gyrobench.tuning.controller_search import TuningProblem, search
 from gyrobench.tuning.plant import Plant
-from gyrobench.tuning.search import Problem, search
+from gyrobench.tuning.robustness import crossovers, gain_limits
 from gyrobench.tuning.tuned_loop import WishResult
 
 BINDS = 0.02  # of the worst ratio: wishes so near to it bind too
@@ -21,7 +21,7 @@ NEAR = 1.35  # factor of frequency within which a mode limits
 
 
 class Loop(Protocol):
-    """What gives the plants at points of the spread and with another step."""
+    """Source of the plants at points of the spread and with another step."""
 
     step: float
 
@@ -30,7 +30,7 @@ class Loop(Protocol):
 
 
 def reasons_of(
-    loop: Loop, problem: Problem, x: Array, results: Sequence[WishResult], f: Array, loops: Complex
+    loop: Loop, problem: TuningProblem, x: Array, results: Sequence[WishResult], f: Array, loops: Complex
 ) -> list[str]:  # fmt: skip
     """Return the sentences, the limiting wishes first."""
     worst = min(r.ratio for r in results)
@@ -48,9 +48,9 @@ def reasons_of(
     return found
 
 
-def _alone(problem: Problem, result: WishResult) -> str:
+def _alone(problem: TuningProblem, result: WishResult) -> str:
     """Return what the structure gives where only this wish, and stability, counts."""
-    one = Problem(problem.structure, [result.wish], problem.plants, problem.box, problem.f)
+    one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f)
     best = float(np.exp(one.worst(search(one))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)

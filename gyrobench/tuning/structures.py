@@ -2,7 +2,7 @@
 
     pi       1 + w_i/s                              lag      (1 + tau1 s)/(1 + T1 s),  T1 > tau1
     lead     (1 + tau2 s)/(1 + T2 s),  tau2 > T2    notch    (s2 + 2 z_z w s + w2)/(s2 + 2 z_p w s + w2)
-    rolloff  1/(1 + s/w_r)                          lead-lag = lag+lead+pi, that of stabilizer_lead_lag
+    rolloff  1/(1 + s/w_r)                          lead-lag = lag+lead+pi, a lag and a lead network with an integral
 
 A gain is in every structure; it is found from the crossover that the search chooses with the nominal plant.  All other
 frequencies are chosen relative to that crossover, by their logarithm.
@@ -20,34 +20,34 @@ from gyrobench.arrays import Array
 from gyrobench.bench import UsageError, suggest_names
 
 Polynomial = Array  # falling powers of s
-Factor = tuple[Polynomial, Polynomial]
+Ratio = tuple[Polynomial, Polynomial]
 
 
 @dataclass(frozen=True)
-class Block:
+class ControllerFactor:
     """A factor of a controller.  ranges: decades of each number; build(w, numbers) -> num, den, values by name."""
 
     ranges: tuple[tuple[float, float], ...]
-    build: Callable[[float, Sequence[float]], tuple[Factor, dict[str, float]]]
+    build: Callable[[float, Sequence[float]], tuple[Ratio, dict[str, float]]]
 
 
-def _pi(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
+def _pi(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
     corner = w * x[0]
     return (np.array([1.0, corner]), np.array([1.0, 0.0])), {"integral": corner}
 
 
-def _lag(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
+def _lag(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
     tau = 1.0 / (w * x[0])
     T = tau * x[1]
     return (np.array([tau, 1.0]), np.array([T, 1.0])), {"tau1": tau, "T1": T}
 
 
-def _lead(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
+def _lead(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
     tau, T = math.sqrt(x[1]) / (w * x[0]), 1.0 / (w * x[0] * math.sqrt(x[1]))
     return (np.array([tau, 1.0]), np.array([T, 1.0])), {"tau2": tau, "T2": T}
 
 
-def _notch(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
+def _notch(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
     w0, zp, zz = w * x[0], x[1], x[1] * x[2]
     return (
         (np.array([1.0, 2.0 * zz * w0, w0**2]), np.array([1.0, 2.0 * zp * w0, w0**2])),
@@ -55,17 +55,17 @@ def _notch(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
     )
 
 
-def _rolloff(w: float, x: Sequence[float]) -> tuple[Factor, dict[str, float]]:
+def _rolloff(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
     wr = w * x[0]
     return (np.array([1.0]), np.array([1.0 / wr, 1.0])), {"f_rolloff": wr / (2.0 * math.pi)}
 
 
 BLOCKS = {
-    "lag": Block(((-2.0, 0.0), (0.0, 3.0)), _lag),
-    "lead": Block(((-0.7, 1.0), (0.0, 2.3)), _lead),
-    "pi": Block(((-2.5, 0.0),), _pi),
-    "notch": Block(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), _notch),
-    "rolloff": Block(((0.0, 2.0),), _rolloff),
+    "lag": ControllerFactor(((-2.0, 0.0), (0.0, 3.0)), _lag),
+    "lead": ControllerFactor(((-0.7, 1.0), (0.0, 2.3)), _lead),
+    "pi": ControllerFactor(((-2.5, 0.0),), _pi),
+    "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), _notch),
+    "rolloff": ControllerFactor(((0.0, 2.0),), _rolloff),
 }
 NAMES = {"lead-lag": ["lag", "lead", "pi"]}
 
@@ -82,7 +82,7 @@ class Controller:
         return np.asarray(np.polyval(self.num[::-1], s) / np.polyval(self.den[::-1], s))
 
 
-class Structure:
+class ControllerStructure:
     """A structure by its name; ``ranges``: decades of the numbers behind the crossover, which is the first."""
 
     def __init__(self, name: str) -> None:
@@ -99,12 +99,12 @@ class Structure:
                 raise UsageError(f"--structure {name}: {once} stands in it twice")
         order = sum(2 if b == "notch" else 1 for b in self.blocks)
         if order > 8:
-            raise UsageError(f"--structure {name}: of order {order}; stabilizer_lti takes 8")
+            raise UsageError(f"--structure {name}: of order {order}; 8 is the highest")
         self.ranges = [r for b in self.blocks for r in BLOCKS[b].ranges]
 
     @property
     def is_lead_lag(self) -> bool:
-        """True where stabilizer_lead_lag has it."""
+        """True where a lag and a lead network with an integral have it."""
         return sorted(self.blocks) == sorted(set(self.blocks)) and set(self.blocks) <= {"lag", "lead", "pi"}
 
     def controller(self, w: float, numbers: Sequence[float], plant_at: Callable[[float], complex]) -> Controller:

@@ -18,17 +18,17 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
 from gyrobench.system.system import System
-from gyrobench.tuning.measures import crossovers, measured
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
 from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
-from gyrobench.tuning.search import Problem, box, frequencies, polished, search
+from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.spread import Range, parse_spread, points
-from gyrobench.tuning.structures import Controller, Structure
+from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.tuned_loop import TunedLoop, WishResult
 from gyrobench.tuning.wishes import Wish, parse_wishes
 
-OWN, ANY = "stabilizer_lead_lag", "stabilizer_lti"
+ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
 ROUNDS = 3  # of the search for worse points between those of the spread
@@ -54,7 +54,7 @@ def tune(
     want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
     Raises UsageError, TuningError, and what a session raises.
     """
-    wishes, shape = parse_wishes(want), Structure(structure)
+    wishes, shape = parse_wishes(want), ControllerStructure(structure)
     _require_loop(system, parts or {})
     began = time.perf_counter()
     system.nominal = dict(system.overrides)
@@ -78,7 +78,7 @@ def tune(
             "structure, or a smaller spread"
         )
     results = _results(wishes, f, loops, problem.plants)
-    part, settings = _settings(shape, controller, system, parts or {})
+    part, settings = _settings(shape, controller, nominal)
     settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]))
     had = all(r.ratio >= 1.0 for r in results)
     reasons = () if had else tuple(reasons_of(loop, problem, x, results, f, loops))
@@ -120,11 +120,11 @@ class _Loop:
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
 
-    def problem(self, shape: Structure, wishes: Sequence[Wish]) -> Problem:
+    def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
         models = self.plants(points(self.ranges))
         wanted = self.system.crossovers().get("stabilizer")
         decades = box(shape, wishes, wanted, self.step)
-        return Problem(shape, wishes, models, decades, frequencies(models, decades, wishes))
+        return TuningProblem(shape, wishes, models, decades, frequencies(models, decades, wishes))
 
 
 def _has_loop(system: System) -> bool:
@@ -169,7 +169,7 @@ def _known(session: Session, nominal: Mapping[str, Any], name: str) -> tuple[flo
     return float(value), units.unit(bound.unit or "1").dimension
 
 
-def _worse_points(loop: _Loop, problem: Problem, x: Any) -> Any:
+def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
     """Return the controller after worse points of the spread, where there are any, were added to the problem."""
     from scipy.optimize import minimize
 
@@ -185,7 +185,7 @@ def _worse_points(loop: _Loop, problem: Problem, x: Any) -> Any:
             return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
-            one = Problem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f)
+            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f)
             return float(one.judged(controller).min())
 
         found = minimize(
@@ -209,20 +209,32 @@ def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]
 
 
 def _settings(
-    shape: Structure, controller: Controller, system: System, parts: Mapping[str, str]
+    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any]
 ) -> tuple[str, dict[str, Any]]:  # fmt: skip
     """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
-    if shape.is_lead_lag and system.slots[SLOT].part == OWN:
+    if shape.is_lead_lag and all(f"{SLOT}.{n}" in nominal for n in NETWORK):
         neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
         values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
         return "", {f"{SLOT}.{n}": float(f"{values[n]:.9g}") for n in NETWORK}
     direct = len(np.trim_zeros(controller.num, "b")) == len(np.trim_zeros(controller.den, "b"))
-    return ANY, {
+    return _part_of_any(), {
         f"{SLOT}.form": 1,
         f"{SLOT}.num": list(np.trim_zeros(controller.num, "b")),
         f"{SLOT}.den": list(np.trim_zeros(controller.den, "b")),
         **({f"{SLOT}.conditioned": 1} if direct else {}),
     }
+
+
+def _part_of_any() -> str:
+    """Return the part of the bench that takes any transfer function.  Raises TuningError where there is none."""
+    bench = Bench.find()
+    for name, folder in bench.parts().items():
+        text = (folder / "model.py").read_text(encoding="utf-8")
+        if all(f"    {n} = Parameter(" in text for n in ANY):
+            return name
+    raise TuningError(
+        f"the bench has no part that takes a transfer function ({', '.join(ANY)}); use structure lead-lag"
+    )
 
 
 def _crossover(

@@ -16,7 +16,7 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.plant import SLOT
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
-from gyrobench.tuning.structures import Controller, Structure
+from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.wishes import Wish
 
 
@@ -43,7 +43,7 @@ class TunedLoop:
     """
 
     system: str
-    structure: Structure
+    structure: ControllerStructure
     given: Mapping[str, Any]
     part: str
     settings: Mapping[str, Any]

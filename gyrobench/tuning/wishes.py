@@ -1,4 +1,4 @@
-"""What is wanted of a loop, as a person writes it: "phase margin=40deg", "bandwidth>20Hz", "S at 1Hz<-40dB".
+"""Wishes for a loop, as a person writes them: "phase margin=40deg", "bandwidth>20Hz", "S at 1Hz<-40dB".
 
 Inside all are SI: rad, s, Hz; ratios of amplitudes as factors (6dB = 1.995).
 """

@@ -6,8 +6,8 @@ import control
 import numpy as np
 import pytest
 
-from gyrobench.tuning.measures import measure, peak
-from gyrobench.tuning.structures import Structure
+from gyrobench.tuning.robustness import measure, peak
+from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.wishes import parse_wishes
 
 F = np.geomspace(1e-3, 1e3, 800)
@@ -67,7 +67,7 @@ def test_a_peak_between_frequencies() -> None:
 def test_structures_are_what_their_equations_say() -> None:
     """K (1 + tau1 s)(1 + tau2 s)/((1 + T1 s)(1 + T2 s))(1 + integral/s), and notch and roll-off; |L| = 1 at w."""
     s = 1j * np.geomspace(0.1, 1e4, 30)
-    c = Structure("lead-lag").controller(30.0, [0.1, 20.0, 1.5, 9.0, 0.05], lambda f: 0.25j)
+    c = ControllerStructure("lead-lag").controller(30.0, [0.1, 20.0, 1.5, 9.0, 0.05], lambda f: 0.25j)
     v = c.values
     expected = (
         v["K"] * (1 + v["tau1"] * s) * (1 + v["tau2"] * s) / ((1 + v["T1"] * s) * (1 + v["T2"] * s))
@@ -75,7 +75,7 @@ def test_structures_are_what_their_equations_say() -> None:
     assert c.response(s) == pytest.approx(expected, rel=1e-7)
     assert v["T1"] == pytest.approx(20.0 * v["tau1"]) and v["tau2"] == pytest.approx(9.0 * v["T2"])
     assert abs(c.response(np.array([30j]))[0]) == pytest.approx(4.0, rel=1e-7)
-    c = Structure("notch+rolloff").controller(30.0, [2.0, 0.3, 0.1, 5.0], lambda f: 1.0)
+    c = ControllerStructure("notch+rolloff").controller(30.0, [2.0, 0.3, 0.1, 5.0], lambda f: 1.0)
     w0 = 2.0 * np.pi * c.values["f_notch"]
     assert w0 == pytest.approx(60.0)
     assert c.response(np.array([1j * w0]))[0] == pytest.approx(0.1 * c.values["K"] / (1.0 + 60j / 150.0), rel=1e-6)

@@ -16,10 +16,10 @@ from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
 from gyrobench.record.frequency_response import model_response
 from gyrobench.system.system import load_system
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, search
 from gyrobench.tuning.plant import HeldController, plants
-from gyrobench.tuning.search import Problem, box, frequencies, search
 from gyrobench.tuning.spread import Range, points
-from gyrobench.tuning.structures import Structure, rounded
+from gyrobench.tuning.structures import ControllerStructure, rounded
 from gyrobench.tuning.tune_loop import tunable, tune
 from gyrobench.tuning.wishes import parse_wishes
 
@@ -122,11 +122,11 @@ def test_the_proof_measured_what_the_model_says(tuned) -> None:
 
 
 def test_the_search_finds_what_a_grid_finds() -> None:
-    """Structure pi, two numbers: the worst ratio within 2 % of the best of 70 x 70 controllers (or above it)."""
+    """Factor pi, two numbers: the worst ratio within 2 % of the best of 70 x 70 controllers (or above it)."""
     found, _, _, step = models(NAMES[0], points([Range("platform.J", 1.4, 2.6, "kg.m2")])[:3])
-    wishes, shape = parse_wishes(["phase margin=40deg", "bandwidth>3Hz"]), Structure("pi")
+    wishes, shape = parse_wishes(["phase margin=40deg", "bandwidth>3Hz"]), ControllerStructure("pi")
     decades = box(shape, wishes, None, step)
-    problem = Problem(shape, wishes, found, decades, frequencies(found, decades, wishes, 200))
+    problem = TuningProblem(shape, wishes, found, decades, frequencies(found, decades, wishes, 200))
     best = problem.worst(search(problem))
     every = [
         problem.worst(np.array([a, b])) for a in np.linspace(*decades[0], 70) for b in np.linspace(*decades[1], 70)

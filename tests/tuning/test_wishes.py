@@ -8,7 +8,7 @@ import pytest
 
 from gyrobench.bench import UsageError
 from gyrobench.tuning.spread import parse_spread, points
-from gyrobench.tuning.structures import Structure
+from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.wishes import parse_wishes
 
 FAST = "bandwidth>20Hz"
@@ -99,9 +99,9 @@ def test_spreads_refused(text: str, message: str) -> None:
     [
         ("pid", "no factor 'pid'"),
         ("pi+pi", "pi stands in it twice"),
-        ("notch+notch+notch+notch+lead", "of order 9; stabilizer_lti takes 8"),
+        ("notch+notch+notch+notch+lead", "of order 9; 8 is the highest"),
     ],
 )
 def test_structures_refused(name: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        Structure(name)
+        ControllerStructure(name)

@@ -16,9 +16,9 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.measures import grid, measured
 from gyrobench.tuning.plant import HeldController, Plant
-from gyrobench.tuning.structures import Controller, Structure
+from gyrobench.tuning.robustness import grid, measured
+from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.wishes import Wish
 
 LOOK = 512  # controllers of the coarse look
@@ -30,10 +30,10 @@ CAP = np.log(100.0)  # more than that is no better
 
 
 @dataclass
-class Problem:
-    """What is wanted of which loops.  box: decades of crossover, rad/s, and of the structure's numbers."""
+class TuningProblem:
+    """Wishes, and the loops that they are of.  box: decades of crossover, rad/s, and of the structure's numbers."""
 
-    structure: Structure
+    structure: ControllerStructure
     wishes: Sequence[Wish]
     plants: list[Plant]
     box: Array  # (numbers, 2)
@@ -73,13 +73,13 @@ class Problem:
         return float(self.ratios(x).min())
 
 
-def search(problem: Problem) -> Array:
+def search(problem: TuningProblem) -> Array:
     """Return the decades of the best controller that was found."""
     from scipy.optimize import minimize
     from scipy.stats import qmc
 
     low, high = problem.box.T
-    many = Problem(problem.structure, problem.wishes, problem.plants[:1], problem.box, problem.f)
+    many = TuningProblem(problem.structure, problem.wishes, problem.plants[:1], problem.box, problem.f)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
     looked = [(many.worst(x), x) for x in low + cube * (high - low)]
     starts: list[Array] = []
@@ -108,7 +108,7 @@ def search(problem: Problem) -> Array:
     return max((polished(problem, x) for x in ends[:2]), key=problem.worst)
 
 
-def polished(problem: Problem, x: Array, rounds: int = 40) -> Array:
+def polished(problem: TuningProblem, x: Array, rounds: int = 40) -> Array:
     """Return a better x near one: trust region steps of linear programs in t <= ln ratio_ik + gradient dx."""
     from scipy.optimize import linprog
 
@@ -143,7 +143,7 @@ def polished(problem: Problem, x: Array, rounds: int = 40) -> Array:
     return x
 
 
-def box(structure: Structure, wishes: Sequence[Wish], wanted: float | None, step: float) -> Array:
+def box(structure: ControllerStructure, wishes: Sequence[Wish], wanted: float | None, step: float) -> Array:
     """Return the decades of crossover (rad/s) and of the structure's numbers.  wanted: Hz, of the system's design."""
     top = 0.2 / step
     widths = [w.value for w in wishes if w.name == "bandwidth"]
