@@ -136,7 +136,7 @@ def site(
         typer.Option("--publish", metavar="DIR", help="Folder for all of it, reports included."),
     ] = None,
 ) -> None:
-    """Write the site of a campaign: static pages that open from disk.
+    """Write the site of a campaign: pages that open from disk.
 
     Answer, table of runs, coverage, responses, distributions, failures; of measured lots control charts, tolerance
     intervals, outliers, verdicts.

@@ -43,7 +43,7 @@ def tune(
     seed: Seed = 1,
     as_json: Json = False,
 ) -> None:
-    """Tune the stabilizer of a loop for wanted margins and bandwidth.
+    """Tune a stabilizer loop for wanted margins.
 
     The linear models are those of the parts; what is wanted holds in the worst case over the spread, and is proven in
     co-simulation with noise, friction and limits as they are.  Print the controller as values that are ready to run.
