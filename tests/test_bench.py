@@ -183,8 +183,9 @@ BELOW = {*ROOMS}
 #: from a request to a result, for the commands and the library
 ROOMS["workflow"] = BELOW
 ROOMS["design"] = BELOW
+ROOMS["tuning"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
-ROOMS["library"] = BELOW | {"workflow", "design", "campaign"}
+ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
 #: the face in the browser; that of the shell is in FACES, and neither imports the other
 ROOMS["studio"] = BELOW | {"workflow", "library"}
 #: rooms inside a room -> rooms beside them that they may import
