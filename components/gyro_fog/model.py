@@ -16,13 +16,13 @@ class GyroFog(RateGyro):
         closed loop: w (1 + S_T dT) / (1 - reset_error), then the dead band: sign sqrt(w2 - dead_band2)
         open loop:   (1 + power_error) sin(depth (1 + depth_error)) / sin(depth) sin(phi) / S_0
         white noise (two-sided density), s = R P sin(depth) / 2:
-        N2 S_0 2 = [e R P (1 + cos depth)/2 + 2 k_B theta / load] / s2 + (1 + cos depth)/(1 - cos depth) lambda2/(c dlambda)
-        and `electronics` beside it
+        N2 S_0 2 = [e R P (1 + cos depth)/2 + 2 k_B theta / load] / s2
+                   + (1 + cos depth)/(1 - cos depth) lambda2/(c dlambda),   and `electronics` beside it
         Shupe: n index_T L / (6 D) gradient T',   T' = (temperature - T) / lag
 
     Open loop folds where abs(phi) is above pi/2, and says so (saturated).
-    Not modelled: bandwidth of the loop, transit time, noise that carries a rate through the dead band, noise of the open
-    loop at large phases, polarization, Kerr and Faraday effect beyond the linear `magnetic`, vibration.
+    Not modelled: bandwidth of the loop, transit time, noise that carries a rate through the dead band, noise of the
+    open loop at large phases, polarization, Kerr and Faraday effect beyond the linear `magnetic`, vibration.
     Source: Lefevre 2014; Shupe 1980; IEEE 952; derivation in GYRO-FOG.
     """
 

@@ -36,7 +36,7 @@ class GyroLaser(RateGyro):
     stripped = Parameter(1.0, "1", "1: the dither is removed from the output, 0: it is in it", min=0.0, max=1.0)
     langmuir = Parameter(0.0, "rad/s/A", "bias per difference of the discharge currents")
     current_difference = Parameter(0.0, "A", "difference of the currents of the two arms")
-    white = Noise(0.0, "rad/s/sqrt(Hz)", "white noise beside that of lock-in", samples=2)
+    quantum = Noise(0.0, "rad/s/sqrt(Hz)", "white noise beside that of lock-in (quantum limit)", samples=2)
     crossings = Noise(1.0, "1/sqrt(Hz)", "white noise of lock-in as computed: 1; 0: none", samples=2)
     counting = Parameter(4.0, "1", "counts a fringe: 1, 2 or 4; 0: not counted", min=0.0, max=4.0)
     range_max = Parameter(0.0, "rad/s", "largest rate; 0: no limit", min=0.0)
@@ -86,7 +86,7 @@ class GyroLaser(RateGyro):
                     w = w - 0.5 * sign(w) * self.lock_in * self.lock_in / root
             else:
                 w = locked(w, self.lock_in)
-            self.measured[j] = w + self.noise.white[j] + shaken
+            self.measured[j] = w + self.noise.quantum[j] + shaken
         self.limit(self.range_max)
         self.counter.count()
 
@@ -94,4 +94,4 @@ class GyroLaser(RateGyro):
         crossing = 0.0
         if self.dither > 0.0:
             crossing = self.lock_in * self.lock_in / (self.k * self.dither)
-        self.density = sqrt(crossing * self.crossings * self.crossings + self.white * self.white)
+        self.density = sqrt(crossing * self.crossings * self.crossings + self.quantum * self.quantum)

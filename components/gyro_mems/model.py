@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from gyrobench.component import Discrete, Input, Noise, Output, Parameter, State, sampled
+from gyrobench.component import Discrete, Noise, Output, Parameter, State, sampled
 from gyrobench.component.blocks.rate_gyro import RateGyro
 from gyrobench.component.math import Vector, floor, pi, sqrt, vector
 
@@ -10,7 +10,7 @@ DEG = pi / 180.0
 class GyroMems(RateGyro):
     """Two-axis rate gyro as a data sheet describes it: noise, bias instability, filter, range, word.  [GYRO-MEMS]
 
-        s_j = scaled rate along row j of axes + cubic w3 + drift_j + g_j f + white
+        s_j = scaled rate along row j of axes + cubic w3 + drift_j + white
         y'' = wn2 (s - y) - sqrt(2) wn y',   wn = 2 pi bandwidth                              Butterworth, second order
         rate = y within +-range_max, sampled every `period`, in steps of `resolution`
 
@@ -24,14 +24,11 @@ class GyroMems(RateGyro):
 
     axes = Parameter([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], "1", "rows: sensitive axes in gyro axes (misalignment)")
     cubic = Parameter(0.0, "s2/rad2", "nonlinearity: relative change of the scale factor per rate squared")
-    g = Parameter([[0.0] * 3] * 2, "s/m", "rows: change of each bias with the specific force along x, y, z")
     white = Noise(0.035 * DEG, "rad/s/sqrt(Hz)", "white noise density N (0.05 deg/s/sqrt(Hz) one-sided)", samples=2)
     bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
     range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
     period = Parameter(0.0, "s", "time between two output samples; 0: every step", min=0.0)
     resolution = Parameter(0.0, "rad/s", "step of the output word; 0: none", min=0.0)
-
-    f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, head axes")
 
     density = Output("rad/s/sqrt(Hz)", "density N of the white noise (angle random walk)")
 
@@ -49,11 +46,9 @@ class GyroMems(RateGyro):
         """Return the rates of both axes without white noise."""
         w = self.mount @ self.omega
         leaning = vector([vector(self.axes[0]) @ w, vector(self.axes[1]) @ w])
-        force = self.mount @ self.f
         out = self.scaled(leaning, self.temperature) + self.drift_rates(self.temperature)
         for j in range(2):
-            cube = self.cubic * leaning[j] * leaning[j] * leaning[j]
-            out[j] = out[j] + cube + vector(self.g[j]) @ force
+            out[j] = out[j] + self.cubic * leaning[j] * leaning[j] * leaning[j]
         return vector(out)
 
     def flow(self) -> None:

@@ -41,11 +41,11 @@ class AngleCounter(Block):
 
 
 class RateGyro(Component):
-    """Common part of rate gyros with the axes x and y: mount, scale factor, drift, ports.  [NORTH-COMMON]
+    """Common part of rate gyros with the axes x and y: mount, scale factor, drift, ports.  [DRIFT-RANDOM-ALLAN]
 
         w = mount omega                                                   T: temperature above that of the coefficients
         scaled_j = (1 + scale_j + scale_T T + sign(w_j) asymmetry / 2) w_j
-        drift_j  = bias_j + bias_T_j T + magnetic_j B + turn-on bias + flicker + random walk        [DRIFT-RANDOM-ALLAN]
+        drift_j  = bias_j + bias_T_j T + magnetic_j B + g_j f + turn-on bias + flicker + random walk
 
     The measured rate is that of the internal step that ends; the drift is in the sign of the rate (an indicated rate).
     """
@@ -58,6 +58,7 @@ class RateGyro(Component):
     bias = Parameter([0.0, 0.0], "rad/s", "bias of each axis")
     bias_T = Parameter([0.0, 0.0], "rad/s/K", "change of the bias with temperature")
     magnetic = Parameter([[0.0] * 3] * 2, "rad/s/T", "rows: change of each bias with the field along x, y, z")
+    g = Parameter([[0.0] * 3] * 2, "s/m", "rows: change of each bias with the specific force along x, y, z")
     mount = Rotation("rows: gyro axes x, y, z in head axes")
     turn_on = Noise(0.0, "rad/s", "rms of the turn-on bias, one value a run", per="start", samples=2)
     flicker_x = Flicker("rad/s", "drift, x axis", tau="flicker_tau")
@@ -67,6 +68,7 @@ class RateGyro(Component):
     walk_y = RateRandomWalk("rad/s", "rad/s2/sqrt(Hz)", "drift, y axis")
 
     omega = Input([0.0, 0.0, 0.0], "rad/s", "inertial rate, head axes")
+    f = Input([0.0, 0.0, 0.0], "m/s2", "specific force a - G, head axes")
     temperature = Input(0.0, "K", "mean temperature above that of the coefficients")
     B = Input([0.0, 0.0, 0.0], "T", "magnetic field, head axes")
 
@@ -86,11 +88,12 @@ class RateGyro(Component):
     def drift_rates(self, T: Number) -> Vector:
         """Return the drift of both axes."""
         field = self.mount @ self.B
+        force = self.mount @ self.f
         wander = vector([self.flicker_x_value + self.walk_x_value, self.flicker_y_value + self.walk_y_value])
         out = vector([0.0, 0.0])
         for j in range(2):
             out[j] = self.bias[j] + self.bias_T[j] * T + vector(self.magnetic[j]) @ field
-            out[j] = out[j] + self.noise.turn_on[j] + wander[j]
+            out[j] = out[j] + vector(self.g[j]) @ force + self.noise.turn_on[j] + wander[j]
         return vector(out)
 
     def limit(self, range_max: Number) -> None:
