@@ -145,9 +145,10 @@ def truth_of(record: Record) -> dict[str, float]:
     p: dict[str, Any] = dict(run.parameters)
     if run_metadata.reads_rate(run):
         out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN_X.items() if f"gyro.{name}" in p}
-        shown = record.channels.get("gyro.density", ())
-        if len(shown) or "gyro.white_x" in p:
-            out["N"] = float(shown[0]) if len(shown) else float(p["gyro.white_x"])
+        if "gyro.density" in record.channels:
+            out["N"] = float(record.channels["gyro.density"][0])
+        elif "gyro.white_x" in p:
+            out["N"] = float(p["gyro.white_x"])
         return out
     out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN.items() if f"gyro.{name}" in p}
     if p.get("gyro.pickoff") or not p.get("gyro.quantization"):

@@ -35,7 +35,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],mean [mA]
 """
 ATTITUDE = "service attitude"
-COLUMNS = (
+COLUMNS: tuple[CsvColumn, ...] = (
     CsvColumn("t_start", "s", "start of the reading"),
     CsvColumn("t_end", "s", "end of the reading"),
     CsvColumn("mean", "A", "mean torquer current"),
