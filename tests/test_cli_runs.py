@@ -58,6 +58,7 @@ def test_run_prints_table_verdict_step_check_and_paths(runs: Path) -> None:
     assert text.endswith("verdict: pass\na/result.json\na/report.html\na/report.pdf\n")
     assert {p.name for p in (runs / "a").iterdir()} == {
         "run.json", "record.parquet", "channels.parquet", "result.json", "report.html", "report.pdf",
+        "manifest.json",
     }  # fmt: skip
     assert "verdict: fail" in (runs / "b.txt").read_text(encoding="utf-8")
 
@@ -66,6 +67,25 @@ def test_step_check_changes_less_than_a_tenth_of_u(runs: Path) -> None:
     check = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))["step_check"]
     assert len(check["rows"]) == 9
     assert check["worst"] == max(r["ratio"] for r in check["rows"]) < 0.1
+
+
+def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: Call, runs: Path) -> None:
+    code, out, _ = gyrobench("verify", runs / "b")  # without pages
+    assert code == 0 and "all 4 files as they were written" in out
+    assert gyrobench("sign", "--new-key", "lab.key") == (
+        0,
+        "lab.pub: give it to those who verify; keep lab.key to yourself\n",
+        "",
+    )
+    assert gyrobench("sign", runs / "b", "--key", "lab.key")[0] == 0
+    assert "signed by lab.pub" in gyrobench("verify", runs / "b", "--key", "lab.pub")[1]
+    result, kept = runs / "b" / "result.json", (runs / "b" / "result.json").read_bytes()
+    result.write_bytes(kept.replace(b'"verdict": "fail"', b'"verdict": "pass"'))
+    code, _, err = gyrobench("verify", runs / "b")
+    assert code == 1 and "- result.json: changed after the report was written" in err
+    result.write_bytes(kept)
+    code, _, err = gyrobench("sign", runs / "b")
+    assert code == 2 and "name a folder and the --key that signs it" in err
 
 
 def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
@@ -110,7 +130,7 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
     code, out, _ = gyrobench(*run, "--no-report", pages=True)
     assert code == 0 and out.rstrip().endswith("r/result.json") and "D_I" in out
     assert {f.name for f in (tmp_path / "r").iterdir()} == {
-        "run.json", "record.parquet", "channels.parquet", "result.json",
+        "run.json", "record.parquet", "channels.parquet", "result.json", "manifest.json",
     }  # fmt: skip
     again = json.loads((tmp_path / "r" / "result.json").read_bytes())
     assert again["coefficients"] == json.loads(before)["coefficients"]

@@ -230,3 +230,76 @@ def record(
     assert to is TableFormat.csv
     for file in Record.load(require_run(folder)).to_csv(out or folder / "csv"):
         echo(display_path(file))
+
+
+@app.command()
+def verify(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a run or of a suite.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE.pub", help="Public key that the signature must belong to.")
+    ] = None,
+) -> None:
+    """Verify that a report is as it was written, and signed.
+
+    \b
+    Example: gyrobench verify reports/out/tumble_single_axis/e567487f --key laboratory.pub
+    """
+    from gyrobench.workflow import manifest
+
+    found = manifest.verify(folder, key)
+    for name in found.files:
+        echo(f"  as written  {name}")
+    for name in found.others:
+        echo(f"  not covered {name}")
+    signed = f"signed by {key}" if found.signed else "signature not asked for (--key)"
+    echo(f"report {found.report_id}: all {len(found.files)} files as they were written; {signed}")
+
+
+@app.command()
+def certificate(
+    runs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of runs of one test.")],
+    laboratory: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Profile; default laboratory.toml, here or in the bench.")
+    ] = None,
+    number: Annotated[str, typer.Option(help="Number of the certificate; default: that of the report.")] = "",
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: the working folder.")] = None,
+) -> None:
+    """Write the certificate of an instrument, or of a lot.
+
+    One or two pages of what the laboratory answers for; the reports must verify.
+
+    \b
+    Example: gyrobench certificate reports/out/tumble_single_axis/measured-47e4353f --number 2026-014
+    """
+    from gyrobench.workflow.certificate import write_certificate
+
+    for path in write_certificate(runs, laboratory, number, out):
+        echo(display_path(path))
+
+
+@app.command()
+def sign(
+    folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Folder of a run or of a suite.")] = None,
+    key: Annotated[Path | None, typer.Option(metavar="FILE.key", help="Private key, Ed25519 in PEM.")] = None,
+    new_key: Annotated[
+        Path | None, typer.Option(metavar="FILE.key", help="Make a key; its public part gets the suffix .pub.")
+    ] = None,
+    passphrase: Annotated[bool, typer.Option("--passphrase", help="Ask for the passphrase of the key.")] = False,
+) -> None:
+    """Sign a report with the key of the laboratory.
+
+    \b
+    Examples:
+      gyrobench sign --new-key laboratory.key
+      gyrobench sign reports/out/tumble_single_axis/e567487f --key laboratory.key
+    """
+    from gyrobench.workflow import manifest
+
+    if (new_key is None) == (folder is None) or (folder is None) != (key is None):
+        raise UsageError("name a folder and the --key that signs it, or a --new-key to make")
+    secret = typer.prompt("passphrase", hide_input=True, confirmation_prompt=folder is None) if passphrase else None
+    if folder is not None and key is not None:
+        echo(display_path(manifest.sign(folder, key, secret)))
+    elif new_key is not None:
+        public = display_path(manifest.new_key(new_key, secret))
+        echo(f"{public}: give it to those who verify; keep {new_key} to yourself")

@@ -5,10 +5,13 @@ from __future__ import annotations
 import functools
 import json
 import re
+import shutil
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from gyrobench.files import temporary_folder
 from gyrobench.reading import visible
 from gyrobench.report.assets import content_dir, read_content
 from gyrobench.report.page_model import Equation, Page, walk
@@ -22,6 +25,15 @@ def equations(page: Page) -> None:
     for section in page.sections:
         for k, block in enumerate(b for b in walk(section.blocks) if isinstance(b, Equation)):
             block.svg = equation_svg(block.source, f"equation-{section.slug}-{k}")
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield every text of a page."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _texts(inner)
 
 
 def _typst(files: dict[str, bytes], **options: Any) -> Any:
@@ -66,8 +78,11 @@ def html(page: Page, bench: Path | None = None) -> str:
 
 
 def pdf(page: Page, bench: Path | None = None) -> bytes:
-    """Return the page as a PDF (A4, searchable text, vector figures)."""
-    import matplotlib
+    """Return the page as a PDF (A4, searchable text, vector figures).
+
+    Raises MissingFontError where it has characters that no font of the machine has.
+    """
+    from gyrobench.report.fonts import fonts_for
 
     data = _plain(asdict(page))
     files: dict[str, bytes] = {"main.typ": read_content("templates/report.typ", bench).encode()}
@@ -77,10 +92,24 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
     for section in data["sections"]:
         for block in section["blocks"]:
             _strip(block)
+    others = fonts_for(_texts(data), bench)
+    data["fonts"] = [font.family for font in others]
     files["data.json"] = json.dumps(data, ensure_ascii=False).encode()
-    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    made: bytes = _typst(files, font_paths=[str(fonts)])
+    folder = _font_folder(tuple(font.path for font in others))
+    made: bytes = _typst(files, font_paths=[str(folder)])
     return made
+
+
+@functools.lru_cache(maxsize=8)
+def _font_folder(others: tuple[Path, ...]) -> Path:
+    """Return a folder with DejaVu Sans and other fonts alone: matplotlib's own holds one that draws boxes."""
+    import matplotlib
+
+    folder = temporary_folder()
+    own = sorted((Path(matplotlib.get_data_path()) / "fonts" / "ttf").glob("DejaVuSans*.ttf"))
+    for k, path in enumerate((*own, *others)):
+        shutil.copyfile(path, folder / f"{k}{path.suffix}")
+    return folder
 
 
 def _plain(value: Any, key: str = "") -> Any:

@@ -6,6 +6,7 @@ so that a figure looks the same on every machine.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 from collections.abc import Iterator, Sequence
@@ -114,6 +115,7 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+    _in_any_script(fig)
     buffer = io.StringIO()  # not by savefig, which draws everything twice
     canvas: Any = FigureCanvasSVG(fig)
     canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
@@ -122,6 +124,22 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
         low, high = (float(v) for v in zoom.get_xlim())
         text = text.replace("<svg ", f'<svg data-x0="{low!r}" data-x1="{high!r}" ', 1)
     return text
+
+
+def _in_any_script(fig: Any) -> None:
+    """Give the texts of a figure the fonts of the machine where DejaVu Sans lacks a character (names of runs)."""
+    from matplotlib.font_manager import fontManager
+    from matplotlib.text import Text
+
+    from gyrobench.report.fonts import MissingFontError, fonts_for
+
+    texts = [t for t in fig.findobj(Text) if not t.get_text().isascii()]
+    with contextlib.suppress(MissingFontError):  # the PDF says which, a page shows the name beside the figure
+        others = fonts_for(t.get_text() for t in texts)
+        for font in others:
+            fontManager.addfont(str(font.path))
+        for text in texts if others else []:
+            text.set_fontfamily([*text.get_fontfamily(), *(font.family for font in others)])
 
 
 def clean_svg(text: str, key: str) -> str:

@@ -19,6 +19,7 @@ from gyrobench.system.system import System
 
 RECORD = (RUN, "record.parquet", "record.csv", "channels.parquet", "channels.csv", checkpoint.FILE)
 REPORT = ("result.json", "report.html", "report.pdf")
+MANIFEST, SIGNATURE = "manifest.json", "manifest.json.sig"
 
 
 def prepare_run_folder(
@@ -156,7 +157,7 @@ def prepare_folder(folder: Path, identity: Mapping[str, Any], force: bool) -> Pa
                 f"{display_path(folder)}: holds another run (its {', '.join(changed)} differ); name another folder, "
                 "or replace it: --force (force=True)"
             )
-        for name in (*RECORD, *REPORT) if changed else ():
+        for name in (*RECORD, *REPORT, MANIFEST, SIGNATURE) if changed else ():
             (folder / name).unlink(missing_ok=True)
     folder.mkdir(parents=True, exist_ok=True)
     return folder

@@ -17,6 +17,7 @@ from gyrobench.result import Result, StepCheck
 from gyrobench.result_content import typed
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_limits
+from gyrobench.workflow.manifest import write_manifest
 from gyrobench.workflow.user_errors import PostRunError, record_kept
 
 
@@ -49,7 +50,9 @@ def write_report(
         return {}
     for kind in set(FORMATS) - set(formats):
         (folder / NAMES[kind]).unlink(missing_ok=True)
-    return write(result, folder, formats, (record and record.channels) or None, Bench.find().folder)
+    paths = write(result, folder, formats, (record and record.channels) or None, Bench.find().folder)
+    write_manifest(folder)
+    return paths
 
 
 def reduce_saved_run(folder: Path, system: System, spec: Path | None, formats: Sequence[str] = FORMATS) -> RunOutcome:
