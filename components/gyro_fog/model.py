@@ -27,6 +27,7 @@ class GyroFog(RateGyro):
     """
 
     version = "1.0.0"
+    white_noise, without_own_noise = "electronics", {"optical": 0.0}
 
     length = Parameter(1000.0, "m", "length of the fibre of a coil, L", above=0.0)
     diameter = Parameter(0.1, "m", "diameter of a coil, D", above=0.0)

@@ -25,6 +25,7 @@ class GyroLaser(RateGyro):
     """
 
     version = "1.0.0"
+    white_noise, without_own_noise = "quantum", {"lock_in": 0.0, "counting": 0.0}
 
     perimeter = Parameter(0.3, "m", "perimeter of the ring, L", above=0.0)
     area = Parameter(4.33e-3, "m2", "area of the ring, A (triangle of 0.1 m)", above=0.0)

@@ -21,6 +21,7 @@ class GyroMems(RateGyro):
     """
 
     version = "1.0.0"
+    white_noise = "white"
 
     axes = Parameter([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], "1", "rows: sensitive axes in gyro axes (misalignment)")
     cubic = Parameter(0.0, "s2/rad2", "nonlinearity: relative change of the scale factor per rate squared")

@@ -1,6 +1,8 @@
-"""What rate gyros share: mount, scale factor, bias and its drift, lock-in, counting of angle increments."""
+"""Rate gyros: mount, scale factor, bias and its drift, lock-in, counting of angle increments, which they share."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 from gyrobench.component.blocks.random_drift import Flicker, RateRandomWalk
 from gyrobench.component.component import Component
@@ -50,6 +52,10 @@ class RateGyro(Component):
     The measured rate is that of the internal step that ends; the drift is in the sign of the rate (an indicated rate).
     """
 
+    #: for data sheets: the parameter that is the white noise, and the values with which the part computes none itself
+    white_noise: ClassVar[str] = ""
+    without_own_noise: ClassVar[dict[str, float]] = {}
+
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     scale = Parameter([0.0, 0.0], "1", "relative errors of the scale factors", min=-0.1, max=0.1)
     scale_T = Parameter(0.0, "1/K", "change of the scale factor with temperature, relative")
@@ -58,7 +64,7 @@ class RateGyro(Component):
     bias = Parameter([0.0, 0.0], "rad/s", "bias of each axis")
     bias_T = Parameter([0.0, 0.0], "rad/s/K", "change of the bias with temperature")
     magnetic = Parameter([[0.0] * 3] * 2, "rad/s/T", "rows: change of each bias with the field along x, y, z")
-    g = Parameter([[0.0] * 3] * 2, "s/m", "rows: change of each bias with the specific force along x, y, z")
+    g = Parameter([[0.0] * 3] * 2, "rad.s/m", "rows: change of each bias with the specific force along x, y, z")
     mount = Rotation("rows: gyro axes x, y, z in head axes")
     turn_on = Noise(0.0, "rad/s", "rms of the turn-on bias, one value a run", per="start", samples=2)
     flicker_x = Flicker("rad/s", "drift, x axis", tau="flicker_tau")

@@ -33,6 +33,7 @@ class RateReading(RebalanceTest):
     The option reading says which; a part in the slot gyro that has an output rate sets it.
     """
 
+    rate_gyro: ClassVar[str]  # the part that stands in the slot gyro where a rate is read, unless another one is given
     reads: ClassVar[dict[str, Option]] = {
         "reading": Option(CURRENT, str, "what is read: current (torque rebalance), or rate (of a rate gyro, axis x)")
     }
@@ -57,7 +58,7 @@ class RateReading(RebalanceTest):
         for changed in ("slots", "wires", "channels", "noises", "assumed", "read_by", "windows"):
             vars(self).pop(changed, None)
         if self.reads_rate:
-            slots = on_table(table=self.slots["table"], gyro=Slot("RateGyro", "gyro_rate"))
+            slots = on_table(table=self.slots["table"], gyro=Slot("RateGyro", self.rate_gyro))
             vars(self).update(
                 slots=slots,
                 wires=TableTest.wires + RATE_GYRO,
