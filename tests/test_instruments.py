@@ -39,9 +39,10 @@ def test_there_are_some() -> None:
         assert set(parameters(sheet)) <= set(load_part(sheet.part).declarations)
 
 
-@pytest.mark.parametrize(
-    "name", [n for n in SHEETS if {"noise_density", "angle_random_walk"} <= set(find_instrument(n).figures)]
-)
+BOTH = [n for n in SHEETS if {"noise_density", "angle_random_walk"} <= set(find_instrument(n).figures)]
+
+
+@pytest.mark.parametrize("name", BOTH)
 def test_noise_density_and_random_walk_of_a_sheet_agree(name: str) -> None:
     """The density is one-sided: n / sqrt 2 is the random walk, within the rounding of the two figures."""
     sheet = find_instrument(name)
