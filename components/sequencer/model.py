@@ -19,7 +19,8 @@ class Sequencer(Component):
         settle  t - t_move >= settle
         open    the gate is open: 1 (hold, index and servo phases; windows by time) until t - t_open >= dwell
                 and, in a servo phase, |angle - angle_open| >= travel too;
-                2 (rate phases; windows by angle) until |angle - angle_open| >= travel + window / 100
+                2 (rate phases; windows by angle) until |angle - angle_open| >= travel + window / 100;
+                rate phases without travel have windows by time, as a hold phase: a second axis may turn alone
         close   GUARD further samples with the gate open
 
     so that a sampler which receives gate or angle a sample late or early, or an encoder with a coarse quantum,
@@ -41,8 +42,8 @@ class Sequencer(Component):
     targets = Parameter([0.0] * 99, "1", "target of each phase: angle in rad (index), rate in rad/s (rate)")
     targets_y = Parameter([0.0] * 99, "1", "target of each phase for a second axis, same mode: rad or rad/s")
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
-    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo)")
-    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate; servo: at least)")
+    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo; rate without travel)")
+    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate, 0: by dwell; servo: at least)")
     windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo) or rad (rate)")
     face_of = Parameter([1] * 99, int, "which of the faces each phase uses, from 1")
     faces = Parameter([IDENTITY] * 12, "1", "mounts: rows of the face matrix one after the other")
@@ -82,20 +83,21 @@ class Sequencer(Component):
                 self.face_of[p] < 1.0 or self.face_of[p] > 12.0 or self.face_of[p] != floor(self.face_of[p]),
                 "phase {bad_phase}: face_of must be 1 to 12",
             )
+            by_angle = self.modes[p] == 2.0 and self.travel[p] > 0.0
             self.refuse(
-                rate and self.targets[p] == 0.0,
+                rate and self.targets[p] == 0.0 and (by_angle or self.targets_y[p] == 0.0),
                 "phase {bad_phase}: the table does not turn: a rate phase needs a target other than 0",
             )
             self.refuse(
-                rate and self.travel[p] <= 0.0,
-                "phase {bad_phase}: a rate phase needs a travel above 0 rad",
+                rate and self.travel[p] < 0.0,
+                "phase {bad_phase}: a rate phase needs a travel above 0 rad, or none and a dwell",
             )
             self.refuse(
-                not rate and self.dwell[p] <= 0.0,
-                "phase {bad_phase}: a hold, index or servo phase needs a dwell above 0 s",
+                not by_angle and self.dwell[p] <= 0.0,
+                "phase {bad_phase}: a hold, index or servo phase, or a rate phase without travel, needs a dwell > 0 s",
             )
             self.refuse(self.windows[p] <= 0.0, "phase {bad_phase}: the window must be above 0")
-            longest = (self.travel[p] if rate else self.dwell[p]) * (1.0 + 1e-9)
+            longest = (self.travel[p] if by_angle else self.dwell[p]) * (1.0 + 1e-9)
             self.refuse(
                 self.windows[p] > longest,
                 "phase {bad_phase}: the window is longer than the dwell (hold, index, servo) or travel (rate)",
@@ -139,7 +141,7 @@ class Sequencer(Component):
             self.angle_ref = self.angle
             self.waited = 0.0
         elif self.stage == OPEN:
-            if self.modes[index(self.now - 1.0)] == 2.0:
+            if self.modes[index(self.now - 1.0)] == 2.0 and self.travel[index(self.now - 1.0)] > 0.0:
                 end = self.travel[index(self.now - 1.0)] + 0.01 * self.windows[index(self.now - 1.0)]
                 if fabs(self.angle - self.angle_ref) >= end:
                     self.stage = CLOSE
@@ -169,7 +171,7 @@ class Sequencer(Component):
         self.gate = 0.0
         self.done = 0.0
         if self.stage == OPEN or self.stage == CLOSE:
-            self.gate = 2.0 if self.mode == 2.0 else 1.0
+            self.gate = 2.0 if self.mode == 2.0 and self.travel[index(self.now - 1.0)] > 0.0 else 1.0
         if self.stage == DONE:
             self.mode = 0.0
             self.target = 0.0

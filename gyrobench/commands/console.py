@@ -107,8 +107,10 @@ def _phase(p: Mapping[str, Any]) -> list[str]:
         )
         size += f", {p['frequency']:.4g} Hz" if p["frequency"] else ""
         return [str(p["phase"]), p["label"], p["mode"], size, f"{p['settle']:.4g} s", f"{p['dwell']:.4g} s"]
-    turning = p["mode"] == "rate"
-    if turning:
+    turning = p["mode"] == "rate" and p["travel"] > 0.0
+    if p["mode"] == "rate" and not turning:
+        size = f"{p['dwell']:g} s at {format_quantity(p['target'], 'rad/s')}, {format_quantity(p['target_y'], 'rad/s')}"
+    elif turning:
         size = f"{format_quantity(p['travel'], 'rad')} at {format_quantity(p['target'], 'rad/s')}"
     else:
         second = f", {format_quantity(p['target_y'], 'rad')}" if "target_y" in p else ""

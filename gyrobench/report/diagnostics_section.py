@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.reduction.estimation.step_effect import step_text
@@ -24,7 +25,7 @@ from gyrobench.report.page_model import (
 from gyrobench.report.plain_text import step_sentence
 from gyrobench.report.result_json import Report
 from gyrobench.report.tables import heading, method_table, render_value, unit_groups
-from gyrobench.result import Autocorrelation, DriftTestResult, LoopResult
+from gyrobench.result import Autocorrelation, DriftTestResult, LoopResult, Series
 
 RunResult = DriftTestResult | LoopResult
 
@@ -49,12 +50,17 @@ def _residuals(report: Report[RunResult], result: DriftTestResult) -> list[Any]:
     noise = render_value(report.document, ("noise",), "Noise model of the estimation.")
     if not result.series and not result.tests:
         return noise
-    values = [r for s in result.series for r in s.residual]
-    in_time = Picture(
-        "residuals-time", plots.residuals_in_time(result.series, "residuals-time"),
-        "Residuals against time, phases shaded and labelled. A trend or a step is drift outside the model.",
-        "Residuals of all windows against time", zoom=True,
-    )  # fmt: skip
+    units = list(dict.fromkeys(s.y_unit for s in result.series)) or [""]
+    each = [[s for s in result.series if s.y_unit == unit] for unit in units]
+    values = [r / scale for alike in each for s in alike for r in s.residual if (scale := _rms(alike, len(units) > 1))]
+    in_time = []
+    for number, alike in enumerate(each, 1):
+        key = "residuals-time" if number == 1 else f"residuals-time-{number}"
+        which = f", {', '.join(s.label for s in alike)}" if len(each) > 1 else ""
+        shaded = "" if which else ", phases shaded and labelled"
+        caption = f"Residuals against time{which}{shaded}. A trend or a step is drift outside the model."
+        svg = plots.residuals_in_time(alike, key)
+        in_time += pictures(Picture(key, svg, caption, f"Residuals of all windows against time{which}", zoom=True))
     acf = _acf(
         result.acf, "windows",
         "Autocorrelation of the residuals. Band: 95 % bounds for white noise; bars outside it: correlated noise.",
@@ -69,8 +75,18 @@ def _residuals(report: Report[RunResult], result: DriftTestResult) -> list[Any]:
     spread = number_cell(report.document, ("residual_std",)).text
     dof = write_number(result.dof, significant=5).text
     sentence = f"Residual standard deviation {spread} {result.residual_unit} with {dof} degrees of freedom."
+    if len(units) > 1:
+        sentence = f"{dof} degrees of freedom; the rms residual of each series stands with the measured series."
     tests = _tests(report, "Tests of the residuals. A small p is evidence against the model.")
-    return [Text(sentence), *pictures(in_time), *pictures(acf, quantiles), *tests, *noise]
+    return [Text(sentence), *in_time, *pictures(acf, quantiles), *tests, *noise]
+
+
+def _rms(series: Sequence[Series], several: bool) -> float:
+    """Return the rms residual of series of one unit; 1 where all have it: then residuals are drawn as they are."""
+    if not several:
+        return 1.0
+    finite = [r for s in series for r in s.residual if math.isfinite(r)]
+    return math.sqrt(math.fsum(r * r for r in finite) / len(finite)) if finite else 0.0
 
 
 def _innovations(report: Report[RunResult], result: LoopResult) -> list[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from gyrobench.report.numbers import write_number
@@ -51,11 +52,11 @@ def is_curve(series: Series) -> bool:
 
 
 def by_axis(series: Sequence[Series]) -> list[list[Series]]:
-    """Return the series that can be drawn, together where they have one axis, the axis with most points first."""
-    groups: dict[tuple[str, str], list[Series]] = {}
+    """Return the series that can be drawn, together where they have the same axes, those with most points first."""
+    groups: dict[tuple[str, str, str], list[Series]] = {}
     for s in series:
         if is_curve(s):
-            groups.setdefault((s.x_name, s.x_unit), []).append(s)
+            groups.setdefault((s.x_name, s.x_unit, s.y_unit), []).append(s)
     return sorted(groups.values(), key=lambda alike: -sum(len(s.x) for s in alike))
 
 
@@ -101,7 +102,7 @@ def fit(series: Sequence[Series], key: str, alike: Sequence[Series], everything:
 
 
 def residuals_in_time(series: Sequence[Series], key: str) -> str:
-    """Residuals of all series against time, the series shaded and named."""
+    """Residuals of series of one unit against time, the series shaded and named where they follow one another."""
     seconds = [t for s in series for t in s.t if math.isfinite(t)]
     if len(seconds) < 3:
         return ""
@@ -121,7 +122,8 @@ def residuals_in_time(series: Sequence[Series], key: str) -> str:
     ax.set_xlabel(axis_label("time", unit))
     ax.set_ylabel(axis_label("residual", series[0].y_unit))
     ax.margins(x=0.01)
-    span_labels(ax, spans)
+    if all(b[0] >= 0.5 * (a[0] + a[1]) for a, b in pairwise(spans)):
+        span_labels(ax, spans)
     return svg(fig, key, zoom=ax)
 
 

@@ -156,6 +156,8 @@ def _moments(series: Series) -> SeriesMoments:
 
 def _plan_line(row: PlanRow) -> PlanLine:
     given, turning = row.as_dict(), row.mode == "rate"
+    about = "target" if given.get("target") else "target_y"  # the axis that turns
+    by_angle = turning and row.travel > 0.0
 
     def number(key: str, factor: float = 1.0, shown: bool = True) -> float | None:
         return factor * given[key] if shown and given.get(key) is not None else None
@@ -164,10 +166,10 @@ def _plan_line(row: PlanRow) -> PlanLine:
         phase=row.phase, label=row.label, mode=row.mode, shape=given.get("shape"), face=given.get("face"),
         axis=given.get("axis"), amplitude=given.get("amplitude"), unit=given.get("unit"),
         frequency_Hz=given.get("frequency"), angle_deg=number("target", DEGREE, not turning),
-        angle_y_deg=number("target_y", DEGREE, not turning), rate_deg_per_h=number("target", DEGREE * 3600.0, turning),
-        settle_s=number("settle"), dwell_s=number("dwell", shown=not turning),
-        travel_deg=number("travel", DEGREE, turning), window_s=number("window", shown=not turning),
-        window_deg=number("window", DEGREE, turning),
+        angle_y_deg=number("target_y", DEGREE, not turning), rate_deg_per_h=number(about, DEGREE * 3600.0, turning),
+        settle_s=number("settle"), dwell_s=number("dwell", shown=not by_angle),
+        travel_deg=number("travel", DEGREE, by_angle), window_s=number("window", shown=not by_angle),
+        window_deg=number("window", DEGREE, by_angle),
     )  # fmt: skip
 
 

@@ -205,11 +205,11 @@ def _numbered(
 
 
 def _count(p: Phase) -> int:
-    return int((p.travel if p.mode == "rate" else p.dwell) / p.window + 1e-6)
+    return int((p.travel if p.by_angle else p.dwell) / p.window + 1e-6)
 
 
 def _rule_of_motion(phases: Sequence[Phase]) -> Callable[[tuple[int, ...]], Averaging]:
-    rules = [Averaging(p.window, p.mode == "rate", _count(p)) for p in phases]
+    rules = [Averaging(p.window, p.by_angle, _count(p)) for p in phases]
     return lambda key: rules[key[0] - 1]
 
 
@@ -218,12 +218,12 @@ def _rule_of_columns(
 ) -> Callable[[tuple[int, ...]], Averaging]:
     """Windows of the plan's phase of that name; of the plan, where all are alike; or of the comment ``window``."""
     given = units.parse_quantity(said["window"], "s") if "window" in said else 0.0
-    alike = {(p.mode == "rate", p.window) for p in plan}
+    alike = {(p.by_angle, p.window) for p in plan}
 
     def rule(key: tuple[int, ...]) -> Averaging:
         name = said.get(f"phase {key[keys.index('phase')]}", "") if "phase" in keys else ""
         mine = [p for p in plan if name in (p.label, p.face)]
-        turning = bool(mine) and mine[0].mode == "rate"
+        turning = bool(mine) and mine[0].by_angle
         if given > 0.0 and not turning:
             return Averaging(given)
         if mine or len(alike) == 1:

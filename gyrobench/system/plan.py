@@ -21,7 +21,8 @@ class Phase:
     mode "hold": stay where the table is; "index": go to the angle ``target`` (rad); "rate": turn at ``target`` (rad/s);
     "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned.
     settle: s before the first window.  dwell: s of windows (hold, index, servo).  travel: rad of windows (rate).
-    window: length of one window, s (hold, index, servo) or rad (rate).  face: name of the mount in :attr:`Plan.faces`.
+    window: length of one window, s (hold, index, servo) or rad (rate).  A rate phase without travel has windows by
+    time, as the others: its second axis may turn alone.  face: name of the mount in :attr:`Plan.faces`.
     target_y: as target, of the second axis of a table that has two.  expected: s that the travel of a servo phase is
     expected to take.
     """
@@ -37,9 +38,14 @@ class Phase:
     target_y: float = 0.0
     expected: float = 0.0
 
+    @property
+    def by_angle(self) -> bool:
+        """True of windows by the angle of the first axis."""
+        return self.mode == "rate" and self.travel > 0.0
+
     def duration(self) -> float:
         """Time of the phase without the way to its target, s."""
-        if self.mode == "rate" and self.target:
+        if self.by_angle and self.target:
             return self.settle + self.travel / abs(self.target)
         return self.settle + max(self.dwell, self.expected)
 
@@ -64,13 +70,13 @@ class Plan:
                 found.append(f"{where}: mode '{p.mode}' is none of {', '.join(MODES)}")
             if p.face not in self.faces:
                 found.append(f"{where}: face '{p.face}' is none of {', '.join(self.faces) or 'none'}")
-            length = p.travel if p.mode == "rate" else p.dwell
-            name = "travel" if p.mode == "rate" else "dwell"
+            by_time = p.mode != "rate" or p.dwell > 0.0
+            length, name = (p.dwell, "dwell") if by_time else (p.travel, "travel")
             if not length > 0.0:
                 found.append(f"{where}: {name} = {length:g}: must be > 0")
             if not 0.0 < p.window <= length * (1.0 + 1e-12):
                 found.append(f"{where}: window = {p.window:g}: must be > 0 and at most the {name} {length:g}")
-            if p.mode == "rate" and not p.target:
+            if p.mode == "rate" and not p.target and not (by_time and p.target_y):
                 found.append(f"{where}: target rate 0: the table would never turn; use mode hold")
         return found
 

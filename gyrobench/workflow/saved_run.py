@@ -98,7 +98,7 @@ def lacking_phases(record: Record, spare: int = 0) -> list[str]:
     done = [int(p) for p in record.windows.get("phase", [])]
     lines = []
     for row in record.run.plan:
-        length = row.travel if row.mode == "rate" else row.dwell
+        length = row.travel if row.mode == "rate" and row.travel else row.dwell
         expected = round(length / row.window) if row.window else 0
         have = done.count(row.phase)
         if have < expected - spare:

@@ -61,6 +61,15 @@ def test_a_stale_report_is_not_believed():
     assert changes(track)[0] == (32, 1.0, 1.0, 0.0)
 
 
+def test_rate_phase_without_travel_has_windows_by_time():
+    # only the second axis turns; opens at sample 3 + 5, dwell 0.2 s to 28, three more: as a hold phase
+    phase = {"mode": 2, "settle": 0.05, "dwell": 0.2, "window": 0.1}
+    part = Sequencer(**plan([phase], [EYE]), targets_y=[1.0] + [0.0] * 98)
+    part.initialize()
+    assert (part.mode, part.target, part.target_y) == (2.0, 0.0, 1.0)
+    assert changes(play(part, 60)) == [(8, 1.0, 1.0, 0.0), (31, 1.0, 0.0, 1.0)]
+
+
 def test_rate_phase_opens_by_angle_and_keeps_the_gate_a_hair_longer():
     # 1 rad/s: 0.01 rad a sample.  Opens at sample 8 (3 + 5), sees 0.07; travel 0.5 + 0.1/100 reached when
     # angle >= 0.571, seen at 58 -> sample 59 (0.58 is seen); three more: closed at 62.
@@ -154,9 +163,17 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
         ({**OK, "face": 13}, "phase 2: face_of must be 1 to 12"),
         ({**OK, "face": 0}, "phase 2: face_of must be 1 to 12"),
         ({**RATE, "target": 0.0}, "phase 2: the table does not turn"),
-        ({**RATE, "travel": 0.0}, "phase 2: a rate phase needs a travel above 0 rad"),
-        ({**OK, "dwell": 0.0}, "phase 2: a hold, index or servo phase needs a dwell above 0 s"),
-        ({**OK, "mode": 1, "dwell": -1.0}, "phase 2: a hold, index or servo phase needs a dwell above 0 s"),
+        ({**RATE, "travel": -1.0}, "phase 2: a rate phase needs a travel above 0 rad, or none and a dwell"),
+        (
+            {**RATE, "travel": 0.0, "dwell": 0.0},
+            "phase 2: a hold, index or servo phase, or a rate phase without travel,",
+        ),
+        ({**RATE, "travel": 0.0, "dwell": 1.0, "target": 0.0}, "phase 2: the table does not turn"),
+        ({**OK, "dwell": 0.0}, "phase 2: a hold, index or servo phase, or a rate phase without travel, needs a dwell"),
+        (
+            {**OK, "mode": 1, "dwell": -1.0},
+            "phase 2: a hold, index or servo phase, or a rate phase without travel, needs a dwell",
+        ),
         ({**OK, "window": 0.0}, "phase 2: the window must be above 0"),
         ({**OK, "window": 1.1}, "phase 2: the window is longer than the dwell"),
         ({**RATE, "window": 6.1}, "phase 2: the window is longer than the dwell"),

@@ -1,10 +1,10 @@
-"""The skeleton of a test with two channels: each is a drift test of its own, and both are reported as one.
+"""The skeleton of a test with several channels: each is a drift test of its own, and all are reported as one.
 
     class MyChannel(DriftReduction[MySetup]): ...            # made with windows, setup, "x" or "y"
     class Reduction(ChannelTests[MySetup]):
         channel = MyChannel
 
-The noise of both is taken as uncorrelated, errors of the set-up that both name are one (merge_channels).
+The noise of different ones is taken as uncorrelated, errors of the set-up that several name are one (merge_channels).
 """
 
 from __future__ import annotations
@@ -22,26 +22,30 @@ S = TypeVar("S", bound=Setup)
 
 
 class ChannelTests(DriftReduction[S]):
-    """Both channels of a gyro of two degrees of freedom; see the module.  label: of a channel in the report."""
+    """Channels of one record, those of a gyro of two degrees of freedom unless ``names`` says others; see the module.
 
-    channel: ClassVar[Any]  # windows, setup, "x" or "y" -> the test of a channel
+    label: of a channel in the report.
+    """
+
+    names: ClassVar[Sequence[str]] = ("x", "y")
+    channel: ClassVar[Any]  # windows, setup, one of names -> the test of a channel
     label: ClassVar[str] = "{} channel"
 
     def of_channel(self, name: str) -> DriftReduction[S]:
-        """Return the test of a channel, "x" or "y"."""
+        """Return the test of a channel."""
         test: DriftReduction[S] = type(self).channel(self.windows, self.setup, name)
         return test
 
     def equation(self) -> str | None:
-        """Return the equation of both channels, Typst math; None: those of the channels below one another."""
+        """Return the equation of all channels, Typst math; None: those of the channels below one another."""
         return None
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
-        """Return tables of both channels together."""
+        """Return tables of all channels together."""
         return []
 
     def reasons(self) -> list[Reason]:
-        """Return what limits both channels."""
+        """Return what limits all channels."""
         return []
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
@@ -53,8 +57,8 @@ class ChannelTests(DriftReduction[S]):
         return told(every, f"Constant drift {constant}.", f"Largest drift per g: {linear} = {{{linear}}}.")
 
     def result(self) -> DriftTestResult:
-        """Return what both channels say, without the checks of :meth:`problems`."""
-        self.each = {c: self.of_channel(c) for c in "xy"}
+        """Return what all channels say, without the checks of :meth:`problems`."""
+        self.each = {c: self.of_channel(c) for c in type(self).names}
         results = {self.label.format(c): test.result() for c, test in self.each.items()}
         noise = " ".join(f"{name}: {r.summary[0]}" for name, r in results.items())
         others = [f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]]

@@ -1,0 +1,86 @@
+"""The six instruments of an inertial measurement unit: names, and the coefficients of each with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gyrobench.frames import G0
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.units import DPH
+
+UG = 1e-6 * G0  # m/s2
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class ImuInstrument:
+    """One instrument.  kind: "g" gyro or "a" accelerometer.  axis: 0, 1, 2."""
+
+    kind: str
+    axis: int
+
+    @property
+    def name(self) -> str:
+        """Short name, of columns: gx, ay."""
+        return self.kind + AXES[self.axis]
+
+    @property
+    def letter(self) -> str:
+        return AXES[self.axis]
+
+    @property
+    def gyro(self) -> bool:
+        return self.kind == "g"
+
+    @property
+    def output(self) -> str:
+        """Output of the part that it is."""
+        return "rate" if self.gyro else "f_read"
+
+    @property
+    def words(self) -> str:
+        return f"{'gyro' if self.gyro else 'accelerometer'} {self.letter}"
+
+    def names(self, seen: Sequence[int] = (0, 1, 2)) -> list[str]:
+        """Return the coefficients: bias, row of the matrix along ``seen``, g-sensitivity of a gyro."""
+        matrix = [f"S{self.kind}_{self.letter}{AXES[k]}" for k in seen]
+        sensitivity = [f"G_{self.letter}{a}" for a in AXES] if self.gyro else []
+        return [f"b{self.kind}_{self.letter}", *matrix, *sensitivity]
+
+    def quantity(self, name: str, truth: Mapping[str, float]) -> Quantity:
+        """Return a coefficient with its meaning and unit."""
+        what, _, along = name.partition("_")
+        if what.startswith("b"):
+            unit = ("deg/h") if self.gyro else "ug"
+            return Quantity.of(name, f"bias of the {self.words}", unit, truth.get(name))
+        if what == "G":
+            meaning = f"rate of the {self.words} per g along {along[1]}"
+            return Quantity(name, meaning, "°/h/g", DPH, truth.get(name))
+        if along[0] == along[1]:
+            return Quantity.of(name, f"scale factor error of the {self.words}", "ppm", truth.get(name))
+        meaning = f"input axis of the {self.words} towards {along[1]}"
+        return Quantity.of(name, meaning, "arcsec", truth.get(name))
+
+
+CHANNELS = tuple(ImuInstrument(kind, axis) for kind in "ga" for axis in range(3))
+BY_NAME = {c.name: c for c in CHANNELS}
+
+_PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba": "acc_bias", "Sa": "acc_scale"}
+
+
+def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
+    """Return the coefficients of the simulated part, SI; None where it has none."""
+    found: dict[str, float] = {}
+    for short, long in _PARAMETERS.items():
+        if f"{slot}.{long}" not in parameters:
+            return None
+        values = np.asarray(parameters[f"{slot}.{long}"], dtype=float)
+        for i, a in enumerate(AXES):
+            row = np.atleast_1d(values[i]) if values.ndim == 1 else values[i]
+            names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
+            found |= dict(zip(names, map(float, row), strict=True))
+    return found

@@ -1,0 +1,37 @@
+"""A laboratory's record of the multi-position and rate test: windows, or time series that are averaged into them."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
+from gyrobench.system.lab_record import read_record
+from gyrobench.system.system import MeasuredData
+
+from .channels import CHANNELS
+from .geometry import ANGLES
+
+TEMPLATE = """\
+# Positions and turns of an inertial measurement unit on a table with two axes: a row for each average, several a phase.
+# latitude = 45.75deg
+# gravity = 9.8067m/s2
+# instrument = type and number of the unit
+# operator = who took the record
+#
+# latitude: needed, here or by --set.  gravity, height: optional (WGS84 normal gravity).
+# phase: number of the position or of the turns.  outer, inner: table angles at the start and the end of the average,
+#   right-handed, counted on through the turns.  The outer axis is level and points east, the inner axis at outer angle
+#   0 north; at 0, 0 the plate lies level and the axes x, y, z of the case point east, north and up.
+# mean_gx, mean_gy, mean_gz: rates that the gyros read; mean_ax, mean_ay, mean_az: specific force, +1 g with the axis up.
+# Rows in which the table turns determine scale factors and misalignments of the gyros; the turns about three axes are
+#   needed for all of them.  Without turns the gyros have bias and g-sensitivity alone.
+# Units in brackets may be others of the same kind (deg/h, g, mg, arcsec ...).
+phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean_gx [deg/s],mean_gy [deg/s],mean_gz [deg/s],mean_ax [m/s2],mean_ay [m/s2],mean_az [m/s2]
+"""  # noqa: E501
+COLUMNS = (
+    *(c for c in WINDOW_COLUMNS if c.name in ("phase", "t_start", "t_end", "n", "flagged")),
+    *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle at the {a.split('_')[1]}, cumulative") for a in ANGLES),
+    *(CsvColumn(f"mean_{c.name}", "rad/s" if c.gyro else "m/s2", f"mean reading of the {c.words}") for c in CHANNELS),
+)
+NEEDED = {"latitude": "45.75deg"}
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))

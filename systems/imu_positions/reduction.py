@@ -1,0 +1,229 @@
+"""Reduction of positions and turns of an inertial measurement unit: six instruments, each a linear fit of its own.
+
+    accelerometer i   f_read_i - f_i = ba_i + sum_k Sa_ik f_k                                   windows at rest
+    gyro i            rate_i - w_i   = bg_i + sum_k Sg_ik w_k + sum_k G_ik f_k/g0               all windows
+
+w and f are the means over a window of inertial rate and specific force in axes of the case, from the angles of the
+table that were read, the site and the Earth rate; the noise of each instrument (white, Gauss-Markov or both) is
+estimated from the same record.  Turns about each axis show the columns of Sg; those that the record does not show are
+taken as zero and are a line of the budget.  [IMU-POSITIONS; IEEE 1559]
+
+Not modelled: nonlinearity, asymmetry, lever arms (accelerometers are read at rest), bias that changes other than by a
+trend or by its noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Candidate,
+    Coefficient,
+    DriftReduction,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Reason,
+    Regression,
+    RunDocument,
+    Table,
+    told,
+    window_problems,
+)
+from gyrobench.units import DPH
+
+from . import geometry, mistakes, tables
+from .budget import GYRO_SCALE, ImuSetup, Kinematics
+from .channels import BY_NAME, CHANNELS, UG, truth_of
+
+COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
+ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
+
+
+class ImuChannel(DriftReduction[ImuSetup]):
+    """One gyro or accelerometer; kinematics: those of the record, shared by all."""
+
+    def __init__(self, windows: Mapping[str, Array], setup: ImuSetup, channel: str, kinematics: Kinematics) -> None:
+        super().__init__(windows, setup)
+        self.channel, self.kinematics = BY_NAME[channel], kinematics
+        self.rows = np.ones(kinematics.motion.length.size, dtype=bool)
+        if not self.channel.gyro:
+            self.rows = kinematics.motion.at_rest
+        self.seen = geometry.rates_seen(kinematics.felt[0]) if self.channel.gyro else (0, 1, 2)
+
+    def design(self, omega: Array, force: Array) -> Array:
+        """Return the regressors for rates and specific forces (n, 3)."""
+        if self.channel.gyro:
+            return geometry.gyro_columns(omega, force, self.seen)
+        return geometry.accelerometer_columns(force)
+
+    def regression(self) -> Regression:
+        s, c, w = self.setup, self.channel, self.windows
+        omega, force = (v[self.rows] for v in self.kinematics.felt)
+        read = np.asarray(w[f"mean_{c.name}"], dtype=float)[self.rows]
+        y = read - (omega if c.gyro else force)[:, c.axis]
+        quantities = [c.quantity(n, s.truth or {}) for n in c.names(self.seen)]
+        t0, t1 = (np.asarray(w[n], dtype=float)[self.rows] for n in ("t_start", "t_end"))
+        phase = np.asarray(w["phase"], dtype=float)[self.rows]
+        shown = [Group(c.words, np.arange(y.size), phase, "number of the phase", "")]
+        unit = ("departure of the rate", "°/h", DPH) if c.gyro else ("departure of the specific force", "µg", UG)
+        weighed = self._candidates() if s.nuisances else []
+        return Regression(
+            quantities, self.design(omega, force), y, t0, t1, shown, *unit, limit=geometry.LIMIT, candidates=weighed,
+            ideal=ROUNDING,
+        )  # fmt: skip
+
+    def _candidates(self) -> list[Candidate]:
+        """Return trend and temperature of the bias."""
+        c = self.channel
+        rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items()}
+        found = nuisances.common(rows, f" {c.name}")
+        if c.gyro:
+            return found
+        return [
+            Candidate(f.name, f.meaning.replace("drift", "bias"), f.unit.replace("°/h", "µg", 1), UG, f.columns)
+            if not f.scatter else f for f in found if not f.scatter
+        ]  # fmt: skip
+
+    def error(self, found: Findings, omega: Array, force: Array) -> Array:
+        """Return the error of the data where rate and specific force are other ones by these (n, 3)."""
+        c = self.channel
+        own = (omega if c.gyro else force)[self.rows, c.axis]
+        columns = self.design(omega[self.rows], force[self.rows])
+        columns[:, 0] = 0.0
+        return found.error(own, -columns)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        out = []
+        for source, (omega, force) in self.kinematics.changes:
+            if omega.ndim == 2:
+                error = self.error(found, omega, force)
+            else:
+                error = np.array([self.error(found, *part) for part in zip(omega, force, strict=True)])
+            out.append(source.effect(self.setup, error))
+        lost = [k for k in range(3) if k not in self.seen]
+        if lost:
+            names = [f"Sg_{self.channel.letter}{'xyz'[k]}" for k in lost]
+            truth = tuple((self.setup.truth or {}).get(n, 0.0) for n in names)
+            columns = self.kinematics.felt[0][:, lost].T
+            source = GYRO_SCALE.of()
+            out.append(source.effect(self.setup, columns, parts=tuple(names), simulated=truth if any(truth) else ()))
+        return out
+
+    def test(self, found: Findings) -> None:
+        """Add an F test of constants of each phase: errors of single positions, nonlinearity."""
+        phase = np.asarray(self.windows["phase"])[self.rows]
+        block = np.array([phase == p for p in np.unique(phase)], dtype=float).T
+        found.f_test(
+            "phases.agree", "constants of the phases", block, "errors of single positions, nonlinearity",
+            "the phases differ from the model by more than the noise", "the phases agree within the noise",
+        )  # fmt: skip
+
+    def account(self, found: Findings) -> Account:
+        c, s = self.channel, self.setup
+        if c.gyro:
+            equation = (
+                f'omega_"read,{c.letter}" - omega_{c.letter} = b_g + sum_k S_(g,k) omega_k + sum_k G_k f_k \\/ g_0'
+            )
+        else:
+            equation = f'f_"read,{c.letter}" - f_{c.letter} = b_a + sum_k S_(a,k) f_k'
+        return Account(
+            method="Positions and turns of an inertial measurement unit on a table with two axes; least squares of "
+            "each instrument under an estimated noise model [IMU-POSITIONS]",
+            sources=[
+                "IMU-POSITIONS; IEEE 1559 (terms); Tedaldi 2014 (model of a triad)",
+                "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
+            ],
+            equation=equation,
+            conventions=[
+                "Coefficients are departures of the readings: reading = input + bias + matrix · input.",
+                "Specific force f = a − g: an axis that points up reads +1 g; g0 = 9.80665 m/s².",
+                "Axes x, y, z of the case are those of the plate, which carries it; local frame east, north, up; outer "
+                "table axis level and east, table angles right-handed.",
+                f"Gravity {s.gravity:.6f} m/s² and Earth rate are taken as known; the accelerometers are read at rest.",
+            ],
+            reasons=[Reason("rates.unseen", t) for t in geometry.unseen_rates(self.seen)] if c.gyro else [],
+            random="noise of the instrument",
+        )  # fmt: skip
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        return [found.noise_sentence(), *found.nuisance_sentences()]
+
+
+class Reduction(ChannelTests[ImuSetup]):
+    """Three gyros and three accelerometers from windows with :data:`COLUMNS`, SI."""
+
+    handling = staticmethod(mistakes.candidates)
+    names = tuple(c.name for c in CHANNELS)
+    label = "{}"
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> ImuSetup:
+        return ImuSetup.of(run, truth=None if run.measured else truth_of(run.parameters))
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        return Kinematics(self.windows, self.setup)
+
+    def of_channel(self, name: str) -> DriftReduction[ImuSetup]:
+        return ImuChannel(self.windows, self.setup, name, self.kinematics)
+
+    def problems(self) -> list[str]:
+        s = self.setup
+        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        if problems := problems + window_problems(self.windows, COLUMNS):
+            return problems
+        force = self.kinematics.felt[1][self.kinematics.motion.at_rest]
+        if problems := geometry.force_problems(_places(force) / s.gravity):
+            return problems
+        return self._mistaken()
+
+    def _mistaken(self) -> list[str]:
+        """Return what the matrices of the triads say of columns, signs and units."""
+        omega, force = self.kinematics.felt
+        rest = self.kinematics.motion.at_rest
+        found = []
+        read = {k: np.array([self.windows[f"mean_{k}{a}"] for a in "xyz"], dtype=float).T for k in "ag"}
+        X = geometry.accelerometer_columns(force[rest])
+        found += mistakes.triad_problems(np.linalg.lstsq(X, read["a"][rest], rcond=None)[0][1:4].T, "a")
+        seen = geometry.rates_seen(omega)
+        if len(seen) == 3:
+            X = geometry.gyro_columns(omega, force, seen)
+            found += mistakes.triad_problems(np.linalg.lstsq(X, read["g"], rcond=None)[0][1:4].T, "g")
+        return found
+
+    def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
+        """Return the largest of each kind."""
+        every = [c for r in results.values() for c in r.coefficients]
+
+        def largest(*prefixes: str, unit: str = "") -> str:
+            mine = [c for c in every if c.name.split("_")[0] in prefixes and unit in c.unit]
+            return max(mine, key=lambda c: abs(c.estimate)).name if mine else ""
+
+        kinds = (
+            ("Largest gyro bias", largest("bg")), ("Largest accelerometer bias", largest("ba")),
+            ("Largest scale factor error", largest("Sg", "Sa", unit="ppm")),
+            ("Largest misalignment", largest("Sg", "Sa", unit="″")), ("Largest g-sensitivity", largest("G")),
+        )  # fmt: skip
+        return told(every, *(f"{words}: {n} = {{{n}}}." for words, n in kinds if n))
+
+    def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
+        return tables.tables(coefficients)
+
+
+def _places(force: Array) -> Array:
+    """Return the different directions (n, 3) of specific forces, some arc minutes apart at least."""
+    keys = np.round(force / np.linalg.norm(force, axis=1)[:, None] * 500.0)
+    return np.asarray(force[np.sort(np.unique(keys, axis=0, return_index=True)[1])])
+
+
+reduce = Reduction.reduce

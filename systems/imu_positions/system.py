@@ -1,0 +1,139 @@
+"""Multi-position and rate test of an inertial measurement unit on a table with two axes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SETTLE, SITE, type_b
+from gyrobench.system.families.table_test import TableTest, sampled
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import Plan
+from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.values import InvalidValueError
+from gyrobench.system.visits import Visit, parse_visits
+
+from . import geometry, plans
+from .channels import CHANNELS
+from .measured import MEASURED
+
+IMU = Socket(
+    "Imu",
+    "three gyros and three accelerometers: inertial rate and specific force in, readings out",
+    (
+        inp("omega", "rad/s", "inertial rate, axes of the plate", 3),
+        inp("f", "m/s2", "specific force, axes of the plate", 3),
+        out("rate", "rad/s", "rates that the gyros x, y, z read", 3),
+        out("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
+    ),
+)
+INDEX_RATE, ACCELERATION = [0.5, 0.5], [0.5, 0.5]  # rad/s, rad/s2
+
+
+class ImuPositions(TableTest):
+    """Static positions and turns in both senses give bias, scale factor and misalignment of three gyros and three
+    accelerometers, and the g-sensitivity of the gyros: gravity, the Earth rate and the rate of the table are known in
+    every position.
+
+    [IMU-POSITIONS; IEEE 1559]
+    """
+
+    title = "Multi-position and rate test of an inertial measurement unit"
+    spec = ("IMU-POSITIONS",)
+    reduction = "reduction"
+    slots = {
+        "site": Slot("Site", "site"),
+        "sequencer": Slot("Sequencer", "sequencer"),
+        "table": Slot("TwoAxisTable", "table_two_axis"),
+        "imu": Slot(IMU, "imu"),
+        **{f"sampler_{c.name}": Slot("Sampler", "sampler") for c in CHANNELS},
+    }
+    # every sampler averages one channel; the first brings the outer angle, the second the inner one
+    wires = "\n".join([
+        "site -> table: f=f_local omega=omega_local",
+        "sequencer -> table: mode=mode_x mode=mode_y target=target_x target_y face",
+        "table -> sequencer: angle_x_read=angle in_position",
+        "table -> imu: omega f",
+        *(sampled(f"sampler_{c.name}", f"table: angle_{'y' if k == 1 else 'x'}_read") for k, c in enumerate(CHANNELS)),
+        *(f"imu.{c.output}[{c.axis + 1}] -> sampler_{c.name}.x" for c in CHANNELS),
+    ])  # fmt: skip
+    options = (
+        SITE
+        | {
+            "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
+            "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
+            "dwell": Option(60.0, "s", "averaging time in each position"),
+            "windows": Option(4, int, "averages a position", 1, 100),
+            "rate": Option("30deg/s", "rad/s", "rate of the turns; 0: none", 0.0, 20.0),
+            "turns": Option(5, int, "whole turns in each sense about each axis of the case; 0: none", 0, 100),
+            "rate_axes": Option("xyz", str, "axes of the case about which it is turned"),
+        }
+        | SETTLE
+        | NUISANCES
+        | CORRECTIONS
+        | type_b(
+            "square", "angle1", "angle2", "wobble", "latitude", "time",
+            axis="standard uncertainty of the outer axis against level, and against east",
+            mount="standard uncertainty of the case about each of its axes on the plate",
+        )
+        | {
+            "u_zero": Option(0.0, "rad", "standard uncertainty of the zero of each angle, plate level", 0.0),
+            "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
+            "u_gyro_scale": Option(
+                0.0, "1", "std. unc. of scale factors and misalignments of the gyros that the plan does not show", 0.0
+            ),
+        }
+    )  # fmt: skip
+    noises = tuple(f"imu.{a}_{n}" for a in "xyz" for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
+    assumed = ("table.base", "imu.mount")
+    measured_data = MEASURED
+    step = 1e-2
+    windows = Windows(
+        "sampler_gx.count",
+        {
+            "phase": "sampler_gx.window_phase",
+            **{n: f"sampler_gx.{n}" for n in ("t_start", "t_end", "n")},
+            **{f"outer_{e}": f"sampler_gx.angle_{e}" for e in ("start", "end")},
+            **{f"inner_{e}": f"sampler_gy.angle_{e}" for e in ("start", "end")},
+            **{f"{n}_{c.name}": f"sampler_{c.name}.{n}" for n in ("mean", "std") for c in CHANNELS},
+        },
+    )
+    channels = ("table.angle_x", "table.angle_y", *(f"imu.{c.output}[{c.axis + 1}]" for c in CHANNELS))
+
+    def times(self) -> plans.Times:
+        """Return dwells and turns.  Raises InvalidValueError."""
+        axes = self["rate_axes"]
+        if len(set(axes)) < len(axes) or set(axes) - set("xyz"):
+            raise InvalidValueError(f"rate_axes = {axes}: letters of xyz are expected, each once")
+        return plans.Times(self["settle"], self["dwell"], self["windows"], self["rate"], self["turns"], axes)
+
+    def visits(self) -> list[Visit]:
+        """Return the positions.  Raises InvalidValueError."""
+        if given := parse_visits("visits", self["visits"], ("rad", "rad"), self["dwell"]):
+            return given
+        if self["positions"] not in geometry.POSITIONS:
+            known = ", ".join(map(str, geometry.POSITIONS))
+            raise InvalidValueError(f"positions = {self['positions']}: {known} are possible, or visits")
+        return plans.positions(self["positions"], self["dwell"])
+
+    def plan(self) -> Plan:
+        """Return the positions, then the turns about x, y and z, each after a rest."""
+        return plans.plan(self.visits(), self.times())
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        return {**super().parameters(parts), "table.index_rate": INDEX_RATE, "table.acceleration": ACCELERATION}
+
+    def check(self) -> list[str]:
+        return super().check() + geometry.force_problems(self._directions())
+
+    def _directions(self) -> np.ndarray[Any, Any]:
+        """Return the directions of the case that point up in the phases at rest."""
+        rest = [p for p in self.plan().phases if p.mode == "index"]
+        x, y = (np.array([getattr(p, n) for p in rest]) for n in ("target", "target_y"))
+        return np.column_stack([-np.cos(x) * np.sin(y), np.sin(x), np.cos(x) * np.cos(y)])
+
+    def warnings(self) -> list[str]:
+        axes = self["rate_axes"] if self.times().rates else ""
+        return geometry.unseen_rates(tuple("xyz".index(a) for a in axes))

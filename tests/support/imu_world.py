@@ -1,0 +1,128 @@
+"""A table with two axes and an inertial measurement unit in plain numpy and scipy: records without gyrobench.
+
+Rotations are those of scipy (vectors turned from the instrument into east, north, up); means over a window that turns
+are sums over 720 even steps of each turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+EARTH = 7.2921159e-5
+Array = Any
+
+
+@dataclass
+class Unit:
+    """True instrument, SI; G per g0."""
+
+    bg: Array
+    Sg: Array
+    G: Array
+    ba: Array
+    Sa: Array
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, size: float = 1e-3) -> Unit:
+        dph = math.pi / 648000.0
+        return cls(
+            rng.normal(size=3) * 20.0 * dph, rng.normal(size=(3, 3)) * size, rng.normal(size=(3, 3)) * 2.0 * dph,
+            rng.normal(size=3) * 5e-3 * 9.80665, rng.normal(size=(3, 3)) * size,
+        )  # fmt: skip
+
+    def coefficients(self) -> dict[str, float]:
+        """Return the values by the names of the reduction."""
+        found = {}
+        for i, a in enumerate("xyz"):
+            found |= {f"bg_{a}": self.bg[i], f"ba_{a}": self.ba[i]}
+            for k, b in enumerate("xyz"):
+                found |= {f"Sg_{a}{b}": self.Sg[i, k], f"G_{a}{b}": self.G[i, k], f"Sa_{a}{b}": self.Sa[i, k]}
+        return {n: float(v) for n, v in found.items()}
+
+
+@dataclass
+class World:
+    """Site and errors of the set-up.  case: turn of the instrument on the plate; table: of the table in the room."""
+
+    latitude: float = 0.7
+    gravity: float = 9.805
+    case: Rotation = field(default_factory=Rotation.identity)
+    table: Rotation = field(default_factory=Rotation.identity)
+    square: float = 0.0
+
+    def axes(self, x: Array, y: Array) -> Rotation:
+        """Instrument to east, north, up at table angles (n,): turned about X, then about Y as X has taken it."""
+        right = Rotation.from_rotvec([0.0, 0.0, self.square])
+        about_x, about_y = (Rotation.from_rotvec(np.outer(q, axis)) for q, axis in ((x, [1, 0, 0]), (y, [0, 1, 0])))
+        return self.table * about_x * right * about_y * self.case
+
+    def felt(self, x: Array, y: Array, rate_x: float, rate_y: float) -> tuple[Array, Array]:
+        """Rate and specific force (n, 3) in axes of the instrument."""
+        to_room = self.axes(x, y)
+        earth = EARTH * np.array([0.0, math.cos(self.latitude), math.sin(self.latitude)])
+        about = self.table.apply([1.0, 0.0, 0.0]) * rate_x
+        second = (
+            self.table * Rotation.from_rotvec(np.outer(x, [1, 0, 0])) * Rotation.from_rotvec([0.0, 0.0, self.square])
+        ).apply([0.0, 1.0, 0.0])
+        omega = to_room.inv().apply(earth + about + second * rate_y)
+        return omega, to_room.inv().apply([0.0, 0.0, self.gravity])
+
+    def windows(self, plan: list[tuple[float, float, float, float, float, int]], unit: Unit,
+                noise: Any = None) -> dict[str, Array]:  # fmt: skip
+        """Windows of a plan of (outer, inner, rate of outer, rate of inner, length, number); noise: (gyro, acc) (n, 3)
+        functions of starts and ends.
+        """
+        rows: dict[str, list[float]] = {
+            n: [] for n in ("phase", "t_start", "t_end", "outer_start", "outer_end", "inner_start", "inner_end")
+        }
+        omega, force = [], []
+        t = 0.0
+        for k, (x0, y0, rx, ry, length, count) in enumerate(plan, 1):
+            t += 10.0
+            for j in range(count):
+                turns = max(1, math.ceil(max(abs(rx), abs(ry)) * length / (2.0 * math.pi)))
+                steps = 720 * turns if rx or ry else 1
+                s = (np.arange(steps) + 0.5) / steps * length + j * length
+                w, f = self.felt(x0 + rx * s, y0 + ry * s, rx, ry)
+                omega.append(w.mean(axis=0))
+                force.append(f.mean(axis=0))
+                ends = (j * length, (j + 1) * length)
+                values = (k, t, t + length, x0 + rx * ends[0], x0 + rx * ends[1], y0 + ry * ends[0], y0 + ry * ends[1])
+                for n, v in zip(rows, values, strict=True):
+                    rows[n].append(v)
+                t += length
+        out = {n: np.array(v) for n, v in rows.items()}
+        w, f = np.array(omega), np.array(force)
+        gyro = w + w @ unit.Sg.T + f @ unit.G.T / 9.80665 + unit.bg
+        acc = f + f @ unit.Sa.T + unit.ba
+        if noise is not None:
+            more = noise(out["t_start"], out["t_end"])
+            gyro, acc = gyro + more[0], acc + more[1]
+        for i, a in enumerate("xyz"):
+            out[f"mean_g{a}"], out[f"mean_a{a}"] = gyro[:, i], acc[:, i]
+        return out
+
+
+RIGHT = math.pi / 2.0
+FACES = [(0.0, 0.0), (math.pi, 0.0), (RIGHT, 0.0), (-RIGHT, 0.0), (0.0, RIGHT), (0.0, -RIGHT)]
+EDGES = [(a * RIGHT / 2.0, b * RIGHT) for a in (1, -1) for b in (0, 2, 1, -1)] + [
+    (0.0, b * RIGHT / 2.0) for b in (1, -1, 3, -3)
+]
+
+
+def plan(places: Any = (*FACES, *EDGES), rate: float = 0.5, turns: int = 5, dwell: float = 60.0, count: int = 4,
+         axes: str = "xyz") -> Any:  # fmt: skip
+    """Positions, then turns in both senses about the axes."""
+    found = [(x, y, 0.0, 0.0, dwell / count, count) for x, y in places]
+    one = 2.0 * math.pi / rate if rate else 0.0
+    for axis in axes if rate else "":
+        for sign in (1.0, -1.0):
+            inner = RIGHT if axis == "z" else 0.0
+            rates = (0.0, sign * rate) if axis == "y" else (sign * rate, 0.0)
+            found.append((0.1, inner, *rates, one, turns))
+    return found
