@@ -39,7 +39,7 @@ class GyroLaser(RateGyro):
     current_difference = Parameter(0.0, "A", "difference of the currents of the two arms")
     quantum = Noise(0.0, "rad/s/sqrt(Hz)", "white noise beside that of lock-in (quantum limit)", samples=2)
     crossings = Noise(1.0, "1/sqrt(Hz)", "white noise of lock-in as computed: 1; 0: none", samples=2)
-    counting = Parameter(4.0, "1", "counts a fringe: 1, 2 or 4; 0: not counted", min=0.0, max=4.0)
+    counting = Parameter(0.0, "1", "counts a fringe: 1, 2 or 4; 0: not counted", min=0.0, max=4.0)
     range_max = Parameter(0.0, "rad/s", "largest rate; 0: no limit", min=0.0)
 
     density = Output("rad/s/sqrt(Hz)", "density N of the white noise at small rates (angle random walk)")
