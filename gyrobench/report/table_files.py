@@ -1,6 +1,7 @@
 """The tables of a report for other programs: a CSV file each, or a workbook with the record beside them.
 
-Numbers have all their digits in CSV, 16 in a workbook (whose format has no more); units stand in the header.  Tables are numbered as in the report.
+Numbers have all their digits in CSV, 16 in a workbook (whose format has no more); units stand in the header.  Tables
+are numbered as in the report.
 """
 
 from __future__ import annotations
