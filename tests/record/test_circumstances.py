@@ -40,9 +40,8 @@ def record_of(name: str) -> str:
     if name in RECORDS:
         return RECORDS[name].read_text(encoding="utf-8")
     template = empty_record(load_system(name))
-    row = ["1", "0", "1", "0", "0", "0.1", "0.01", "0"]
-    columns = template.splitlines()[-1].count(",") + 1
-    return template + ",".join([*row, *["0"] * (columns - len(row))]) + "\n"
+    width = template.strip().rsplit("\n", 1)[-1].count(",") + 1
+    return template + ",".join(["1", "0", "1", "0", "0", "0.1", "0.01", *["0"] * width][:width]) + "\n"
 
 
 def known(system: System) -> Keys:
