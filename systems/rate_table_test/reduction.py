@@ -4,8 +4,9 @@
 
 d is 1 where a rate was reached from below, -1 from above; R the largest rate.  By least squares under a noise model
 estimated from the readings, with a trend and temperature weighed by the data.  Small rates are left out; of them the
-ratio of response to rate says where the gyro begins to respond (threshold: half of it).  Beside the fit the line alone,
-the departures of each level from it, and the scale factor of each cycle.
+ratio of response to rate says where the gyro begins to respond (threshold: half of it).  Where one of them is not
+answered the readings at rest are left out, too: there the gyro does not answer the Earth rate.  Beside the fit the
+line alone, the departures of each level from it, and the scale factor of each cycle.
 [TEST-RATE-GYRO; IEEE 952, IEEE 647, IEEE 1431; RED-GLS]
 
 Not modelled: hysteresis that is not the same at all rates, response of the gyro to the changes of rate, Earth rate
@@ -45,7 +46,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DEG, DPH
 
 from . import handling, tables, threshold
-from .steps import cycle_of, direction, levels
+from .steps import cycle_of, direction, levels, scatter
 
 PPM = 1e-6
 LEAST = 8  # readings of the sweep
@@ -109,6 +110,11 @@ class Reduction(DriftReduction[RateTableSetup]):
         self.full = float(np.max(np.abs(self.table)))
         still = np.abs(self.table) < 1e-9 * max(self.full, 1e-12)
         self.large = still | (np.abs(self.table) > threshold.SMALL * self.full)
+        self.small = threshold.Response.of(
+            self.w[~self.large], self.y[~self.large], scatter(levels(self.table), self.y)
+        )
+        if self.small.silent:
+            self.large &= ~still
         if self.setup.steps:
             self.cycle = cycle_of(np.asarray(w["phase"]).astype(int), self.setup.steps)
         else:
@@ -170,7 +176,6 @@ class Reduction(DriftReduction[RateTableSetup]):
         noise = found.residual_std * found.y_scale
         self.departures = tables.Departures.of(w, y, levels(self.table[large]), self.d, self.full, noise)
         self.cycles = tables.Cycles.of(w, y, self.cycle[large], noise)
-        self.small = threshold.Response.of(self.w[~large], self.y[~large], noise)
         return Account(
             method="Rates in steps through both senses; least squares under an estimated noise model [TEST-RATE-GYRO]",
             sources=["TEST-RATE-GYRO; IEEE 952; IEEE 647; IEEE 1431", "RED-GLS"],
@@ -219,19 +224,23 @@ reduce = Reduction.reduce
 def truth_of(run: RunDocument) -> dict[str, float] | None:
     """Return what the parameters of a simulated gyro make of the coefficients, SI; None where they do not say it.
 
-    A gyro with a dead band or lock-in begins to respond with half of a rate r at sqrt(r2 - d2) = r/2: d/sqrt(3/4).
+    A gyro with a dead band or lock-in passes sqrt(r2 - d2): it begins to answer with half of a rate at d/sqrt(3/4), and
+    its scale factor depends on the rate in a way that is not that of the model.
     """
     p: dict[str, Any] = dict(run.parameters)
     if "gyro.scale" not in p or run.measured:
         return None
-    full = float(run.options["full_scale"])
-    out = {"a": float(p.get("gyro.asymmetry", 0.0)), "h": float(p.get("gyro.hysteresis", 0.0))}
-    if p.get("gyro.closed", 1.0) > 0.5:
-        reset = float(p.get("gyro.reset_error", 0.0))
-        out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) / (1.0 - reset) - 1.0
-        out["c"] = float(p.get("gyro.cubic", 0.0)) * full**2
-    if not p.get("gyro.turn_on"):
-        out["b"] = float(np.ravel(p["gyro.bias"])[0])
     locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
     band = float(p.get("gyro.dead_band", 0.0)) or locks
-    return {**out, **({"threshold": band / math.sqrt(0.75)} if band else {})}
+    out = {"threshold": band / math.sqrt(0.75)} if band else {}
+    if not p.get("gyro.turn_on"):
+        out["b"] = float(np.ravel(p["gyro.bias"])[0])
+    if p.get("gyro.closed", 1.0) < 0.5:  # a sine of the rate
+        return out
+    out["h"] = float(p.get("gyro.hysteresis", 0.0))
+    if not band:
+        reset = float(p.get("gyro.reset_error", 0.0))
+        out["a"] = float(p.get("gyro.asymmetry", 0.0))
+        out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) / (1.0 - reset) - 1.0
+        out["c"] = float(p.get("gyro.cubic", 0.0)) * float(run.options["full_scale"]) ** 2
+    return out

@@ -39,6 +39,11 @@ class Response:
         return cls(*(np.array([row[k] for row in rows]) for k in range(3)))
 
     @property
+    def silent(self) -> bool:
+        """Whether a rate is surely not answered."""
+        return bool(np.any(self.ratio + SURE * self.u < HALF))
+
+    @property
     def bounds(self) -> tuple[float, float] | None:
         """Largest rate surely without and least rate surely with half of the response; 0 and infinity where none is;
         None where a rate above one that responds does not, or the readings do not say it of any.

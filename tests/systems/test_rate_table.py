@@ -125,6 +125,8 @@ def test_threshold_of_a_dead_band(part: str, given: dict[str, Any], between: tup
     threshold = found(result)["threshold"]
     assert threshold.interval == pytest.approx(between)
     assert threshold.interval[0] <= threshold.truth <= threshold.interval[1]
+    # at rest the gyro reads 0, not the Earth rate of 10.8 deg/h: those readings are no part of the fit
+    assert abs(found(result)["b"].estimate) < 0.1
 
 
 def test_threshold_that_is_not_there_or_not_seen(session: Session) -> None:
