@@ -110,7 +110,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         self.full = float(np.max(np.abs(self.table)))
         still = np.abs(self.table) < 1e-9 * max(self.full, 1e-12)
         self.large = still | (np.abs(self.table) > threshold.SMALL * self.full)
-        self.small = threshold.Response.of(
+        self.small = threshold.SmallRates.of(
             self.w[~self.large], self.y[~self.large], scatter(levels(self.table), self.y)
         )
         if self.small.silent:

@@ -19,7 +19,7 @@ MEANING = "threshold: rate at which the gyro begins to answer with half of it, b
 
 
 @dataclass(frozen=True)
-class Response:
+class SmallRates:
     """Response over rate of each small rate (n,), half the difference of both senses, with its u; rates rise, rad/s."""
 
     rate: Array
@@ -27,7 +27,7 @@ class Response:
     u: Array
 
     @classmethod
-    def of(cls, w: Array, y: Array, noise: float) -> Response:
+    def of(cls, w: Array, y: Array, noise: float) -> SmallRates:
         """w, y: rates and readings; noise: standard deviation of a reading."""
         rows = []
         for r in _distinct(np.abs(w)):
