@@ -108,7 +108,9 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         (tmp_path / room).mkdir()
     (tmp_path / "instruments" / "mine.toml").write_text(MINE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    assert with_instrument("mine", {}) == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
+    title, values = with_instrument("mine", {})
+    assert title == "Me Mine (own sheet, 2020), simulated"
+    assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
 @pytest.mark.parametrize(

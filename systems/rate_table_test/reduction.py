@@ -233,7 +233,7 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
     locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
     band = float(p.get("gyro.dead_band", 0.0)) or locks
     out = {"threshold": band / math.sqrt(0.75)} if band else {}
-    if not p.get("gyro.turn_on"):
+    if not any(p.get(f"gyro.{n}") for n in ("turn_on", "flicker_x", "walk_x")):  # which are part of the bias
         out["b"] = float(np.ravel(p["gyro.bias"])[0])
     if p.get("gyro.closed", 1.0) < 0.5:  # a sine of the rate
         return out
