@@ -89,8 +89,9 @@ def run(
 
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
-    sheet = with_instrument(instrument, parts) if instrument else {}
+    title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
     test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
+    vars(test)["instrument"] = title
     request = RunRequest(
         parts=parts,
         maps=maps,

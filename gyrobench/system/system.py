@@ -146,6 +146,7 @@ class System(Configurable):
     ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
+    instrument: str = ""  # of whose data sheet its gyro is; "": the part is named
     step: float = 1e-3  # s, communication step
     coupling: str = ""  # "parallel": every wire carries the value of the communication step before (Jacobi)
     stop: float | None = None  # s, or a property; None: only `done` ends the run
