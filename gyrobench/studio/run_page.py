@@ -13,10 +13,13 @@ from nicegui import ui
 from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
-from gyrobench.studio.chart import SignalChart, first_shown, signals_of
+from gyrobench.studio.chart import LiveChart, SignalChart, signals_of
 from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
+from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
-from gyrobench.studio.request import comparison_command, comparison_python
+from gyrobench.studio.picture import MovingPicture
+from gyrobench.studio.request import comparison_command, comparison_python, first_shown
+from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
@@ -65,6 +68,7 @@ def _add_job_page(studio: Studio) -> None:
                     "resume"
                 )
                 done = ui.link("Report and signals", "#").mark("result")
+            chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
             gone = {"there": False}
@@ -86,6 +90,7 @@ def _add_job_page(studio: Studio) -> None:
                 if now.state == "done" and place and not message.text and not gone["there"]:
                     gone["there"] = True
                     ui.navigate.to(address("run", place))
+                chart.look()
                 if not now.active:
                     timer.deactivate()
 
@@ -126,22 +131,29 @@ def _add_run_page(studio: Studio) -> None:
                 CopyLines().show(*lines_of)
                 return
             with ui.tabs().props("no-caps align=left dense") as tabs:
-                names = ["Report", "Signals", "As a command"]
+                names = ["Report", "Signals", "Moving picture", "As a command"]
                 made = {n: ui.tab(n) for n in names}
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
                     _report(folder, place)
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
+                with ui.tab_panel(made["Moving picture"]):
+                    moving = ui.element("div").classes("rows")
                 with ui.tab_panel(made["As a command"]):
                     CopyLines().show(*lines_of)
-            drawn: list[bool] = []
+            drawn: list[str] = []
 
             async def opened() -> None:
-                if tabs.value == "Signals" and not drawn:
-                    drawn.append(True)
+                if tabs.value in drawn:
+                    return
+                drawn.append(tabs.value)
+                if tabs.value == "Signals":
                     with body:
                         await _signals(folder, document)
+                if tabs.value == "Moving picture":
+                    with moving:
+                        await _picture(studio, folder, document)
 
             tabs.on_value_change(opened)
 
@@ -192,6 +204,17 @@ async def _signals(folder: Path, document: RunDocument) -> None:
     chart = SignalChart({folder.name: signals})
     menu.on_value_change(lambda e: chart.show(e.value or []))
     await chart.show(first)
+
+
+async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
+    signals = await asyncio.to_thread(signals_of, folder)
+    try:
+        bodies = parse_bodies(getattr(load_test(document.system), "bodies", ""))
+    except Exception:  # a run of a system that is not there any more
+        bodies = []
+    shown = MovingPicture(signals.record, bodies, studio.dark) if len(signals.time) else None
+    if shown is None or not shown.names:
+        ui.label("The record holds no angle of a body that moves.").classes("soft")
 
 
 def _shown_by_report(name: str) -> list[Any]:
