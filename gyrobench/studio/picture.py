@@ -14,7 +14,9 @@ from gyrobench.frames import pole
 from gyrobench.record.record import Record
 from gyrobench.system.moving_bodies import MovingBody, attitudes
 
-AXES = (("#d03030", "x"), ("#1f8f3a", "y"), ("#2f6fd0", "z"))  # of every body, in this order
+AXES = ("#d03030", "#1f8f3a", "#2f6fd0")  # x, y, z of every body
+ALONG = ((0.0, 0.0, -np.pi / 2.0), (0.0, 0.0, 0.0), (np.pi / 2.0, 0.0, 0.0))  # turns a rod, which lies along y
+THICK = 0.014
 SHADES = ("#9aa7b4", "#b9a37c", "#8fae8b", "#a58fb0", "#7c9cb9")
 SIZE = 2.6  # of the outermost body; each that stands on it is smaller
 FRAMES = 400  # of a whole record while it plays
@@ -47,7 +49,8 @@ class MovingPicture:
             return
         with ui.element("div").classes("bar"):
             self.button = ui.button(icon="play_arrow", on_click=self._play).props('flat round aria-label="Play"')
-            self.slider = ui.slider(min=0, max=max(1, len(self.time) - 1), value=0).classes("time")
+            last = max(1, len(self.time) - 1)
+            self.slider = ui.slider(min=0, max=last, value=0, step=1).classes("time")
             self.slider.props('aria-label="time"')
             self.label = ui.label().classes("soft")
         self.scene = ui.scene(width=900, height=520, grid=False, background_color="#20262d" if dark else "#f2f4f6")
@@ -56,7 +59,7 @@ class MovingPicture:
             self._ground(record.run.parameters)
             for depth, name in enumerate(self.names):
                 self.groups[name] = self._body(depth, name)
-        self.scene.move_camera(x=4.2, y=-5.4, z=3.2, look_at_z=0.0, duration=0.0)
+        self.scene.move_camera(x=1.7, y=-2.2, z=1.3, look_at_z=0.0, duration=0.0)
         legend = ", ".join(f"{c} {n}" for c, n in (("red", "x or I"), ("green", "y or O"), ("blue", "z or S")))
         ui.label(f"Axes of each body: {legend}. E, N, U, the pole and gravity are fixed. Not to scale.").classes("soft")
         self.slider.on_value_change(lambda e: self.show(int(e.value)))
@@ -87,16 +90,16 @@ class MovingPicture:
     def _ground(self, parameters: Mapping[str, Any]) -> None:
         """Add east, north, up, the pole of the sky where the latitude is known, and gravity."""
         scene = self.scene
-        for end, name in (([3.2, 0, 0], "E"), ([0, 3.2, 0], "N"), ([0, 0, 3.2], "U")):
+        for end, name in (([2.0, 0, 0], "E"), ([0, 2.0, 0], "N"), ([0, 0, 1.9], "U")):
             scene.line([0, 0, 0], end).material("#8a939c")
             scene.text(name, "color: #7a838c; font-size: 14px").move(*[1.05 * x for x in end])
         latitude = parameters.get("site.latitude", parameters.get("motion.latitude"))
         if isinstance(latitude, int | float):
-            end = (3.0 * pole(float(latitude))).tolist()
+            end = (1.9 * pole(float(latitude))).tolist()
             scene.line([0, 0, 0], end).material("#c09000")
             scene.text("pole", "color: #b08000; font-size: 14px").move(*[1.05 * x for x in end])
-        scene.line([0, 0, 0], [0, 0, -2.4]).material("#777777")
-        scene.text("g", "color: #888888; font-size: 14px").move(0, 0, -2.6)
+        scene.line([0, 0, 0], [0, 0, -1.5]).material("#777777")
+        scene.text("g", "color: #888888; font-size: 14px").move(0, 0, -1.6)
 
     def _body(self, depth: int, name: str) -> Any:
         """Add a body: a plate or a ring, with its three axes; return the group that turns."""
@@ -111,9 +114,13 @@ class MovingPicture:
                 )
             else:
                 self.scene.ring(0.36 * size, 0.42 * size, 48).material(shade, 0.8, "both")
-            for k, (colour, _) in enumerate(AXES):
-                end = [0.0, 0.0, 0.0]
-                end[k] = 0.5 * size
-                self.scene.line([0, 0, 0], end).material(colour)
-            self.scene.text(name, "font-size: 12px; color: #7a838c").move(0.52 * size, 0, 0)
+            length = 0.62 * size
+            for k, colour in enumerate(AXES):
+                middle, tip = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+                middle[k], tip[k] = 0.5 * length, length
+                self.scene.cylinder(THICK, THICK, length, 8).rotate(*ALONG[k]).move(*middle).material(colour)
+                self.scene.cylinder(0.0, 3.0 * THICK, 8.0 * THICK, 12).rotate(*ALONG[k]).move(*tip).material(colour)
+            place = [0.0, 0.0, 0.0]
+            place[depth % 3] = 1.16 * length  # on another axis than the name of the body before
+            self.scene.text(name, "font-size: 13px; color: #6a737c").move(*place)
         return group.with_name(f"body {name}")

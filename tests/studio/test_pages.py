@@ -19,7 +19,9 @@ import numpy as np
 import pytest
 from messy_file import messy
 
+import gyrobench as gb
 from gyrobench.record.record import Record
+from gyrobench.system.moving_bodies import attitudes, parse_bodies
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: the studio is not looked at")
@@ -167,6 +169,55 @@ def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str
     folder = run_of(page, studio[1])
     kept = [k for k in range(47) if k != 7]
     np.testing.assert_allclose(Record.load(folder).windows["mean"], mean[kept] * 1e-6, rtol=1e-12)  # µA, as was said
+
+
+MOVING = {
+    "tumble_single_axis": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": "12"},
+    "tumble_two_channel": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": "12"},
+    "tumble_two_axis": {"positions": "12"},
+    "platform_three_axis": {"hold": "5s"},
+    "accelerometer_four": {}, "accelerometer_multipoint": {}, "attitude_estimator": {}, "north_finder": {},
+    "pickoff_scale_factor": {}, "rebalance_loop_test": {},
+}  # fmt: skip
+#: axes of the bodies as they are drawn: name -> x, y, z axes in east, north, up
+DRAWN = """() => {
+  const scene = getElement(document.querySelector('.scene').id.slice(1));
+  const found = {};
+  for (const {mesh} of scene.objects.values()) {
+    if (!mesh?.name?.startsWith('body ')) continue;
+    mesh.updateWorldMatrix(true, false);
+    const e = mesh.matrixWorld.elements;
+    found[mesh.name.slice(5)] = [[e[0], e[1], e[2]], [e[4], e[5], e[6]], [e[8], e[9], e[10]]];
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_what_is_drawn_stands_as_the_record_says(page: Any, studio: tuple[str, Path], name: str) -> None:
+    """Read from the scene, at three times: the axes of all bodies, to 1e-9.
+
+    That the record's attitudes are the true ones: tests/system/test_moving_bodies.py.
+    """
+    folder = studio[1] / "reports" / "out" / name / "moving"
+    test = gb.load(name, MOVING[name])
+    record = test.run(out=folder, check_step=False).record
+    page.goto(base_of(studio) + f"/run/{name}/moving")
+    page.get_by_role("tab", name="Moving picture").click()
+    slider = page.get_by_role("slider")
+    slider.wait_for()
+    bodies = parse_bodies(test.system.bodies)
+    last = len(record.channels["time"]) - 1
+    for keys in ("Home", "PageUp", "End"):
+        slider.press(keys)
+        page.wait_for_timeout(700)
+        row = int(slider.get_attribute("aria-valuenow"))
+        assert row == {"Home": 0, "End": last}.get(keys, row) and (keys != "PageUp" or 0 < row < last)
+        expected = attitudes(bodies, record, np.array([row]))
+        drawn = page.evaluate(DRAWN)
+        assert set(drawn) == set(expected)
+        for body, axes in expected.items():
+            assert np.abs(np.array(drawn[body]) - axes[0]).max() < 1e-9, (body, keys)
 
 
 def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
