@@ -19,7 +19,7 @@ from gyrobench.report.channel_figure import scaled
 POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
-RECORDS = 4  # kept open
+RECORDS = 3  # kept open
 
 
 class RecordSignals:
@@ -27,7 +27,7 @@ class RecordSignals:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self.time = record.channels.get("time", np.empty(0))
+        self.time = record.channels["time"] if "time" in record.channels else np.empty(0)
         self.names = [n for n in record.channels if n != "time"]
         self._pyramids: dict[str, SignalPyramid] = {}
 
@@ -64,7 +64,7 @@ def signals_of(folder: Path) -> RecordSignals:
 
 @functools.lru_cache(maxsize=RECORDS)
 def _signals(folder: Path, _changed: int) -> RecordSignals:
-    return RecordSignals(Record.load(folder))
+    return RecordSignals(Record.load(folder, on_request=True))
 
 
 def panels(titles: Sequence[str], begin: float, end: float) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from nicegui import ui
 from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
-from gyrobench.studio.chart import LiveChart, SignalChart, signals_of
+from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
 from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
@@ -23,10 +23,12 @@ from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
+from gyrobench.workflow.run_folders import short_names
 from gyrobench.workflow.run_list import RunEntry, list_runs
 
 TICK = 0.4  # s between two looks at a job
 LISTED = 300  # runs shown at a time
+HOW = "The wheel or two fingers zoom, dragging moves; every point drawn is a sample of the record."
 
 
 def add_run_pages(studio: Studio) -> None:
@@ -196,14 +198,7 @@ async def _signals(folder: Path, document: RunDocument) -> None:
         ui.label("The record holds no signals over time.").classes("soft")
         return
     first = first_shown(signals.names, _shown_by_report(document.system))
-    menu = ui.select(signals.names, value=first, multiple=True, label="Signals", with_input=True)
-    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
-    ui.label("The wheel or two fingers zoom, dragging moves; every point drawn is a sample of the record.").classes(
-        "soft"
-    )
-    chart = SignalChart({folder.name: signals})
-    menu.on_value_change(lambda e: chart.show(e.value or []))
-    await chart.show(first)
+    await _chosen({folder.name: signals}, signals.names, first)
 
 
 async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
@@ -329,6 +324,44 @@ def _add_comparison_page(studio: Studio) -> None:
             with ui.element("div").classes("bar"):
                 for place in asked:
                     ui.link(place, address("run", place))
-            if target.is_dir():
-                _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
-            CopyLines().show(comparison_command(shown), comparison_python(shown))
+            with ui.tabs().props("no-caps align=left dense") as tabs:
+                made = {n: ui.tab(n) for n in ("Report", "Signals", "As a command")}
+            with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
+                with ui.tab_panel(made["Report"]):
+                    if target.is_dir():
+                        _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
+                with ui.tab_panel(made["Signals"]):
+                    body = ui.element("div").classes("rows")
+                with ui.tab_panel(made["As a command"]):
+                    CopyLines().show(comparison_command(shown), comparison_python(shown))
+            drawn: list[str] = []
+
+            async def opened() -> None:
+                if tabs.value == "Signals" and not drawn:
+                    drawn.append(tabs.value)
+                    with body:
+                        await _overlay(folders)
+
+            tabs.on_value_change(opened)
+
+
+async def _overlay(folders: list[Path]) -> None:
+    """Draw the signals of several runs over each other."""
+    names = short_names(folders)
+    records = {n: await asyncio.to_thread(signals_of, f) for n, f in zip(names, folders, strict=True)}
+    common = [n for n in next(iter(records.values())).names if all(n in s.names for s in records.values())]
+    if not common:
+        ui.label("The runs have no signal in common.").classes("soft")
+        return
+    document = await asyncio.to_thread(read_run, folders[0])
+    await _chosen(records, common, first_shown(common, _shown_by_report(document.system))[:2])
+
+
+async def _chosen(records: dict[str, RecordSignals], names: list[str], first: list[str]) -> None:
+    """Add a menu of signals and their chart."""
+    menu = ui.select(names, value=first, multiple=True, label="Signals", with_input=True)
+    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
+    ui.label(HOW).classes("soft")
+    chart = SignalChart(records)
+    menu.on_value_change(lambda e: chart.show(e.value or []))
+    await chart.show(first)

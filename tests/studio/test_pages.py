@@ -240,6 +240,13 @@ def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
     page.get_by_role("button", name="Compare").click()
     page.wait_for_url("**/compare?**")
     page.frame_locator("iframe.report").get_by_text("baseline", exact=False).first.wait_for()
+    page.get_by_role("tab", name="Signals").click()
+    page.locator(".chart canvas").first.wait_for()
+    page.wait_for_timeout(500)
+    names = page.evaluate(
+        "getElement(document.querySelector('.chart').id.slice(1)).chart.getOption().series.map(s => s.name)"
+    )
+    assert len(names) == 4 and len({n.partition(", ")[0] for n in names}) == 2, "two signals of two runs"
 
 
 def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
