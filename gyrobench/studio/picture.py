@@ -22,14 +22,25 @@ SIZE = 2.6  # of the outermost body; each that stands on it is smaller
 FRAMES = 400  # of a whole record while it plays
 TICK = 0.1  # s between two frames
 #: the front end's own call turns by Euler angles, whose extraction loses digits near 90 degrees; a quaternion does not
-TURN = """const scene = getElement(%d);
-for (const [id, r] of %s) {
-  const found = scene?.objects.get(id);
-  if (!found?.mesh) continue;
-  const m = found.mesh.matrix.clone();
-  m.set(r[0][0], r[1][0], r[2][0], 0, r[0][1], r[1][1], r[2][1], 0, r[0][2], r[1][2], r[2][2], 0, 0, 0, 0, 1);
-  found.mesh.setRotationFromMatrix(m);
-}"""
+#: what is newest counts, and what is not there yet is waited for
+TURN = """(() => {
+  const turns = %s, place = %d;
+  (window.bodiesTurned ??= {})[place] = turns;
+  const turn = left => {
+    if (window.bodiesTurned[place] !== turns) return;
+    const objects = getElement(place)?.objects;
+    let waiting = !objects;
+    for (const [id, r] of objects ? turns : []) {
+      const mesh = objects.get(id)?.mesh;
+      if (!mesh) { waiting = true; continue; }
+      const m = mesh.matrix.clone();
+      m.set(r[0][0], r[1][0], r[2][0], 0, r[0][1], r[1][1], r[2][1], 0, r[0][2], r[1][2], r[2][2], 0, 0, 0, 0, 1);
+      mesh.setRotationFromMatrix(m);
+    }
+    if (waiting && left > 0) setTimeout(() => turn(left - 1), 50);
+  };
+  turn(200);
+})()"""
 
 
 class MovingPicture:
@@ -64,7 +75,6 @@ class MovingPicture:
         ui.label(f"Axes of each body: {legend}. E, N, U, the pole and gravity are fixed. Not to scale.").classes("soft")
         self.slider.on_value_change(lambda e: self.show(int(e.value)))
         self.timer = ui.timer(TICK, self._step, active=False)
-        self.scene.on("init", lambda: self.show(self.row))
         self.show(0)
 
     def attitudes(self, row: int) -> Mapping[str, Array]:
@@ -76,7 +86,7 @@ class MovingPicture:
         self.row = row
         turns = [[self.groups[n].id, a.tolist()] for n, a in self.attitudes(row).items() if n in self.groups]
         self.label.set_text(f"t = {self.time[row]:,.6g} s")
-        ui.run_javascript(TURN % (self.scene.id, json.dumps(turns)))
+        ui.run_javascript(TURN % (json.dumps(turns), self.scene.id))
 
     def _play(self) -> None:
         self.timer.active = not self.timer.active

@@ -21,7 +21,6 @@ SHORT: dict[str, dict[str, Any]] = {
     "accelerometer_four": {"settle": "1s", "dwell": "1s"},
     "tumble_two_axis": {"positions": 12},
     "north_finder": {},
-    "open_loop_drift": {},
     "pickoff_scale_factor": {},
     "rebalance_loop_test": {},
     "torquer_scale_factor": {},
