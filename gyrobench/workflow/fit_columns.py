@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,11 +21,13 @@ from gyrobench.record.column_proposal import (
     match_columns,
     series_columns,
 )
+from gyrobench.record.log_files import as_text, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.measured_run import empty_record
 
+MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
@@ -53,10 +56,11 @@ class ColumnProposal:
     found: Mapping[str, FileColumn]
     wanted: Mapping[str, str]
     stated: Mapping[str, str]
+    table: str = ""  # of a log with several
 
     def text(self) -> tuple[str, list[str]]:
         """Return the text of the map, and what it lacks."""
-        text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated)
+        text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
         if "channel" in self.test.options:
             names = [] if any(u not in ("s", "K", "degC") for u in self.wanted.values()) else ["rate"]
         else:
@@ -74,8 +78,22 @@ def propose_columns(file: Path, system: str) -> ColumnProposal:
     if not file.is_file():
         raise UsageError(f"{file}: no such file")
     test = load_test(system)
+    tables = tables_of(file)[:MOST_TABLES] if is_log(file) else [""]
+    if len(tables) == 1:
+        tables = [""]
+    proposals = []
+    for table in tables:
+        with suppress(UsageError) if len(tables) > 1 else nullcontext():
+            proposals.append(_proposal(file, test, table))
+    if not proposals:
+        raise UsageError(f"{file}: no table of numbers with names in {', '.join(tables)}")
+    return max(proposals, key=lambda p: len(p.found))
+
+
+def _proposal(file: Path, test: System | Suite, table: str) -> ColumnProposal:
+    """Return the map of a table of a file, "" of the only one."""
     wanted, stated = wanted_columns(test)
-    layout = find_layout(file)
+    layout = find_layout(as_text(file, table) if is_log(file) else file)
     if "channel" in test.options:
         found, wanted = _any_names(layout)
     else:
@@ -85,7 +103,7 @@ def propose_columns(file: Path, system: str) -> ColumnProposal:
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c
-    return ColumnProposal(file, test, layout, found, dict(wanted), stated)
+    return ColumnProposal(file, test, layout, found, dict(wanted), stated, table)
 
 
 def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:
@@ -125,18 +143,16 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
 
 def map_text(
     file: Path, test: System | Suite, layout: FileLayout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
-    stated: Mapping[str, str],
+    stated: Mapping[str, str], table: str = "",
 ) -> tuple[str, list[str]]:  # fmt: skip
-    """Return the text of a map, and what it lacks: units that the file does not tell."""
+    """Return the text of a map, and what it lacks: units that the file does not tell.  table: of a log."""
     problems: list[str] = []
     empty = sum(c.empty for c in found.values())
     series = "t_start" not in wanted
     lines = [
         f"# Column map of {file.name}: gyrobench reduce {test.name} --data {file.name} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
-        f"encoding = {_quoted(layout.encoding)}",
-        f"delimiter = {_quoted(layout.delimiter)}",
-        f"decimal = {_quoted(layout.decimal)}",
+        *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
         f"skip = {layout.skip}  # lines above the names of the columns",
         f"below = {layout.below}  # lines between names and rows",
         "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
@@ -157,6 +173,11 @@ def map_text(
     ]
     lines += [f"# {n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")]
     return "\n".join(lines) + "\n", problems
+
+
+def _text_keys(layout: FileLayout) -> list[str]:
+    keys = {"encoding": layout.encoding, "delimiter": layout.delimiter, "decimal": layout.decimal}
+    return [f"{key} = {_quoted(value)}" for key, value in keys.items()]
 
 
 def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str]:

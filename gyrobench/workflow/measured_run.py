@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.record.csv_reader import DataError
+from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import DataFile
@@ -64,7 +65,7 @@ def reduce_measured(
     if columns is not None:
         record = _read_mapped(measured, system, data, values, columns, feedback)
     else:
-        record = _read(measured, system, data, values, feedback)
+        record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
     with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
