@@ -19,6 +19,7 @@ from gyrobench.report.channel_figure import scaled
 POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
+TEXT, GRID = "#7b8791", "rgba(128, 140, 150, 0.3)"  # read on light and on dark ground
 RECORDS = 3  # kept open
 
 
@@ -73,19 +74,22 @@ def panels(titles: Sequence[str], begin: float, end: float) -> dict[str, Any]:
     last = len(titles) - 1
     return {
         "animation": False, "color": list(COLOURS), "backgroundColor": "transparent",
-        "legend": {"type": "scroll", "top": 0}, "tooltip": {"trigger": "axis"},
+        "textStyle": {"color": TEXT},
+        "legend": {"type": "scroll", "top": 0, "textStyle": {"color": TEXT}}, "tooltip": {"trigger": "axis"},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "grid": [{"left": 64, "right": 18, "top": t + 24, "height": PANEL} for t in top],
         "title": [
-            {"text": text, "top": t, "left": 0, "textStyle": {"fontSize": 12}}
+            {"text": text, "top": t, "left": 0, "textStyle": {"fontSize": 12, "color": TEXT}}
             for text, t in zip(titles, top, strict=True)
         ],
         "xAxis": [
             {"type": "value", "gridIndex": k, "min": begin, "max": end, "name": "time in s" if k == last else "",
-             "nameLocation": "middle", "nameGap": 24, "axisLabel": {"show": k == last}}
+             "nameLocation": "middle", "nameGap": 24, "axisLabel": {"show": k == last, "color": TEXT},
+             "splitLine": {"lineStyle": {"color": GRID}}}
             for k in range(len(titles))
         ],
-        "yAxis": [{"type": "value", "gridIndex": k, "scale": True, "splitNumber": 4} for k in range(len(titles))],
+        "yAxis": [{"type": "value", "gridIndex": k, "scale": True, "splitNumber": 4, "axisLabel": {"color": TEXT},
+             "splitLine": {"lineStyle": {"color": GRID}}} for k in range(len(titles))],
     }  # fmt: skip
 
 
