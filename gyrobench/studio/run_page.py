@@ -193,7 +193,9 @@ def _tests(document: SuiteDocument, place: str) -> None:
 
 
 async def _signals(folder: Path, document: RunDocument) -> None:
+    wait = ui.label("The record is being read.").classes("soft").props("role=status")
     signals = await asyncio.to_thread(signals_of, folder)
+    wait.delete()
     if not signals.names or not len(signals.time):
         ui.label("The record holds no signals over time.").classes("soft")
         return
