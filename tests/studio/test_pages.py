@@ -114,6 +114,16 @@ def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str,
     assert "/system/" in page.url
 
 
+def test_what_is_not_there_is_said_with_what_is_near(page: Any, studio: tuple[str, Path]) -> None:
+    for path, said in (
+        ("/system/fixed_positio", "did you mean fixed_position"),
+        ("/job/x", "no job 'x'"),
+        ("/run/x/y", "x/y"),
+    ):
+        page.goto(base_of(studio) + path)
+        page.get_by_role("alert").get_by_text(said).wait_for()
+
+
 def test_a_part_is_swapped_and_its_parameters_follow(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/tumble_single_axis")
     page.get_by_label("part in gyro").click()
