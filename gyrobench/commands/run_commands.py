@@ -229,7 +229,7 @@ def record(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder; default: of the run, csv/ in it for csv.")
     ] = None,
 ) -> None:
-    """Write the record of a run, and the tables of its report, for other programs.
+    """Write the record of a run and the tables of its report.
 
     A row of windows.csv is a completed window (its columns: docs/systems.md), one of channels.csv a time; names are
     those of the record, "gyro.u [V]" with the SI unit where it is not 1.  Numbers read back bit for bit.

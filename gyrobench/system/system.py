@@ -132,6 +132,7 @@ class System(Configurable):
     #: channels that a report draws, a panel an entry: names, of a vector without its index; (): the first ones
     shown: ClassVar[Iterable[str]] = ()
     channel_period: float = 1.0  # s
+    bodies: ClassVar[str] = ""  # what moves, as the record tells it: gyrobench.system.moving_bodies
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
