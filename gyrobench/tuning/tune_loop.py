@@ -78,7 +78,7 @@ def tune(
             "structure, or a smaller spread"
         )
     results = _results(wishes, f, loops, problem.plants)
-    part, settings = _settings(shape, controller, nominal)
+    part, settings = _settings(shape, controller, nominal, system)
     settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]))
     had = all(r.ratio >= 1.0 for r in results)
     reasons = () if had else tuple(reasons_of(loop, problem, x, results, f, loops))
@@ -209,13 +209,15 @@ def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]
 
 
 def _settings(
-    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any]
+    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any], system: System
 ) -> tuple[str, dict[str, Any]]:  # fmt: skip
     """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
     if shape.is_lead_lag and all(f"{SLOT}.{n}" in nominal for n in NETWORK):
         neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
         values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
-        return "", {f"{SLOT}.{n}": float(f"{values[n]:.9g}") for n in NETWORK}
+        owners = {option.sets: name for name, option in system.options.items()}  # "stabilizer.K" -> its option
+        names = (f"{SLOT}.{n}" for n in NETWORK)
+        return "", {owners.get(n, n): float(f"{values[n.partition('.')[2]]:.9g}") for n in names}
     direct = len(np.trim_zeros(controller.num, "b")) == len(np.trim_zeros(controller.den, "b"))
     return _part_of_any(), {
         f"{SLOT}.form": 1,
@@ -261,8 +263,8 @@ def _notes(proofs: Sequence[Proof], part: str) -> list[str]:
     for p in proofs:
         if p.friction and not all(w.agrees for w in p.wishes):
             notes.append(
-                f"the friction ({p.friction}) is not in the linear model: at the amplitude of the test sines the loop "
-                "is another one (describing function)"
+                f"the linear model takes the friction ({p.friction}) for an elastic contact that does not slip: at the "
+                "amplitude of the test sines the loop is another one (describing function)"
             )
             break
     if any(p.limits for p in proofs):

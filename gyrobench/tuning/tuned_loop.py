@@ -137,10 +137,15 @@ def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
     return ", ".join(f"{n} = {units.format_quantity(float(f'{v:.4g}'), unit[n])}" for n, v in at.items()) or "nominal"
 
 
+def range_text(r: Range) -> str:
+    """Return a range as text."""
+    low, high = (units.format_quantity(float(f"{x:.4g}"), r.unit) for x in (r.low, r.high))
+    return f"{r.name} {low} to {high}"
+
+
 def _lines(t: TunedLoop) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
-    over = ", ".join(f"{r.name} {where({r.name: r.low}, t.spread)[len(r.name) + 3:]} to "
-                     f"{where({r.name: r.high}, t.spread)[len(r.name) + 3:]}" for r in t.spread)  # fmt: skip
+    over = ", ".join(range_text(r) for r in t.spread)
     lines = [
         f"{t.system}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
         f"over {over}: {len(t.points)} points" if over else "at nominal values",
@@ -161,7 +166,7 @@ def _lines(t: TunedLoop) -> list[str]:
         for w in p.wishes:
             end = "" if w.kept else "  ! below what is wanted"
             end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
-            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{_margin(w)}{end}")
+            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{margin_text(w)}{end}")
         if p.limits:
             lines.append(f"  at its limit in the test sines: {p.limits}")
         if p.step is not None:
@@ -174,7 +179,7 @@ def _lines(t: TunedLoop) -> list[str]:
     return [*lines, "", f"{title}: {values}", "", t.command]
 
 
-def _margin(w: ProvenWish) -> str:
+def margin_text(w: ProvenWish) -> str:
     """Return the expanded uncertainty of a measured wish as text."""
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""
