@@ -12,8 +12,8 @@ import pytest
 
 import gyrobench
 from gyrobench.bench import Bench, BenchError, display_path, standard_folder, suggest_names
-from gyrobench.commands import catalog
-from gyrobench.commands.catalog import init_bench, list_contents
+from gyrobench.workflow import catalog
+from gyrobench.workflow.catalog import init_bench, list_contents
 
 ODD = '''"""A module."""
 class Helper:
@@ -104,7 +104,7 @@ def test_short_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 # --------------------------------------------------------------------------------- list and init
 def test_listing_reads_what_each_part_says_of_itself() -> None:
     found = list_contents(Bench(standard_folder()))
-    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+    assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
     assert all(r["what"] for rows in found.values() for r in rows)
     rows = {r["name"]: r for title in ("parts", "systems") for r in found[title]}
     assert rows["floated_gyro"]["what"] == "Single-degree-of-freedom floated gyro"
@@ -186,6 +186,8 @@ ROOMS["design"] = BELOW
 ROOMS["tuning"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
 ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
+#: the face in the browser; that of the shell is in FACES, and neither imports the other
+ROOMS["studio"] = BELOW | {"workflow", "library"}
 #: rooms inside a room -> rooms beside them that they may import
 INNER: dict[str, set[str]] = {
     "campaign.execution": set(),

@@ -18,6 +18,7 @@ from gyrobench.commands.arguments import parse_settings
 from gyrobench.commands.console import print_notes
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
+from gyrobench.workflow.progress_words import format_duration
 
 Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
@@ -76,7 +77,7 @@ def test_list(gyrobench: Call) -> None:
     for name in (*Bench(standard_folder()).parts(), NAME, "SdfGyro"):
         assert f"  {name} " in out
     found = json.loads(gyrobench("list", "--json")[1])
-    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+    assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
 
 
 # ------------------------------------------------------------------------------------------------ show
@@ -233,7 +234,7 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_spans_of_time() -> None:
-    assert [progress_display.format_duration(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
+    assert [format_duration(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
         "0 s", "1 min 15 s", "2 h 01 min", "unknown",
     ]  # fmt: skip
 

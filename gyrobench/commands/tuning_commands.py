@@ -54,8 +54,9 @@ def tune(
     \b
     Example: gyrobench tune platform_single_axis --want "phase margin=40deg" --want "bandwidth>10Hz"
     """
-    from gyrobench.commands.arguments import load_system, parse_settings, parse_swaps
+    from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.tuning.tune_loop import tune as tune_loop
+    from gyrobench.workflow.settings import load_system
 
     settings = parse_settings(values)
     parts, maps = parse_swaps(part, mapping)
