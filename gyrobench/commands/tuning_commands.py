@@ -66,10 +66,9 @@ def tune(
     )  # fmt: skip
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
     if out is not None:
-        from gyrobench.bench import Bench, display_path
-        from gyrobench.tuning.tuning_page import write_tuning
+        from gyrobench.bench import display_path
 
-        for path in write_tuning(found, out, bench=Bench.find().folder).values():
+        for path in found.write(out).values():
             echo(display_path(path), err=True)
     if not found.proven:
         raise typer.Exit(1)

@@ -29,7 +29,8 @@ from gyrobench.tuning.wishes import Wish
 
 INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
 SINES = 14  # beside those at the limits
-PERIODS = 32
+PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
+SLOWER = 40.0
 SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
@@ -78,7 +79,7 @@ class Proof:
         return not self.why_not and all(w.kept for w in self.wishes)
 
 
-def test_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
+def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
     """Return the sines, Hz: about the crossovers, the limits and the largest |S - 1/2|."""
     crossed = [at for at, _ in crossovers(f, L)]
     upper = max(crossed, default=float(f[len(f) // 2]))
@@ -108,7 +109,12 @@ def loop_plan(system: System, frequencies: Sequence[float]) -> tuple[LoopPlan, f
     slowest = min(frequencies)
     rest = LoopPhase("rest", "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
     steps = [replace(load, dwell=min(load.dwell, 20.0 / slowest), settle=2.0 / slowest)] if load else []
-    sines_ahead = sweep("loop", "test", frequencies, amplitude, periods=PERIODS, settle=0.5 / slowest)
+    fast = [f for f in frequencies if f * SLOWER > max(frequencies)]
+    slow = [f for f in frequencies if f not in fast]
+    sines_ahead = [
+        *sweep("loop", "test", slow, amplitude, periods=PERIODS // 3, settle=0.5 / slowest),
+        *sweep("loop", "test", fast, amplitude, periods=PERIODS, settle=0.5 / slowest),
+    ]
     plan = LoopPlan([rest, *sines_ahead, *steps])
     return plan, float(load.amplitude) if load else 0.0
 
@@ -120,7 +126,7 @@ def proof_of(
     """Run the loop test at a point of the spread.  L: the linear loop at this point over f.  Raises RunError."""
     system = session.system
     step = system.step
-    chosen = test_frequencies(f, L, wishes, step)
+    chosen = sine_frequencies(f, L, wishes, step)
     plan, load = loop_plan(system, chosen)
     kept = dict(vars(system))
     vars(system).update(

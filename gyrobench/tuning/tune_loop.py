@@ -13,7 +13,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
 from gyrobench.component import Component, ComponentError
-from gyrobench.engine.session import Session
+from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
@@ -89,7 +89,10 @@ def tune(
     with Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
-            proofs.append(proof_of(session, settings, at, f, loops[k], wishes, seed))
+            try:
+                proofs.append(proof_of(session, settings, at, f, loops[k], wishes, seed))
+            except RunError as error:
+                proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops, seconds,

@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,12 @@ class TunedLoop:
             "seconds": self.seconds,
             "evaluations": self.evaluations,
         }  # fmt: skip
+
+    def write(self, folder: str | Path) -> dict[str, Path]:
+        """Write tuning.json, tuning.html and tuning.pdf into a folder; return the path of each format."""
+        from gyrobench.tuning.tuning_page import write_tuning
+
+        return write_tuning(self, Path(folder))
 
     def __str__(self) -> str:
         return "\n".join(_lines(self))

@@ -13,7 +13,7 @@ from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, W
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.tuned_loop import TunedLoop
 
-SPAN = 100.0  # figures over frequency show so much about the crossover
+SPAN = 40.0  # figures over frequency show so much about the crossover
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
 OTHER: dict[str, Any] = {"color": MUTED, "linewidth": 0.5, "alpha": 0.6, "zorder": 2}
 DOTS: dict[str, Any] = {"color": VERMILION, "marker": "o", "linestyle": "", "markersize": 3.2, "zorder": 4}
@@ -57,7 +57,7 @@ def nyquist(t: TunedLoop) -> str:
     for name, margin, colour in margin_disks(t):
         ring = disk(margin)
         ax.fill(ring.real, ring.imag, color=SHADE, zorder=0)
-        ax.plot(ring.real, ring.imag, "--", color=colour, linewidth=1.0, label=f"disk margin, {name}")
+        ax.plot(ring.real, ring.imag, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
     if t.proofs and t.proofs[0].points:
         measured = np.array([p.value for p in t.proofs[0].points])
         ax.plot(measured.real, measured.imag, **DOTS, label="co-simulation")
@@ -80,7 +80,7 @@ def nichols(t: TunedLoop) -> str:
         ring = disk(margin)
         x, y = np.degrees(np.unwrap(np.angle(-ring))) - 180.0, 20.0 * np.log10(np.abs(ring))
         ax.fill(x, y, color=SHADE, zorder=0)
-        ax.plot(x, y, "--", color=colour, linewidth=1.0, label=f"disk margin, {name}")
+        ax.plot(x, y, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
     if t.proofs and t.proofs[0].points:
         points = t.proofs[0].points
         size, turn = _polar(np.array([p.value for p in points]), np.array([p.f for p in points]))

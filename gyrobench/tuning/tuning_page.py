@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from gyrobench.bench import Bench
 from gyrobench.report import FORMATS
 from gyrobench.report.page_model import (
     BulletList,
@@ -30,11 +31,9 @@ from gyrobench.tuning.tuned_loop import TunedLoop, margin_text, range_text, wher
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
 
 
-def write_tuning(
-    tuned: TunedLoop, folder: Path, formats: Sequence[str] = FORMATS, bench: Path | None = None
-) -> dict[str, Path]:
+def write_tuning(tuned: TunedLoop, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
     """Write tuning.json, tuning.html, tuning.pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
-    return write_files(tuned.as_dict(), lambda: page(tuned), folder, formats, NAMES, bench)
+    return write_files(tuned.as_dict(), lambda: page(tuned), folder, formats, NAMES, Bench.find().folder)
 
 
 def page(t: TunedLoop) -> Page:
@@ -97,7 +96,7 @@ def _margins(t: TunedLoop) -> list[Any]:
 
 def _responses(t: TunedLoop) -> list[Any]:
     both = (
-        Picture("sensitivities", draw.sensitivities(t), "S = 1/(1 + L) and T = L/(1 + L), with what was wanted of them.",
+        Picture("sensitivities", draw.sensitivities(t), "S = 1/(1 + L) and T = L/(1 + L), and what was wanted.",
                 "gain of S and T over frequency"),
         Picture("open-loop", draw.open_loop(t), "Open loop L, step and delays of the co-simulation in it.",
                 "Bode plot of the open loop"),
@@ -159,9 +158,9 @@ def _method(t: TunedLoop) -> list[Any]:
 
     meant = [f"{n}: {MEASURES[n][2]}." if n in MEASURES else f"{n}: |S| there." for n in names]
     text = (
-        "The linear models come from the Jacobians of the parts, with the communication step, the order of the parts and "
-        "every inserted delay in them. The search maximizes the smallest ratio of what is got to what is wanted, over "
-        f"all wishes and points of the spread; {t.evaluations} controllers were judged. Limits, dry friction that slides "
-        "and noise are not in the linear models; they are in the proof."
+        "The linear models come from the Jacobians of the parts, with the communication step, the order of the parts "
+        "and every inserted delay in them. The search maximizes the smallest ratio of what is got to what is wanted, "
+        f"over all wishes and points of the spread; {t.evaluations} controllers were judged. Limits, dry friction that "
+        "slides and noise are not in the linear models; they are in the proof."
     )
     return [Text(text), BulletList(meant), Text("Seiler 2020; Skogestad 2005, sections 2.4.5 and 2.8.2.", quiet=True)]
