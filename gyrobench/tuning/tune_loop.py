@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from gyrobench.packaging import load_part
 from gyrobench.system.system import System
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
-from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
+from gyrobench.tuning.proof import INSIDE, LIMITED, TEST, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.spread import Range, parse_spread, points
@@ -86,11 +87,12 @@ def tune(
     worst = sorted(results, key=lambda r: r.ratio)[0].at
     runs = [{}, worst] if worst else [{}]
     proofs = []
-    with Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
+    system.channels = tuple(dict.fromkeys((*system.channels, LIMITED)))  # type: ignore[misc]
+    with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
             try:
-                proofs.append(proof_of(session, settings, at, f, loops[k], wishes, seed))
+                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed))
             except RunError as error:
                 proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
@@ -127,7 +129,21 @@ class _Loop:
         models = self.plants(points(self.ranges))
         wanted = self.system.crossovers().get("stabilizer")
         decades = box(shape, wishes, wanted, self.step)
-        return TuningProblem(shape, wishes, models, decades, frequencies(models, decades, wishes))
+        return TuningProblem(
+            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges)
+        )
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Keep back what the runs of a proof would warn of: that parts are off their nominal values is meant."""
+    log = logging.getLogger("gyrobench")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def _has_loop(system: System) -> bool:

@@ -135,6 +135,22 @@ def test_the_search_finds_what_a_grid_finds() -> None:
     assert np.exp(best) < 1.1 * np.exp(max(every))  # a grid of 70 is not far off
 
 
+def test_the_test_sines_of_a_proof_meet_no_limit() -> None:
+    """A lead of 200 makes 600 V of the test voltage of the system's own plan: the motor has 27.  The sines are smaller,
+    so that what is measured is the linear loop; and the saturation of the stabilizer is watched.
+    """
+    system = load_system(NAMES[1])
+    system.set("motor", "real")
+    found = tune(system, ["phase margin=40deg", "peak S<6dB", "bandwidth>12Hz", "S at 1Hz<-30dB"])
+    effort = found.controller.response(2j * np.pi * np.array([40.0]))[0] / (
+        1.0 + np.interp(40.0, found.f, found.loops[0])
+    )
+    assert abs(effort) * 1e-3 > 27.0
+    assert found.proven and found.proofs[0].limits == ""
+    for w in found.proofs[0].wishes:
+        assert w.agrees, w
+
+
 def run(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
 
