@@ -40,7 +40,7 @@ from gyrobench.workflow.run_comparison import Comparison, compare_results, read_
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
-    from gyrobench.tuning.tuned_loop import TunedLoop
+    from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
     "Comparison",

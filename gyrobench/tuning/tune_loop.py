@@ -26,8 +26,9 @@ from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.tuned_loop import TunedLoop, WishResult
+from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import Wish, parse_wishes
+from gyrobench.tuning.written_loop import TunedLoop
 
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")

@@ -6,7 +6,6 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ class WishResult:
 
 
 @dataclass(frozen=True)
-class TunedLoop:
+class LoopTuning:
     """settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
 
     reasons: why what is wanted cannot be had, else ().  loops: L over f (Hz) at each point of the spread, nominal
@@ -114,13 +113,8 @@ class TunedLoop:
             "evaluations": self.evaluations,
         }  # fmt: skip
 
-    def write(self, folder: str | Path) -> dict[str, Path]:
-        """Write tuning.json, tuning.html and tuning.pdf into a folder; return the path of each format."""
-        from gyrobench.tuning.tuning_page import write_tuning
-
-        return write_tuning(self, Path(folder))
-
-    def __str__(self) -> str:
+    def text(self) -> str:
+        """Return all of it as a text."""
         return "\n".join(_lines(self))
 
 
@@ -150,7 +144,7 @@ def range_text(r: Range) -> str:
     return f"{r.name} {low} to {high}"
 
 
-def _lines(t: TunedLoop) -> list[str]:
+def _lines(t: LoopTuning) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
     over = ", ".join(range_text(r) for r in t.spread)
     lines = [

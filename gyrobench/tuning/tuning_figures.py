@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
 from gyrobench.tuning.robustness import FLOOR
-from gyrobench.tuning.tuned_loop import TunedLoop
+from gyrobench.tuning.tuned_loop import LoopTuning
 
 SPAN = 40.0  # figures over frequency show so much about the crossover
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
@@ -25,7 +25,7 @@ def disk(margin: float) -> Complex:
     return np.asarray(0.5 * (far + near) + 0.5 * (near - far) * np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361)))
 
 
-def margin_disks(t: TunedLoop) -> list[tuple[str, float, str]]:
+def margin_disks(t: LoopTuning) -> list[tuple[str, float, str]]:
     """Return the disks to show: name, margin, colour."""
     from gyrobench.tuning.robustness import peak
 
@@ -35,7 +35,7 @@ def margin_disks(t: TunedLoop) -> list[tuple[str, float, str]]:
     return [*((f"wanted {x:.3g}", x, VERMILION) for x in wanted), *((f"{n} {x:.3g}", x, c) for n, x, c in shown)]
 
 
-def near(t: TunedLoop) -> tuple[float, float]:
+def near(t: LoopTuning) -> tuple[float, float]:
     """Return the range of frequencies that the figures show, Hz."""
     size = np.abs(t.loops[0])
     crossed = t.f[np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))]
@@ -43,12 +43,12 @@ def near(t: TunedLoop) -> tuple[float, float]:
     return max(float(t.f[0]), middle / SPAN), min(float(t.f[-1]), middle * SPAN)
 
 
-def _inside(t: TunedLoop) -> Array:
+def _inside(t: LoopTuning) -> Array:
     low, high = near(t)
     return np.asarray((t.f >= low) & (t.f <= high))
 
 
-def nyquist(t: TunedLoop) -> str:
+def nyquist(t: LoopTuning) -> str:
     """Return L near the critical point, with the disks that it must not enter."""
     fig, axes = figure(HALF, 78)
     ax = axes[0, 0]
@@ -68,7 +68,7 @@ def nyquist(t: TunedLoop) -> str:
     return svg(fig, "nyquist")
 
 
-def nichols(t: TunedLoop) -> str:
+def nichols(t: LoopTuning) -> str:
     """Return gain over phase of L, the disks in these coordinates."""
     fig, axes = figure(HALF, 78)
     ax = axes[0, 0]
@@ -103,7 +103,7 @@ def _polar(L: Complex, f: Array) -> tuple[Array, Array]:
     return size, turn - 360.0 * math.ceil(at / 360.0)
 
 
-def open_loop(t: TunedLoop) -> str:
+def open_loop(t: LoopTuning) -> str:
     """Return gain and phase of L over frequency, with the points that the co-simulation measured."""
     fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
     pick = _inside(t)
@@ -139,7 +139,7 @@ def _frequencies(ax: Any) -> None:
     ax.xaxis.set_minor_formatter(NullFormatter())
 
 
-def sensitivities(t: TunedLoop) -> str:
+def sensitivities(t: LoopTuning) -> str:
     """Return |S| and |T| over frequency with the bounds that the wishes set."""
     fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
     pick = _inside(t)
@@ -180,7 +180,7 @@ def sensitivities(t: TunedLoop) -> str:
     return svg(fig, "sensitivities")
 
 
-def load_step(t: TunedLoop) -> str:
+def load_step(t: LoopTuning) -> str:
     """Return the platform's angle after a step of torque in the co-simulation; "" where the plan has none."""
     shown = [p for p in t.proofs if p.step is not None]
     if not shown:
