@@ -33,6 +33,7 @@ from gyrobench.tuning.written_loop import TunedLoop
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
+HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
@@ -64,6 +65,10 @@ def tune(
         now, _, document = session.prepare({}, seed)
         nominal = document.parameters
         ranges = parse_spread(over, lambda name: _known(session, nominal, name))
+        for w in wishes:
+            if w.f >= HIGHEST / now.step:
+                raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
+                                 f"{HIGHEST / now.step:g} Hz")  # fmt: skip
         loop = _Loop(session, now, nominal, ranges)
         problem = loop.problem(shape, wishes)
         x = search(problem)

@@ -69,12 +69,18 @@ def summary(t: LoopTuning) -> str:
     return f"What is wanted cannot be had {where_} with this structure; shown is the best compromise that was found."
 
 
+def minus(text: str) -> str:
+    """Return a number's text with the sign of print."""
+    return text.replace("-", "−")
+
+
 def _wishes(t: LoopTuning) -> PageTable:
     rows = []
     for w in t.wishes:
         good = w.ratio >= 1.0
-        cells = [w.wish.name, ("≥ " if w.wish.least else "≤ ") + w.wish.shown(w.wish.value), w.wish.shown(w.worst),
-                 w.wish.shown(w.nominal), where(w.at, t.spread), "fulfilled" if good else "not fulfilled"]  # fmt: skip
+        wanted, worst, nominal = (minus(w.wish.shown(x)) for x in (w.wish.value, w.worst, w.nominal))
+        cells = [w.wish.name, ("≥ " if w.wish.least else "≤ ") + wanted, worst, nominal, where(w.at, t.spread),
+                 "fulfilled" if good else "not fulfilled"]  # fmt: skip
         marks = ["strong", "", "", "", "", "pass" if good else "fail"]
         rows.append(Row([text_cell(c, m) for c, m in zip(cells, marks, strict=True)]))
     heads = columns("measure", "wanted", "worst case", "nominal", "worst at", "", wide=["worst at"])
@@ -124,7 +130,7 @@ def _proven(point: str, w: ProvenWish) -> list[Any]:
     state = ("holds", "pass") if w.kept else ("below what is wanted", "fail")
     if w.kept and not w.agrees:
         state = ("holds, unlike the linear model", "warn")
-    cells = [point, w.wish.name, w.wish.shown(w.value) + margin_text(w), w.wish.shown(w.expected)]
+    cells = [point, w.wish.name, minus(w.wish.shown(w.value) + margin_text(w)), minus(w.wish.shown(w.expected))]
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
 
 

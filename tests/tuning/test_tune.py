@@ -198,3 +198,9 @@ def test_spreads_of_parts_refused(over: str, message: str) -> None:
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], [over])
     with pytest.raises(UsageError, match="tune chooses the stabilizer"):
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], parts={"stabilizer": "servo_three_loop"})
+
+
+def test_a_wish_beyond_the_communication_step_is_refused() -> None:
+    """A step of 0.5 ms: up to 800 Hz."""
+    with pytest.raises(UsageError, match=r"S at 900Hz: the communication step of 0\.0005 s reaches up to 800 Hz"):
+        tune(load_system(NAMES[0]), ["S at 900Hz<3dB"])

@@ -11,7 +11,7 @@ import pytest
 
 import gyrobench as gb
 from gyrobench.tuning.tuning_figures import disk
-from gyrobench.tuning.tuning_page import page
+from gyrobench.tuning.tuning_page import minus, page
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_page_says_what_was_wanted_and_what_came(tuned, tmp_path: Path) -> N
     assert json.loads(written["json"].read_text())["proven"] is True
     html = written["html"].read_text(encoding="utf-8")
     for w in tuned.wishes:
-        assert w.wish.name in html and w.wish.shown(w.worst) in html
+        assert w.wish.name in html and minus(w.wish.shown(w.worst)) in html
     assert "Every wish is fulfilled over the whole spread" in html
     assert tuned.command.split(" --set")[0] in html
     assert written["pdf"].read_bytes().startswith(b"%PDF")
