@@ -59,6 +59,7 @@ def tune(
     """
     wishes, shape = parse_wishes(want), ControllerStructure(structure)
     _require_loop(system, parts or {})
+    system = system.with_values({})
     began = time.perf_counter()
     system.nominal = dict(system.overrides)
     with Session(system, parts, maps, bench=Bench.find().folder, child=True) as session:
@@ -103,8 +104,10 @@ def tune(
                 proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
-        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops, seconds,
-        problem.evaluations, reasons, tuple(_notes(proofs, part)),
+        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
+        swaps={slot: str(name) for slot, name in (parts or {}).items()},
+        maps={slot: str(file) for slot, file in (maps or {}).items()},
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=tuple(_notes(proofs)),
     )  # fmt: skip
 
 
@@ -283,7 +286,7 @@ def _crossover(
     return {"crossover": f"{at:g}Hz"} if all(other.get(n) == v for n, v in plain.items()) else {}
 
 
-def _notes(proofs: Sequence[Proof], part: str) -> list[str]:
+def _notes(proofs: Sequence[Proof]) -> list[str]:
     notes = []
     for p in proofs:
         if p.friction and not all(w.agrees for w in p.wishes):

@@ -38,6 +38,8 @@ class WishResult:
 class LoopTuning:
     """settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
 
+    swaps, maps: parts and mapping files of other slots that were given.
+
     reasons: why what is wanted cannot be had, else ().  loops: L over f (Hz) at each point of the spread, nominal
     first.
     """
@@ -54,6 +56,8 @@ class LoopTuning:
     proofs: tuple[Proof, ...]
     f: Array = field(repr=False)
     loops: Complex = field(repr=False)
+    swaps: Mapping[str, str] = field(default_factory=dict)
+    maps: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     evaluations: int = 0
     reasons: tuple[str, ...] = ()
@@ -72,9 +76,10 @@ class LoopTuning:
     @property
     def command(self) -> str:
         """Return the command that runs the system with this controller."""
-        part = f" --part {SLOT}={self.part}" if self.part else ""
-        text = " ".join(f"--set {shlex.quote(f'{n}={_text(v)}')}" for n, v in {**self.given, **self.settings}.items())
-        return f"gyrobench run {self.system}{part} {text}".rstrip()
+        parts = {**self.swaps, **({SLOT: self.part} if self.part else {})}
+        named = [("part", parts), ("map", self.maps), ("set", {**self.given, **self.settings})]
+        words = [f"--{option} {shlex.quote(f'{n}={_text(v)}')}" for option, values in named for n, v in values.items()]
+        return " ".join(["gyrobench run", self.system, *words])
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain JSON values; unlimited margins are null."""

@@ -156,15 +156,16 @@ def run(*arguments: str):
 
 
 def test_the_command_and_what_it_prints() -> None:
-    """A structure for stabilizer_lti; its last line is a command that runs."""
+    """A structure for stabilizer_lti, another estimator in the loop: the command that is printed has both."""
     wishes = [x for w in ("phase margin=45deg", "bandwidth>4Hz") for x in ("--want", w)]
-    answer = run("tune", NAMES[0], *wishes, "--structure", "pi+lead+rolloff", "--json")
+    other = ["--part", "estimator=estimator_kalman_rate"]
+    answer = run("tune", NAMES[0], *wishes, *other, "--structure", "pi+lead+rolloff", "--json")
     assert answer.exit_code == 0, answer.output
     found = json.loads(answer.stdout)
     assert found["had"] and found["proven"] and found["part"] == "stabilizer_lti"
     assert all(w["worst"] >= w["wanted"] for w in found["wishes"])
     words = shlex.split(found["command"])
-    assert words[:5] == ["gyrobench", "run", NAMES[0], "--part", "stabilizer=stabilizer_lti"]
+    assert words[:7] == ["gyrobench", "run", NAMES[0], *other, "--part", "stabilizer=stabilizer_lti"]
     shown = run("show", *words[2:])
     assert shown.exit_code == 0 and "stabilizer_lti" in shown.stdout
 
