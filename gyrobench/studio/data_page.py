@@ -128,7 +128,7 @@ def _preview(mapping: _Mapping) -> None:
     """Add the first rows of the file as they are."""
     layout = mapping.proposal.layout
     rows = []
-    for number, cells in cells_of_file(mapping.proposal.file, layout.encoding, layout.delimiter):
+    for number, cells in cells_of_file(mapping.proposal.text_file, layout.encoding, layout.delimiter):
         if number > layout.skip:
             rows.append([str(number), *cells[:WIDE]])
         if len(rows) > ROWS:
