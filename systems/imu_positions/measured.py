@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Mapping
+from pathlib import Path
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
+from gyrobench.record.drift_columns import open_table
+from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.system import MeasuredData, System
 
 from .channels import CHANNELS
 from .geometry import ANGLES
+from .hand import UNKNOWN
+from .log import read_log
 
 TEMPLATE = """\
 # Positions and turns of an inertial measurement unit on a table with two axes: a row for each average, several a phase.
@@ -34,4 +39,17 @@ COLUMNS = (
     *(CsvColumn(f"mean_{c.name}", "rad/s" if c.gyro else "m/s2", f"mean reading of the {c.words}") for c in CHANNELS),
 )
 NEEDED = {"latitude": "45.75deg"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))
+
+
+def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """Return the record of a file: of positions that a table read, or of a logger where attitudes are unknown.
+
+    Raises DataError and InvalidValueError.
+    """
+    stated = open_table(data).head.comments if data.is_file() else {}
+    if values.get("attitudes", stated.get("attitudes", "table")) == UNKNOWN:
+        return read_log(system, data, values)
+    return read_record(system, data, values, needed=NEEDED, columns=COLUMNS)
+
+
+MEASURED = MeasuredData(TEMPLATE, read)

@@ -1,0 +1,468 @@
+"""Reduction in unknown attitudes: positions at rest, put there by hand or by a table that is not read, and the turns
+between them.
+
+    accelerometers    |C (f_read - b)| = g                    each position                    (norms.py)
+    gyros             gravity after a turn is where the gyros say that it is, each turn         (turns.py)
+    gyro i at rest    rate_i - w_i = bg_i + sum_k G_ik f_k/g0   each position, f from the accelerometers
+
+Each is linear about its solution and goes through the skeleton of a drift test: one datum a position, two a turn, noise
+from what is left.  Of the Earth rate w the vertical part is known from gravity and latitude; the level part, whose
+heading is not known, is a line of the budget.  [IMU-HAND; Tedaldi 2014]
+
+Not modelled: nonlinearity, lever arms (slow turns), a delay between the instruments, g-sensitivity while turning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.setup import sources
+from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftReduction,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Reason,
+    Record,
+    Regression,
+    RunDocument,
+    Table,
+)
+from gyrobench.units import ARCSEC, DPH
+
+from . import norms, tables, turns
+from .budget import ImuSetup
+from .channels import AXES, CHANNELS, UG, ImuInstrument, overview, truth_of
+from .norms import Triad
+from .turns import Turn
+
+COLUMNS = ("phase", "t_start", "t_end", *(f"mean_{c.name}" for c in CHANNELS))
+SAMPLES = tuple(f"imu.rate[{k}]" for k in (1, 2, 3))
+UNKNOWN = "unknown"  # option attitudes
+ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimated
+LEAST_TURNS = 6  # two data each for nine unknowns
+LEVEL_RATE = Source(
+    "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
+)
+WHITE = "noise of the instrument and what the model does not hold, from the residuals"
+CONVENTIONS = [
+    "Axes of the case: x along the input axis of the accelerometer x, y in the plane of those of x and y, z "
+    "right-handed to them; so Sa_xy, Sa_xz and Sa_yz are zero. Gyros in these axes.",
+    "reading = input + bias + matrix · input; specific force f = a − g: an axis that points up reads +1 g.",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandSetup(ImuSetup):
+    """rest: phases in which the case stood still; empty: all.  counts: letters of the triads (a, g) that read counts of
+    an unknown scale.  samples: time (m,) and readings of the gyros (m, 3) while it was turned; none: no turns.
+    """
+
+    rest: frozenset[int] = frozenset()
+    counts: str = ""
+    samples: tuple[Array, Array] | None = field(default=None, repr=False)
+
+    @classmethod
+    def of_record(cls, record: Record) -> HandSetup:
+        """Return the setup of a run or of a file."""
+        run, counts = record.run, ""
+        for kind in "ag":
+            unit = run.window_units.get(f"mean_{kind}x", "") if run.measured else ""
+            counts += kind if unit == "1" else ""
+        there = all(n in record.channels for n in ("time", *SAMPLES))
+        samples = None
+        if there:
+            read = np.column_stack([np.asarray(record.channels[n], dtype=float) for n in SAMPLES])
+            samples = np.asarray(record.channels["time"], dtype=float), read
+        rest = frozenset(row.phase for row in run.plan if row.mode == "index")
+        truth = None if run.measured else truth_of(run.parameters)
+        return cls.of(run, truth=own_axes(truth) if truth else None, rest=rest, counts=counts, samples=samples)
+
+
+def own_axes(truth: Mapping[str, float]) -> dict[str, float]:
+    """Return coefficients in the axes of the accelerometers: 1 + Sa = L Q with L lower triangular, Q a rotation."""
+
+    def matrix(name: str) -> Array:
+        return np.array([[truth[f"{name}_{a}{b}"] for b in AXES] for a in AXES])
+
+    q, r = np.linalg.qr((np.eye(3) + matrix("Sa")).T)
+    q = q * np.sign(np.diag(r))
+    found = {n: v for n, v in truth.items() if n.startswith("b")}
+    for name, value in (
+        ("Sa", (np.eye(3) + matrix("Sa")) @ q - np.eye(3)),
+        ("Sg", (np.eye(3) + matrix("Sg")) @ q - np.eye(3)),
+        ("G", matrix("G") @ q),
+    ):
+        found |= {f"{name}_{a}{b}": float(value[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}
+    return found
+
+
+class Positions:
+    """Readings at rest, one row a position, and the solutions that all instruments share."""
+
+    def __init__(self, windows: Mapping[str, Array], setup: HandSetup) -> None:
+        self.setup = s = setup
+        phase = np.asarray(windows["phase"]).astype(int)
+        rest = np.isin(phase, list(s.rest)) if s.rest else np.ones(phase.size, dtype=bool)
+        w = {n: np.asarray(windows[n], dtype=float)[rest] for n in COLUMNS}
+        new = np.concatenate([[True], np.diff(phase[rest]) != 0])
+        group = np.cumsum(new) - 1
+        length = w["t_end"] - w["t_start"]
+        total = np.bincount(group, length)
+        self.start, self.end = w["t_start"][new], w["t_end"][np.concatenate([new[1:], [True]])]
+        read = {c.name: np.bincount(group, length * w[f"mean_{c.name}"]) / total for c in CHANNELS}
+        self.acc, self.gyro = (np.column_stack([read[k + a] for a in AXES]) for k in "ag")
+
+    @cached_property
+    def scale_a(self) -> tuple[Array, Array]:
+        """D of the accelerometers, readings per m/s2, and the start of their bias, readings."""
+        if "a" in self.setup.counts:
+            D, middle = norms.nominal(self.acc, self.setup.gravity)
+            return D, middle
+        return np.ones(3), np.zeros(3)
+
+    @cached_property
+    def triad(self) -> Triad:
+        D, middle = self.scale_a
+        return norms.solve(self.acc / D, self.setup.gravity, np.concatenate([np.zeros(6), middle / D]))
+
+    @cached_property
+    def force(self) -> Array:
+        """Specific force (n, 3), m/s2, axes of the case."""
+        return self.triad.force(self.acc / self.scale_a[0])
+
+    @cached_property
+    def up(self) -> Array:
+        return np.asarray(self.force / np.linalg.norm(self.force, axis=1)[:, None])
+
+    @cached_property
+    def vertical(self) -> Array:
+        """Vertical part of the Earth rate (n, 3), rad/s."""
+        return self.setup.earth_rate * math.sin(self.setup.latitude) * self.up
+
+    @cached_property
+    def raw_turns(self) -> list[Turn]:
+        """Turns between neighbouring positions, readings less those at rest, before a scale factor is known."""
+        if self.setup.samples is None:
+            return []
+        time, read = self.setup.samples
+        found = []
+        for k in range(len(self.start) - 1):
+            rows = slice(np.searchsorted(time, self.end[k] - 1e-9), np.searchsorted(time, self.start[k + 1] + 1e-9))
+            if rows.stop - rows.start > 2:
+                bias = 0.5 * (self.gyro[k] + self.gyro[k + 1])
+                found.append(Turn(time[rows], read[rows] - bias, self.up[k], self.up[k + 1]))
+        return found if len(found) == len(self.start) - 1 else []
+
+    @cached_property
+    def labels(self) -> tuple[float, Array]:
+        """Scale factor of the gyros, and the permutation of their axes that turns the case as gravity says."""
+        return turns.nominal(self.raw_turns, "g" not in self.setup.counts)
+
+    @property
+    def scale_g(self) -> float:
+        """D of the gyros, readings per rad/s; 1 where there are no turns."""
+        return self.labels[0] if self.enough else 1.0
+
+    @property
+    def enough(self) -> bool:
+        return len(self.raw_turns) >= LEAST_TURNS
+
+    @cached_property
+    def turned(self) -> list[Turn]:
+        """Turns with readings over D, less the bias: what is read at rest less the vertical Earth rate there."""
+        v = self.vertical
+        found = []
+        for k, t in enumerate(self.raw_turns):
+            found.append(Turn(t.time, t.rate / self.scale_g + 0.5 * (v[k] + v[k + 1]), t.before, t.after))
+        return found
+
+    @cached_property
+    def matrix(self) -> Array:
+        """S (3, 3) of the gyros."""
+        return turns.solve(self.turned, np.zeros((3, 3))) if self.enough else np.zeros((3, 3))
+
+    @cached_property
+    def level(self) -> list[Array]:
+        """Level directions (2, 3) at each position, one heading through all of them, as far as turns tell it."""
+        if self.enough:
+            return turns.headings(self.turned, np.linalg.inv(np.eye(3) + self.matrix), self.up[0])
+        return [turns.across(u) for u in self.up]
+
+    @property
+    def level_size(self) -> float:
+        """Standard uncertainty of each component of the level Earth rate: its heading is anything."""
+        return self.setup.earth_rate * abs(math.cos(self.setup.latitude)) / math.sqrt(2.0)
+
+
+class HandChannel(DriftReduction[HandSetup]):
+    """One of the regressions, all of which share the positions."""
+
+    words = ""
+
+    def __init__(self, positions: Positions) -> None:
+        super().__init__({}, positions.setup)
+        self.at = positions
+
+    def account(self, found: Findings) -> Account:
+        return Account(
+            method="Positions at rest in unknown attitudes and the turns between them; least squares about the "
+            "solution, noise from what is left [IMU-HAND]",
+            sources=["IMU-HAND; Tedaldi 2014, eq. 1..13", "RED-OLS; Hu 1981, eq. 4-64..4-78"],
+            equation=self.equation,
+            conventions=CONVENTIONS,
+            random=WHITE,
+        )
+
+    equation = ""
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        return [found.noise_sentence("data")]
+
+
+class HandAccelerometers(HandChannel):
+    """Nine unknowns of three accelerometers from the size of gravity."""
+
+    equation = '|(1 + S_a)^(-1) (f_"read" - b_a)| = g'
+
+    def regression(self) -> Regression:
+        D, at = self.at.scale_a, self.at
+        readings = at.acc / D[0]
+        X = -norms.slopes(at.triad, readings)
+        solution = np.concatenate([[at.triad.matrix[p] for p in norms.PLACES], at.triad.bias])
+        y = np.linalg.norm(at.force, axis=1) - self.setup.gravity + X @ solution
+        group = Group("accelerometers", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
+        unit = ("specific force less gravity", "µg", UG)
+        return Regression(list(norms.NAMES), X, y, None, None, [group], *unit, noise="white", limit=norms.LIMIT)
+
+    def derived(self, found: Findings) -> Findings:
+        """Return the fit as the instruments have it: counts and their scale factors where the scale was unknown."""
+        counts, D = "a" in self.setup.counts, self.at.scale_a[0]
+        truth = {} if counts else dict(self.setup.truth or {})
+        quantities = [_quantity("a", n, counts, truth, float(D[0])) for n in norms.NAMES]
+        diagonal = {i: k for k, (i, j) in enumerate(norms.PLACES) if i == j}
+
+        def of(b: Array) -> Array:
+            if not counts:
+                return b
+            out = np.array(b)
+            for k, (i, j) in enumerate(norms.PLACES):
+                own = 1.0 + b[diagonal[i]]
+                out[k] = D[i] * own if i == j else b[k] / own
+            return out
+
+        return found.derive(quantities, of)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        y = found.data.y
+        return [sources.GRAVITY.effect(self.setup, -np.ones(y.size))]
+
+
+class HandTurns(HandChannel):
+    """Nine elements of the matrix of three gyros from gravity before and after each turn."""
+
+    equation = "u_(k+1) = Q_k^T u_k, quad Q_k = product exp((1 + S_g)^(-1) (omega_read - b) dif t)"
+
+    def regression(self) -> Regression:
+        at = self.at
+        X = -turns.slopes(at.turned, at.matrix)
+        y = turns.left(at.turned, at.matrix) + X @ at.matrix.ravel()
+        number = np.repeat(np.arange(1.0, len(at.turned) + 1), 2)
+        group = Group("gyros in turns", np.arange(y.size), number, "number of the turn", "")
+        names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
+        unit = ("direction of gravity after a turn", "″", ARCSEC)
+        return Regression(names, X, y, None, None, [group], *unit, noise="white", limit=norms.LIMIT)
+
+    def derived(self, found: Findings) -> Findings:
+        counts, D = "g" in self.setup.counts, self.at.scale_g
+        truth = {} if counts else dict(self.setup.truth or {})
+        names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
+        quantities = [_quantity("g", n, counts, truth, D) for n in names]
+
+        def of(b: Array) -> Array:
+            if not counts:
+                return b
+            S = b.reshape(3, 3)
+            own = 1.0 + np.diag(S)
+            out = S / own[:, None]
+            np.fill_diagonal(out, D * own)
+            return np.asarray(out.ravel())
+
+        return found.derive(quantities, of)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        """Return the level Earth rate, which the readings at rest hold and the turn has otherwise."""
+        at = self.at
+        clean = turns.left(at.turned, at.matrix)
+        errors = []
+        for axis in range(2):
+            step = 1e-6  # rad/s
+            moved = []
+            for k, t in enumerate(at.turned):
+                rest = 0.5 * (at.level[k][axis] + at.level[k + 1][axis])
+                # in the room gravity stands; the turning Earth carries the start by rate times time
+                span = float(t.time[-1] - t.time[0])
+                before = t.before + step * span * np.cross(at.level[k][axis], t.before)
+                moved.append(Turn(t.time, t.rate + step * rest, before, t.after))
+            errors.append(-(turns.left(moved, at.matrix) - clean) / step)
+        level = LEVEL_RATE.effect(at.level_size, np.array(errors), parts=("first", "second"))
+        return [level]
+
+
+class HandGyro(HandChannel):
+    """Bias and g-sensitivity of a gyro at rest."""
+
+    def __init__(self, positions: Positions, channel: ImuInstrument) -> None:
+        super().__init__(positions)
+        self.channel = channel
+
+    @property
+    def equation(self) -> str:  # type: ignore[override]
+        i = self.channel.letter
+        return f'omega_"read,{i}" - omega_{i} = b_g + sum_k G_k f_k \\/ g_0'
+
+    def regression(self) -> Regression:
+        at, c, s = self.at, self.channel, self.setup
+        matrix = np.eye(3) + at.matrix
+        y = at.gyro[:, c.axis] / at.scale_g - (at.vertical @ matrix.T)[:, c.axis]
+        counts = "g" in s.counts
+        truth = {} if counts else dict(s.truth or {})
+        names = c.names(())
+        quantities = [_quantity("g", n, counts, truth, at.scale_g) for n in names]
+        X = np.column_stack([np.ones(len(y)), at.force / frames.G0])
+        group = Group(c.words, np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
+        many = y.size >= ESTIMATED
+        weighed = [replace(nuisances.trend(at.start, at.end), name=f"trend {c.name}")] if many and s.nuisances else []
+        return Regression(
+            quantities, X, y, at.start, at.end, [group], "rate at rest", "°/h", DPH,
+            "estimated" if many else "white", limit=1e3, candidates=weighed,
+        )  # fmt: skip
+
+    def effects(self, found: Findings) -> list[Effect]:
+        at, c = self.at, self.channel
+        level = np.array([d[:, c.axis] for d in at.level])  # (n, 2)
+        if at.enough:
+            return [LEVEL_RATE.effect(at.level_size, level.T.copy(), parts=("first", "second"))]
+        own = np.concatenate([np.diag(level[:, 0]), np.diag(level[:, 1])])  # a heading of its own each
+        return [LEVEL_RATE.effect(at.level_size, own)]
+
+
+def _quantity(kind: str, name: str, counts: bool, truth: Mapping[str, float], scale: float) -> Quantity:
+    """Return a coefficient; in counts, scale counts for a unit of SI, a diagonal element is a scale factor."""
+    what, _, along = name.partition("_")
+    channel = ImuInstrument(kind, AXES.index(along[0]))
+    if not counts or what == "G" or (what[0] == "S" and along[0] != along[1]):
+        return channel.quantity(name, truth)
+    if what[0] == "b":
+        return Quantity(name, f"bias of the {channel.words}", "counts", 1.0 / scale)
+    unit = "counts/(rad/s)" if kind == "g" else "counts/(m/s²)"
+    return Quantity(name, f"scale factor of the {channel.words}", unit, 1.0, shown=f"k{kind}_{channel.letter}")
+
+
+class HandReduction(ChannelTests[HandSetup]):
+    """Three accelerometers and three gyros from positions in unknown attitudes."""
+
+    label = "{}"
+
+    @property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("accelerometers", *(("gyros",) if self.at.enough else ()), *(() if self.blind else ("gx", "gy", "gz")))
+
+    @property
+    def blind(self) -> bool:
+        """True where gyros read counts, and no turns tell their scale."""
+        return "g" in self.setup.counts and not self.at.enough
+
+    @cached_property
+    def at(self) -> Positions:
+        return Positions(self.windows, self.setup)
+
+    def of_channel(self, name: str) -> DriftReduction[HandSetup]:
+        if name == "accelerometers":
+            return HandAccelerometers(self.at)
+        if name == "gyros":
+            return HandTurns(self.at)
+        return HandGyro(self.at, next(c for c in CHANNELS if c.name == name))
+
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        return cls.reduce(record.windows, HandSetup.of_record(record))
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> HandSetup:
+        return HandSetup.of(run)
+
+    def problems(self) -> list[str]:
+        s = self.setup
+        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        if problems := problems + window_problems(self.windows, COLUMNS):
+            return problems
+        at = self.at
+        if len(at.start) < norms.LEAST:
+            return norms.problems(np.zeros((len(at.start), 3)))
+        D, middle = at.scale_a
+        around = (at.acc - middle) / D
+        if problems := norms.problems(around / np.linalg.norm(around, axis=1)[:, None]):
+            return problems
+        return self._mistaken()
+
+    def _mistaken(self) -> list[str]:
+        """Return what sizes and turns say of units, axes and signs."""
+        s, at = self.setup, self.at
+        found = []
+        size = float(np.median(np.linalg.norm(at.acc, axis=1)))
+        if "a" not in s.counts and abs(size / s.gravity - 1.0) > 0.2:
+            found.append(
+                f"accelerometers: at rest they read {size:.4g} m/s², gravity is {s.gravity:.4g}: the unit is mistaken "
+                "(readings in g, counts: write '[g]', '[counts]' behind the names of the columns)"
+            )
+        elif at.enough and not np.array_equal(at.labels[1], np.eye(3)):
+            found.append(_labels(at.labels[1]))
+        return found
+
+    def reasons(self) -> list[Reason]:
+        if self.at.enough:
+            return []
+        text = (
+            "There are no samples of the turns between the positions, or fewer than 6 turns; not estimable: Sg (scale "
+            "factors and misalignments of the gyros)."
+        )
+        if self.blind:
+            text += " The gyros read counts, so nothing is said of them."
+        return [Reason("turns.none", text)]
+
+    def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
+        return overview([c for r in results.values() for c in r.coefficients])
+
+    def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
+        return tables.tables(coefficients)
+
+
+def _labels(p: Array) -> str:
+    """Return what a signed permutation of the gyros against the accelerometers says."""
+    order, signs = np.argmax(np.abs(p), axis=1), p.sum(axis=1)
+    reads = ", ".join(f"{a} reads {'−' if s < 0 else ''}{AXES[k]}" for a, k, s in zip(AXES, order, signs, strict=True))
+    handed = "; so labelled one of the triads is left-handed" if np.linalg.det(p) < 0.0 else ""
+    mirrored = ", ".join(a for a in AXES if (p @ np.eye(3))[AXES.index(a), AXES.index(a)] > 0.0)
+    other = ""
+    if np.array_equal(np.abs(p), np.eye(3)) and np.linalg.det(p) > 0.0:
+        other = f", or the sign of the accelerometer {mirrored} is"
+    if np.array_equal(np.abs(p), np.eye(3)):
+        axes = " and ".join(a for a, s in zip(AXES, signs, strict=True) if s < 0)
+        return f"gyros: against the accelerometers the signs of {axes} are reversed{other}{handed}"
+    return f"gyros: in axes of the accelerometers {reads}{handed}; columns are exchanged, or signs reversed"
