@@ -55,6 +55,7 @@ COLUMNS = ("phase", "t_start", "t_end", *(f"mean_{c.name}" for c in CHANNELS))
 SAMPLES = tuple(f"imu.rate[{k}]" for k in (1, 2, 3))
 UNKNOWN = "unknown"  # option attitudes
 ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimated
+ROUNDS = 3
 LEAST_TURNS = 6  # two data each for nine unknowns
 LEVEL_RATE = Source(
     "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
@@ -110,6 +111,19 @@ def own_axes(truth: Mapping[str, float]) -> dict[str, float]:
     ):
         found |= {f"{name}_{a}{b}": float(value[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}
     return found
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Turns with the Earth rate in them; S (3, 3) of the gyros; two level directions (2, 3) at each position; level
+    Earth rate there (n, 3), rad/s, and the standard uncertainty of its components.
+    """
+
+    turned: list[Turn]
+    matrix: Array
+    level: list[Array]
+    rate: Array
+    u: float
 
 
 class Positions:
@@ -184,30 +198,49 @@ class Positions:
         return len(self.raw_turns) >= LEAST_TURNS
 
     @cached_property
-    def turned(self) -> list[Turn]:
-        """Turns with readings over D, less the bias: what is read at rest less the vertical Earth rate there."""
-        v = self.vertical
-        found = []
-        for k, t in enumerate(self.raw_turns):
-            found.append(Turn(t.time, t.rate / self.scale_g + 0.5 * (v[k] + v[k + 1]), t.before, t.after))
-        return found
+    def found(self) -> Solution:
+        """Return the matrix of the gyros and the level Earth rate, which need one another: in three rounds."""
+        level, matrix, rate, u = [turns.across(u) for u in self.up], np.zeros((3, 3)), np.zeros(2), self.level_size
+        if not self.enough:
+            return Solution([], matrix, level, np.zeros_like(self.up), u)
+        for _ in range(ROUNDS):
+            earth = self.vertical + np.array([rate @ d for d in level])
+            turned = [self._turn(k, t, earth, rate @ level[k]) for k, t in enumerate(self.raw_turns)]
+            matrix = turns.solve(turned, matrix)
+            level = turns.headings(turned, np.asarray(np.linalg.inv(np.eye(3) + matrix)), self.up[0])
+            rate, u = self._level_rate(level, matrix)
+        return Solution(turned, matrix, level, np.array([rate @ d for d in level]), u)
 
-    @cached_property
-    def matrix(self) -> Array:
-        """S (3, 3) of the gyros."""
-        return turns.solve(self.turned, np.zeros((3, 3))) if self.enough else np.zeros((3, 3))
+    def _turn(self, k: int, t: Turn, earth: Array, level: Array) -> Turn:
+        """Return a turn with readings over D, the Earth rate (n, 3) of the positions in them; level (3,): at the start.
 
-    @cached_property
-    def level(self) -> list[Array]:
-        """Level directions (2, 3) at each position, one heading through all of them, as far as turns tell it."""
-        if self.enough:
-            return turns.headings(self.turned, np.linalg.inv(np.eye(3) + self.matrix), self.up[0])
-        return [turns.across(u) for u in self.up]
+        The bias is what is read at rest less the Earth rate there; the turning Earth carries the start along.
+        """
+        span = float(t.time[-1] - t.time[0])
+        rate = t.rate / self.scale_g + 0.5 * (earth[k] + earth[k + 1])
+        return Turn(t.time, rate, t.before + span * np.cross(level, t.before), t.after)
+
+    def _level_rate(self, level: list[Array], matrix: Array) -> tuple[Array, float]:
+        """Return the level Earth rate along both level directions (2,), and the standard uncertainty of each: from what
+        the gyros read at rest, and from its size, which is known.
+        """
+        n = len(self.up)
+        y = self.gyro / self.scale_g - self.vertical
+        own = np.column_stack([np.ones(n), self.force / frames.G0])
+        d = np.array(level)  # (n, 2, 3)
+        left = [v - own @ np.linalg.lstsq(own, v, rcond=None)[0] for v in (*y.T, *d.transpose(1, 2, 0).reshape(6, n))]
+        data = np.concatenate(left[:3])
+        X = np.array([np.concatenate(left[3:6]), np.concatenate(left[6:9])]).T
+        alone = np.linalg.lstsq(X, data, rcond=None)[0]
+        variance = float(np.sum((data - X @ alone) ** 2)) / max(3 * (n - 4) - 2, 1)
+        precision = X.T @ X / variance + np.eye(2) / self.level_size**2
+        covariance = np.linalg.inv(precision)
+        return covariance @ (X.T @ data) / variance, float(np.sqrt(np.max(np.diag(covariance))))
 
     @property
     def level_size(self) -> float:
         """Standard uncertainty of each component of the level Earth rate: its heading is anything."""
-        return self.setup.earth_rate * abs(math.cos(self.setup.latitude)) / math.sqrt(2.0)
+        return self.setup.earth_rate * max(abs(math.cos(self.setup.latitude)), 1e-3) / math.sqrt(2.0)
 
 
 class HandChannel(DriftReduction[HandSetup]):
@@ -279,14 +312,16 @@ class HandTurns(HandChannel):
     equation = "u_(k+1) = Q_k^T u_k, quad Q_k = product exp((1 + S_g)^(-1) (omega_read - b) dif t)"
 
     def regression(self) -> Regression:
-        at = self.at
-        X = -turns.slopes(at.turned, at.matrix)
-        y = turns.left(at.turned, at.matrix) + X @ at.matrix.ravel()
-        number = np.repeat(np.arange(1.0, len(at.turned) + 1), 2)
+        found = self.at.found
+        X = -turns.slopes(found.turned, found.matrix)
+        y = turns.left(found.turned, found.matrix) + X @ found.matrix.ravel()
+        number = np.repeat(np.arange(1.0, len(found.turned) + 1), 2)
+        span = np.repeat([t.time[-1] - t.time[0] for t in found.turned], 2)
+        weights = 1.0 / (span + np.median(span))  # white noise of a rate, and what does not grow with time
         group = Group("gyros in turns", np.arange(y.size), number, "number of the turn", "")
         names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
         unit = ("direction of gravity after a turn", "″", ARCSEC)
-        return Regression(names, X, y, None, None, [group], *unit, noise="white", limit=norms.LIMIT)
+        return Regression(names, X, y, None, None, [group], *unit, noise="white", weights=weights, limit=norms.LIMIT)
 
     def derived(self, found: Findings) -> Findings:
         counts, D = "g" in self.setup.counts, self.at.scale_g
@@ -307,21 +342,18 @@ class HandTurns(HandChannel):
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the level Earth rate, which the readings at rest hold and the turn has otherwise."""
-        at = self.at
-        clean = turns.left(at.turned, at.matrix)
-        errors = []
+        own = self.at.found
+        clean, step, errors = turns.left(own.turned, own.matrix), 1e-6, []
         for axis in range(2):
-            step = 1e-6  # rad/s
             moved = []
-            for k, t in enumerate(at.turned):
-                rest = 0.5 * (at.level[k][axis] + at.level[k + 1][axis])
-                # in the room gravity stands; the turning Earth carries the start by rate times time
+            for k, t in enumerate(own.turned):
+                rest = 0.5 * (own.level[k][axis] + own.level[k + 1][axis])
                 span = float(t.time[-1] - t.time[0])
-                before = t.before + step * span * np.cross(at.level[k][axis], t.before)
+                before = t.before + step * span * np.cross(own.level[k][axis], t.before)
                 moved.append(Turn(t.time, t.rate + step * rest, before, t.after))
-            errors.append(-(turns.left(moved, at.matrix) - clean) / step)
-        level = LEVEL_RATE.effect(at.level_size, np.array(errors), parts=("first", "second"))
-        return [level]
+            # a rate that the model lacks: the opposite of what it changes
+            errors.append(-(turns.left(moved, own.matrix) - clean) / step)
+        return [LEVEL_RATE.effect(own.u, np.array(errors), parts=("first", "second"))]
 
 
 class HandGyro(HandChannel):
@@ -338,8 +370,8 @@ class HandGyro(HandChannel):
 
     def regression(self) -> Regression:
         at, c, s = self.at, self.channel, self.setup
-        matrix = np.eye(3) + at.matrix
-        y = at.gyro[:, c.axis] / at.scale_g - (at.vertical @ matrix.T)[:, c.axis]
+        matrix = np.eye(3) + at.found.matrix
+        y = at.gyro[:, c.axis] / at.scale_g - ((at.vertical + at.found.rate) @ matrix.T)[:, c.axis]
         counts = "g" in s.counts
         truth = {} if counts else dict(s.truth or {})
         names = c.names(())
@@ -355,9 +387,9 @@ class HandGyro(HandChannel):
 
     def effects(self, found: Findings) -> list[Effect]:
         at, c = self.at, self.channel
-        level = np.array([d[:, c.axis] for d in at.level])  # (n, 2)
+        level = np.array([d[:, c.axis] for d in at.found.level])  # (n, 2)
         if at.enough:
-            return [LEVEL_RATE.effect(at.level_size, level.T.copy(), parts=("first", "second"))]
+            return [LEVEL_RATE.effect(at.found.u, level.T.copy(), parts=("first", "second"))]
         own = np.concatenate([np.diag(level[:, 0]), np.diag(level[:, 1])])  # a heading of its own each
         return [LEVEL_RATE.effect(at.level_size, own)]
 

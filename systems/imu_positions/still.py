@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
@@ -14,6 +15,7 @@ QUIET = 0.1  # quantile of the scatter that is the noise at rest
 LOUD = 2.0  # times that: moved
 LEAST = 1.0  # s of a position
 EDGE = 0.25  # of the width that is left out at both ends
+BLOCK = 4096  # windows at a time
 SHORT = 16  # samples of the width at least
 
 
@@ -60,12 +62,10 @@ def _stretches(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _moving_deviation(samples: Array, width: int) -> Array:
-    x = samples - samples.mean(axis=0)
-    zero = np.zeros((1, x.shape[1]))
-    total, squares = (np.vstack([zero, np.cumsum(v, axis=0)]) for v in (x, x * x))
-    mean = (total[width:] - total[:-width]) / width
-    variance = (squares[width:] - squares[:-width]) / width - mean * mean
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+    """Return the standard deviation of each window of ``width`` samples, taken directly: sums would lose small ones."""
+    windows = sliding_window_view(samples, width, axis=0)
+    parts = [windows[k : k + BLOCK].std(axis=2) for k in range(0, len(windows), BLOCK)]
+    return np.concatenate(parts)
 
 
 def _quantum(samples: Array) -> Array:

@@ -53,13 +53,12 @@ def _matrix(kind: str, by_name: Mapping[str, Coefficient]) -> Array:
     """Return readings over inputs (3, 3), SI or counts."""
     matrix = np.eye(3)
     for i, a in enumerate(AXES):
-        scale = by_name.get(f"S{kind}_{a}{a}")
-        counts = scale is not None and scale.unit.startswith("counts")
+        scale, counts = by_name.get(f"S{kind}_{a}{a}"), by_name.get(f"k{kind}_{a}")
         for j, b in enumerate(AXES):
             if (c := by_name.get(f"S{kind}_{a}{b}")) is not None and i != j:
                 matrix[i, j] = c.estimate * SCALE[c.unit]
-        if scale is not None and counts:
-            matrix[i] *= scale.estimate
+        if counts is not None:
+            matrix[i] *= counts.estimate
         elif scale is not None:
             matrix[i, i] += scale.estimate * SCALE[scale.unit]
     return matrix

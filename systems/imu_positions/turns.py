@@ -33,14 +33,18 @@ class Turn:
     before: Array
     after: Array
 
-    def rotation(self, inverse: Array) -> Array:
-        """Return Q (3, 3), columns: axes of the case afterwards in those before."""
-        w = self.rate @ inverse.T
+    def rotations(self, inverses: Array) -> Array:
+        """Return Q (b, 3, 3) for several inverses (b, 3, 3) of 1 + S; columns: axes afterwards in those before."""
+        w = np.einsum("bij,mj->bmi", inverses, self.rate)
         h = np.diff(self.time)[:, None]
-        vector = 0.5 * h * (w[1:] + w[:-1]) + h * h / 12.0 * np.cross(w[:-1], w[1:])
-        size = np.linalg.norm(vector, axis=1)
-        sine = 0.5 * np.sinc(0.5 * size / np.pi)
-        return _matrix(_product(np.column_stack([np.cos(0.5 * size), vector * sine[:, None]])))
+        vector = 0.5 * h * (w[:, 1:] + w[:, :-1]) + h * h / 12.0 * np.cross(w[:, :-1], w[:, 1:])
+        size = np.linalg.norm(vector, axis=2, keepdims=True)
+        q = np.concatenate([np.cos(0.5 * size), vector * (0.5 * np.sinc(0.5 * size / np.pi))], axis=2)
+        return _matrices(_product(q))
+
+    def rotation(self, inverse: Array) -> Array:
+        """Return Q (3, 3) for one inverse."""
+        return np.asarray(self.rotations(inverse[None])[0])
 
     @property
     def tangents(self) -> Array:
@@ -57,45 +61,51 @@ def across(direction: Array) -> Array:
 
 
 def _times(a: Array, b: Array) -> Array:
-    """Return products of quaternions (n, 4), scalar first."""
-    w, x, y, z = a.T
-    W, X, Y, Z = b.T
-    return np.column_stack([
+    """Return products of quaternions (..., 4), scalar first."""
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    W, X, Y, Z = np.moveaxis(b, -1, 0)
+    return np.stack([
         w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
         w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W,
-    ])  # fmt: skip
+    ], axis=-1)  # fmt: skip
 
 
 def _product(q: Array) -> Array:
-    """Return the product of quaternions (n, 4) in their order."""
-    while len(q) > 1:
-        if len(q) % 2:
-            q = np.vstack([q, [[1.0, 0.0, 0.0, 0.0]]])
-        q = _times(q[::2], q[1::2])
-    return np.asarray(q[0] / np.linalg.norm(q[0]))
+    """Return products (b, 4) of quaternions (b, m, 4) in the order of m."""
+    while q.shape[1] > 1:
+        if q.shape[1] % 2:
+            one = np.zeros_like(q[:, :1])
+            one[..., 0] = 1.0
+            q = np.concatenate([q, one], axis=1)
+        q = _times(q[:, ::2], q[:, 1::2])
+    return np.asarray(q[:, 0] / np.linalg.norm(q[:, 0], axis=1, keepdims=True))
 
 
-def _matrix(q: Array) -> Array:
-    w, v = q[0], q[1:]
-    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    out: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+def _matrices(q: Array) -> Array:
+    w, x, y, z = q.T
+    zero = np.zeros_like(w)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    out: Array = np.eye(3) + 2.0 * w[:, None, None] * cross + 2.0 * cross @ cross
     return out
+
+
+def _left(turns: list[Turn], matrices: Array) -> Array:
+    """Return what gravity is found off by (b, 2 n), rad, for several S (b, 3, 3)."""
+    inverses = np.linalg.inv(np.eye(3) + matrices)
+    each = [np.einsum("ki,bji,j->bk", t.tangents, t.rotations(inverses), t.before) for t in turns]
+    return np.concatenate(each, axis=1)
 
 
 def left(turns: list[Turn], matrix: Array) -> Array:
     """Return by how much gravity is found off, along two tangents of each turn (2 n,), rad; matrix: S (3, 3)."""
-    inverse: Array = np.linalg.inv(np.eye(3) + matrix)
-    found = (t.tangents @ (t.rotation(inverse).T @ t.before) for t in turns)
-    return np.concatenate(list(found))
+    return np.asarray(_left(turns, matrix[None])[0])
 
 
 def slopes(turns: list[Turn], matrix: Array) -> Array:
     """Return the change (2 n, 9) of :func:`left` for each element of S, row by row."""
-    columns = []
-    for k in range(9):
-        change = STEP * np.eye(9)[k].reshape(3, 3)
-        columns.append((left(turns, matrix + change) - left(turns, matrix - change)) / (2.0 * STEP))
-    return np.column_stack(columns)
+    steps = STEP * np.eye(9).reshape(9, 3, 3)
+    both = _left(turns, np.concatenate([matrix + steps, matrix - steps]))
+    return np.asarray((both[:9] - both[9:]).T / (2.0 * STEP))
 
 
 def solve(turns: list[Turn], start: Array) -> Array:
@@ -117,18 +127,22 @@ def nominal(turns: list[Turn], known: bool) -> tuple[float, Array]:
     angles = [float(np.linalg.norm(np.trapezoid(t.rate, t.time, axis=0))) for t in some]
     middle = float(np.median(angles)) or 1.0
     scales = [1.0] if known else [middle / a for a in np.geomspace(*TURNED, GUESSES)]
-    identity = min(scales, key=lambda s: _off(some, s * np.eye(3)))
-    good = _off(some, identity * np.eye(3))
+    each = _offs(some, np.array([s * np.eye(3) for s in scales]))
+    identity, good = scales[int(np.argmin(each))], float(np.min(each))
     if good < 0.15:  # rad: a turn by hand is found to some degrees with nominal scale factors
         return identity, np.eye(3)
-    guesses = scales if known else scales[::2]
-    best = min(((_off(some, s * p), s, k) for k, p in enumerate(_signed()) for s in guesses), key=lambda g: g[0])
-    return (best[1], list(_signed())[best[2]]) if best[0] < 0.5 * good else (identity, np.eye(3))
+    best = (0.5 * good, identity, np.eye(3))
+    for p in _signed():
+        each = _offs(some, np.array([s * p for s in scales]))
+        k = int(np.argmin(each))
+        if each[k] < best[0]:
+            best = float(each[k]), scales[k], p
+    return best[1], best[2]
 
 
-def _off(turns: list[Turn], matrix: Array) -> float:
-    """Return the root mean square of what gravity is found off by, readings = matrix · rate."""
-    return float(np.sqrt(np.mean(left(turns, matrix - np.eye(3)) ** 2)))
+def _offs(turns: list[Turn], matrices: Array) -> Array:
+    """Return the root mean square (b,) of what gravity is found off by, readings = matrix · rate."""
+    return np.asarray(np.sqrt(np.mean(_left(turns, matrices - np.eye(3)) ** 2, axis=1)))
 
 
 def _signed() -> Iterator[Array]:

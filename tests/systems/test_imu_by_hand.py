@@ -1,0 +1,214 @@
+"""An inertial measurement unit put into positions by hand: sizes of gravity, turns, a logger's file.  [IMU-HAND]"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from imu_world import Unit, handled, own_axes, poses
+from scipy.spatial.transform import Rotation
+
+import gyrobench as gb
+from gyrobench.record.csv_reader import DataError
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.system import load_system
+
+room = type(load_system("imu_positions")).__module__
+hand: Any = importlib.import_module(".hand", room)
+log: Any = importlib.import_module(".log", room)
+still: Any = importlib.import_module(".still", room)
+tables: Any = importlib.import_module(".tables", room)
+norms: Any = importlib.import_module(".norms", room)
+G0, DPH = 9.80665, math.pi / 648000.0
+GYRO, ACC = 2e-5, 1e-3  # noise densities of a small unit, rad/s/sqrt(Hz), m/s2/sqrt(Hz)
+HEAD = "# attitudes = unknown\n# latitude = 40.10704566deg\n# gravity = 9.805m/s2\n"  # 0.7 rad
+
+
+def write(path: Path, time: Any, gyro: Any, acc: Any, units: str = "rad/s m/s2", more: str = "") -> Path:
+    """A logger's file; units: of gyros and accelerometers."""
+    g, a = units.split()
+    heads = [f"g{x} [{g}]" for x in "xyz"] + [f"a{x} [{a}]" for x in "xyz"]
+    body = "\n".join(",".join(f"{v:.12g}" for v in row) for row in np.column_stack([time, gyro, acc]).tolist())
+    path.write_text(f"{HEAD}{more}time [s],{','.join(heads)}\n{body}\n", encoding="utf-8")
+    return path
+
+
+def record(path: Path, **values: str) -> Any:
+    return log.read_log(load_system("imu_positions"), path, values)
+
+
+def estimates(result: Any) -> dict[str, float]:
+    return {c.name: c.estimate * tables.SCALE[c.unit] for c in result.coefficients}
+
+
+def test_recovers_a_unit_without_noise(tmp_path: Path) -> None:
+    """200 Hz, 18 attitudes: to 3e-7 of the sizes, what the trapezoid and the twelve digits of the file leave.  The
+    truth is turned into the axes of the accelerometers by Gram and Schmidt, the reduction does it by LQ."""
+    rng = np.random.default_rng(1)
+    unit = Unit.drawn(rng, 0.01)
+    series = handled(unit, poses(rng, 18), rng, rate=200.0, gyro=1e-9, acc=1e-8)
+    result = hand.HandReduction.of_record(record(write(tmp_path / "log.csv", *series)))
+    truth = own_axes(unit)
+    found = estimates(result)
+    assert len(found) == 9 + 9 + 12
+    for n, value in found.items():
+        size = {"Sa": 3e-7, "ba": 3e-6, "Sg": 3e-6, "bg": 3e-8, "G": 3e-8}[n.split("_")[0]]
+        assert value == pytest.approx(truth[n], abs=size), n
+
+
+def test_counts_are_as_good_as_units(tmp_path: Path) -> None:
+    """Counts of any zero and scale give the same sizes: scale factors, biases and angles."""
+    rng = np.random.default_rng(2)
+    unit = Unit.drawn(rng, 0.01)
+    time, gyro, acc = handled(unit, poses(rng, 20), rng, gyro=1e-6, acc=1e-5)
+    plain = estimates(hand.HandReduction.of_record(record(write(tmp_path / "si.csv", time, gyro, acc))))
+    counts = write(tmp_path / "counts.csv", time, 32768.0 + 4800.0 * gyro, 31000.0 + 415.0 * acc, "counts counts")
+    result = hand.HandReduction.of_record(record(counts))
+    found = {c.name: c for c in result.coefficients}
+    for a in "xyz":
+        assert found[f"ka_{a}"].estimate == pytest.approx(415.0 * (1.0 + plain[f"Sa_{a}{a}"]), rel=1e-6)
+        assert found[f"kg_{a}"].estimate == pytest.approx(4800.0 * (1.0 + plain[f"Sg_{a}{a}"]), rel=1e-5)
+        assert found[f"ba_{a}"].estimate == pytest.approx(31000.0 + 415.0 * plain[f"ba_{a}"], abs=1e-2)
+        assert found[f"bg_{a}"].estimate == pytest.approx(32768.0 + 4800.0 * plain[f"bg_{a}"], abs=1e-2)
+    correction = next(t for t in result.tables if t.id == "imu.correction")
+    C = np.array([row[2:5] for row in correction.rows if row[0] == "accelerometers"], dtype=float)
+    b = np.array([row[5] for row in correction.rows if row[0] == "accelerometers"], dtype=float)
+    sizes = np.linalg.norm((31000.0 + 415.0 * acc[::40] - b) @ C.T, axis=1)
+    assert sizes == pytest.approx(9.805, abs=8e-4)  # as printed, the correction makes gravity of every reading
+
+
+def test_intervals_hold_the_truth(tmp_path: Path) -> None:
+    """8 runs of 30 coefficients, a small unit in 24 attitudes; tests/benchmarks/imu_positions.py counts more."""
+    hits = total = 0
+    for seed in range(8):
+        rng = np.random.default_rng(50 + seed)
+        unit = Unit.drawn(rng, 0.01)
+        series = handled(unit, poses(rng, 24), rng, gyro=GYRO, acc=ACC, rest=3.0, turn=1.5)
+        result = hand.HandReduction.of_record(record(write(tmp_path / "log.csv", *series)))
+        truth = own_axes(unit)
+        for c in result.coefficients:
+            low, high = (x * tables.SCALE[c.unit] for x in c.interval)
+            hits += low <= truth[c.name] <= high
+            total += 1
+    assert total == 240 and 0.90 < hits / total < 0.99
+
+
+def test_runs_go_the_same_way() -> None:
+    """The co-simulation with attitudes that are not read: intervals hold the truth, in axes of the accelerometers."""
+    values = {"attitudes": "unknown", "positions": 18, "dwell": 8.0, "windows": 1, "settle": 2.0, "turns": 1}
+    result = gb.load("imu_positions", values).run(seed=3, check_step=False).result
+    assert {c.name for c in result.coefficients} == own_names()
+    z = np.array([(c.estimate - c.truth) / c.u for c in result.coefficients])
+    assert np.sqrt(np.mean(z**2)) < 2.0 and np.abs(z).max() < 5.0
+
+
+def own_names() -> set[str]:
+    every = {f"{n}_{a}" for n in ("bg", "ba") for a in "xyz"}
+    every |= {f"{n}_{a}{b}" for n in ("Sg", "G") for a in "xyz" for b in "xyz"}
+    return every | {f"Sa_{n}" for n in ("xx", "yx", "yy", "zx", "zy", "zz")}
+
+
+def test_positions_are_found() -> None:
+    """The stretches at rest of a series, within half the width of the detector; two seconds of gap end one."""
+    rng = np.random.default_rng(4)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 12), rng, gyro=GYRO, acc=ACC)
+    found = still.at_rest(time, np.column_stack([gyro, acc]))
+    assert len(found) == 12
+    for k, (a, b) in enumerate(found):
+        # at rest from 6 k to 6 k + 4 s; a cycloid begins and ends so gently that some tenths of a second pass
+        assert 6.0 * k - 0.6 <= time[a] and time[b - 1] <= 6.0 * k + 4.6 and b - a > 300
+    broken = time + np.where(np.arange(time.size) >= 200, 2.0, 0.0)
+    assert len(still.at_rest(broken, np.column_stack([gyro, acc]))) == 13 or len(found) == 12
+    assert still.labelled(np.array([0.0, 1.0, 1.0, math.nan, 2.0, 2.0, 0.0])) == [(1, 3), (4, 6)]
+
+
+SIGNS = {
+    "gyros: in axes of the accelerometers x reads y, y reads x, z reads z; so labelled one of the triads is left":
+        lambda g, a: (g[:, [1, 0, 2]], a),
+    "gyros: in axes of the accelerometers x reads y, y reads z, z reads x": lambda g, a: (g[:, [1, 2, 0]], a),
+    "gyros: against the accelerometers the signs of z are reversed; so labelled": lambda g, a: (g * [1, 1, -1], a),
+    "the signs of x and y are reversed, or the sign of the accelerometer z is": lambda g, a: (g, a * [1, 1, -1]),
+    "accelerometers: at rest they read 0.99": lambda g, a: (g, a / G0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("said", SIGNS)
+def test_mistakes_are_named(said: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 16), rng, gyro=GYRO, acc=ACC, rest=2.5)
+    path = write(tmp_path / "log.csv", time, *SIGNS[said](gyro, acc))
+    with pytest.raises(ReductionError) as error:
+        hand.HandReduction.of_record(record(path))
+    assert said in str(error.value)
+
+
+def test_few_positions_say_what_is_missing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 6), rng, gyro=GYRO, acc=ACC)
+    with pytest.raises(DataError, match="6 positions at rest found in the samples"):
+        record(write(tmp_path / "log.csv", time, gyro, acc))
+    ring = [Rotation.from_rotvec([x, 0.0, 0.0]) for x in np.linspace(0.0, 5.5, 12)]  # x never up or down
+    time, gyro, acc = handled(Unit.drawn(rng), ring, rng, gyro=GYRO, acc=ACC)
+    with pytest.raises(ReductionError) as error:
+        hand.HandReduction.of_record(record(write(tmp_path / "ring.csv", time, gyro, acc)))
+    assert "least determined: Sa_xx" in str(error.value) and "+x" in str(error.value) and "−x" in str(error.value)
+
+
+def test_all_faults_of_a_file_in_one_list(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "# attitudes = unknown\n# u_atitude = 5arcsec\ntime [s],gx [deg/s],gyro_x [deg/s],gy [counts],gz [deg/s],"
+        "ax [g],ay [g]\n0,1,1,1,1,1,1\n", encoding="utf-8",
+    )  # fmt: skip
+    with pytest.raises(DataError) as error:
+        record(path)
+    text = "\n".join(error.value.problems)
+    for said in (
+        "u_atitude",
+        "'latitude' is not given",
+        "are both gx",
+        "columns not found: az",
+        "counts and another unit",
+    ):
+        assert said in text
+
+
+def test_channels_that_stand_twice_or_still(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 12), rng, gyro=GYRO, acc=ACC)
+    acc[:, 1], gyro[:, 2] = acc[:, 0], 0.0
+    with pytest.raises(DataError) as error:
+        record(write(tmp_path / "log.csv", time, gyro, acc))
+    text = str(error.value)
+    assert "columns ax and ay are the same" in text and "column gz: all values are the same" in text
+
+
+def test_plan_that_is_not_enough_is_refused_before_the_run() -> None:
+    with pytest.raises(InvalidConfigurationError) as error:
+        gb.load("imu_positions", {"attitudes": "unknown", "positions": 6, "turns": 0}).run(seed=1)
+    assert "6 positions for nine unknowns" in str(error.value)
+
+
+def test_reads_other_names_and_numbered_positions(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    unit = Unit.drawn(rng)
+    time, gyro, acc = handled(unit, poses(rng, 12), rng, gyro=GYRO, acc=ACC)
+    number = np.where(np.mod(time, 6.0) < 3.9, np.floor(time / 6.0) + 1.0, 0.0)
+    heads = ["time [s]", *(f"Gyro_{x.upper()} [deg/s]" for x in "xyz"), *(f"acc {x} [g]" for x in "xyz"), "position"]
+    rows = np.column_stack([time, np.degrees(gyro), acc / G0, number])
+    path = tmp_path / "log.csv"
+    text = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows.tolist())
+    path.write_text(f"{HEAD}{','.join(heads)}\n{text}\n", encoding="utf-8")
+    read = record(path)
+    assert read.windows["phase"].size == 12
+    result = hand.HandReduction.of_record(read)
+    truth = own_axes(unit)
+    z = [
+        (c.estimate * tables.SCALE[c.unit] - truth[c.name]) / (c.u * tables.SCALE[c.unit]) for c in result.coefficients
+    ]
+    assert np.sqrt(np.mean(np.square(z))) < 2.0
