@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from gyrobench.arrays import Array
+from gyrobench.arrays import AnyArray, Array
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head
 from gyrobench.record.drift_columns import open_table
@@ -23,6 +24,8 @@ from gyrobench.system.system import System
 
 from . import norms, still
 from .channels import CHANNELS
+
+UP_DOWN = "up_down"  # option attitudes
 
 TEMPLATE = """\
 # Samples of an inertial measurement unit that is put into positions by hand and stands still in each for some seconds.
@@ -44,7 +47,8 @@ GYRO = re.compile(r"(?:mean_)?(?:g|gyro|gyr|omega|w|rate)[ _.]?([xyz])", re.I)
 ACC = re.compile(r"(?:mean_)?(?:a|acc|accel|accelerometer|f)[ _.]?([xyz])", re.I)
 COUNTS = ("counts", "count", "lsb", "digits")
 NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
-FEW = 20  # samples of a position
+FEW = 20  # samples of a position, or of a piece of it
+PIECES = 20  # of a position up or down
 
 
 def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
@@ -71,7 +75,8 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     time, every, problems = _checked(samples)
     if problems:
         raise DataError(data, problems)
-    windows, problems = _windows(time, every, samples)
+    up_down = system["attitudes"] == UP_DOWN
+    windows, problems = _windows(time, every, samples, 2 if up_down else norms.LEAST, PIECES if up_down else 1)
     if problems:
         raise DataError(data, problems)
     said = {**table.head.comments, **values}
@@ -142,23 +147,25 @@ def _checked(samples: Mapping[str, Array]) -> tuple[Array, Array, list[str]]:
     return time, every, problems
 
 
-def _windows(time: Array, every: Array, samples: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
+def _windows(
+    time: Array, every: Array, samples: Mapping[str, Array], least: int, pieces: int
+) -> tuple[dict[str, AnyArray], list[str]]:
+    """Return a row for each of so many pieces of each position at rest, and what is wrong with them."""
     if "position" in samples:
-        found = still.labelled(samples["position"])
-        found = [(a, b) for a, b in found if b - a >= FEW]
+        found = [(a, b) for a, b in still.labelled(samples["position"]) if b - a >= FEW]
     else:
         found = still.at_rest(time, every)
-    if len(found) < norms.LEAST:
+    if len(found) < least:
         how = "numbered" if "position" in samples else "found in the samples (at rest for two seconds or more)"
+        why = "an axis up and down" if pieces > 1 else "three accelerometers in unknown attitudes"
         return {}, [
-            f"{len(found)} positions at rest {how}; at least {norms.LEAST} in different directions are needed for "
-            "three accelerometers in unknown attitudes"
+            f"{len(found)} positions at rest {how}; at least {least} in different directions are needed for {why}"
         ]
-    start, end = (np.array([p[k] for p in found]) for k in (0, 1))
-    out: dict[str, Array] = {
-        "phase": np.arange(1, len(found) + 1), "t_start": time[start], "t_end": time[end - 1], "n": end - start,
-    }  # fmt: skip
+    cuts = [np.linspace(a, b - 1, min(pieces, (b - a) // FEW) + 1).astype(int) for a, b in found]
+    rows = [(k, a, b) for k, c in enumerate(cuts, 1) for a, b in pairwise(c.tolist())]
+    phase, start, end = (np.array(x) for x in zip(*rows, strict=True))
+    out: dict[str, AnyArray] = {"phase": phase, "t_start": time[start], "t_end": time[end], "n": end - start}
     for k, c in enumerate(CHANNELS):
-        out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for a, b in found])
-        out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for a, b in found])
+        out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for _, a, b in rows])
+        out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for _, a, b in rows])
     return out, []

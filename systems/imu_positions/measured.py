@@ -14,7 +14,7 @@ from gyrobench.system.system import MeasuredData, System
 from .channels import CHANNELS
 from .geometry import ANGLES
 from .hand import UNKNOWN
-from .log import read_log
+from .log import UP_DOWN, read_log
 
 TEMPLATE = """\
 # Positions and turns of an inertial measurement unit on a table with two axes: a row for each average, several a phase.
@@ -47,7 +47,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     Raises DataError and InvalidValueError.
     """
     stated = open_table(data).head.comments if data.is_file() else {}
-    if values.get("attitudes", stated.get("attitudes", "table")) == UNKNOWN:
+    if values.get("attitudes", stated.get("attitudes", "table")) in (UNKNOWN, UP_DOWN):
         return read_log(system, data, values)
     return read_record(system, data, values, needed=NEEDED, columns=COLUMNS)
 

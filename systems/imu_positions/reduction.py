@@ -15,6 +15,7 @@ trend or by its noise.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -45,6 +46,8 @@ from . import geometry, mistakes, tables
 from .budget import GYRO_SCALE, ImuSetup, Kinematics
 from .channels import BY_NAME, CHANNELS, UG, overview, truth_of
 from .hand import UNKNOWN, HandReduction
+from .log import UP_DOWN
+from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
@@ -172,7 +175,17 @@ class Reduction(ChannelTests[ImuSetup]):
         """Return what a record says, of attitudes that the table reads or of unknown ones."""
         if record.run.options.get("attitudes") == UNKNOWN:
             return HandReduction.of_record(record)
+        if record.run.options.get("attitudes") == UP_DOWN:
+            return UpDownReduction.of_record(record)
         return super().of_record(record)
+
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says; half of up less down is close to the Earth rate, and should be."""
+        result = super().from_record(record)
+        if record.run.options.get("attitudes") != UP_DOWN:
+            return result
+        return replace(result, reasons=[r for r in result.reasons if r.id != "plausibility.earth_rate"])
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> ImuSetup:

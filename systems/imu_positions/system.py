@@ -63,7 +63,7 @@ class ImuPositions(TableTest):
     options = (
         SITE
         | {
-            "attitudes": Option("table", str, "table: read by the table; unknown: from |f| = g and the turns"),
+            "attitudes": Option("table", str, "read by the table (table), unknown (|f| = g, turns), of a file up_down"),
             "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
@@ -134,7 +134,7 @@ class ImuPositions(TableTest):
 
     def check(self) -> list[str]:
         if self["attitudes"] not in ("table", UNKNOWN):
-            return [f"attitudes = {self['attitudes']}: must be table or unknown"]
+            return [f"attitudes = {self['attitudes']}: a run has table or unknown; up_down is of files"]
         problems = norms.problems if self["attitudes"] == UNKNOWN else geometry.force_problems
         return super().check() + problems(self._directions())
 

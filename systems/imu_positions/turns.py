@@ -91,8 +91,8 @@ def _matrices(q: Array) -> Array:
 
 def _left(turns: list[Turn], matrices: Array) -> Array:
     """Return what gravity is found off by (b, 2 n), rad, for several S (b, 3, 3)."""
-    inverses = np.linalg.inv(np.eye(3) + matrices)
-    each = [np.einsum("ki,bji,j->bk", t.tangents, t.rotations(inverses), t.before) for t in turns]
+    inverses: Array = np.asarray(np.linalg.inv(np.eye(3) + matrices), dtype=float)
+    each = [t.before @ t.rotations(inverses) @ t.tangents.T for t in turns]
     return np.concatenate(each, axis=1)
 
 
