@@ -27,22 +27,6 @@ from .channels import CHANNELS
 
 UP_DOWN = "up_down"  # option attitudes
 
-TEMPLATE = """\
-# Samples of an inertial measurement unit that is put into positions by hand and stands still in each for some seconds.
-# attitudes = unknown
-# latitude = 45.75deg
-# gravity = 9.8067m/s2
-# instrument = type and number of the unit
-# operator = who took the record
-#
-# latitude: needed.  gravity: optional (WGS84 normal gravity).  CSV or Parquet; one row a sample, any rate from 20 Hz.
-# gx, gy, gz (or gyro_x ...): rates that the gyros read; ax, ay, az (or acc_x ...): specific force, +1 g with the
-#   axis up.  Units in brackets: deg/s, rad/s, g, m/s2 ...; 'counts': the scale factors are not known, and are found.
-# At least 10 positions, spread over all directions: faces, edges and corners of a cube up; 24 are better.  They are
-#   found in the samples, or numbered in a column 'position' (0 or empty while the unit is moved).
-# The turns between them, smooth and not too fast, determine scale factors and misalignments of the gyros.
-time [s],gx [deg/s],gy [deg/s],gz [deg/s],ax [g],ay [g],az [g]
-"""
 GYRO = re.compile(r"(?:mean_)?(?:g|gyro|gyr|omega|w|rate)[ _.]?([xyz])", re.I)
 ACC = re.compile(r"(?:mean_)?(?:a|acc|accel|accelerometer|f)[ _.]?([xyz])", re.I)
 COUNTS = ("counts", "count", "lsb", "digits")

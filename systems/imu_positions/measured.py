@@ -31,6 +31,11 @@ TEMPLATE = """\
 # Rows in which the table turns determine scale factors and misalignments of the gyros; the turns about three axes are
 #   needed for all of them.  Without turns the gyros have bias and g-sensitivity alone.
 # Units in brackets may be others of the same kind (deg/h, g, mg, arcsec ...).
+#
+# '# attitudes = unknown' and latitude in place of all this: a logger's samples, CSV or Parquet, of a unit put by hand
+#   into 10 positions or more, spread over all directions, in which it stands still for some seconds; 24 are better.
+#   Columns time [s], gx, gy, gz [deg/s], ax, ay, az [g], or [counts] where the scale factors are not known.  Positions
+#   are found, or numbered in a column 'position' (0 or empty: moved).  '# attitudes = up_down': one axis up and down.
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean_gx [deg/s],mean_gy [deg/s],mean_gz [deg/s],mean_ax [m/s2],mean_ay [m/s2],mean_az [m/s2]
 """  # noqa: E501
 COLUMNS = (

@@ -38,11 +38,11 @@ class ImuPositions(TableTest):
     accelerometers, and the g-sensitivity of the gyros: gravity, the Earth rate and the rate of the table are known in
     every position.
 
-    [IMU-POSITIONS; IEEE 1559]
+    [IMU-POSITIONS, IMU-HAND, IMU-UPDOWN; IEEE 1559, Tedaldi 2014]
     """
 
     title = "Multi-position and rate test of an inertial measurement unit"
-    spec = ("IMU-POSITIONS",)
+    spec = ("IMU-POSITIONS", "IMU-HAND", "IMU-UPDOWN")
     reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
@@ -63,7 +63,7 @@ class ImuPositions(TableTest):
     options = (
         SITE
         | {
-            "attitudes": Option("table", str, "read by the table (table), unknown (|f| = g, turns), of a file up_down"),
+            "attitudes": Option("table", str, "table (it reads them), unknown (gravity and turns), up_down (of a file)"),
             "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
