@@ -1,4 +1,4 @@
-"""The typed boundary of the Python face: an argument of another type than the one written there is a UsageError.
+"""The typed boundary: an argument of a call, or a key of a file, of another type than the one written is a UsageError.
 
     @checked
     def load(name: File, values: Mapping[str, Any] | None = None) -> Experiment: ...
@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ValidationError
 
-from gyrobench.bench import UsageError
+from gyrobench.bench import UsageError, suggest_names
 from gyrobench.reading import shorten
 
 P = ParamSpec("P")
@@ -108,3 +109,17 @@ def checked(function: Callable[P, T]) -> Callable[P, T]:
         return function(*args, **kwargs)
 
     return call
+
+
+def faults_of(error: ValidationError, model_at: Callable[[tuple[int | str, ...]], type[BaseModel]]) -> list[str]:
+    """Return all that is wrong with a file that people write; model_at: place of a key -> the model that it is of."""
+    found = []
+    for fault in error.errors():
+        place, model = ".".join(map(str, fault["loc"])), model_at(fault["loc"])
+        if fault["type"] == "extra_forbidden":
+            known = [field.alias or name for name, field in model.model_fields.items()]
+            found.append(f"{place}: unknown key; {suggest_names(str(fault['loc'][-1]), known)}")
+            continue
+        given = "" if fault["type"] == "missing" else f" = {shorten(repr(fault['input']))}"
+        found.append(f"{place}{given}: {fault['msg'][:1].lower()}{fault['msg'][1:]}")
+    return found

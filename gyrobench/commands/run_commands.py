@@ -256,6 +256,28 @@ def verify(
 
 
 @app.command()
+def certificate(
+    runs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of runs of one test.")],
+    laboratory: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Profile; default laboratory.toml, here or in the bench.")
+    ] = None,
+    number: Annotated[str, typer.Option(help="Number of the certificate; default: that of the report.")] = "",
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: the working folder.")] = None,
+) -> None:
+    """Write the certificate of an instrument, or of a lot.
+
+    One or two pages of what the laboratory answers for; the reports must verify.
+
+    \b
+    Example: gyrobench certificate reports/out/tumble_single_axis/measured-47e4353f --number 2026-014
+    """
+    from gyrobench.workflow.certificate import write_certificate
+
+    for path in write_certificate(runs, laboratory, number, out):
+        echo(display_path(path))
+
+
+@app.command()
 def sign(
     folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Folder of a run or of a suite.")] = None,
     key: Annotated[Path | None, typer.Option(metavar="FILE.key", help="Private key, Ed25519 in PEM.")] = None,

@@ -36,12 +36,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
+from gyrobench.boundary import faults_of
 from gyrobench.record.csv_reader import DataError, regular, row_list
 from gyrobench.record.row_faults import NOTHING
 
@@ -97,22 +98,12 @@ def read_map(file: Path) -> ColumnMap:
     try:
         found = ColumnMap.model_validate(data)
     except ValidationError as error:
-        problems = [_problem(e) for e in error.errors()]
+        problems = faults_of(error, lambda place: MappedColumn if place[0] == "columns" else ColumnMap)
     else:
         problems = _contradictions(found)
         if not problems:
             return found
     raise UsageError("\n".join([f"{file}: not a column map:", *(f"  - {p}" for p in problems)]))
-
-
-def _problem(error: Any) -> str:
-    place = ".".join(map(str, error["loc"]))
-    if error["type"] == "extra_forbidden":
-        model = MappedColumn if error["loc"][0] == "columns" else ColumnMap
-        known = [f.alias or n for n, f in model.model_fields.items()]
-        return f"{place}: unknown key; {suggest_names(str(error['loc'][-1]), known)}"
-    given = "" if error["type"] == "missing" else f" = {reading.shorten(repr(error['input']))}"
-    return f"{place}{given}: {error['msg'][:1].lower()}{error['msg'][1:]}"
 
 
 def _contradictions(found: ColumnMap) -> list[str]:

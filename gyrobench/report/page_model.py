@@ -166,6 +166,7 @@ class Page:
     head: list[tuple[str, str]]
     sections: list[Section]
     pictures: list[Picture] = field(default_factory=list)
+    what: str = "Report"
 
     def finish(self) -> Page:
         """Number sections, tables and figures in reading order; drop sections without content."""

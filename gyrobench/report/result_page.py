@@ -156,7 +156,7 @@ def coefficients(report: Report[Result]) -> list[Any]:
         rows += [heading(f"in {unit}")] if groups else []
         rows += [Row(_coefficient(report, k, not groups, truth, limits)) for k in members]
     note = (
-        f"u: {_uncertainty(report)}; estimates are rounded to its second significant digit. 95 % from, to: limits of "
+        f"u: {what_u_is(report)}; estimates are rounded to its second significant digit. 95 % from, to: limits of "
         "the coverage interval."
     )
     if truth:
@@ -191,7 +191,7 @@ def _coefficient(report: Report[Result], k: int, unit: bool, truth: bool, limits
     return cells
 
 
-def _uncertainty(report: Report[Result]) -> str:
+def what_u_is(report: Report[Result]) -> str:
     """Return what u is: combined, or of type A only, and why."""
     valued = [c for c in report.result.coefficients if math.isfinite(c.u)]
     if any(c.u_a is None or c.u > c.u_a * (1.0 + 1e-9) for c in valued):

@@ -1,0 +1,57 @@
+"""The profile of a laboratory, ``laboratory.toml``: what its certificates say of it.
+
+name = "Inertial laboratory"
+address = ["Example street 1", "12345 Example town"]
+accreditation = "D-K-00000-00-00"                        # what follows is optional
+statements = ["The measurements are traceable to the national standards."]
+coefficients = ["D_F", "D_I", "D_S"]                     # shown, in this order; default all
+[[signatories]]
+role = "Head of the laboratory"
+name = "N. N."
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from gyrobench import reading
+from gyrobench.bench import UsageError
+from gyrobench.boundary import faults_of
+
+FILE = "laboratory.toml"
+
+
+class Signatory(BaseModel):
+    """A line to sign on."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    role: str = Field(min_length=1)
+    name: str = ""
+
+
+class Laboratory(BaseModel):
+    """The keys of a profile; see the module."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    name: str = Field(min_length=1)
+    address: list[str] = Field(min_length=1)
+    accreditation: str = ""
+    statements: list[str] = []
+    coefficients: list[str] = []
+    signatories: list[Signatory] = [Signatory(role="Tested by"), Signatory(role="Approved by")]
+
+
+def read_laboratory(file: Path) -> Laboratory:
+    """Return the profile of a TOML file.  Raises UsageError naming all that is wrong with it."""
+    if not file.is_file():
+        raise UsageError(f"{file}: no profile of a laboratory; {FILE} needs two lines, name = and address = [...]")
+    data = reading.toml(reading.read_text(file, UsageError), file, UsageError)
+    try:
+        return Laboratory.model_validate(data)
+    except ValidationError as error:
+        problems = faults_of(error, lambda place: Signatory if place[0] == "signatories" and place[1:] else Laboratory)
+    raise UsageError("\n".join([f"{file}: not a profile of a laboratory:", *(f"  - {p}" for p in problems)]))

@@ -1,0 +1,43 @@
+"""Certificates from the folders of runs: only of reports that are as they were written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from gyrobench import reading
+from gyrobench.bench import Bench
+from gyrobench.files import sha256, write_whole
+from gyrobench.record.run_document import RecordError
+from gyrobench.report import certificate_page, load, render
+from gyrobench.report.laboratory import FILE, read_laboratory
+from gyrobench.report.result_json import Report
+from gyrobench.workflow.inputs import require_run
+from gyrobench.workflow.manifest import verify
+from gyrobench.workflow.run_folders import MANIFEST
+
+
+def write_certificate(
+    runs: Sequence[Path], profile: Path | None = None, number: str = "", out: Path | None = None
+) -> list[Path]:
+    """Write ``certificate-NUMBER.html`` and ``.pdf`` of runs of one test; return their paths.
+
+    profile: of the laboratory, default ``laboratory.toml`` here or in the bench; out: default the working folder.
+    Raises VerificationError for a report that was changed, UsageError for runs of different tests and a wrong profile.
+    """
+    bench = Bench.find().folder
+    there = [file for file in (Path(FILE), bench / FILE) if file.is_file()]
+    laboratory = read_laboratory(profile or (there[0] if there else Path(FILE)))
+    of = []
+    for folder in runs:
+        verify(require_run(folder))
+        result = load(reading.read_text(folder / "result.json", RecordError))
+        of.append(certificate_page.Certified(Report.of(result), sha256(folder / MANIFEST)))
+    page = certificate_page.page(of, laboratory, number)
+    target = out or Path()
+    target.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for kind, content in (("html", render.html(page, bench).encode()), ("pdf", render.pdf(page, bench))):
+        paths.append(target / f"certificate-{reading.visible(page.report_id).replace('/', '-')}.{kind}")
+        write_whole(paths[-1], content)
+    return paths
