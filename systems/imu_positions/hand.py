@@ -97,10 +97,16 @@ class HandAccelerometers(HandChannel):
         readings = at.acc / D[0]
         X = -norms.slopes(at.triad, readings)
         solution = np.concatenate([[at.triad.matrix[p] for p in norms.PLACES], at.triad.bias])
-        y = np.linalg.norm(at.force, axis=1) - self.setup.gravity + X @ solution
-        group = Group("accelerometers", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
+        y = np.linalg.norm(at.force, axis=1) - self.setup.gravity + X @ (solution - self.start)
+        group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
         unit = ("specific force less gravity", "µg", UG)
-        return Regression(list(norms.NAMES), X, y, None, None, [group], *unit, noise="white", limit=norms.LIMIT)
+        return Regression(list(norms.NAMES), X, y, at.start, at.end, [group], *unit, noise="white", limit=norms.LIMIT)
+
+    @property
+    def start(self) -> Array:
+        """The unknowns from which the data are counted: the middle of counts."""
+        D, middle = self.at.scale_a
+        return np.concatenate([np.zeros(6), middle / D])
 
     def derived(self, found: Findings) -> Findings:
         """Return the fit as the instruments have it: counts and their scale factors where the scale was unknown."""
@@ -109,7 +115,8 @@ class HandAccelerometers(HandChannel):
         quantities = [_quantity("a", n, counts, truth, float(D[0])) for n in norms.NAMES]
         diagonal = {i: k for k, (i, j) in enumerate(norms.PLACES) if i == j}
 
-        def of(b: Array) -> Array:
+        def of(change: Array) -> Array:
+            b = self.start + change
             if not counts:
                 return b
             out = np.array(b)
@@ -135,12 +142,16 @@ class HandTurns(HandChannel):
         X = -turns.slopes(found.turned, found.matrix)
         y = turns.left(found.turned, found.matrix) + X @ found.matrix.ravel()
         number = np.repeat(np.arange(1.0, len(found.turned) + 1), 2)
-        span = np.repeat([t.time[-1] - t.time[0] for t in found.turned], 2)
+        ends = np.array([[t.time[0], t.time[-1]] for t in found.turned])
+        t0, t1 = (
+            np.column_stack(v).ravel() for v in ((ends[:, 0], ends.mean(axis=1)), (ends.mean(axis=1), ends[:, 1]))
+        )
+        span = np.repeat(ends[:, 1] - ends[:, 0], 2)
         weights = 1.0 / (span + np.median(span))  # white noise of a rate, and what does not grow with time
-        group = Group("gyros in turns", np.arange(y.size), number, "number of the turn", "")
+        group = Group("turns", np.arange(y.size), number, "number of the turn", "")
         names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
         unit = ("direction of gravity after a turn", "″", ARCSEC)
-        return Regression(names, X, y, None, None, [group], *unit, noise="white", weights=weights, limit=norms.LIMIT)
+        return Regression(names, X, y, t0, t1, [group], *unit, noise="white", weights=weights, limit=norms.LIMIT)
 
     def derived(self, found: Findings) -> Findings:
         counts, D = "g" in self.setup.counts, self.at.scale_g
@@ -190,19 +201,30 @@ class HandGyro(HandChannel):
     def regression(self) -> Regression:
         at, c, s = self.at, self.channel, self.setup
         matrix = np.eye(3) + at.found.matrix
-        y = at.gyro[:, c.axis] / at.scale_g - ((at.vertical + at.found.rate) @ matrix.T)[:, c.axis]
-        counts = "g" in s.counts
-        truth = {} if counts else dict(s.truth or {})
-        names = c.names(())
-        quantities = [_quantity("g", n, counts, truth, at.scale_g) for n in names]
+        y = (at.gyro[:, c.axis] - self.middle) / at.scale_g - ((at.vertical + at.found.rate) @ matrix.T)[:, c.axis]
+        quantities = self._quantities()
         X = np.column_stack([np.ones(len(y)), at.force / frames.G0])
-        group = Group(c.words, np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
+        group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
         many = y.size >= ESTIMATED
         weighed = [replace(nuisances.trend(at.start, at.end), name=f"trend {c.name}")] if many and s.nuisances else []
         return Regression(
             quantities, X, y, at.start, at.end, [group], "rate at rest", "°/h", DPH,
             "estimated" if many else "white", limit=1e3, candidates=weighed,
         )  # fmt: skip
+
+    @property
+    def middle(self) -> float:
+        """What the data are counted from: the mean of counts, which begin anywhere."""
+        return float(np.mean(self.at.gyro[:, self.channel.axis])) if "g" in self.setup.counts else 0.0
+
+    def _quantities(self) -> list[Quantity]:
+        counts = "g" in self.setup.counts
+        truth = {} if counts else dict(self.setup.truth or {})
+        return [_quantity("g", n, counts, truth, self.at.scale_g) for n in self.channel.names(())]
+
+    def derived(self, found: Findings) -> Findings:
+        start = np.array([self.middle / self.at.scale_g, 0.0, 0.0, 0.0])
+        return found.derive(self._quantities(), lambda b: start + b) if self.middle else found
 
     def effects(self, found: Findings) -> list[Effect]:
         at, c = self.at, self.channel

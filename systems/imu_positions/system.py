@@ -63,7 +63,7 @@ class ImuPositions(TableTest):
     options = (
         SITE
         | {
-            "attitudes": Option("table", str, "table (it reads them), unknown (gravity and turns), up_down (of a file)"),
+            "attitudes": Option("table", str, "table (read by it), unknown (gravity and turns), up_down (of a file)"),
             "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
