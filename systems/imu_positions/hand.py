@@ -14,6 +14,7 @@ Not modelled: nonlinearity, lever arms (slow turns), a delay between the instrum
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -50,6 +51,7 @@ from .hand_positions import COLUMNS, HandSetup, Positions
 from .turns import Turn
 
 UNKNOWN = "unknown"  # option attitudes
+STEADY = math.radians(2.0)  # rad/s, beyond what bias and g-sensitivity change from position to position
 ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimated
 LEVEL_RATE = Source(
     "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
@@ -306,14 +308,26 @@ class HandReduction(ChannelTests[HandSetup]):
             )
         elif at.enough and not np.array_equal(at.labels[1], np.eye(3)):
             found.append(_labels(at.labels[1]))
-        return found
+        return found or self._moving()
+
+    def _moving(self) -> list[str]:
+        """Return the positions in which the gyros read so much more than in the others that they were turned."""
+        if self.blind:
+            return []
+        rate = (self.at.gyro - np.median(self.at.gyro, axis=0)) / self.at.scale_g
+        size = np.max(np.abs(rate), axis=1)
+        return [
+            f"position {k + 1} (t = {self.at.start[k]:.6g} s): the gyros read {math.degrees(size[k]):.3g} °/s more "
+            "than in the others: it was not at rest"
+            for k in np.flatnonzero(size > STEADY)
+        ]
 
     def reasons(self) -> list[Reason]:
         if self.at.enough:
             return []
         text = (
-            "There are no samples of the turns between the positions, or fewer than 6 turns; not estimable: Sg (scale "
-            "factors and misalignments of the gyros)."
+            "There are no samples of the turns between the positions, or not of all, or fewer than 6 turns; not "
+            "estimable: Sg (scale factors and misalignments of the gyros)."
         )
         if self.blind:
             text += " The gyros read counts, so nothing is said of them."

@@ -25,6 +25,7 @@ COLUMNS = ("phase", "t_start", "t_end", *(f"mean_{c.name}" for c in CHANNELS))
 SAMPLES = tuple(f"imu.rate[{k}]" for k in (1, 2, 3))
 ROUNDS = 3  # of turns and heading
 LEAST_TURNS = 6  # two data each for nine unknowns
+GAP = 5.5  # steps between two samples from which on a turn is not integrated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,14 +131,17 @@ class Positions:
 
     @cached_property
     def raw_turns(self) -> list[Turn]:
-        """Turns between neighbouring positions, readings less those at rest, before a scale factor is known."""
+        """Turns between neighbouring positions, readings less those at rest, before a scale factor is known; none where
+        samples of one are missing.
+        """
         if self.setup.samples is None:
             return []
         time, read = self.setup.samples
         found = []
         for k in range(len(self.start) - 1):
             rows = slice(np.searchsorted(time, self.end[k] - 1e-9), np.searchsorted(time, self.start[k + 1] + 1e-9))
-            if rows.stop - rows.start > 2:
+            steps = np.diff(time[rows])
+            if steps.size > 1 and np.max(steps) < GAP * np.median(steps):
                 bias = 0.5 * (self.gyro[k] + self.gyro[k + 1])
                 found.append(Turn(time[rows], read[rows] - bias, self.up[k], self.up[k + 1]))
         return found if len(found) == len(self.start) - 1 else []

@@ -32,6 +32,7 @@ ACC = re.compile(r"(?:mean_)?(?:a|acc|accel|accelerometer|f)[ _.]?([xyz])", re.I
 COUNTS = ("counts", "count", "lsb", "digits")
 NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
 FEW = 20  # samples of a position, or of a piece of it
+MOVED = 6.0  # times the usual scatter
 PIECES = 20  # of a position up or down
 
 
@@ -152,4 +153,17 @@ def _windows(
     for k, c in enumerate(CHANNELS):
         out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for _, a, b in rows])
         out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for _, a, b in rows])
-    return out, []
+    return out, _moved(out)
+
+
+def _moved(windows: Mapping[str, AnyArray]) -> list[str]:
+    """Return the positions in which a channel scatters far more than it usually does."""
+    problems = []
+    for c in CHANNELS:
+        scatter = windows[f"std_{c.name}"] / max(float(np.median(windows[f"std_{c.name}"])), 1e-300)
+        problems += [
+            f"position {windows['phase'][k]} (t = {windows['t_start'][k]:.6g} s): {c.name} scatters {scatter[k]:.3g} "
+            "times as much as in the others: it was moved, or its number reaches into the motion"
+            for k in np.flatnonzero(scatter > MOVED)
+        ]
+    return problems

@@ -260,3 +260,36 @@ def test_up_and_down_without_an_upright_axis(tmp_path: Path) -> None:
     read = record(path, attitudes="up_down")
     with pytest.raises(ReductionError, match="no axis stands up and down"):
         updown.UpDownReduction.of_record(read)
+
+
+def test_positions_that_were_not_at_rest_are_named(tmp_path: Path) -> None:
+    """Numbers that reach into the motion; a position that turned evenly about the vertical, which no scatter shows."""
+    rng = np.random.default_rng(14)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 12), rng, gyro=GYRO, acc=ACC)
+    number = np.where(np.mod(time, 6.0) < np.where(time < 12.0, 5.5, 3.9), np.floor(time / 6.0) + 1.0, 0.0)
+    path = write(tmp_path / "log.csv", time, gyro, acc)
+    lines = path.read_text("utf-8").splitlines()
+    head = next(k for k, line in enumerate(lines) if line.startswith("time"))
+    rows = [f"{line},{n:g}" for line, n in zip(lines[head + 1 :], number, strict=True)]
+    path.write_text("\n".join([*lines[:head], lines[head] + ",position", *rows]) + "\n", encoding="utf-8")
+    with pytest.raises(DataError) as error:
+        record(path)
+    assert "position 1 (t = 0 s): gx scatters" in str(error.value) and "position 3" not in str(error.value)
+    still_rows = (time >= 30.0) & (time < 34.0)
+    turning = gyro + 0.1 * np.where(still_rows, 1.0, 0.0)[:, None]
+    with pytest.raises(ReductionError, match=r"position 6 .* °/s more than in the others: it was not at rest"):
+        hand.HandReduction.of_record(record(write(tmp_path / "even.csv", time, turning, acc)))
+
+
+def test_turns_without_samples_leave_the_gyros_bias_and_sensitivity(tmp_path: Path) -> None:
+    """A logger that was switched off between two positions: no turns, and the report says what is not estimable."""
+    rng = np.random.default_rng(15)
+    unit = Unit.drawn(rng)
+    time, gyro, acc = handled(unit, poses(rng, 14), rng, gyro=GYRO, acc=ACC)
+    there = ~((time > 28.3) & (time < 29.5))
+    result = hand.HandReduction.of_record(record(write(tmp_path / "log.csv", time[there], gyro[there], acc[there])))
+    names = {c.name for c in result.coefficients}
+    assert "bg_x" in names and "G_zz" in names and not any(n.startswith("Sg") for n in names)
+    assert any(r.id == "turns.none" and "not estimable: Sg" in r.text for r in result.reasons)
+    level = next(line for line in result.budget if "level Earth rate" in line.source)
+    assert level.size == pytest.approx(15.0410686 * math.cos(0.7) / math.sqrt(2.0) * DPH, rel=1e-6)
