@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check style bench docs clean
+.PHONY: demo test check style bench docs studio clean
 
 # The whole single-axis tumble test of the standard gyro: FMUs, run, step check, coefficients, report.
 demo: $(VENV)/demo.stamp
@@ -35,6 +35,10 @@ bench: $(VENV)/bench.stamp
 docs: $(VENV)/docs.stamp
 	$(BIN)/python docs/site/build.py
 
+# The bench in the browser; Ctrl-C ends it.
+studio: $(VENV)/studio.stamp
+	$(BIN)/gyrobench studio
+
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "gyrobench needs Python 3.11 or newer; name one: make PYTHON=/path/to/python3.11"; exit 1; }
@@ -56,6 +60,10 @@ $(VENV)/bench.stamp: pyproject.toml | $(BIN)/python
 
 $(VENV)/docs.stamp: pyproject.toml | $(BIN)/python
 	$(PIP) -e ".[docs,notebook]"
+	@touch $@
+
+$(VENV)/studio.stamp: pyproject.toml | $(BIN)/python
+	$(PIP) -e ".[studio]"
 	@touch $@
 
 clean:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import standard_folder
-from gyrobench.commands.catalog import init_bench
 from gyrobench.record.record import Record
+from gyrobench.workflow.catalog import init_bench
 
 Call = Callable[..., tuple[int, str, str]]
 SYSTEM = '''

@@ -12,8 +12,8 @@ import pytest
 
 import gyrobench
 from gyrobench.bench import Bench, BenchError, display_path, standard_folder, suggest_names
-from gyrobench.commands import catalog
-from gyrobench.commands.catalog import init_bench, list_contents
+from gyrobench.workflow import catalog
+from gyrobench.workflow.catalog import init_bench, list_contents
 
 ODD = '''"""A module."""
 class Helper:
@@ -183,8 +183,11 @@ BELOW = {*ROOMS}
 #: from a request to a result, for the commands and the library
 ROOMS["workflow"] = BELOW
 ROOMS["design"] = BELOW
+ROOMS["tuning"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
-ROOMS["library"] = BELOW | {"workflow", "design", "campaign"}
+ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
+#: the face in the browser; that of the shell is in FACES, and neither imports the other
+ROOMS["studio"] = BELOW | {"workflow", "library"}
 #: rooms inside a room -> rooms beside them that they may import
 INNER: dict[str, set[str]] = {
     "campaign.execution": set(),

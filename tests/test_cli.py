@@ -18,6 +18,7 @@ from gyrobench.commands.arguments import parse_settings
 from gyrobench.commands.console import print_notes
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
+from gyrobench.workflow.progress_words import format_duration
 
 Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
@@ -29,7 +30,7 @@ def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
     names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
-    assert len(names) == 16
+    assert len(names) == 20
     for name in names:
         code, text, _ = gyrobench(name, "--help")
         assert code == 0
@@ -233,7 +234,7 @@ def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_spans_of_time() -> None:
-    assert [progress_display.format_duration(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
+    assert [format_duration(s) for s in (0.4, 75.0, 7265.0, float("inf"))] == [
         "0 s", "1 min 15 s", "2 h 01 min", "unknown",
     ]  # fmt: skip
 

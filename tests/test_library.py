@@ -20,12 +20,12 @@ import pytest
 from processes import unhurried
 
 import gyrobench as gb
-from gyrobench.commands.catalog import init_bench
 from gyrobench.commands.cli import main
 from gyrobench.engine.session import RunError, Session
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult, Reason
 from gyrobench.system.system import System
+from gyrobench.workflow.catalog import init_bench
 from gyrobench.workflow.user_errors import PostRunError
 
 NAME = "tumble_single_axis"

@@ -17,10 +17,11 @@ from printed.pages import ROOT, Step
 from gyrobench.bench import Bench
 from gyrobench.campaign.execution.axes import parse_axis
 from gyrobench.commands import cli
-from gyrobench.commands.arguments import load_with_values, parse_settings
+from gyrobench.commands.arguments import parse_settings
 from gyrobench.packaging import load_part
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import find_specification
+from gyrobench.workflow.settings import load_with_values
 
 ALL = [step for page in pages.pages() for step in pages.read(page)]
 COMMANDS = [s for s in ALL if s.kind == "command"]

@@ -144,12 +144,15 @@ def main() -> int:
     given = options.parse_args()
     source = given.out.with_name(given.out.name + "-source")
     stage(source, not given.no_notebook)
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto", "-b", "html", "-c", str(HERE)]
+    # not by -W: with it a warning ends Sphinx while its workers still write to it, and both wait for ever
+    warnings = source / "warnings.txt"
+    command = [sys.executable, "-m", "sphinx", "-q", "-j", "auto", "-w", str(warnings), "-b", "html", "-c", str(HERE)]
     done = subprocess.run([*command, str(source), str(given.out)], check=False)
-    if done.returncode == 0:
-        shutil.copy(given.out / "README.html", given.out / "index.html")
-        print(given.out / "index.html")
-    return done.returncode
+    if done.returncode or warnings.read_text(encoding="utf-8").strip():
+        return done.returncode or 1
+    shutil.copy(given.out / "README.html", given.out / "index.html")
+    print(given.out / "index.html")
+    return 0
 
 
 if __name__ == "__main__":

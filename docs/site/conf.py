@@ -36,7 +36,9 @@ autodoc_typehints = "signature"
 #: what a module hands on in ``__all__`` is documented where it is defined
 autodoc_default_options = {"members": True, "show-inheritance": True, "ignore-module-all": True}
 OPTIONAL = ("distributed", "dask", "fsspec", "psutil", "SALib", "pandas", "pygeomag", "fmu_manipulation_toolbox")
-autodoc_mock_imports = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
+#: of the studio: what only a type checker imports of them does not run
+FRONT_END = ["fastapi", "nicegui", "starlette", "uvicorn"]
+autodoc_mock_imports = [*(name for name in OPTIONAL if importlib.util.find_spec(name) is None), *FRONT_END]
 python_use_unqualified_type_names = True
 toc_object_entries = False
 

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gyrobench import reading
 from gyrobench.bench import UsageError
-from gyrobench.system.suite import Suite
-from gyrobench.system.system import System
-from gyrobench.system.values import InvalidValueError, parse_number
-from gyrobench.workflow.inputs import load_test
-
-HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
+from gyrobench.system.values import parse_number
 
 
 def parse_assignments(values: list[str] | None, option: str, example: str) -> dict[str, str]:
@@ -83,41 +77,3 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
 def parse_time(option: str, text: str | None) -> float | None:
     """Return the time given by an option in s.  Raises InvalidValueError."""
     return parse_number(option, text, "s") if text else None
-
-
-def load_with_values(
-    name: str, values: Mapping[str, str], step: float | None = None, coupling: str = "sequential"
-) -> System | Suite:
-    """Return a system or suite with the values of --set, see :func:`gyrobench.workflow.inputs.load_test`."""
-    test = load_test(name, step)
-    if coupling == "parallel":
-        if isinstance(test, Suite):
-            raise UsageError(f"--coupling: {name} is a suite; run its tests one by one: {', '.join(test.tests())}")
-        test.coupling = coupling
-    apply_values(test, values)
-    return test
-
-
-def load_system(name: str, values: Mapping[str, str], coupling: str = "sequential") -> System:
-    """Return a system with the values of --set.  Raises UsageError for a suite too, naming its tests."""
-    test = load_with_values(name, values, None, coupling)
-    if isinstance(test, Suite):
-        raise UsageError(f"{name} is a suite; name one of its tests: {', '.join(test.tests())}")
-    return test
-
-
-def apply_values(test: System | Suite, values: Mapping[str, Any]) -> None:
-    """Set values.  Raises UsageError."""
-    for key, value in values.items():
-        try:
-            test.set(key, value)
-        except InvalidValueError as error:
-            raise UsageError(f"--set {error}{_unit_hint(test, key, value)}") from None
-
-
-def _unit_hint(test: System | Suite, key: str, value: Any) -> str:
-    """Return the end of a message about a number that was given without its unit."""
-    option = test.options.get(key)
-    if option is None or option.unit not in HINTS or str(value)[-1:].isalpha():
-        return ""
-    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS[option.unit]}"

@@ -34,7 +34,7 @@ def list_command(as_json: Json = False) -> None:
     \b
     Example: gyrobench list
     """
-    from gyrobench.commands.catalog import list_contents
+    from gyrobench.workflow.catalog import list_contents
 
     contents = list_contents(Bench.find())
     if as_json:
@@ -65,9 +65,10 @@ def show(
     \b
     Example: gyrobench show tumble_single_axis --picture wiring.svg
     """
-    from gyrobench.commands.arguments import load_with_values, parse_settings, parse_swaps
+    from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.commands.show_system import show_suite, show_system
     from gyrobench.system.suite import Suite
+    from gyrobench.workflow.settings import load_with_values
 
     test = load_with_values(system, parse_settings(values), None, coupling.value)
     if isinstance(test, Suite):

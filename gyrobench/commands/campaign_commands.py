@@ -136,7 +136,7 @@ def site(
         typer.Option("--publish", metavar="DIR", help="Folder for all of it, reports included."),
     ] = None,
 ) -> None:
-    """Write the site of a campaign: static pages that open from disk.
+    """Write the site of a campaign as static pages.
 
     Answer, table of runs, coverage, responses, distributions, failures; of measured lots control charts, tolerance
     intervals, outliers, verdicts.
@@ -198,7 +198,6 @@ def design(
       gyrobench design drift_test_suite --set tests="tumble_single_axis tumble_two_axis" --want D_I=0.001deg/h/g
     """
     from gyrobench.commands.arguments import (
-        load_with_values,
         parse_assignments,
         parse_settings,
         parse_swaps,
@@ -208,6 +207,7 @@ def design(
     from gyrobench.design.shortest_test import design_test
     from gyrobench.design.suite_design import design_suite
     from gyrobench.system.suite import Suite
+    from gyrobench.workflow.settings import load_with_values
 
     settings = parse_settings(values)
     parts, maps = parse_swaps(part, mapping)

@@ -101,11 +101,11 @@ def fit(
     if (slot is None) == (system is None):
         raise UsageError("fit: --slot SYSTEM.SLOT for an FMU, or --system SYSTEM for a file of data")
     if slot is not None:
-        from gyrobench.commands.fit_mapping import write_mapping
+        from gyrobench.workflow.fit_mapping import write_mapping
 
         text, problems = write_mapping(file, slot, out)
     else:
-        from gyrobench.commands.fit_columns import write_columns
+        from gyrobench.workflow.fit_columns import write_columns
 
         assert system is not None
         text, problems = write_columns(file, system, out)
@@ -153,7 +153,7 @@ def init(
     \b
     Example: gyrobench init mybench --copy floated_gyro
     """
-    from gyrobench.commands.catalog import init_bench
+    from gyrobench.workflow.catalog import init_bench
 
     for line in init_bench(name, list(copy or [])):
         echo(line)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
-from gyrobench.commands.arguments import load_system
 from gyrobench.packaging.compiler import PLATFORMS
 from gyrobench.workflow.inputs import check_fmu_files, require_slots
+from gyrobench.workflow.settings import load_system
 
 
 def export(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from gyrobench.bench import UsageError, display_path
 from gyrobench.commands import console
-from gyrobench.commands.arguments import apply_values
 from gyrobench.commands.progress_display import ProgressDisplay
 from gyrobench.report import FORMATS
 from gyrobench.report.plain_text import format_result, format_summary
@@ -19,6 +18,7 @@ from gyrobench.workflow.feedback import Feedback
 from gyrobench.workflow.inputs import find_specification
 from gyrobench.workflow.run_execution import RunRequest, execute_run
 from gyrobench.workflow.saved_run import RunOutcome, reduce_saved_run
+from gyrobench.workflow.settings import apply_values
 from gyrobench.workflow.suite_report import SuiteOutcome
 
 FEEDBACK = Feedback(console.print_notes, ProgressDisplay)

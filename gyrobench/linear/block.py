@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.linear.part_linearization import jacobians
-from gyrobench.linear.sampled_model import SampledStep, sampled_step
+from gyrobench.linear.sampled_model import SampledStep, sampled_step, undelayed
 
 KEPT = 256  # parts at a point
 
@@ -81,6 +81,13 @@ def step_of(part: Component, inputs: list[str], outputs: list[str], step: float)
     return _step(_Point(part), tuple(inputs), tuple(outputs), step)
 
 
+def undelayed_of(
+    part: Component, inputs: list[str], outputs: list[str], step: float
+) -> tuple[Array, Array, Array, Array] | None:
+    """Return what :func:`gyrobench.linear.sampled_model.undelayed` does."""
+    return _undelayed(_Point(part), tuple(inputs), tuple(outputs), step)
+
+
 @functools.lru_cache(maxsize=KEPT)
 def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> LinearBlock:
     part = point.part
@@ -92,6 +99,13 @@ def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], ste
 @functools.lru_cache(maxsize=KEPT)
 def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> SampledStep | None:
     return sampled_step(point.part, [*inputs], [*outputs], step)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _undelayed(
+    point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float
+) -> tuple[Array, Array, Array, Array] | None:
+    return undelayed(point.part, [*inputs], [*outputs], step)
 
 
 def _within(part: Component, inputs: tuple[str, ...], b: Array, step: float) -> list[Array]:

@@ -11,9 +11,9 @@ wires; excitations come in from outside.  Two models are made:
 
 Opened at an input, the loop is L = -(returned signal) / (injected signal), other loops closed.
 
-A sampled method that passes an input on has no continuous model; the discrete one takes the part's own step, where one
-step is like the next (gyrobench.linear.sampled_model).  One that carries it through the step only (the motion of a base
-between its values) has both.
+A sampled method that keeps something of an input has no continuous model; the discrete one takes the part's own step,
+where one step is like the next (gyrobench.linear.sampled_model).  One that carries it through the step only (the motion
+of a base between its values), or hands it on a step later, has both.
 
 Not modelled: limits.  Sampled methods whose steps differ (a moving average) and third-party FMUs leave the system
 without a linear model; a warning says so.
@@ -30,7 +30,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.block import LinearBlock, block_of, step_of
+from gyrobench.linear.block import LinearBlock, block_of, step_of, undelayed_of
 from gyrobench.linear.sampled_model import SampledStep
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
@@ -110,6 +110,11 @@ class Linear:
                 raise LinearizationError(f"{s} works in samples, and {error}") from error
             if model is not None:
                 self.sampled[s] = model
+        self.undelayed = {
+            s: undelayed_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+            for s, model in self.sampled.items()
+            if not model.within
+        }
         self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
         self.outputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].outputs]
         self.states = [f"{s}.{v}" for s in self.order for v in self.blocks[s].states]
@@ -152,8 +157,9 @@ class Linear:
         """Return A, B, C, D from excitations to channels, or of the loop L opened at an input ("slot.variable")."""
         from scipy.linalg import block_diag
 
-        blocks = [self.blocks[s] for s in self.order]
-        a, b, c, d = (block_diag(*(getattr(p, m) for p in blocks)) for m in "abcd")
+        plain = {s: (p.a, p.b, p.c, p.d) for s, p in self.blocks.items()}
+        of_parts = [self.undelayed.get(s) or plain[s] for s in self.order]
+        a, b, c, d = (block_diag(*(of_part[m] for of_part in of_parts)) for m in range(4))
         k, w = self.k.copy(), self.w
         return_row = np.zeros((0, len(self.outputs)))
         if break_at is not None:
@@ -230,7 +236,7 @@ def loops(
     try:
         parts = operating_point(assembly, parameters, part_of)
         linear = Linear(assembly, parts, step)
-        in_samples = any(not model.within for model in linear.sampled.values())
+        in_samples = any(model is None for model in linear.undelayed.values())
         kinds = {"discrete": linear.discrete} | ({} if in_samples else {"continuous": linear.continuous})
         loops_: dict[str, OpenLoop] = {}
         for name, at in assembly.system.loops.items():

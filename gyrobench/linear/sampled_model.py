@@ -2,6 +2,9 @@
 
 x+ = A x + B u,  y = C x+ + D u with x = states and discrete values.  Exact but for rounding where the step is linear.
 
+A part that hands on values of earlier steps and keeps none (an amplifier that is asked once a step) only delays by the
+step, and has a continuous model, in which it does not: :func:`undelayed`.
+
 Not modelled: a part whose step is not the same one step later (a ring buffer, a sampling period of several steps).
 """
 
@@ -16,9 +19,11 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component, ComponentError
+from gyrobench.linear.part_linearization import jacobians
 
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
+FINE = 1e-3  # of the step, where it is to be none
 MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the same one step later
 
 
@@ -55,8 +60,7 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         raise ValueError(f"keeps {len(discrete)} values in memory")
     first = _differences(twin, inputs, outputs, step, discrete)
     n = len(part.states)
-    for _ in discrete:  # what is handed on from value to value
-        reached = reached | np.any(first.a[n:, n:][:, reached], axis=1)
+    reached = _handed_on(first, n, reached)
     if not (np.any(first.a[:n, n:][:, reached]) or np.any(first.c[:, n:][:, reached])):
         return None  # none that the inputs reach goes further; constants of the part do not count
     first.within = not any(np.any(side) for k in np.flatnonzero(reached) for side in part.tangent({discrete[k]: 1.0}))
@@ -75,6 +79,50 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         if not np.allclose(x, y, rtol=1e-3, atol=1e-6 * (np.abs(x).max() if x.size else 0.0)):
             raise ValueError("its one step is not like the next (a memory, or a sampling period of several steps)")
     return last
+
+
+def undelayed(
+    part: Component, inputs: list[str], outputs: list[str], step: float
+) -> tuple[Array, Array, Array, Array] | None:
+    """Return A, B, C, D of x' = A x + B u, y = C x + D u without the delay of the sampled methods; x: the states.
+
+    None where a discrete value that the inputs reach keeps something from step to step (a filter in samples), or where
+    half the step is not the same method twice as often (a sampling period of its own).
+
+    Values d that are handed on, d+ = N d + K x + L u with a nilpotent N, are (I - N)^-1 (K x + L u) as the step goes to
+    zero.
+    """
+    discrete = [s.name for s in part.layout if s.section == "discrete"]
+    n = len(part.states)
+    try:
+        twin = type(part)(part.instance)
+        twin.set_state(part.get_state())
+        if sampled_step(part, inputs, outputs, 0.5 * step) is None:
+            return None
+        whole, fine = (_differences(twin, inputs, outputs, h, discrete) for h in (step, FINE * step))
+    except (ComponentError, ValueError):
+        return None
+    there = _handed_on(whole, n, _reached(part, inputs, discrete, step))
+    rows = n + np.flatnonzero(there)
+    kept = whole.a[np.ix_(rows, rows)]
+    if np.any(np.abs(np.linalg.matrix_power(kept, len(rows))) > DELTA):
+        return None
+    still = np.linalg.inv(np.eye(len(rows)) - fine.a[np.ix_(rows, rows)])
+    of_x, of_u = still @ fine.a[rows, :n], still @ fine.b[rows]
+    a, b, c, d = jacobians(part, inputs, outputs)
+    all_outputs = [s.name for s in part.layout if s.section == "output"]
+    sides = list(part.tangents({discrete[k - n]: 1.0} for k in rows))
+    a_d = np.array([side[0] for side in sides], dtype=float).T.reshape(n, len(rows))
+    c_d = np.array([[side[1][all_outputs.index(o)] for o in outputs] for side in sides], dtype=float).T
+    c_d = c_d.reshape(len(outputs), len(rows))
+    return a + a_d @ of_x, b + a_d @ of_u, c + c_d @ of_x, d + c_d @ of_u
+
+
+def _handed_on(step: SampledStep, n: int, reached: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the discrete values that are reached at once or from another of them; n: states before them."""
+    for _ in reached:
+        reached = reached | np.any(step.a[n:, n:][:, reached], axis=1)
+    return reached
 
 
 def _reached(part: Component, inputs: list[str], discrete: list[str], step: float) -> NDArray[np.bool_]:

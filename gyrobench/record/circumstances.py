@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from textwrap import shorten
 
 WORD = r"[^\W\d][\w.-]*"
@@ -44,10 +44,11 @@ class Statement:
 
 @dataclass(frozen=True)
 class Keys:
-    """Keys that a reader knows; phases: ``phase N`` too."""
+    """Keys that a reader knows; phases: ``phase N`` too.  elsewhere: keys of other tests -> why not here."""
 
     names: Sequence[str]
     phases: bool = False
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     def __contains__(self, key: str) -> bool:
         return key in self.names or (self.phases and PHASE.fullmatch(key) is not None)
@@ -92,6 +93,9 @@ def faults(statements: Iterable[Statement], keys: Keys) -> list[str]:
                     f"{where}states nothing, though it names '{s.key}': write '{shown}' on a line of its own (a remark "
                     "ends otherwise than in a value)"
                 )
+            continue
+        if s.key not in keys and s.key in keys.elsewhere:
+            problems.append(f"{where}'{shown}': {keys.elsewhere[s.key]}")
             continue
         if s.key not in keys:
             near = keys.nearest(s.key, NEAR if s.line else MISPRINT)

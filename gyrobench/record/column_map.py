@@ -5,6 +5,7 @@
     decimal = ","
     skip = 9                               # lines above the names of the columns
     below = 1                              # lines between names and rows (units)
+    table = "imu"                          # of a log that has several: a group, topic or sheet
     empty = "skip"                         # missing (default): see the reader; skip: the row; previous: as above it
 
     [columns.t_start]
@@ -44,6 +45,7 @@ from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.boundary import faults_of
 from gyrobench.record.csv_reader import DataError, regular, row_list
+from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.row_faults import NOTHING
 
 Empty = Literal["missing", "skip", "previous"]
@@ -83,6 +85,7 @@ class ColumnMap(BaseModel):
     skip: int = Field(default=0, ge=0)
     below: int = Field(default=0, ge=0)
     empty: Empty = "missing"
+    table: str = ""  # of a log with several
     absent: list[str] = NOTHING  # texts of cells without a value
     columns: dict[str, MappedColumn]
     set: dict[str, str | int | float | bool] = {}
@@ -365,8 +368,11 @@ def cells_of_file(file: Path, encoding: str, delimiter: str) -> Iterator[tuple[i
 def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
     """Write a file under its map as the bench's CSV, and return what was wrong and left out.  Raises DataError."""
     done = MappedRows(columns, file)
+    if columns.table and not is_log(file):
+        raise DataError(file, [f"table = '{columns.table}': a text file has one table; leave it out"])
+    text = as_text(file, columns.table) if is_log(file) else file
     with to.open("w", encoding="utf-8", newline="\n") as out:
-        for line in done.lines(cells_of_file(file, columns.encoding, columns.delimiter)):
+        for line in done.lines(cells_of_file(text, columns.encoding, columns.delimiter)):
             out.write(line + "\n")
     if not done.read:
         raise DataError(file, [f"no names of columns in row {columns.skip + 1} (skip = {columns.skip})"])

@@ -34,6 +34,7 @@ CHUNK = 200  # samples whose median step is held against the usual one
 MIXED = 0.1  # of the step: a larger change of it is another sampling rate
 BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
+BURSTS = 1.5  # mean step of a chunk over its median, where long ones are not whole steps: stamps of arrival
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
 JUMP = 100.0  # spreads of the increments of an angle
 LARGEST = 1e100  # value of a column, and the inverse of the least range: squares are numbers yet
@@ -244,6 +245,14 @@ class DriftReader:
             return
         usual = np.median(chunks, axis=1)
         ratio = chunks / usual[:, None]
+        long = ratio[ratio > GAP]
+        if long.size and float(np.median(chunks.mean(axis=1) / usual)) > BURSTS and np.std(long - np.rint(long)) > 0.2:
+            mean = float(d.mean())
+            raise ValueError(
+                f"the time stamps come in bursts, {float(np.median(usual)):.3g} s apart with a mean of {mean:.4g} s: "
+                "stamps of arrival, not of sampling?  If the instrument samples evenly, leave the column time out "
+                f"(of the column map) and state its rate: sampling = {1.0 / mean:.4g}Hz"
+            )
         even = ratio < GAP
         off = np.sqrt(np.sum(np.where(even, ratio - 1.0, 0.0) ** 2, axis=1) / even.sum(axis=1))
         if float(np.median(off)) > UNEVEN:

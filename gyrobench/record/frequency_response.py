@@ -22,7 +22,7 @@ def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
     n = len(model.states)
     a, b, c = a.reshape(n, n), b.reshape(n, len(model.inputs)), c.reshape(len(model.outputs), n)
     d = d.reshape(len(model.outputs), len(model.inputs))
-    between = _reached(a, b) & _reached(a.T, c.T)  # the other states, often two of three, are of no effect
+    between = reached(a, b) & reached(a.T, c.T)  # the other states, often two of three, are of no effect
     a, b, c, n = a[between][:, between], b[between], c[:, between], int(between.sum())
     s = 2j * np.pi * np.asarray(f, float)
     s = np.exp(s * model.step) if model.step else s
@@ -30,7 +30,7 @@ def model_response(model: LinearModel, f: Sequence[float] | Array) -> Complex:
     return np.asarray(c @ states + d)
 
 
-def _reached(a: Array, b: Array) -> NDArray[np.bool_]:
+def reached(a: Array, b: Array) -> NDArray[np.bool_]:
     """Return the states that the inputs move, directly (b) or through others (a): (n,)."""
     reached: NDArray[np.bool_] = np.any(b != 0.0, axis=1)
     for _ in range(len(reached)):

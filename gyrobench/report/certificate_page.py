@@ -154,10 +154,15 @@ def _lot(of: Sequence[Certified], names: Sequence[str]) -> list[PageTable]:
     for start in range(0, len(names), ACROSS):
         shown = names[start : start + ACROSS]
         units = {c.name: c.unit for c in of[0].report.result.coefficients}
-        rows = [Row([text_cell(c.instrument, "strong"), *(_value(x) for x in _chosen(c, shown))]) for c in of]
+        rows = [Row([text_cell(c.instrument, "strong"), *_values(c, shown)]) for c in of]
         heads = columns("instrument", *((n, units[n]) for n in shown))
         tables.append(PageTable(heads, rows, caption, small=True))
     return tables
+
+
+def _values(certified: Certified, names: Sequence[str]) -> list[Cell]:
+    by_name = {c.name: c for c in certified.report.result.coefficients}
+    return [_value(by_name[n]) if n in by_name else text_cell("–") for n in names]
 
 
 def _value(c: Coefficient) -> Cell:

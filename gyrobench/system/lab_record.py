@@ -35,9 +35,14 @@ Time series may stand here instead of windows: columns `time [s]`, `current` for
 #   Samples that may be aliased are warned of: say what they are by '# samples = means' (each since the one before) or
 #   points, and how far the signal reaches by '# bandwidth = 14Hz'."""
 TEXTS = (
-    "title", "source", "made", "note", "instrument", "operator", *ABOUT, "polarity", "date", "report", "type_b",
-    "arrangement",
+    "title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement",
 )  # fmt: skip
+POLARITY = "polarity"  # read by the tumbles alone: RebalanceSetup
+WITH_POLARITY = (*TEXTS, POLARITY)
+ELSEWHERE = {
+    POLARITY: "this test does not turn its readings round; give them with the sign that its template asks for "
+    "(gyrobench reduce NAME --template) and leave this key out"
+}
 OF_SERIES = ("window", "samples", "bandwidth")  # keys of time series
 
 
@@ -81,12 +86,15 @@ def read_record(
     comments that are kept as they are.  Raises DataError, and InvalidValueError for an option that does not fit.
     """
     for name in values:
+        if name in ELSEWHERE and name not in texts:
+            raise InvalidValueError(f"{name}: {ELSEWHERE[name]}")
         if name not in system.options and name not in texts and not (attitudes and name.startswith("phase ")):
             system.set(name, values[name])  # says which options there are
     head = read_head(data)
     windows: dict[str, np.ndarray[Any, Any]] = {}
     series, notes, problems = is_time_series(head, columns), list[str](), list[str]()
-    keys = Keys((*system.options, *texts, *(OF_SERIES if series else ())), phases=attitudes is not None or series)
+    known = (*system.options, *texts, *(OF_SERIES if series else ()))
+    keys = Keys(known, phases=attitudes is not None or series, elsewhere=ELSEWHERE)
     stated = head.statements if series else read_statements(data)
     if series:
         problems += faults(stated, keys)

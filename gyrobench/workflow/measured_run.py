@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.record.csv_reader import DataError
+from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import DataFile
@@ -64,7 +65,7 @@ def reduce_measured(
     if columns is not None:
         record = _read_mapped(measured, system, data, values, columns, feedback)
     else:
-        record = _read(measured, system, data, values, feedback)
+        record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
     with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
@@ -87,6 +88,22 @@ def reduce_measured(
     with record_kept(folder, record):
         paths = write_report(result, folder, record, file, formats)
     return RunOutcome(record, result, folder, paths)
+
+
+def find_faults(system: System, data: Path, values: Mapping[str, str], columns: Path | None = None) -> list[str]:
+    """Return all that is wrong with a file, as sentences; nothing where it can be reduced.  Nothing is reduced.
+
+    Arguments as of :func:`reduce_measured`.  Raises UsageError for what is wrong beside the file.
+    """
+    measured = _measured_data(system)
+    try:
+        if columns is not None:
+            _read_mapped(measured, system, data, values, columns, SILENT)
+        else:
+            _read(measured, system, data, values, SILENT)
+    except DataError as error:
+        return list(error.problems)
+    return []
 
 
 def _read(measured: MeasuredData, system: System, data: Path, values: Mapping[str, str], feedback: Feedback) -> Record:

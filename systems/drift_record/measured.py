@@ -28,8 +28,9 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator
 from gyrobench.reduction.series.quantization import angle_quantization, quantization
-from gyrobench.system.lab_record import TEXTS, measured_run, set_options
+from gyrobench.system.lab_record import ELSEWHERE, TEXTS, measured_run, set_options
 from gyrobench.system.system import MeasuredData, System
+from gyrobench.system.values import InvalidValueError
 
 ATTITUDE = "at rest"
 EXACT = 1e-15  # of an angle: to which decimals of a file are exact
@@ -60,9 +61,11 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     table = open_table(data, values.get("channel", ""))
     said = {**table.head.comments, **values}
     for name in values:
+        if name in ELSEWHERE:
+            raise InvalidValueError(f"{name}: {ELSEWHERE[name]}")
         if name not in system.options and name not in (*TEXTS, "samples"):
             system.set(name, values[name])  # says which options there are
-    problems = faults(table.head.statements, Keys((*system.options, *TEXTS, "samples")))
+    problems = faults(table.head.statements, Keys((*system.options, *TEXTS, "samples"), elsewhere=ELSEWHERE))
     problems += set_options(system, table.head.statements, values)
     if system["counts"] not in ("cumulative", "increments"):
         problems.append(f"counts = {system['counts']}: must be 'cumulative' or 'increments'")

@@ -115,7 +115,7 @@ class StabilizerFloated2dof(OneAxisTest):
             "platform.i_max?": I_MAX,
             "gyro.u_max": RANGE * pickoff,
             "gyro.k_y": data_sheet(parts["gyro.k_y"], 10),
-            "stabilizer.K": self["K_G"] * (self["stiffness"] / (pickoff * torque)),  # the amplifier counts to K_m
+            "stabilizer.K?": self["K_G"] * (self["stiffness"] / (pickoff * torque)),  # the amplifier counts to K_m
             **{f"stabilizer.{n}?": self[n] for n in TIMES},
             "stabilizer.v_max?": V_MAX,
         }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from gyrobench.system.families.tumble_test import attitudes
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import WITH_POLARITY, read_record
 from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
@@ -34,4 +34,4 @@ TEMPLATE = """\
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
 NEEDED = {"k": "...", "latitude": "45.75deg"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes))
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, texts=WITH_POLARITY))

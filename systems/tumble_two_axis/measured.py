@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import WITH_POLARITY, read_record
 from gyrobench.system.system import MeasuredData
 
 from .geometry import ANGLES
@@ -36,4 +36,4 @@ COLUMNS = (
     *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
 )
 NEEDED = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))
+MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS, texts=WITH_POLARITY))

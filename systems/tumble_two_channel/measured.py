@@ -6,7 +6,7 @@ from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.families.tumble_test import attitudes
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import WITH_POLARITY, read_record
 from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
@@ -49,4 +49,6 @@ COLUMNS = (
     CsvColumn("std_y", "A", "standard deviation of the samples of mean_y", required=False),
 )
 NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/mA"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, columns=COLUMNS))
+MEASURED = MeasuredData(
+    TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, columns=COLUMNS, texts=WITH_POLARITY)
+)

@@ -14,12 +14,12 @@ import pytest
 from archives import LAG, write_archive
 from fmpy import platform, platform_tuple
 
-from gyrobench.commands.fit_mapping import write_mapping
 from gyrobench.engine.session import Session, run
 from gyrobench.packaging.validate import validate
 from gyrobench.system.binding import SocketMismatchError
 from gyrobench.system.system import InvalidConfigurationError, Slot, System, load_system
 from gyrobench.system.wiring import WiringError
+from gyrobench.workflow.fit_mapping import write_mapping
 
 Foreign = Callable[..., Path]
 Command = Callable[..., tuple[int, str, str]]

@@ -24,6 +24,7 @@ from gyrobench.engine.session import RunInterrupted, Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError
+from gyrobench.workflow.progress_words import format_status
 
 Foreign = Callable[[str], Path]
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0, "gyro.white": 1e-7, "gyro.markov": 1e-7}
@@ -195,7 +196,7 @@ def test_time_left_is_that_of_this_process() -> None:
     # resumed at 800 of 1000 s; 100 s of simulated time took 5 s, so the other 100 s take 5 s
     status = ProgressReport(time=900.0, total=1000.0, steps=100_000, windows=0, rate=2e4, elapsed=5.0, since=800.0)
     assert status.eta == pytest.approx(5.0)
-    assert progress_display.format_status(status) == "t = 900 of 1,000 s, 20,000 steps/s, 5 s left"
+    assert format_status(status) == "t = 900 of 1,000 s, 20,000 steps/s, 5 s left"
 
 
 # ------------------------------------------------------------------------------- the command, killed processes

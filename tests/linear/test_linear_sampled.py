@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from gyrobench.linear.sampled_model import sampled_step
+from gyrobench.linear.sampled_model import sampled_step, undelayed
 from gyrobench.packaging import load_part
 
 H = 1e-3
@@ -52,3 +52,19 @@ def test_a_value_that_only_reports_leaves_the_part_continuous():
     part = started("platform_single_axis", L=0.0)
     assert sampled_step(part, ["v"], ["theta"], H) is None
     assert sampled_step(part, ["v"], ["theta", "i_motor"], H) is not None
+
+
+def test_what_is_handed_on_a_step_later_has_a_model_without_the_delay():
+    """q' = u, i = i_read = 30 q + 2 u: the current that flowed is that of now where the step is none."""
+    part = started("rebalance_analog", K_p=2.0, K_i=30.0, i_max=1e3)
+    a, b, c, d = undelayed(part, ["u"], ["i", "i_read"], H)
+    np.testing.assert_allclose(a, [[0.0]], atol=1e-12)
+    np.testing.assert_allclose(b, [[1.0]])
+    np.testing.assert_allclose(c, [[30.0], [30.0]], rtol=1e-6)
+    np.testing.assert_allclose(d, [[2.0], [2.0]], rtol=1e-4)  # 30 FINE H of 2 are left
+
+
+def test_a_method_with_a_memory_of_its_own_has_none():
+    """The filter keeps its estimate, with a sampling period; the pulse loop its integral, and rounds to clocks."""
+    assert undelayed(started("estimator_kalman_rate", Ts=H), ["z"], ["estimate"], H) is None
+    assert undelayed(started("rebalance_pwm"), ["u"], ["i"], H) is None

@@ -11,9 +11,10 @@ import pytest
 from gyrobench.bench import standard_folder
 from gyrobench.record.circumstances import Keys, faults, statement, values_of
 from gyrobench.record.csv_reader import DataError, read_statements
-from gyrobench.system.lab_record import TEXTS
+from gyrobench.system.lab_record import POLARITY, WITH_POLARITY
 from gyrobench.system.suite import load_test
 from gyrobench.system.system import System, load_system
+from gyrobench.system.values import InvalidValueError
 from gyrobench.workflow.measured_run import empty_record
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -41,7 +42,7 @@ def record_of(name: str) -> str:
 
 
 def known(system: System) -> Keys:
-    return Keys((*system.options, *TEXTS, "samples", "window", "bandwidth"), phases=True)
+    return Keys((*system.options, *WITH_POLARITY, "samples", "window", "bandwidth"), phases=True)
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -57,6 +58,22 @@ def test_misprint_is_refused_with_the_nearest_key_by_every_reader(name: str, tmp
     assert f"did you mean '{option}'?" in said
     (said,) = problems(name, tmp_path / "b.csv", f"# equipment = A\n# a remark\n# equipment = B\n{text}")
     assert said.startswith("rows 1 and 3: 'equipment' is given twice")
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_polarity_is_taken_only_where_it_turns_readings_round(name: str, tmp_path: Path) -> None:
+    """Elsewhere it was taken and had no effect.  The three tumbles read it (RebalanceSetup)."""
+    text = "\n".join(line for line in record_of(name).splitlines() if not line.startswith(f"# {POLARITY}")) + "\n"
+    file = tmp_path / "a.csv"
+    if name.startswith("tumble_"):
+        file.write_text(f"# polarity = left\n{text}", encoding="utf-8")
+        assert load_system(name).read_measured(file, {}).run.polarity == "left"
+        return
+    (said,) = problems(name, file, f"# polarity = book\n{text}")
+    assert said.startswith("row 1: '# polarity = book': this test does not turn its readings round")
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidValueError, match="polarity: this test does not turn"):
+        load_system(name).read_measured(file, {POLARITY: "book"})
 
 
 def test_misprint_of_the_issue(tmp_path: Path) -> None:

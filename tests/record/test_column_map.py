@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import UsageError
-from gyrobench.commands.fit_columns import write_columns
 from gyrobench.record.column_map import MappedRows, read_map, translate
 from gyrobench.record.column_proposal import find_encoding, find_layout
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import load_system
+from gyrobench.workflow.fit_columns import write_columns
 from gyrobench.workflow.measured_run import reduce_measured
 
 

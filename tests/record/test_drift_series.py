@@ -154,6 +154,8 @@ def test_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, timed: 
 BACK = TIME.copy()
 BACK[500:] -= 1.0
 TWO = np.concatenate([TIME[:500], TIME[499] + 0.1 * np.arange(1, 501)])
+# four samples 2 ms apart, then one after 36 to 48 ms: means of 10 ms
+BURSTS = np.cumsum(np.where(np.arange(N) % 5, 0.002, np.random.default_rng(2).uniform(0.036, 0.048, N)))
 PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
 
 
@@ -162,6 +164,7 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
     [
         ({"time [s]": BACK, "rate [deg/h]": RATE}, "", "row 502: time = 4 s does not come after 4.99 s"),
         ({"time [s]": TWO, "rate [deg/h]": RATE}, "", "the sampling changes from 0.01 s to 0.1 s at about row"),
+        ({"time [s]": BURSTS, "rate [deg/h]": RATE}, "", "come in bursts, 0.002 s apart with a mean of 0.0"),
         ({"time [s]": PAIRS, "rate [deg/h]": RATE}, "", "not evenly spaced: steps from 0.004 to 0.01 s"),
         ({"time": TIME, "rate [deg/h]": RATE}, "", "column 'time': no unit; write 'time [s]'"),
         ({"time [kg]": TIME, "rate [deg/h]": RATE}, "", "column 'time': wrong unit [kg]"),

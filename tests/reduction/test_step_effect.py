@@ -141,10 +141,12 @@ def test_the_effect_stated_by_default_is_that_of_much_smaller_steps(command: Any
         }
         runs = [{c.name: c for c in system.reduce(session.run(quiet, 1, h)).coefficients} for h in (5e-4, 1.25e-4)]
     u = {c["name"]: c["u"] for c in result["coefficients"]}
+    taken = {r["name"]: r["taken"] for r in result["step_check"]["rows"]}
+    assert [n for n, x in taken.items() if x] == ["f_c", "PM"]
     for name in ("peak", "load/peak", "PM", "rate error", "platform error"):
         true = (runs[0][name].estimate - runs[1][name].estimate) / 0.75
         assert stated[name] == pytest.approx(true, rel=0.3), name
-        assert u[name] >= abs(true) / 2.0  # U covers it
+        assert u[name] >= abs(true - taken[name]) / 2.0  # U covers what is left
     code, out, _ = command("report", tmp_path / "a", figures=False)
     again = json.loads((tmp_path / "a" / "result.json").read_text())
     assert again["step_check"] == result["step_check"] and again["coefficients"] == result["coefficients"]

@@ -214,8 +214,9 @@ def _set(folder: Path) -> Callable[[random.Random], object]:
 
 
 def _settings(folder: Path) -> Callable[[random.Random], object]:
-    from gyrobench.commands.arguments import apply_values, read_settings
+    from gyrobench.commands.arguments import read_settings
     from gyrobench.system.system import load_system
+    from gyrobench.workflow.settings import apply_values
 
     text = b'latitude = "45.75deg"\nheight = 12.5\nattitude = "E U"\n[gyro]\nwhite = 9e-8\nD_I = "1deg/h/g"\n'
     file = folder / "settings.toml"

@@ -299,8 +299,8 @@ def _columns(folder: Path) -> Callable[[random.Random], object]:
     """Files of a laboratory and their column maps: proposed, read and used."""
     from messy_file import messy
 
-    from gyrobench.commands.fit_columns import write_columns
     from gyrobench.system.system import load_system
+    from gyrobench.workflow.fit_columns import write_columns
     from gyrobench.workflow.measured_run import reduce_measured
 
     file, columns, good = folder / "messy.csv", folder / "map.toml", messy()[0]

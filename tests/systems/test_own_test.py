@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.commands.catalog import init_bench
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import Result
@@ -23,6 +22,7 @@ from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System, load_system
+from gyrobench.workflow.catalog import init_bench
 
 Command = Callable[..., tuple[int, str, str]]
 EXAMPLE = standard_folder() / "docs" / "guides" / "own_test" / "system.py"

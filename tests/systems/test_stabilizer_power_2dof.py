@@ -180,7 +180,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
 
 def test_measures_of_the_whole_run(whole: Any) -> None:
     result = load().reduce(whole)
-    assert result.summary[0].startswith("Crossover 1.3293") and "rise by 23.1 dB" in result.summary[0]
+    assert result.summary[0].startswith("Crossover 1.3293") and "rise by 23.123 ± 0.019 dB" in result.summary[0]
     assert any(s.endswith("carried over by the damping of the axis (100 %).") for s in result.summary)
     c = {c.name: c for c in result.coefficients}
     assert c["K_m"].estimate == pytest.approx(100.0, rel=1e-4)

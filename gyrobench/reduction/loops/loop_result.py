@@ -10,14 +10,15 @@ found.measure("K", "stiffness", "N.m/rad", value, u, closed=H * K_m / C_b)
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.record import Record
-from gyrobench.record.run_document import LinearModels, LinearPair, RunDocument
+from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.loops import margins as m
@@ -51,6 +52,7 @@ from gyrobench.units import DPH
 
 AGREEMENT = "Largest deviations of the measured points from the model, up to twice the gain crossover frequency"
 AGREEMENT_COLUMNS = ["model", "up to / Hz", "points", "gain / dB", "phase / °", "loop"]
+DECIBEL = 20.0 / math.log(10.0)  # of a relative uncertainty
 NAMES = {"discrete": "linear, with step and delays", "continuous": "linear, continuous"}
 
 
@@ -132,8 +134,8 @@ class LoopFindings(MeasureFindings):
             curves.append(curve(label, span, dense))
             if limits.crossover is not None:
                 self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
-            if kind == "discrete" and not self.unstable:
-                self._conditional(title, limits)
+        if computed and not self.unstable:
+            self._conditional(title, computed.get("continuous") or computed["discrete"])
         drawn = bode(title, "loop", caption, points, curves, "gain", "1")
         self.responses.append(replace(drawn, counts=counts))
         self.margins[loop] = {kind: row[1:] for kind, row in rows.items()}
@@ -159,6 +161,7 @@ class LoopFindings(MeasureFindings):
             crosses = values["crossover"][0]
             self.modelled(f"f_c{key}", loop, lambda limits: limits.near(crosses)[0])
             self.modelled(f"PM{key}", loop, lambda limits: limits.near(crosses)[1])
+        self._gain_margins(loop, key, values, sure, models.discrete)
         noisy = "" if self.unstable else excluded_words(title, points, counts)
         self.warn("loop.noisy", noisy)
         if "phase" in values:
@@ -167,6 +170,29 @@ class LoopFindings(MeasureFindings):
             causes = self._causes(sines, noisy)
             self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
+
+    def _gain_margins(
+        self, loop: str, key: str, values: Mapping[str, tuple[float, float]], points: Sequence[Point],
+        model: LinearModel | None,
+    ) -> None:  # fmt: skip
+        """Add the gain margin and the gain-reduction margin, dB, of a loop whose measured points have them; what the
+        interpolation does to the limits of the linear model is in u.
+        """
+        dense = self.limits[loop].get("discrete")
+        at = [p.f for p in points]
+        same = None
+        if model is not None and dense is not None and ("upper" in values or "lower" in values):
+            read = model_response(model, at)[:, 0, 0]
+            same = m.measured_margins([Point(f, complex(v), None, 1.0) for f, v in zip(at, read, strict=True)])
+        for name, side, what in (("GM", "upper", "gain margin"), ("GRM", "lower", "gain-reduction margin")):
+            if side not in values:
+                continue
+            factor, u = values[side]
+            pair = [None if x is None else getattr(x, side) for x in (dense, same)]
+            between = math.log(pair[1] / pair[0]) if pair[0] and pair[1] else 0.0
+            share, closed = math.hypot(u / factor, between), None if dense is None else dense.limit(side)
+            self.measure(f"{name}{key}", what, "dB", m.decibel(factor), DECIBEL * share, closed=closed)
+            self.modelled(f"{name}{key}", loop, partial(m.Margins.limit, side=side))
 
     def modelled(self, name: str, loop: str, of: Callable[[m.Margins], float | None]) -> None:
         """Note what the linear models of a loop have of a coefficient, with the step and without; SI is its unit."""

@@ -19,6 +19,7 @@ from gyrobench.result import Response
 
 DRIFTS = "At rest the platform drifts by {drift}."
 AGREES = 0.05  # relative: contributions that miss the whole by more do not explain it
+SHIFTED = 0.05  # relative: the step moves the frequency of a limit by less
 SAME = 1.0  # dB, between the isolation at 1 Hz and the worst one
 
 
@@ -27,25 +28,30 @@ def margins(found: LoopFindings, *loops: str) -> list[str]:
     sentences: list[str] = []
     for loop in loops or ("stabilizer",):
         key, head = ("", "Crossover") if loop == "stabilizer" else (f" {loop}", f"{loop.capitalize()} loop: crossover")
-        told_of = told(found.coefficients, f"{head} {{f_c{key}}}, phase margin {{PM{key}}}{_gain(found, loop)}.")
+        told_of = told(found.coefficients, f"{head} {{f_c{key}}}, phase margin {{PM{key}}}{_gain(found, loop, key)}.")
         reason = next((c.no_value for c in found.coefficients if c.name == f"f_c{key}" and c.no_value), "")
         sentences += told_of or ([f"{head}: no value, {reason}."] if reason else [])
     return sentences
 
 
-def _gain(found: LoopFindings, loop: str) -> str:
-    """Return by how much the gain may rise and fall: as measured, or where that shows no limit, by the linear model."""
+def _gain(found: LoopFindings, loop: str, key: str) -> str:
+    """Return by how much the gain may rise and fall: as measured, or where that shows no limit, by the linear model
+    (without the communication step, where there is one).
+    """
     rows = found.margins.get(loop, {})
-    by_model = rows.get("discrete") or rows.get("continuous") or [None] * 6
-    texts, modelled = [], False
-    for verb, at in (("rise", 2), ("fall", 4)):
-        value = next((r for r in (rows.get("measured", [None] * 6), by_model) if r[at] is not None), None)
-        if value is not None:
-            modelled = modelled or value is by_model
-            where = f" (oscillation at {value[at + 1]:.3g} Hz)" if value[at + 1] else ""
-            texts.append(f"{verb} by {abs(value[at]):.3g} dB{where}")
+    by_model = rows.get("continuous") or rows.get("discrete") or [None] * 6
+    measured, texts, modelled = found.estimates, [], False
+    for verb, name, at in (("rise", f"{{GM{key}}}", 2), ("fall", f"{{-GRM{key}}}", 4)):
+        seen = name.strip("{-}") in measured
+        row = rows["measured"] if seen else by_model
+        if row[at] is not None:
+            modelled = modelled or not seen
+            f = row[at + 1]
+            f = by_model[at + 1] if f and abs((by_model[at + 1] or 0.0) / f - 1.0) < SHIFTED else f
+            where = f" to an oscillation at {f:.3g} Hz" if f else ""
+            texts.append(f"{verb} by {name if seen else f'{abs(row[at]):.3g} dB'}{where}")
     source = ", by the linear model" if modelled else ""
-    return f"; the gain may {' or '.join(texts)} before the loop is unstable{source}" if texts else ""
+    return f"; the gain may {' or '.join(texts)}{source}" if texts else ""
 
 
 def isolation(found: LoopFindings, name: str, output: str, axis: int = 1, plus: str | None = None) -> list[str]:

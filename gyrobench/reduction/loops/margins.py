@@ -53,6 +53,11 @@ def grid(low: float, high: float, count: int = DENSE) -> Array:
     return np.geomspace(low, high, count)
 
 
+def decibel(factor: float | None) -> float | None:
+    """Return a gain in dB; None of None."""
+    return None if factor is None else 20.0 * math.log10(factor)
+
+
 @dataclass(frozen=True)
 class Margins:
     """Points at which |L| = 1 and at which the phase of L is -180 degrees.
@@ -82,6 +87,10 @@ class Margins:
     def lower(self) -> float | None:
         return max((g for _, g in self.gains if 0.0 < g < 1.0), default=None)
 
+    def limit(self, side: str) -> float | None:
+        """Return "upper" or "lower" in dB."""
+        return decibel(self.upper if side == "upper" else self.lower)
+
     def near(self, f: float) -> tuple[float | None, float | None]:
         """Return the crossover (Hz) next to f, and its phase margin (degrees)."""
         return min(self.crossovers, key=lambda c: abs(math.log(c[0] / f)), default=(None, None))
@@ -93,13 +102,10 @@ class Margins:
 
     def row(self, name: str) -> list[Any]:
         """Return the row of a table with :data:`COLUMNS`."""
-
-        def db(x: float | None) -> float | None:
-            return None if x is None else 20.0 * math.log10(x)
-
         at = {g: f for f, g in self.gains}
         upper, lower = self.upper, self.lower
-        return [name, self.crossover, self.phase, db(upper), at.get(upper or 0.0), db(lower), at.get(lower or 0.0)]
+        sides = (decibel(upper), at.get(upper or 0.0), decibel(lower), at.get(lower or 0.0))
+        return [name, self.crossover, self.phase, *sides]
 
 
 COLUMNS = [

@@ -238,7 +238,7 @@ def scale_factor_problems(k: float, name: str = "k") -> list[str]:
     """Return what is wrong with the scale factor of a torquer, rad/s/A."""
     if math.isfinite(k) and k > 0.0:
         return []
-    return [f"scale factor {name} = {k:g} rad/s/A: a finite positive number is expected; the sign is 'polarity'"]
+    return [f"scale factor {name} = {k:g} rad/s/A: a finite positive number is expected; signs are in the readings"]
 
 
 def attitude_of(run: RunDocument) -> Array:

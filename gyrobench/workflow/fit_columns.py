@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench import units
@@ -19,11 +21,13 @@ from gyrobench.record.column_proposal import (
     match_columns,
     series_columns,
 )
+from gyrobench.record.log_files import as_text, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.measured_run import empty_record
 
+MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
@@ -38,33 +42,76 @@ def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[st
     return [(m[1], m[2] or "") for m in found if m], stated
 
 
+@dataclass(frozen=True)
+class ColumnProposal:
+    """A first column map of a file for a test.
+
+    found: column of the bench -> column of the file.  wanted: column of the bench -> unit, of those that the test
+    reads.  stated: what the test needs to know, with an example each.
+    """
+
+    file: Path
+    test: System | Suite
+    layout: FileLayout
+    found: Mapping[str, FileColumn]
+    wanted: Mapping[str, str]
+    stated: Mapping[str, str]
+    table: str = ""  # of a log with several
+
+    def text(self) -> tuple[str, list[str]]:
+        """Return the text of the map, and what it lacks."""
+        text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
+        if "channel" in self.test.options:
+            names = [] if any(u not in ("s", "K", "degC") for u in self.wanted.values()) else ["rate"]
+        else:
+            names = [n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL]
+        for name in names:
+            if name == "t_end" and "t_start" in self.found:
+                continue
+            unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
+            problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
+        return text, problems
+
+
+def propose_columns(file: Path, system: str) -> ColumnProposal:
+    """Return a first column map of a file.  Raises UsageError where there is no such file, and no table in it."""
+    if not file.is_file():
+        raise UsageError(f"{file}: no such file")
+    test = load_test(system)
+    tables = tables_of(file)[:MOST_TABLES] if is_log(file) else [""]
+    if len(tables) == 1:
+        tables = [""]
+    proposals = []
+    for table in tables:
+        with suppress(UsageError) if len(tables) > 1 else nullcontext():
+            proposals.append(_proposal(file, test, table))
+    if not proposals:
+        raise UsageError(f"{file}: no table of numbers with names in {', '.join(tables)}")
+    return max(proposals, key=lambda p: len(p.found))
+
+
+def _proposal(file: Path, test: System | Suite, table: str) -> ColumnProposal:
+    """Return the map of a table of a file, "" of the only one."""
+    wanted, stated = wanted_columns(test)
+    layout = find_layout(as_text(file, table) if is_log(file) else file)
+    if "channel" in test.options:
+        found, wanted = _any_names(layout)
+    else:
+        if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
+            wanted = series_columns(wanted)
+        found = match_columns(wanted, layout)
+    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
+    for k, c in enumerate(others):
+        found[f"temperature {k + 1}" if k else "temperature"] = c
+    return ColumnProposal(file, test, layout, found, dict(wanted), stated, table)
+
+
 def write_columns(file: Path, system: str, out: Path | None) -> tuple[str, list[str]]:
     """Return a first column map of a file, written to ``out`` where given, and what it still lacks.
 
     Raises UsageError.
     """
-    if not file.is_file():
-        raise UsageError(f"{file}: no such file")
-    test = load_test(system)
-    wanted, stated = wanted_columns(test)
-    layout = find_layout(file)
-    if "channel" in test.options:
-        found, wanted = _any_names(layout)
-        missing = [] if any(u not in ("s", "K", "degC") for _, u in wanted) else ["rate"]
-    else:
-        if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
-            wanted = series_columns(wanted)
-        found = match_columns(wanted, layout)
-        missing = [n for n, _ in wanted if n not in found and n.split("_")[0] not in OPTIONAL]
-    others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
-    for k, c in enumerate(others):
-        found[f"temperature {k + 1}" if k else "temperature"] = c
-    text, problems = map_text(file, test, layout, found, dict(wanted), stated)
-    for name in missing:
-        if name == "t_end" and "t_start" in found:
-            continue
-        unused = ", ".join(f"'{c.name}'" for c in layout.columns if c not in found.values()) or "none"
-        problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
+    text, problems = propose_columns(file, system).text()
     if out is not None:
         if out.exists():
             raise UsageError(f"--out {out}: the file exists; choose another name")
@@ -96,18 +143,16 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
 
 def map_text(
     file: Path, test: System | Suite, layout: FileLayout, found: Mapping[str, FileColumn], wanted: Mapping[str, str],
-    stated: Mapping[str, str],
+    stated: Mapping[str, str], table: str = "",
 ) -> tuple[str, list[str]]:  # fmt: skip
-    """Return the text of a map, and what it lacks: units that the file does not tell."""
+    """Return the text of a map, and what it lacks: units that the file does not tell.  table: of a log."""
     problems: list[str] = []
     empty = sum(c.empty for c in found.values())
     series = "t_start" not in wanted
     lines = [
         f"# Column map of {file.name}: gyrobench reduce {test.name} --data {file.name} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
-        f"encoding = {_quoted(layout.encoding)}",
-        f"delimiter = {_quoted(layout.delimiter)}",
-        f"decimal = {_quoted(layout.decimal)}",
+        *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
         f"skip = {layout.skip}  # lines above the names of the columns",
         f"below = {layout.below}  # lines between names and rows",
         "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
@@ -128,6 +173,11 @@ def map_text(
     ]
     lines += [f"# {n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")]
     return "\n".join(lines) + "\n", problems
+
+
+def _text_keys(layout: FileLayout) -> list[str]:
+    keys = {"encoding": layout.encoding, "delimiter": layout.delimiter, "decimal": layout.decimal}
+    return [f"{key} = {_quoted(value)}" for key, value in keys.items()]
 
 
 def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.commands.arguments import load_system
 from gyrobench.system.sockets import SOCKETS, Socket, socket
 from gyrobench.workflow.inputs import check_fmu_files
+from gyrobench.workflow.settings import load_system
 
 
 def find_socket(slot: str) -> Socket:

@@ -1,0 +1,253 @@
+"""A program of its own that reads a log: readers of damaged or hostile files may end their process, or fill memory.
+
+python log_contents.py FILE                 the tables of a log, JSON to standard output
+python log_contents.py FILE TABLE OUT.csv   one of them as text: names with units, then numbers
+
+A table is what has common rows: a group, a topic, a sheet, arrays of one length.  Code 1 with the reason, the last line
+of standard error, where the file cannot be read; code 4 with the name of a package that is missing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import io
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+MISSING = 4
+Columns = dict[str, Any]  # name, with its unit in brackets -> array of one dimension
+Tables = Iterator[tuple[str, Callable[[], Columns]]]
+
+
+def _named(name: object, unit: object) -> str:
+    text = str(unit or "").strip()
+    return f"{name} [{text}]" if text and text not in ("-", "1") else str(name)
+
+
+def _by_length(arrays: Mapping[str, Any]) -> Tables:
+    """Yield arrays that are equally long as tables; those of two dimensions as a column each."""
+    groups: dict[int, Columns] = {}
+    for name, array in arrays.items():
+        if getattr(array, "ndim", 0) == 2 and 1 in array.shape:
+            array = array.reshape(-1)
+        if getattr(array, "ndim", 0) == 2 and array.shape[0] < array.shape[1] < 64:
+            array = array.T
+        if getattr(array, "ndim", 0) not in (1, 2) or array.dtype.kind not in "biufM" or array.size == 0:
+            continue
+        several = {name: array} if array.ndim == 1 else {f"{name}_{k + 1}": array[:, k] for k in range(array.shape[1])}
+        groups.setdefault(len(array), {}).update(several)
+    for length, columns in sorted(groups.items(), key=lambda g: -g[0] * len(g[1])):
+        yield f"{length} rows", lambda columns=columns: columns  # type: ignore[misc]
+
+
+def _parquet(file: Path) -> Tables:
+    from pyarrow import feather, parquet
+
+    made = (feather.read_table if file.suffix.lower() in (".feather", ".arrow") else parquet.read_table)(str(file))
+    yield "table", lambda: {n: made[n].to_numpy(zero_copy_only=False) for n in made.column_names}
+
+
+def _numpy(file: Path) -> Tables:
+    import numpy as np
+
+    content: Any = np.load(file, allow_pickle=False)
+    if isinstance(content, np.ndarray):
+        content = {n: content[n] for n in content.dtype.names} if content.dtype.names else {"column": content}
+    yield from _by_length(dict(content))
+
+
+def _mat(file: Path) -> Tables:
+    with file.open("rb") as data:
+        if b"MATLAB 7.3" in data.read(128):
+            yield from _hdf5(file)
+            return
+    from scipy.io import loadmat
+
+    flat: Columns = {}
+
+    def add(name: str, value: Any) -> None:
+        if getattr(value, "dtype", None) is not None and value.dtype.names and value.size == 1:
+            for field in value.dtype.names:
+                add(f"{name}.{field}", value[field].reshape(-1)[0])
+        else:
+            flat[name] = value
+
+    for name, value in loadmat(file).items():
+        if not name.startswith("__"):
+            add(name, value)
+    yield from _by_length(flat)
+
+
+def _hdf5(file: Path) -> Tables:
+    import h5py
+
+    groups: dict[str, Columns] = {}
+
+    def visit(path: str, found: Any) -> None:
+        if not isinstance(found, h5py.Dataset) or path.startswith("#"):
+            return
+        unit = found.attrs.get("units", found.attrs.get("unit", ""))
+        unit = unit.decode() if isinstance(unit, bytes) else unit if isinstance(unit, str) else ""
+        group, _, name = path.rpartition("/")
+        if found.dtype.names:  # a table of its own
+            groups[path] = {n: found[n] for n in found.dtype.names}
+        elif found.ndim in (1, 2):
+            groups.setdefault(group, {})[_named(name, unit)] = found[()]
+
+    content = h5py.File(file, "r")
+    content.visititems(visit)
+    for group, arrays in groups.items():
+        several = list(_by_length(arrays))
+        for name, columns in several:
+            yield group if group and len(several) == 1 else f"{group}: {name}" if group else name, columns
+
+
+def _mdf(file: Path) -> Tables:
+    from asammdf import MDF
+
+    log: Any = MDF(file)
+    for k, group in enumerate(log.groups):
+
+        def columns(k: int = k, group: Any = group) -> Columns:
+            found: Columns = {}
+            for channel in group.channels:
+                if channel.channel_type in (2, 3):  # the master: its times come with every other channel
+                    continue
+                signal = log.get(channel.name, group=k)
+                found["time [s]"] = signal.timestamps
+                found[_named(signal.name, signal.unit)] = signal.samples
+            return found
+
+        name = getattr(group.channel_group, "acq_name", None) or group.channel_group.comment or ""
+        yield f"{k + 1} {name}".strip(), columns
+
+
+def _tdms(file: Path) -> Tables:
+    from nptdms import TdmsFile
+
+    for group in TdmsFile.read(file).groups():
+        found: Columns = {}
+        for channel in group.channels():
+            unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription")
+            if "wf_increment" in channel.properties:
+                found.setdefault("time [s]", channel.time_track())
+            found[_named(channel.name, unit)] = channel[:]
+        several = list(_by_length(found))
+        for name, columns in several:
+            yield group.name if len(several) == 1 else f"{group.name}: {name}", columns
+
+
+def _ulog(file: Path) -> Tables:
+    from pyulog import ULog
+
+    topics = ULog(str(file)).data_list
+    many = {t.name for t in topics if t.multi_id}
+    for topic in topics:
+        name = f"{topic.name} {topic.multi_id}" if topic.name in many else topic.name
+        yield name, lambda t=topic: {("timestamp [us]" if n == "timestamp" else n): v for n, v in t.data.items()}  # type: ignore[misc]
+
+
+def _bag(file: Path) -> Tables:
+    """Yield topics: the time of each message in s since the first, and every number in it."""
+    import numpy as np
+    from rosbags.highlevel import AnyReader
+
+    reader = AnyReader([file if file.suffix != ".db3" else file.parent])
+    reader.open()
+
+    def numbers(message: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+        for name, value in vars(message).items():
+            if isinstance(value, bool | int | float):
+                yield prefix + name, float(value)
+            elif isinstance(value, np.ndarray) and value.size <= 36 and value.dtype.kind in "biuf":
+                yield from ((f"{prefix}{name}_{k + 1}", float(v)) for k, v in enumerate(value))
+            elif hasattr(value, "__dataclass_fields__"):
+                yield from numbers(value, f"{prefix}{name}.")
+
+    for connection in reader.connections:
+
+        def columns(connection: Any = connection) -> Columns:
+            rows, times = [], []
+            for _, stamp, raw in reader.messages([connection]):
+                message = reader.deserialize(raw, connection.msgtype)
+                rows.append(dict(numbers(message)))
+                times.append(stamp)
+            ns = np.asarray(times, dtype=np.int64)
+            made = {n: np.array([r.get(n, np.nan) for r in rows]) for n in (rows[0] if rows else {})}
+            return {"time [s]": (ns - ns[0]) / 1e9, **made} if rows else {}
+
+        yield connection.topic, columns
+
+
+def _excel(file: Path) -> Tables:
+    from openpyxl import load_workbook
+
+    for sheet in load_workbook(file, read_only=True, data_only=True).worksheets:
+        yield sheet.title, lambda sheet=sheet: {"": [list(r) for r in sheet.iter_rows(values_only=True)]}  # type: ignore[misc]
+
+
+READERS: dict[str, Callable[[Path], Tables]] = {
+    ".parquet": _parquet, ".feather": _parquet, ".arrow": _parquet, ".npy": _numpy, ".npz": _numpy, ".mat": _mat,
+    ".h5": _hdf5, ".hdf5": _hdf5, ".mf4": _mdf, ".mdf": _mdf, ".tdms": _tdms, ".ulg": _ulog, ".bag": _bag,
+    ".mcap": _bag, ".db3": _bag, ".xlsx": _excel, ".xlsm": _excel,
+}  # fmt: skip
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, datetime.datetime):
+        return f"{value:%Y-%m-%d %H:%M:%S.%f}"
+    return "" if value is None else str(value)
+
+
+def _write(columns: Columns, out: Path) -> None:
+    import csv
+
+    import numpy as np
+
+    if "" in columns:  # a sheet: rows of cells as they are, no empty ones at the end
+        with out.open("w", encoding="utf-8", newline="") as text:
+            csv.writer(text, lineterminator="\n").writerows([_cell(c) for c in row] for row in columns[""])
+        return
+    import pyarrow as pa
+    from pyarrow import csv as arrow
+
+    arrays = {}
+    for name, values in columns.items():
+        array = np.asarray(values)
+        if array.dtype.kind == "M":  # a date: seconds since the first
+            since = (array - array[0]) / np.timedelta64(1, "ns") / 1e9
+            name, array = f"{re.sub(r' *[[].*', '', name)} [s]", np.asarray(since, dtype=float)
+        if array.dtype.kind in "biuf" and array.ndim == 1:
+            arrays[name] = pa.array(array.astype(float) if array.dtype.kind in "bf" else array, from_pandas=True)
+    if not arrays:
+        sys.exit("no column of numbers")
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(arrays)
+    with out.open("wb") as text:  # the header apart: pyarrow would put every name in quotes
+        text.write(header.getvalue().encode())
+        arrow.write_csv(pa.table(arrays), text, arrow.WriteOptions(include_header=False))
+
+
+def main() -> None:
+    file = Path(sys.argv[1])
+    try:
+        with contextlib.redirect_stdout(sys.stderr):  # what readers say of their own
+            tables = list(READERS[file.suffix.lower()](file))
+            if len(sys.argv) > 2:
+                _write(dict(tables)[sys.argv[2]](), Path(sys.argv[3]))
+                return
+    except ImportError as error:
+        print(error.name or error, file=sys.stderr)
+        sys.exit(MISSING)
+    except Exception as error:  # of any kind, where the file is damaged
+        sys.exit(f"{type(error).__name__}: {str(error)[:200]}")
+    print(json.dumps([name for name, _ in tables]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,295 @@
+"""The page of measured data: a file is dropped, its columns are mapped, its faults are listed, it is reduced."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+from nicegui.events import UploadEventArguments
+
+from gyrobench import units
+from gyrobench.bench import UsageError, display_path
+from gyrobench.errors import GyrobenchError
+from gyrobench.files import write_whole
+from gyrobench.reading import visible
+from gyrobench.record.column_map import cells_of_file
+from gyrobench.record.column_proposal import FileColumn
+from gyrobench.studio.frame import CopyLines, Studio, frame, inside, told
+from gyrobench.studio.gate import UPLOAD
+from gyrobench.studio.request import JobRequest
+from gyrobench.system.system import System
+from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
+from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.measured_run import find_faults
+from gyrobench.workflow.user_errors import user_message
+
+FILES = Path("studio", "files")  # below reports/out
+ROWS = 8  # of the preview
+WIDE = 14  # columns of it
+NAME = 80  # characters of the name of a file
+NOT = "not in the file"
+
+
+def kept_name(name: str) -> str:
+    """Return the name under which a dropped file is kept: its own, without what could lead elsewhere."""
+    plain = re.sub(r"[^\w.() +-]", "_", Path(name.replace("\\", "/")).name).lstrip(".")[-NAME:]
+    return plain or "data"
+
+
+def keep(studio: Studio, name: str, content: bytes) -> Path:
+    """Keep a dropped file in the bench and return it; the same content has the same place."""
+    folder = studio.bench.out / FILES / hashlib.sha256(content).hexdigest()[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / kept_name(name)
+    write_whole(file, content)
+    return file
+
+
+def tests_of_data(studio: Studio) -> dict[str, str]:
+    """Return name -> title of the systems that reduce measured data."""
+    found = {}
+    for name in studio.bench.systems():
+        try:
+            test = load_test(name)
+        except Exception:  # it says what is wrong with it in the gallery
+            continue
+        if isinstance(test, System) and test.measured_data is not None:
+            found[name] = f"{test.title} ({name})"
+    return found
+
+
+@dataclass
+class _Mapping:
+    """A file on its way to a report: its proposal, as it was changed, and what is stated."""
+
+    proposal: ColumnProposal
+    lines: CopyLines
+    factors: dict[str, float] = field(default_factory=dict)
+    stated: dict[str, str] = field(default_factory=dict)
+    changed: list[Callable[[], None]] = field(default_factory=list)
+
+    @property
+    def map_file(self) -> Path:
+        return self.proposal.file.with_name(f"{self.proposal.test.name}.toml")
+
+    def text(self) -> tuple[str, list[str]]:
+        """Return the column map and what it lacks."""
+        text, problems = self.proposal.text()
+        for name, factor in self.factors.items():
+            head = f"[columns.{name}]\n"
+            text = text.replace(head, f"{head}factor = {factor!r}\n") if factor != 1.0 else text
+        return text, problems
+
+    def request(self) -> JobRequest:
+        return JobRequest(
+            self.proposal.test.name, values=dict(self.stated), data=display_path(self.proposal.file),
+            columns=display_path(self.map_file),
+        )  # fmt: skip
+
+    def write(self) -> JobRequest:
+        """Write the map beside the file and return what reduces it."""
+        write_whole(self.map_file, self.text()[0].encode())
+        return self.request()
+
+    def put(self, name: str, column: FileColumn | None) -> None:
+        """Say which column of the file is a column of the test; None: there is none."""
+        found = {n: c for n, c in self.proposal.found.items() if n != name}
+        if column is not None:
+            found[name] = column
+        self.proposal = replace(self.proposal, found=found)
+        self.now()
+
+    def unit(self, name: str, text: str) -> str | None:
+        """Say the unit of a column; return what is wrong with it."""
+        try:
+            if text:
+                units.unit(text)
+                if (wanted := self.proposal.wanted.get(name)) and not units.same_dimension(text, wanted):
+                    return f"{text} is no unit of {wanted or '1'}"
+        except GyrobenchError as error:
+            return str(error)
+        self.put(name, replace(self.proposal.found[name], unit=text, written=text))
+        return None
+
+    def now(self) -> None:
+        request = self.request()
+        self.lines.show(request.command(), request.python())
+        for call in self.changed:
+            call()
+
+
+def _preview(mapping: _Mapping) -> None:
+    """Add the first rows of the file as they are."""
+    layout = mapping.proposal.layout
+    rows = []
+    for number, cells in cells_of_file(mapping.proposal.file, layout.encoding, layout.delimiter):
+        if number > layout.skip:
+            rows.append([str(number), *cells[:WIDE]])
+        if len(rows) > ROWS:
+            break
+    decimal = "comma" if layout.decimal == "," else "point"
+    said = [layout.encoding, f"separator {layout.delimiter!r}", f"decimal {decimal}", f"{layout.skip} lines above"]
+    ui.label(", ".join(said)).classes("soft")
+    with ui.element("div").classes("scroll"), ui.element("table").classes("runs"):
+        for k, row in enumerate(rows):
+            with ui.element("tr"):
+                for cell in row:
+                    with ui.element("td" if k else "th"):
+                        ui.label(visible(cell)[:40])
+
+
+def _columns(mapping: _Mapping) -> None:
+    """Add a row for each column of the test: which of the file it is, its unit, its sign."""
+    columns = mapping.proposal.layout.columns
+    names = {k: f"{c.name} [{c.unit or c.written}]" if c.unit or c.written else c.name for k, c in enumerate(columns)}
+    for name in dict.fromkeys([*mapping.proposal.wanted, *mapping.proposal.found]):
+        wanted = mapping.proposal.wanted.get(name, "")
+        with ui.element("div").classes("setting mapped"):
+            with ui.element("div").classes("about"):
+                ui.label(name).classes("option")
+                ui.label(f"as {wanted}" if wanted not in ("", "1") else "").classes("range")
+            with ui.element("div").classes("bar"):
+                held = mapping.proposal.found.get(name)
+                at = columns.index(held) if held in columns else -1
+                menu = ui.select({-1: NOT, **names}, value=at).props("dense outlined")
+                menu.props["aria-label"] = f"column for {name}"
+                check = _unit_check(mapping, name)
+                unit = ui.input(value=held.unit if held else "", placeholder="unit", validation=check)
+                unit.props("dense outlined hide-bottom-space debounce=250").classes("narrow")
+                unit.props["aria-label"] = f"unit of {name}"
+                sign = ui.checkbox("reversed").props("dense")
+        _follow(mapping, name, menu, unit, sign)
+
+
+def _unit_check(mapping: _Mapping, name: str) -> Callable[[Any], str | None]:
+    def check(text: Any) -> str | None:
+        return mapping.unit(name, str(text or "").strip()) if name in mapping.proposal.found else None
+
+    return check
+
+
+def _follow(mapping: _Mapping, name: str, menu: Any, unit: Any, sign: Any) -> None:
+    def chosen() -> None:
+        column = None if menu.value is None or menu.value < 0 else mapping.proposal.layout.columns[menu.value]
+        mapping.put(name, column)
+        unit.set_value(column.unit if column else "")
+
+    def turned() -> None:
+        mapping.factors[name] = -1.0 if sign.value else 1.0
+        mapping.now()
+
+    menu.on_value_change(chosen)
+    sign.on_value_change(turned)
+
+
+def _stated(mapping: _Mapping) -> None:
+    """Add a field for each value that the test needs to know beside the file."""
+
+    def take(name: str, text: str) -> None:
+        mapping.stated.pop(name, None)
+        if text.strip():
+            mapping.stated[name] = text.strip()
+        mapping.now()
+
+    for name, example in mapping.proposal.stated.items():
+        option = mapping.proposal.test.options.get(name)
+        with ui.element("div").classes("setting"):
+            with ui.element("div").classes("about"):
+                ui.label(name).classes("option")
+                ui.label(option.doc if option else "")
+            value = ui.input(placeholder=example).props("dense outlined debounce=250")
+            value.props["aria-label"] = name
+            value.on_value_change(lambda e, n=name: take(n, e.value or ""))
+
+
+def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
+    """Add the mapping of a file, the list of its faults and the button that reduces it."""
+    with ui.element("div").classes("two"):
+        with ui.element("div") as left:
+            pass
+        with ui.element("div").classes("aside"):
+            faults = ui.element("section").classes("rows").props('role=status aria-label="What is wrong"')
+            with ui.element("div").classes("bar"):
+                check = ui.button("Check the file", icon="rule")
+                go = ui.button("Reduce", icon="play_arrow")
+            mapping = _Mapping(proposal, CopyLines())
+            with ui.expansion("Column map").classes("full"):
+                text = ui.label().classes("code")
+    with left:
+        ui.html("<h2>File</h2>", sanitize=False)
+        _preview(mapping)
+        ui.html("<h2>Columns</h2>", sanitize=False)
+        ui.label("Check columns, units and signs: names do not tell them all.").classes("soft")
+        _columns(mapping)
+        ui.html("<h2>What the test needs to know</h2>", sanitize=False)
+        _stated(mapping)
+
+    def say(lines: list[str], head: str) -> None:
+        faults.clear()
+        with faults:
+            ui.label(head).classes("small-head")
+            for line in lines:
+                ui.label(visible(line)).classes("problem")
+
+    def lacks() -> None:
+        written, problems = mapping.text()
+        text.set_text(written)
+        say(problems, "The map still lacks:" if problems else "Every column has its place and its unit.")
+
+    async def examine() -> None:
+        try:
+            test, request = mapping.proposal.test, mapping.write()
+            assert isinstance(test, System)
+            found = await asyncio.to_thread(find_faults, test, proposal.file, request.values, mapping.map_file)
+        except Exception as error:
+            say([user_message(error)], "The file cannot be read so:")
+            return
+        say(found, f"{len(found)} faults:" if found else "Nothing is wrong with the file: it can be reduced.")
+
+    def reduce() -> None:
+        ui.navigate.to(f"/job/{studio.jobs.submit(mapping.write())}")
+
+    check.on_click(examine)
+    go.on_click(told(reduce))
+    mapping.changed.append(lacks)
+    mapping.now()
+
+
+def add_data_page(studio: Studio) -> None:
+    """Register the page."""
+
+    @ui.page("/data", response_timeout=60)
+    async def data_page(file: str = "", test: str = "") -> None:
+        tests = await asyncio.to_thread(tests_of_data, studio)
+        with frame(studio, "Data"):
+            ui.html("<h1>Measured data</h1>", sanitize=False)
+            if studio.read_only:
+                raise UsageError("the studio is read-only: no file is taken")
+            chosen = ui.select(tests, value=test if test in tests else None, label="Test", with_input=True)
+            chosen.props("dense outlined").classes("full")
+            there = inside(studio.bench.out / FILES, file) if file else None
+
+            def show() -> None:
+                if chosen.value and there is not None:
+                    ui.navigate.to(f"/data?file={file}&test={chosen.value}")
+
+            async def taken(event: UploadEventArguments) -> None:
+                kept = keep(studio, event.file.name, await event.file.read())
+                place = kept.relative_to(studio.bench.out / FILES).as_posix()
+                ui.navigate.to(f"/data?file={place}&test={chosen.value or ''}")
+
+            chosen.on_value_change(show)
+            drop = ui.upload(label="Drop a file of your laboratory here: CSV, text", on_upload=taken, auto_upload=True)
+            drop.props("flat bordered").classes("full").props(f"max-file-size={UPLOAD - 4096}")
+            if there is None:
+                return
+            if test not in tests:
+                ui.label(f"{there.name}: choose the test that it is of.").classes("soft")
+                return
+            _mapped(studio, await asyncio.to_thread(propose_columns, there, test))

@@ -1,0 +1,130 @@
+"""The frame of all pages: the state that they share, messages, lines to copy."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import quote
+
+from nicegui import ui
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.reading import visible
+from gyrobench.studio.jobs import StudioJobs
+from gyrobench.workflow.user_errors import user_message
+
+STYLE = Path(__file__).with_name("studio.css")
+PAGES = (("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"))
+DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
+    None: (True, "Colours: as the system"),
+    True: (False, "Colours: dark"),
+    False: (None, "Colours: light"),
+}
+
+
+@dataclass
+class Studio:
+    """Things that the pages of one studio share.  dark: None for what the browser prefers."""
+
+    bench: Bench
+    jobs: StudioJobs
+    read_only: bool = False
+    dark: bool | None = None
+    title: str = field(default="gyrobench studio")
+
+    def run_folder(self, place: str) -> Path:
+        """Return the folder of a run by its place below reports/out.  Raises UsageError for any other folder."""
+        return inside(self.bench.out, place)
+
+
+def inside(root: Path, place: str) -> Path:
+    """Return a folder or file below ``root``, links resolved.  Raises UsageError where it is not below it."""
+    wrong = UsageError(f"{visible(place)[:80]}: no such place in this bench")
+    if "\0" in place or len(place) > 1000:
+        raise wrong
+    try:
+        path = (root / place).resolve()
+        if path.is_relative_to(root.resolve()) and path.exists():
+            return path
+    except (OSError, ValueError, RuntimeError):
+        raise wrong from None
+    raise wrong
+
+
+def address(page: str, place: str) -> str:
+    """Return the address of a run's page."""
+    return f"/{page}/{quote(place)}"
+
+
+@contextlib.contextmanager
+def frame(studio: Studio, title: str) -> Iterator[None]:
+    """Head and body of a page; what goes wrong inside is shown there."""
+    ui.page_title(f"{title}: gyrobench")
+    ui.add_css(STYLE)
+    mode = ui.dark_mode(studio.dark)
+
+    def change() -> None:
+        studio.dark = DARK[studio.dark][0]
+        mode.set_value(studio.dark)
+        button.props(f'title="{DARK[studio.dark][1]}" aria-label="{DARK[studio.dark][1]}"')
+
+    ui.html('<a class="skip" href="#content">To the content</a>', sanitize=False)
+    with ui.element("header").classes("head"):
+        ui.link("gyrobench", "/").classes("brand")
+        with ui.element("nav").props('aria-label="Pages"'):
+            for name, target in PAGES:
+                ui.link(name, target).classes("here" if name == title else "")
+        if studio.read_only:
+            ui.label("read-only").classes("tag")
+        button = ui.button(icon="contrast", on_click=change).props("flat dense round")
+        button.props(f'title="{DARK[studio.dark][1]}" aria-label="{DARK[studio.dark][1]}"')
+    with ui.element("div").props("id=content").classes("content"):
+        try:
+            yield
+        except Exception as error:
+            show_problem(error)
+
+
+def show_problem(error: BaseException) -> None:
+    """Show the message of an error, as the command prints it."""
+    ui.label(visible(user_message(error))).classes("problem").props("role=alert")
+
+
+def told(action: Callable[[], None]) -> Callable[[], None]:
+    """Return an action whose error is shown as a notification."""
+
+    def guarded() -> None:
+        try:
+            action()
+        except Exception as error:
+            ui.notify(visible(user_message(error)), type="negative", multi_line=True, close_button="Close", timeout=0)
+
+    return guarded
+
+
+class CopyLines:
+    """The command line and the lines of Python of what a page does, with a button each that copies them."""
+
+    def __init__(self) -> None:
+        self.text = {"In the shell": "", "In Python": ""}
+        self.shown: dict[str, ui.label] = {}
+        with ui.element("section").classes("lines").props('aria-label="The same as a command and in Python"'):
+            for name in self.text:
+                with ui.element("div").classes("line"):
+                    with ui.element("div").classes("line-head"):
+                        ui.label(name).classes("small-head")
+                        copy = ui.button(icon="content_copy", on_click=lambda n=name: self._copy(n))
+                        copy.props(f'flat dense round size=sm title="Copy" aria-label="Copy: {name}"')
+                    self.shown[name] = ui.label().classes("code").props("tabindex=0")
+
+    def _copy(self, name: str) -> None:
+        ui.clipboard.write(self.text[name])
+        ui.notify("Copied")
+
+    def show(self, command: str, python: str) -> None:
+        """Show other lines."""
+        for name, text in zip(self.text, (command, python), strict=True):
+            self.text[name] = text
+            self.shown[name].set_text(text)

@@ -1,0 +1,149 @@
+"""The process of one job: ``python -m gyrobench.studio.job_process FOLDER``.
+
+It does what the command does, and writes how far it is into ``state.json``.  It has no tie to the studio but its
+folder: the studio may end, be killed or start anew meanwhile.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gyrobench.files import FolderInUseError, FolderLock, write_whole
+from gyrobench.studio.request import JobRequest, read_request
+
+REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
+WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
+
+
+@dataclass
+class JobReport:
+    """Account that a job gives of itself, kept in ``state.json``.
+
+    state: running, done, stopped (it goes on with resume), failed.  fraction: 0 to 1, of the step named by ``label``.
+    folder: of the run, once it is known.
+    """
+
+    state: str = "running"
+    label: str = ""
+    fraction: float = 0.0
+    words: str = ""
+    notes: list[str] = field(default_factory=list)
+    message: str = ""
+    folder: str = ""
+    verdict: str = ""
+
+
+def read_report(folder: Path) -> JobReport | None:
+    """Return what a job says of itself; None before it has said anything."""
+    try:
+        return JobReport(**json.loads((folder / STATE).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+class _Writer:
+    """Receives notes and progress of the workflow and keeps the report on disk."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.report = folder, JobReport()
+        self.write()
+
+    def write(self) -> None:
+        text = json.dumps(vars(self.report), ensure_ascii=False)
+        write_whole(self.folder / STATE, text.encode("utf-8", "backslashreplace"), durable=False)
+
+    def notes(self, lines: Iterable[str]) -> None:
+        self.report.notes += lines
+        self.write()
+
+    @contextlib.contextmanager
+    def progress(self, label: str) -> Iterator[Callable[[Any], None]]:
+        from gyrobench.workflow.progress_words import format_status
+
+        def show(status: Any) -> None:
+            self.report.label, self.report.fraction = label, float(status.fraction)
+            self.report.words = format_status(status)
+            self.write()
+
+        yield show
+
+
+def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
+    """Return the outcome of a request, as the workflow gives it."""
+    from gyrobench.system.suite import Suite
+    from gyrobench.workflow.feedback import Feedback
+    from gyrobench.workflow.inputs import load_test
+    from gyrobench.workflow.run_execution import RunRequest, execute_run
+    from gyrobench.workflow.settings import load_with_values
+
+    feedback = Feedback(writer.notes, writer.progress)
+    spec = request.spec or None
+    if request.data:
+        from gyrobench.bench import UsageError
+        from gyrobench.workflow.measured_run import reduce_measured
+
+        system = load_test(request.system)
+        if isinstance(system, Suite):
+            raise UsageError(f"{system.name} compares runs: reduce each record by its own test")
+        columns = Path(request.columns) if request.columns else None
+        return reduce_measured(system, Path(request.data), request.values, spec, feedback=feedback, columns=columns)
+    test = load_with_values(request.system, request.values)
+    seed = getattr(test, "seed", 1) if request.seed is None else request.seed
+    maps = {slot: Path(file) for slot, file in request.maps.items()}
+    run = RunRequest(parts=request.parts, maps=maps, seed=seed, spec=spec, resume=resume)
+    if isinstance(test, Suite):
+        from gyrobench.workflow.suite_execution import execute_suite
+
+        return execute_suite(run, test, feedback)
+    return execute_run(run, test, feedback)
+
+
+def _finish(report: JobReport, request: JobRequest, resume: bool, writer: _Writer) -> None:
+    """Execute the request and put its end into the report."""
+    from gyrobench.workflow.user_errors import CommandInterrupted, user_message
+
+    try:
+        outcome = _execute(request, resume, writer)
+        report.folder = str(outcome.folder or "")
+        report.verdict = getattr(outcome, "verdict", "") or getattr(outcome.result, "verdict", "") or ""
+        stopped = outcome.stopped
+        report.state = "done" if stopped is None or report.folder else "failed"
+        report.message = "" if stopped is None else str(stopped)
+    except (CommandInterrupted, KeyboardInterrupt) as error:
+        report.state, report.message = "stopped", str(error) or "stopped before its first step"
+    except Exception as error:
+        report.state, report.message = "failed", user_message(error)
+
+
+def main(folder: Path) -> int:
+    """Run the job in a folder; return the exit code."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever the studio was started with
+    until = time.monotonic() + WAIT
+    while True:
+        try:
+            lock = FolderLock(folder)
+            break
+        except FolderInUseError:
+            if time.monotonic() > until:
+                return 2
+            time.sleep(0.05)
+    with lock:
+        content = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+        writer = _Writer(folder)
+        _finish(writer.report, read_request(content["request"]), bool(content["resume"]), writer)
+        writer.write()
+        return 0 if writer.report.state == "done" else 3
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("GYROBENCH_TRACEBACK", "")
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,77 @@
+"""Requests of a page to the bench, and the same as a command and as lines of Python, ready to copy."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """A run of a system, or the reduction of a measured file.
+
+    values: option or slot.parameter -> text with its unit.  parts: slot -> part or FMU.  maps: slot -> mapping file.
+    data: measured file; columns: its column map, "" for a file of the template's layout.  spec: "" for none.
+    """
+
+    system: str
+    values: dict[str, str] = field(default_factory=dict)
+    parts: dict[str, str] = field(default_factory=dict)
+    maps: dict[str, str] = field(default_factory=dict)
+    seed: int | None = None
+    spec: str = ""
+    data: str = ""
+    columns: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the request, JSON-able."""
+        return asdict(self)
+
+    def command(self, resume: bool = False) -> str:
+        """Return the command line that does the same."""
+        words = ["gyrobench", "reduce" if self.data else "run", self.system]
+        words += ["--data", self.data] if self.data else []
+        words += ["--columns", self.columns] if self.columns else []
+        for option, given in (("--set", self.values), ("--part", self.parts), ("--map", self.maps)):
+            words += [w for name, value in given.items() for w in (option, f"{name}={value}")]
+        words += ["--seed", str(self.seed)] if self.seed is not None else []
+        words += ["--spec", self.spec] if self.spec else []
+        return shlex.join([*words, *(["--resume"] if resume else [])])
+
+    def python(self, suite: bool = False) -> str:
+        """Return lines of Python that do the same; suite: the system is a suite of tests."""
+        lines = ["import gyrobench as gb", ""]
+        load = ["load_suite" if suite else "load", repr(self.system)]
+        if self.values and not self.data:
+            load.append(repr(self.values))
+        load += [f"{n}={v!r}" for n, v in (("parts", self.parts), ("maps", self.maps)) if v]
+        spec = [f"spec={self.spec!r}"] if self.spec else []
+        lines.append(f"test = gb.{load[0]}({', '.join(load[1:])})")
+        if self.data:
+            columns = [f"columns={self.columns!r}"] if self.columns else []
+            stated = [f"**{self.values!r}"] if self.values else []
+            lines.append(f"run = test.reduce({', '.join([repr(self.data), *columns, *spec, *stated])})")
+        else:
+            seed = [str(self.seed)] if self.seed is not None else []
+            seed = ["'suite'", *seed] if suite else seed  # a suite keeps its tests in a folder
+            lines.append(f"run = test.run({', '.join([*seed, *spec])})")
+        lines.append("print(run)")
+        if not suite:
+            lines.append("run.report('report')  # record, result.json, report.html, report.pdf")
+        return "\n".join(lines)
+
+
+def read_request(content: dict[str, Any]) -> JobRequest:
+    """Return the request that :meth:`Request.as_dict` wrote."""
+    return JobRequest(**content)
+
+
+def comparison_command(runs: list[str]) -> str:
+    """Return the command line that compares folders of runs."""
+    return shlex.join(["gyrobench", "compare", *runs])
+
+
+def comparison_python(runs: list[str]) -> str:
+    """Return lines of Python that compare folders of runs."""
+    return f"import gyrobench as gb\n\nprint(gb.compare({', '.join(map(repr, runs))}))"

@@ -1,0 +1,311 @@
+"""The pages of jobs and runs: progress, report, signals, the list, the comparison."""
+
+from __future__ import annotations
+
+import asyncio
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import ui
+
+from gyrobench.bench import UsageError, display_path
+from gyrobench.reading import visible
+from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
+from gyrobench.studio.chart import SignalChart, first_shown, signals_of
+from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
+from gyrobench.studio.jobs import StudioJob
+from gyrobench.studio.request import comparison_command, comparison_python
+from gyrobench.system.suite import Suite
+from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
+from gyrobench.workflow.run_list import RunEntry, list_runs
+
+TICK = 0.4  # s between two looks at a job
+LISTED = 300  # runs shown at a time
+
+
+def add_run_pages(studio: Studio) -> None:
+    """Register the pages."""
+    _add_job_page(studio)
+    _add_run_page(studio)
+    _add_runs_page(studio)
+    _add_comparison_page(studio)
+
+
+# ---------------------------------------------------------------------------------------------- a job
+def _is_suite(name: str) -> bool:
+    try:
+        return isinstance(load_test(name), Suite)
+    except Exception:  # it was there when the job was made
+        return False
+
+
+def _place(studio: Studio, folder: str) -> str:
+    """Return the place of a run below reports/out, "" for one elsewhere."""
+    path, out = Path(folder).resolve(), studio.bench.out.resolve()
+    return path.relative_to(out).as_posix() if folder and path.is_relative_to(out) else ""
+
+
+def _add_job_page(studio: Studio) -> None:
+    @ui.page("/job/{key}", response_timeout=60)
+    def job_page(key: str) -> None:
+        with frame(studio, "Run"):
+            job = studio.jobs.find(key)
+            ui.html(f"<h1>{escape(job.request.system)}</h1>", sanitize=False)
+            with ui.element("div").classes("bar"):
+                state = ui.label().classes("tag").props("role=status").mark("state")
+                words = ui.label().classes("soft")
+            bar = ui.linear_progress(0.0, show_value=False).props('aria-label="progress"')
+            message, notes = ui.label().classes("problem"), ui.label().classes("notes")
+            with ui.element("div").classes("bar"):
+                stop = ui.button("Stop", icon="stop", on_click=told(lambda: studio.jobs.stop(key))).mark("stop")
+                again = ui.button("Resume", icon="play_arrow", on_click=told(lambda: _resume(studio, key))).mark(
+                    "resume"
+                )
+                done = ui.link("Report and signals", "#").mark("result")
+            lines = CopyLines()
+            lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
+            gone = {"there": False}
+
+            def show() -> None:
+                now = studio.jobs.find(key)
+                _show_state(now, state, words, bar)
+                message.set_text(
+                    visible(now.report.message) or ("its process was ended" if now.state == "lost" else "")
+                )
+                message.set_visibility(bool(message.text))
+                notes.set_text("\n".join(map(visible, now.report.notes)))
+                stop.set_visibility(now.active and not studio.read_only)
+                again.set_visibility(now.resumable and not studio.read_only)
+                place = _place(studio, now.report.folder)
+                done.set_visibility(bool(place))
+                if place:
+                    done.props(f'href="{address("run", place)}"')
+                if now.state == "done" and place and not message.text and not gone["there"]:
+                    gone["there"] = True
+                    ui.navigate.to(address("run", place))
+                if not now.active:
+                    timer.deactivate()
+
+            timer = ui.timer(TICK, show, immediate=False)
+            show()
+
+
+def _show_state(job: StudioJob, state: ui.label, words: ui.label, bar: ui.linear_progress) -> None:
+    state.set_text(job.state)
+    state.classes(replace=f"tag {job.state}")
+    report = job.report
+    words.set_text(f"{report.label}: {report.words}" if report.label and job.active else "")
+    bar.set_value(1.0 if job.state == "done" else report.fraction)
+
+
+def _resume(studio: Studio, key: str) -> None:
+    ui.navigate.to(f"/job/{studio.jobs.resume(key)}")
+
+
+# ---------------------------------------------------------------------------------------------- a run
+
+
+def _add_run_page(studio: Studio) -> None:
+    @ui.page("/run/{place:path}", response_timeout=60)
+    async def run_page(place: str) -> None:
+        with frame(studio, "Run"):
+            folder = studio.run_folder(place)
+            document = await asyncio.to_thread(read_run, folder)
+            entry = next((r for r in await asyncio.to_thread(list_runs, studio.bench.out) if r.place == place), None)
+            _head(document, place, entry)
+            lines_of = (
+                f"gyrobench report {display_path(folder)}\ngyrobench record {display_path(folder)} --to csv",
+                f'import gyrobench as gb\n\nrun = gb.open_run("{display_path(folder)}")\nprint(run.result)',
+            )
+            if isinstance(document, SuiteDocument):
+                _tests(document, place)
+                _report(folder, place)
+                CopyLines().show(*lines_of)
+                return
+            with ui.tabs().props("no-caps align=left dense") as tabs:
+                names = ["Report", "Signals", "As a command"]
+                made = {n: ui.tab(n) for n in names}
+            with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
+                with ui.tab_panel(made["Report"]):
+                    _report(folder, place)
+                with ui.tab_panel(made["Signals"]):
+                    body = ui.element("div").classes("rows")
+                with ui.tab_panel(made["As a command"]):
+                    CopyLines().show(*lines_of)
+            drawn: list[bool] = []
+
+            async def opened() -> None:
+                if tabs.value == "Signals" and not drawn:
+                    drawn.append(True)
+                    with body:
+                        await _signals(folder, document)
+
+            tabs.on_value_change(opened)
+
+
+def _head(document: RunDocument | SuiteDocument, place: str, entry: RunEntry | None) -> None:
+    ui.html(f"<h1>{escape(document.title or document.system)}</h1>", sanitize=False)
+    with ui.element("div").classes("bar"):
+        if entry is not None and entry.verdict:
+            ui.label(entry.verdict).classes(f"tag {entry.verdict.split()[0]}").mark("verdict")
+        if not document.complete:
+            ui.label("incomplete").classes("tag incomplete")
+        ui.label(place).classes("soft")
+        ui.link("The system", f"/system/{quote(document.system)}")
+        for name, text in (("report.pdf", "PDF"), ("result.json", "result.json")):
+            ui.link(text, f"/files/{quote(place)}/{name}", new_tab=True)
+
+
+def _report(folder: Path, place: str, name: str = "report.html") -> None:
+    """Add the report as it is; its scripts run without a way to the studio."""
+    if not (folder / name).is_file():
+        ui.label("There is no report: the run has no reduction, or it did not come to its end.").classes("soft")
+        return
+    source = f"/files/{quote(place)}/{name}"
+    ui.html(
+        f'<iframe class="report" src="{source}" title="Report" sandbox="allow-scripts allow-popups"></iframe>',
+        sanitize=False,
+    ).classes("full")
+
+
+def _tests(document: SuiteDocument, place: str) -> None:
+    ui.html("<h2>Tests of the suite</h2>", sanitize=False)
+    with ui.element("div").classes("bar"):
+        for name, test in document.tests.items():
+            ui.link(name, address("run", f"{place}/{test.folder}"))
+
+
+async def _signals(folder: Path, document: RunDocument) -> None:
+    signals = await asyncio.to_thread(signals_of, folder)
+    if not signals.names or not len(signals.time):
+        ui.label("The record holds no signals over time.").classes("soft")
+        return
+    first = first_shown(signals.names, _shown_by_report(document.system))
+    menu = ui.select(signals.names, value=first, multiple=True, label="Signals", with_input=True)
+    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
+    ui.label("The wheel or two fingers zoom, dragging moves; every point drawn is a sample of the record.").classes(
+        "soft"
+    )
+    chart = SignalChart({folder.name: signals})
+    menu.on_value_change(lambda e: chart.show(e.value or []))
+    await chart.show(first)
+
+
+def _shown_by_report(name: str) -> list[Any]:
+    try:
+        return list(getattr(load_test(name), "shown", ()))
+    except Exception:  # a run of a system that is not there any more
+        return []
+
+
+# ---------------------------------------------------------------------------------------------- all runs
+def _add_runs_page(studio: Studio) -> None:
+    @ui.page("/runs", response_timeout=60)
+    async def runs_page() -> None:
+        with frame(studio, "Runs"):
+            ui.html("<h1>Runs</h1>", sanitize=False)
+            active = ui.element("div").classes("rows")
+            entries = await asyncio.to_thread(list_runs, studio.bench.out)
+            with ui.element("div").classes("bar"):
+                search = ui.input("Filter").props("dense outlined clearable").mark("filter")
+                compare = ui.button("Compare", icon="compare_arrows").mark("compare")
+                count = ui.label().classes("soft")
+            chosen: dict[str, ui.checkbox] = {}
+            rows = _table(entries, chosen)
+
+            def narrow() -> None:
+                words = (search.value or "").lower().split()
+                shown = [all(w in text for w in words) for text, _ in rows]
+                for (_, row), there in zip(rows, shown, strict=True):
+                    row.set_visibility(there)
+                count.set_text(
+                    f"{sum(shown)} of {len(entries)} runs; tick two or more to compare, the oldest is the baseline"
+                )
+
+            def go() -> None:
+                places = [r.place for r in reversed(entries) if r.place in chosen and chosen[r.place].value]
+                if len(places) < 2:
+                    raise UsageError("tick two runs or more to compare them")
+                ui.navigate.to("/compare?" + "&".join(f"run={quote(p)}" for p in places))
+
+            search.on_value_change(narrow)
+            compare.on_click(told(go))
+            narrow()
+            _watch(studio, active)
+
+
+def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> list[tuple[str, ui.element]]:
+    rows = []
+    with ui.element("div").classes("scroll"), ui.element("table").classes("runs"):
+        with ui.element("thead"), ui.element("tr"):
+            for text in ("", "Run", "Test", "Verdict", "Date", "Changed"):
+                with ui.element("th"):
+                    ui.label(text)
+        with ui.element("tbody"):
+            for r in entries[:LISTED]:
+                with ui.element("tr") as row:
+                    with ui.element("td"):
+                        chosen[r.place] = ui.checkbox().props(f'dense aria-label="choose {escape(r.place)}"')
+                    with ui.element("td"):
+                        ui.link(r.place, address("run", r.place))
+                    with ui.element("td"):
+                        ui.label(r.title or r.system)
+                    with ui.element("td"):
+                        state = r.verdict or ("measured" if r.measured else "")
+                        state = state if r.complete else "incomplete"
+                        ui.label(state).classes(f"tag {state.split()[0]}" if state else "")
+                    with ui.element("td"):
+                        ui.label(r.date[:16].replace("T", " "))
+                    with ui.element("td"):
+                        seed = [f"seed {r.seed}"] if r.seed is not None else []
+                        ui.label(", ".join([*seed, *r.changed[:8]])).classes("soft")
+                rows.append((f"{r.place} {r.title} {r.verdict} {r.date} {' '.join(r.changed)}".lower(), row))
+    return rows
+
+
+def _watch(studio: Studio, place: ui.element) -> None:
+    """Show the jobs that have not ended, as they are now."""
+    known: list[str] = []
+
+    def look() -> None:
+        jobs = [j for j in studio.jobs.all() if j.active]
+        now = [f"{j.key} {j.state} {j.report.fraction:.2f}" for j in jobs]
+        if now == known:
+            return
+        known[:] = now
+        place.clear()
+        with place:
+            for j in jobs:
+                with ui.element("div").classes("bar"):
+                    ui.label(j.state).classes("tag")
+                    ui.link(j.request.system, f"/job/{j.key}")
+                    ui.label(f"{100.0 * j.report.fraction:.0f} %").classes("soft")
+
+    look()
+    ui.timer(1.0, look)
+
+
+# ---------------------------------------------------------------------------------------------- comparison
+def _add_comparison_page(studio: Studio) -> None:
+    @ui.page("/compare", response_timeout=60)
+    async def comparison_page(client: Any = None) -> None:
+        asked = ui.context.client.request.query_params.getlist("run")
+        with frame(studio, "Compare"):
+            ui.html("<h1>Comparison</h1>", sanitize=False)
+            folders = [inside(studio.bench.out, p) for p in asked]
+            found = await asyncio.to_thread(compare_folders, folders)
+            if found.note:
+                ui.label(found.note).classes("soft")
+            shown = [display_path(f) for f in folders]
+            target = comparison_folder(folders)
+            if not studio.read_only:
+                await asyncio.to_thread(found.write, target)
+            with ui.element("div").classes("bar"):
+                for place in asked:
+                    ui.link(place, address("run", place))
+            if target.is_dir():
+                _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
+            CopyLines().show(comparison_command(shown), comparison_python(shown))

@@ -1,0 +1,289 @@
+"""The page of a system: its parts, options and parameters, and the run of it."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from html import escape
+from typing import Any
+
+from nicegui import ui
+
+from gyrobench.component.declarations import Declaration
+from gyrobench.errors import GyrobenchError
+from gyrobench.report import wiring_figure
+from gyrobench.studio.frame import CopyLines, Studio, frame, told
+from gyrobench.studio.request import JobRequest
+from gyrobench.system.configurable import Option
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+from gyrobench.system.values import flatten, parse
+from gyrobench.system.wire_text import parse_wires
+from gyrobench.units import format_quantity
+from gyrobench.workflow.fitting_parts import fitting_parts, load_parts, part_of, settable
+from gyrobench.workflow.inputs import load_test
+
+NONE = "none"
+SEVERAL = 9  # elements of an array that have a row each
+DRAWING = threading.Lock()  # the drawing library keeps one style at a time
+
+
+def wiring_of(name: str) -> str:
+    """Return the drawing of a system's wiring as an SVG, from what it declares; of a suite, its name alone."""
+    test = load_test(name)
+    if isinstance(test, Suite) or not test.slots:
+        text = f'<text x="10" y="35">{escape(name)}</text>'
+        return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 300 60">{text}</svg>'
+    wires = [f"{a}.{x} -> {b}.{y}" for a, x, b, y in parse_wires(test.wires)]
+    with DRAWING:
+        return wiring_figure.draw(list(test.slots), wires, "wiring")
+
+
+def _unit(unit: str | type) -> str:
+    return {int: "whole number", bool: "true or false", str: "text"}.get(unit, "") if isinstance(unit, type) else unit
+
+
+def _shown(value: Any, unit: str | type) -> str:
+    return str(value) if isinstance(unit, type) else format_quantity(value, unit)
+
+
+def _range(low: float | None, high: float | None, unit: str | type, strict: bool = False) -> str:
+    """Return the range of a value in words."""
+    named = unit if isinstance(unit, str) else "1"
+    more, less = (">", "<") if strict else ("≥", "≤")
+    limits = [(more, low), (less, high)]
+    return ", ".join(f"{sign} {format_quantity(x, named)}" for sign, x in limits if x is not None)
+
+
+class _Choice:
+    """Choices on a page: the request that they lead to, and what must be shown anew when one changes."""
+
+    def __init__(self, test: System | Suite, lines: CopyLines) -> None:
+        self.test, self.lines = test, lines
+        self.request = JobRequest(test.name)
+        self.wrong: dict[str, str] = {}  # name -> why its text is no value
+        self.changed: list[Callable[[], None]] = []
+
+    def set(self, name: str, text: str, check: Callable[[str], Any]) -> str | None:
+        """Take a value; return what is wrong with it.  An empty text takes it back."""
+        self.wrong.pop(name, None)
+        values = {k: v for k, v in self.request.values.items() if k != name}
+        if text := (text or "").strip():
+            values[name] = text
+            try:
+                check(text)
+            except GyrobenchError as error:
+                self.wrong[name] = str(error)
+        self._now(replace(self.request, values=values))
+        return self.wrong.get(name)
+
+    def put(self, slot: str, part: str, own: str) -> None:
+        """Put a part into a slot; its own one takes the choice back.  Values of the part before are dropped."""
+        parts = {k: v for k, v in self.request.parts.items() if k != slot}
+        if part != own:
+            parts[slot] = part
+        values = {k: v for k, v in self.request.values.items() if not k.startswith(f"{slot}.")}
+        self.wrong = {k: v for k, v in self.wrong.items() if not k.startswith(f"{slot}.")}
+        self._now(replace(self.request, parts=parts, values=values))
+
+    def about(self, seed: float | None, spec: str | None) -> None:
+        """Take seed and specification."""
+        self._now(
+            replace(self.request, seed=None if seed is None else int(seed), spec=spec if spec and spec != NONE else "")
+        )
+
+    def _now(self, request: JobRequest) -> None:
+        self.request = request
+        self.show()
+        for call in self.changed:
+            call()
+
+    def show(self) -> None:
+        self.lines.show(self.request.command(), self.request.python(isinstance(self.test, Suite)))
+
+
+def _row(
+    choice: _Choice, name: str, doc: str, unit: str | type, default: Any, limits: str, check: Callable[[str], Any]
+) -> tuple[str, ui.element]:
+    """Add a row for a value; return the text that the search looks through, and the row."""
+    with ui.element("div").classes("setting") as row:
+        with ui.element("div").classes("about"):
+            ui.label(name).classes("option")
+            ui.label(doc)
+            kind = _unit(unit)
+            ui.label("; ".join(x for x in (kind if kind != "1" else "", limits) if x)).classes("range")
+        shown = _shown(default, unit)
+        given = choice.request.values.get(name, "")
+        field = ui.input(placeholder=shown, value=given, validation=lambda text: choice.set(name, text, check))
+        field.props(f'dense outlined hide-bottom-space aria-label="{escape(name)}" debounce=250')
+    return f"{name} {doc}".lower(), row
+
+
+def _option_check(name: str, option: Option) -> Callable[[str], Any]:
+    return lambda text: option.parse(name, text)
+
+
+def _parameter_check(name: str, d: Declaration) -> Callable[[str], Any]:
+    def check(text: str) -> None:
+        value = parse(name, text, d.unit, d.type)
+        if not isinstance(value, list) and (broken := d.bound_broken(float(value))):
+            raise GyrobenchError(f"{name} = {text}: must be {broken} ({d.unit})")
+
+    return check
+
+
+def _searched_options(choice: _Choice) -> None:
+    """Add the options, and a field that narrows them."""
+    ui.html("<h2>Options</h2>", sanitize=False)
+    search = ui.input("Search the options").props("dense outlined clearable").classes("full")
+    with ui.element("div").classes("rows"):
+        rows = _options(choice)
+
+    def narrow() -> None:
+        words = (search.value or "").lower().split()
+        for text, row in rows:
+            row.set_visibility(all(w in text for w in words))
+
+    search.on_value_change(narrow)
+
+
+def _options(choice: _Choice) -> list[tuple[str, ui.element]]:
+    return [
+        _row(
+            choice, name, o.doc, o.unit, choice.test.values[name], _range(o.min, o.max, o.unit), _option_check(name, o)
+        )
+        for name, o in choice.test.options.items()
+    ]  # fmt: skip
+
+
+def _parameters(studio: Studio, choice: _Choice, system: System, slot: str) -> list[tuple[str, ui.element]]:
+    """Add the rows of the parameters of the part in a slot; return them as :func:`_row` does."""
+    part = part_of(studio.bench, choice.request.parts.get(slot, system.all_slots()[slot].part))
+    if part is None:
+        ui.label("An FMU of another tool: set its parameters by --set SLOT.NAME=VALUE.").classes("soft")
+        return []
+    owned = system.owned()
+    rows = []
+    for d in settable(part).values():
+        unit: str | type = d.unit if d.type is float else d.type
+        limits = _range(d.min, d.max, d.unit) or _range(d.above, d.below, d.unit, strict=True)
+        starts = flatten(d.name, d.start)
+        for name, start in starts.items() if len(starts) <= SEVERAL else ((d.name, d.start),):
+            full = f"{slot}.{name}"
+            doc = f"{d.doc} (set by an option of the system)" if full in owned else d.doc
+            rows.append(_row(choice, full, doc, unit, start, limits, _parameter_check(full, d)))
+    if not rows:
+        ui.label("no parameters").classes("soft")
+    return rows
+
+
+def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, list[str]]) -> None:
+    """Add a menu for each slot, and below it what can be set of its part."""
+    search = ui.input("Search the parameters of all parts").props("dense outlined clearable").classes("full")
+    drawn: dict[str, list[tuple[str, ui.element]]] = {}
+    opened: dict[str, ui.expansion] = {}
+    bodies: dict[str, ui.element] = {}
+
+    def draw(slot: str) -> None:
+        bodies[slot].clear()
+        with bodies[slot]:
+            drawn[slot] = _parameters(studio, choice, system, slot)
+        narrow()
+
+    def narrow() -> None:
+        words = (search.value or "").lower().split()
+        for slot, rows in drawn.items():
+            hits = [all(w in text for w in words) for text, _ in rows]
+            for (_, row), hit in zip(rows, hits, strict=True):
+                row.set_visibility(hit)
+            opened[slot].set_visibility(not words or any(hits))
+            if words and any(hits):
+                opened[slot].open()
+
+    def find() -> None:
+        for slot in opened if (search.value or "").strip() else ():
+            if slot not in drawn:
+                draw(slot)
+        narrow()
+
+    for slot, declared in system.all_slots().items():
+        with ui.element("div").classes("setting"):
+            with ui.element("div").classes("about"):
+                ui.label(slot).classes("option")
+                name = declared.socket if isinstance(declared.socket, str) else declared.socket.name
+                here = "" if slot in system.slots else ", on request"
+                ui.label(f"socket {name}{here}").classes("range")
+            menu = ui.select(fitting[slot], value=declared.part).props(f'dense outlined aria-label="part in {slot}"')
+            menu.mark(f"slot {slot}")
+        with ui.expansion(f"Parameters of {slot}").props("dense").classes("full") as expansion:
+            bodies[slot] = ui.element("div").classes("rows")
+        opened[slot] = expansion
+
+        def chosen(e: Any, slot: str = slot, own: str = declared.part) -> None:
+            choice.put(slot, e.value, own)
+            if slot in drawn:
+                draw(slot)
+
+        menu.on_value_change(chosen)
+        expansion.on_value_change(lambda e, slot=slot: draw(slot) if e.value and slot not in drawn else None)
+    search.on_value_change(find)
+
+
+def _start(studio: Studio, choice: _Choice) -> None:
+    """Add seed, specification and the button that runs the system."""
+    specs = [NONE, *studio.bench.specifications()]
+    with ui.element("div").classes("bar"):
+        seed = ui.number("Seed of the noise", min=0, precision=0, placeholder="1").props("dense outlined clearable")
+        spec = ui.select(specs, value=NONE, label="Acceptance specification").props("dense outlined")
+        for field in (seed, spec):
+            field.on_value_change(lambda: choice.about(seed.value, spec.value))
+
+    def go() -> None:
+        if choice.wrong:
+            raise GyrobenchError("\n".join(choice.wrong.values()))
+        ui.navigate.to(f"/job/{studio.jobs.submit(choice.request)}")
+
+    if not studio.read_only:
+        ui.button("Run", icon="play_arrow", on_click=told(go)).mark("run")
+    if isinstance(choice.test, System) and not choice.test.slots:
+        ui.label("This system has nothing to run: it reduces measured data.").classes("soft")
+
+
+def add_system_page(studio: Studio) -> None:
+    """Register the page."""
+
+    @ui.page("/system/{name}", response_timeout=60)
+    async def system(name: str) -> None:
+        def load() -> tuple[System | Suite, dict[str, list[str]]]:
+            test = load_test(name) if name in studio.bench.systems() else load_test("")
+            return test, {} if isinstance(test, Suite) else fitting_parts(test, load_parts(studio.bench))
+
+        try:
+            test, fitting = await asyncio.to_thread(load)
+        except Exception as error:
+            with frame(studio, "System"):
+                raise error
+            return
+        with frame(studio, test.title or name):
+            ui.html(f"<h1>{escape(test.title or name)}</h1>", sanitize=False)
+            doc = (type(test).__doc__ or "").strip().partition("\n\n")[0]
+            ui.label(" ".join(doc.split()))
+            ui.label(", ".join([test.name, *test.spec])).classes("soft")
+            with ui.element("div").classes("two"):
+                with ui.element("div") as left:
+                    pass
+                with ui.element("div").classes("aside"):
+                    if not isinstance(test, Suite):
+                        ui.html(f'<img class="wiring" src="/wiring/{name}" alt="Wiring of {name}">', sanitize=False)
+                    lines = CopyLines()
+                    choice = _Choice(test, lines)
+                    choice.show()
+                    _start(studio, choice)
+            with left:
+                _searched_options(choice)
+                if isinstance(test, System) and test.slots:
+                    ui.html("<h2>Parts</h2>", sanitize=False)
+                    with ui.element("div").classes("rows"):
+                        _slots(studio, choice, test, fitting)

@@ -1,0 +1,168 @@
+"""Search for the numbers of a structure: the largest worst ratio of got to wanted, over all wishes and the spread.
+
+    maximize  min over wishes i and points k of  ratio_ik(numbers)        all loops stable
+
+A coarse look over the whole box (Sobol), then from the best, far apart: the simplex method, and sequential quadratic
+programming of t <= ln ratio_ik, which finds the ridge where several wishes bind at once.  The points of the spread are
+the corners and some inside; what is worse between them is added, and the search goes on (scipy, no randomness).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.record.frequency_response import Complex
+from gyrobench.tuning.plant import HeldController, Plant
+from gyrobench.tuning.robustness import grid, measured
+from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.wishes import Wish
+
+LOOK = 512  # controllers of the coarse look
+STARTS = 4  # of the simplex
+SIMPLEX = 220  # evaluations of one
+UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
+ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
+CAP = np.log(100.0)  # more than that is no better
+
+
+@dataclass
+class TuningProblem:
+    """Wishes, and the loops that they are of.  box: decades of crossover, rad/s, and of the structure's numbers."""
+
+    structure: ControllerStructure
+    wishes: Sequence[Wish]
+    plants: list[Plant]
+    box: Array  # (numbers, 2)
+    f: Array
+    evaluations: int = 0
+    _responses: list[Complex] = field(default_factory=list)
+
+    def controller(self, x: Array) -> Controller:
+        """Return the controller of decades x."""
+        numbers = [float(v) for v in 10.0**x]
+        return self.structure.controller(numbers[0], numbers[1:], self._nominal)
+
+    def _nominal(self, f: float) -> complex:
+        return complex(self.plants[0].response(np.array([f]))[0])
+
+    def ratios(self, x: Array) -> Array:
+        """Return ln ratio of each loop and wish, (plants, wishes); below UNSTABLE where a loop is not stable."""
+        return self.judged(self.controller(x))
+
+    def judged(self, controller: Controller) -> Array:
+        self.evaluations += 1
+        while len(self._responses) < len(self.plants):
+            self._responses.append(self.plants[len(self._responses)].response(self.f))
+        step = self.plants[0].step
+        held = HeldController(controller, step)
+        shape = len(self.plants), len(self.wishes)
+        growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
+        if np.any(growth >= ROUNDING):
+            return np.full(shape, UNSTABLE - 1e3 * float(np.maximum(growth, 0.0).sum()))
+        loops = np.array(self._responses) * held.response(np.exp(2j * np.pi * self.f * step))
+        got = measured(self.wishes, self.f, loops)
+        with np.errstate(divide="ignore"):
+            ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
+        return np.asarray(np.clip(ratio, -9.0, CAP))
+
+    def worst(self, x: Array) -> float:
+        return float(self.ratios(x).min())
+
+
+def search(problem: TuningProblem) -> Array:
+    """Return the decades of the best controller that was found."""
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    low, high = problem.box.T
+    many = TuningProblem(problem.structure, problem.wishes, problem.plants[:1], problem.box, problem.f)
+    cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
+    looked = [(many.worst(x), x) for x in low + cube * (high - low)]
+    starts: list[Array] = []
+    for _, x in sorted(looked, key=lambda p: -p[0]):
+        if all(np.linalg.norm((x - s) / (high - low)) > 0.25 for s in starts):
+            starts.append(x)
+        if len(starts) == STARTS:
+            break
+
+    def refused(x: Array) -> float:
+        inside = np.clip(x, low, high)
+        return -problem.worst(inside) + float(np.sum(np.abs(x - inside)))
+
+    ends = []
+    for x in starts:
+        simplex = np.clip(np.vstack([x, x + 0.12 * np.diag(high - low)]), low, high)
+        for k in range(len(x)):
+            if np.allclose(simplex[k + 1], x):
+                simplex[k + 1, k] -= 0.12 * (high - low)[k]
+        found = minimize(
+            refused, x, method="Nelder-Mead",
+            options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
+        )  # fmt: skip
+        ends.append(np.clip(found.x, low, high))
+    ends.sort(key=lambda x: -problem.worst(x))
+    return max((polished(problem, x) for x in ends[:2]), key=problem.worst)
+
+
+def polished(problem: TuningProblem, x: Array, rounds: int = 40) -> Array:
+    """Return a better x near one: trust region steps of linear programs in t <= ln ratio_ik + gradient dx."""
+    from scipy.optimize import linprog
+
+    low, high = problem.box.T
+    radius, best = 0.05, problem.ratios(x)
+    for _ in range(rounds):
+        if radius < 2e-4:
+            break
+        near = best.ravel() < best.min() + 0.5
+        slopes = []
+        for k in range(len(x)):
+            h = 1e-4 if x[k] + 1e-4 <= high[k] else -1e-4
+            moved = x.copy()
+            moved[k] += h
+            slopes.append((problem.ratios(moved).ravel() - best.ravel())[near] / h)
+        g = np.array(slopes).T
+        if not np.all(np.abs(g) < 1e4):
+            break  # at the limit of stability
+        bounds = [(max(lo - xi, -radius), min(hi - xi, radius)) for lo, hi, xi in zip(low, high, x, strict=True)]
+        answer = linprog(
+            [*np.zeros(len(x)), -1.0], A_ub=np.hstack([-g, np.ones((len(g), 1))]), b_ub=best.ravel()[near],
+            bounds=[*bounds, (None, None)],
+        )  # fmt: skip
+        if answer.status != 0:
+            break
+        tried = x + answer.x[:-1]
+        after = problem.ratios(tried)
+        if after.min() > best.min() + 1e-6:
+            x, best, radius = tried, after, min(2.0 * radius, 0.3)
+        else:
+            radius *= 0.35
+    return x
+
+
+def box(structure: ControllerStructure, wishes: Sequence[Wish], wanted: float | None, step: float) -> Array:
+    """Return the decades of crossover (rad/s) and of the structure's numbers.  wanted: Hz, of the system's design."""
+    top = 0.2 / step
+    widths = [w.value for w in wishes if w.name == "bandwidth"]
+    if widths:
+        ends = 0.3 * widths[0], min(20.0 * widths[0], top)
+    elif wanted:
+        ends = wanted / 30.0, min(30.0 * wanted, top)
+    else:
+        ends = 1e-5 / step, top
+    return np.array([np.log10(2.0 * np.pi * np.array([min(ends[0], 0.5 * ends[1]), ends[1]])), *structure.ranges])
+
+
+def frequencies(plants: Sequence[Plant], decades: Array, wishes: Sequence[Wish], count: int = 400) -> Array:
+    """Return the grid for the loops of these plants."""
+    modes = [abs(m) / (2.0 * np.pi) for p in plants for m in p.modes()]
+    apart: list[float] = []
+    for m in sorted(modes):
+        if not apart or m > 1.1 * apart[-1]:
+            apart.append(m)
+    low = float(10.0 ** decades[0, 0] / (2.0 * np.pi))
+    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), apart[:6], count)
+    return np.unique(np.concatenate([found, [w.f for w in wishes if w.f]]))

@@ -1,0 +1,133 @@
+"""The plant that a stabilizer sees, from the exact Jacobians of the parts: what comes back to ``stabilizer.u`` for one
+unit of -v, with the communication step, the order of the parts and every inserted delay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.bench import UsageError
+from gyrobench.component import Component
+from gyrobench.linear.block import LinearBlock
+from gyrobench.linear.linear_model import Linear, operating_point
+from gyrobench.record.frequency_response import Complex, reached
+from gyrobench.record.run_document import LinearModel
+from gyrobench.system.wiring import Assembly
+from gyrobench.tuning.structures import Controller
+
+SLOT = "stabilizer"
+LOOP = {"stabilizer": "stabilizer.u"}
+
+
+@dataclass(frozen=True)
+class Plant:
+    """x+ = a x + b y, w = c x: y the controller's output -v of this step, w the return in the next; step in s.
+
+    L = w/y times the controller.  values: the parameters of the parts that are not nominal.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    step: float
+    values: Mapping[str, float]
+
+    def response(self, f: Array) -> Complex:
+        """Return the response at frequencies in Hz."""
+        z = np.exp(2j * np.pi * np.asarray(f, float) * self.step)
+        n = len(self.a)
+        states = np.linalg.solve(z[:, None, None] * np.eye(n) - self.a, np.broadcast_to(self.b, (z.size, n, 1)) + 0j)
+        return np.asarray((self.c @ states)[:, 0, 0])
+
+    def modes(self) -> list[complex]:
+        """Return the poles in the s plane with a damping below 0.3, upper half, by frequency."""
+        z = np.linalg.eigvals(self.a)
+        p = np.log(z[np.abs(z) > 1e-9] + 0j) / self.step
+        return sorted((complex(x) for x in p if x.imag > 0.0 and -x.real < 0.3 * abs(x)), key=abs)
+
+
+def plants(
+    assembly: Assembly,
+    parameters: Mapping[str, Any],
+    part_of: Callable[[str], type[Component]],
+    step: float,
+    points: Sequence[Mapping[str, float]],
+) -> list[Plant]:
+    """Return the plant at each point of the spread.  Raises LinearizationError and ComponentError."""
+    found = []
+    for values in points:
+        parts = operating_point(assembly, {**parameters, **values}, part_of)
+        linear = Linear(assembly, parts, step)
+        own = linear.blocks[SLOT]
+        d = np.zeros((len(own.outputs), len(own.inputs)))
+        d[own.outputs.index("v"), own.inputs.index("u")] = -1.0
+        m, p = len(own.inputs), len(own.outputs)
+        linear.blocks[SLOT] = LinearBlock(
+            SLOT, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d,
+            [np.zeros((0, m))],
+        )  # fmt: skip
+        linear.sampled.pop(SLOT, None)
+        linear.states = [f"{s}.{v}" for s in linear.order for v in linear.blocks[s].states]
+        found.append(_connected(linear.discrete(LOOP[SLOT]), values))
+    return found
+
+
+def _connected(model: LinearModel, values: Mapping[str, float]) -> Plant:
+    """Return the model without states that no input moves or that no output sees."""
+    n = len(model.states)
+    a, b, c = (np.asarray(m, float) for m in (model.A, model.B, model.C))
+    a, b, c = a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
+    if np.any(np.asarray(model.D, float)):
+        raise UsageError("the loop has no delay of a step: it cannot be tuned")
+    between = reached(a, b) & reached(a.T, c.T)
+    if not between.any():
+        raise UsageError("the voltage of the stabilizer does not reach its input: the loop is open")
+    return Plant(a[between][:, between], b[between], c[:, between], model.step, values)
+
+
+class HeldController:
+    """A continuous controller in the loop: exact for a held input, as the parts are."""
+
+    def __init__(self, controller: Controller, step: float) -> None:
+        from scipy.linalg import expm
+        from scipy.signal import tf2ss
+
+        num, den = (np.trim_zeros(np.array(p), "b")[::-1] for p in (controller.num, controller.den))
+        a, b, c, d = tf2ss(num, den)
+        n = len(den) - 1
+        a, b, c = a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
+        whole = np.zeros((n + 1, n + 1))
+        whole[:n, :n], whole[:n, n:] = a * step, b * step
+        both = expm(whole)
+        self.a, self.b, self.c = both[:n, :n], both[:n, n:], c
+        self.d, self.step = float(np.ravel(d)[0]), step
+
+    def response(self, z: Complex) -> Complex:
+        """Return the response at points z: the output at the end of a step sees the input held in it."""
+        n = len(self.a)
+        if n == 0:
+            return np.full(z.size, self.d + 0j)
+        states = np.linalg.solve(z[:, None, None] * np.eye(n) - self.a, np.broadcast_to(self.b, (z.size, n, 1)) + 0j)
+        return np.asarray(self.d + z * (self.c @ states)[:, 0, 0])
+
+    def loop(self, plant: Plant) -> tuple[Array, Array, Array]:
+        """Return a, b, c of the open loop: states of plant and controller, input r, output w."""
+        direct = float((self.c @ self.b)[0, 0]) + self.d if len(self.a) else self.d
+        n, m = len(plant.a), len(self.a)
+        a = np.zeros((n + m, n + m))
+        a[:n, :n], a[:n, n:], a[n:, n:] = plant.a, plant.b @ self.c @ self.a, self.a
+        b = np.vstack([plant.b * direct, self.b])
+        return a, b, np.hstack([plant.c, np.zeros((1, m))])
+
+    def poles(self, plants: Sequence[Plant]) -> Array:
+        """Return the poles z of each closed loop, (plants, states): of plants with as many states."""
+        closed = []
+        for p in plants:
+            a, b, c = self.loop(p)
+            closed.append(a - b @ c)
+        return np.asarray(np.linalg.eigvals(np.array(closed)))

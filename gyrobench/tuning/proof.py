@@ -1,0 +1,187 @@
+"""Proof of a tuned loop in co-simulation: test sines through noise, friction and limits as they are, and a load step.
+
+Measured L = (r - e)/e at the sines is read as the linear model's is; what the interpolation between the sines does is
+found on the model at the same frequencies and counts to the uncertainty.
+"""
+
+from __future__ import annotations
+
+import cmath
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.engine.session import Session
+from gyrobench.record.frequency_response import Complex
+from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.loop_measures import Gate, Point, gates
+from gyrobench.reduction.loops.margins import interpolate_response
+from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_loop_point
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
+from gyrobench.system.system import System
+from gyrobench.tuning.robustness import crossovers, gain_limits, measured
+from gyrobench.tuning.wishes import Wish
+
+INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
+SINES = 14  # beside those at the limits
+PERIODS = 32
+SAMPLES = 24  # of a period of the fastest sine
+AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
+DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
+FEW = 6  # sines that count: fewer are no measurement
+
+
+@dataclass(frozen=True)
+class ProvenWish:
+    """A wish's measure in the co-simulation: value, expanded uncertainty, and that of the linear model there."""
+
+    wish: Wish
+    value: float
+    U: float
+    expected: float
+
+    @property
+    def kept(self) -> bool:
+        """True where what is measured, with its uncertainty, is not below the wish."""
+        best = self.value + self.U if self.wish.least else self.value - self.U
+        return self.wish.ratio(best) >= 1.0 - 1e-9
+
+    @property
+    def agrees(self) -> bool:
+        """True where it is what the linear model says, within U and 5 %."""
+        if np.isinf(self.expected) or np.isinf(self.value):
+            return self.value >= self.expected or self.wish.name in ("gain margin", "delay margin", "phase margin")
+        return abs(self.value - self.expected) <= max(self.U, DIFFERENT * abs(self.expected))
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Measures of a run at a point of the spread.  why_not: why nothing was, else ""."""
+
+    values: Mapping[str, float]
+    wishes: tuple[ProvenWish, ...]
+    points: tuple[Point, ...]
+    counted: int
+    limits: str  # parts that were at a limit in the test sines
+    friction: str
+    step: tuple[Array, Array] | None  # t, attitude (rad) after the load step
+    load: float  # N.m
+    why_not: str = ""
+
+    @property
+    def holds(self) -> bool:
+        return not self.why_not and all(w.kept for w in self.wishes)
+
+
+def test_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
+    """Return the sines, Hz: about the crossovers, the limits and the largest |S - 1/2|."""
+    crossed = [at for at, _ in crossovers(f, L)]
+    upper = max(crossed, default=float(f[len(f) // 2]))
+    limits = [at for at, _ in gain_limits(f, L) if at > upper / 20.0]
+    hump = float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])
+    low, high = upper / 8.0, min(max([2.5 * upper, 1.3 * hump, *(1.2 * x for x in limits)]), 0.2 / step)
+    at = [x * q for x in (*crossed, *limits, hump) for q in (0.93, 1.0, 1.07)]
+    asked = [*np.geomspace(low, high, SINES), *at, *(w.f for w in wishes if w.f)]
+    found: list[float] = []
+    for x in sorted(float(x) for x in asked if upper / 20.0 <= x <= 0.2 / step or x in [w.f for w in wishes]):
+        if not found or x > 1.02 * found[-1]:
+            found.append(x)
+    return found
+
+
+def loop_plan(system: System, frequencies: Sequence[float]) -> tuple[LoopPlan, float]:
+    """Return the plan of a proof and the torque of its load step, N.m."""
+    own = system.plan()
+    phases = list(getattr(own, "phases", []))
+    sines = [p for p in phases if p.kind == "test" and p.amplitude]
+    load = next((p for p in phases if p.kind == "torque" and p.shape == "step"), None)
+
+    def amplitude(f: float) -> float:
+        near = min(sines, key=lambda p: abs(np.log(p.frequency / f)), default=None)
+        return float(near.amplitude) if near else AMPLITUDE
+
+    slowest = min(frequencies)
+    rest = LoopPhase("rest", "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
+    steps = [replace(load, dwell=min(load.dwell, 20.0 / slowest), settle=2.0 / slowest)] if load else []
+    sines_ahead = sweep("loop", "test", frequencies, amplitude, periods=PERIODS, settle=0.5 / slowest)
+    plan = LoopPlan([rest, *sines_ahead, *steps])
+    return plan, float(load.amplitude) if load else 0.0
+
+
+def proof_of(
+    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], f: Array, L: Complex,
+    wishes: Sequence[Wish], seed: int = 1,
+) -> Proof:  # fmt: skip
+    """Run the loop test at a point of the spread.  L: the linear loop at this point over f.  Raises RunError."""
+    system = session.system
+    step = system.step
+    chosen = test_frequencies(f, L, wishes, step)
+    plan, load = loop_plan(system, chosen)
+    kept = dict(vars(system))
+    vars(system).update(
+        plan=lambda: plan, channel_period=step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), nominal={}
+    )
+    log = logging.getLogger("gyrobench")
+    level = log.level
+    log.setLevel(logging.ERROR)  # what the run would warn of, the parts off their nominal values, is meant
+    try:
+        record = session.run({**settings, **at}, seed)
+    finally:
+        log.setLevel(level)
+        vars(system).clear()
+        vars(system).update(kept)
+    return _read(record, at, f, L, wishes, load)
+
+
+def _read(
+    record: Record, at: Mapping[str, float], f: Array, L: Complex, wishes: Sequence[Wish], load: float
+) -> Proof:  # fmt: skip
+    phases = gates(record)
+    sines = [g for g in phases if g.kind == "test"]
+    judged = [open_loop_point(g, INSIDE, TEST) for g in sines]
+    points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
+    friction, limits = friction_of(record.run), limits_hit(sines)
+    step = next((_step(g) for g in phases if g.kind == "torque" and ANGLE in g.channels), None)
+    if len(points) < FEW:
+        why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"
+        why += f"; the friction ({friction}) may hold the platform" if friction else ""
+        return Proof(at, (), tuple(points), len(points), limits, friction, step, load, why)
+    return Proof(
+        at, tuple(_proven(w, points, f, L) for w in wishes), tuple(points), len(points), limits, friction, step, load
+    )  # fmt: skip
+
+
+def _step(gate: Gate) -> tuple[Array, Array]:
+    rest = gate.rest(ANGLE)
+    return gate.t - gate.t[0], gate[ANGLE] - (float(rest.mean()) if rest.size else 0.0)
+
+
+def _proven(wish: Wish, points: Sequence[Point], f: Array, L: Complex) -> ProvenWish:
+    """Read a wish's measure from measured points, with the share of noise and interpolation in U."""
+    fine = np.unique(np.append(np.geomspace(points[0].f, points[-1].f, 600), [p.f for p in points]))
+
+    def read(values: Sequence[complex]) -> float:
+        moved = [replace(p, value=v) for p, v in zip(points, values, strict=True)]
+        return float(measured([wish], fine, interpolate_response(moved, fine)[None])[0, 0])
+
+    got = [p.value for p in points]
+    value = read(got)
+    squares = 0.0
+    for k, p in enumerate(points):
+        for part in (1.0, 1j):
+            other = list(got)
+            other[k] = p.value * cmath.exp(part * (p.u or 0.0))
+            change = read(other) - value
+            squares += change**2 if np.isfinite(change) else 0.0
+    model = np.exp(np.interp(np.log([p.f for p in points]), np.log(f), np.log(np.abs(L)))) * np.exp(
+        1j * np.interp(np.log([p.f for p in points]), np.log(f), np.unwrap(np.angle(L)))
+    )
+    expected = float(measured([wish], f, L[None])[0, 0])
+    twin = read([complex(v) for v in model])
+    apart = abs(twin - expected) if np.isfinite(twin) and np.isfinite(expected) else 0.0
+    return ProvenWish(wish, value, NORMAL * float(np.sqrt(squares)) + apart, expected)

@@ -1,0 +1,85 @@
+"""Why what is wanted of a loop cannot be had: which wish limits, what each gives alone, what delay and modes cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.errors import GyrobenchError
+from gyrobench.record.frequency_response import Complex
+from gyrobench.tuning.controller_search import TuningProblem, search
+from gyrobench.tuning.plant import Plant
+from gyrobench.tuning.robustness import crossovers, gain_limits
+from gyrobench.tuning.tuned_loop import WishResult
+
+BINDS = 0.02  # of the worst ratio: wishes so near to it bind too
+FINER = 8  # of the communication step, for what the step costs
+NEAR = 1.35  # factor of frequency within which a mode limits
+
+
+class Loop(Protocol):
+    """Source of the plants at points of the spread and with another step."""
+
+    step: float
+
+    def plants(self, at: Sequence[Any], step: float | None = None) -> list[Plant]:
+        """Return the plants."""
+
+
+def reasons_of(
+    loop: Loop, problem: TuningProblem, x: Array, results: Sequence[WishResult], f: Array, loops: Complex
+) -> list[str]:  # fmt: skip
+    """Return the sentences, the limiting wishes first."""
+    worst = min(r.ratio for r in results)
+    binding = [r for r in results if r.ratio <= worst * (1.0 + BINDS)]
+    names = " and ".join(r.wish.name for r in binding)
+    found = [f"{names} bind{'s' if len(binding) == 1 else ''}: the best compromise reaches {100.0 * worst:.3g} % of "
+             f"what is wanted of {'it' if len(binding) == 1 else 'each'}"]  # fmt: skip
+    found += [_alone(problem, r) for r in binding[:3]]
+    at = dict(binding[0].at)
+    k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
+    crossed = max((c[0] for c in crossovers(f, loops[k])), default=None)
+    if crossed is not None:
+        found += _delay(loop, at, problem.plants[k], crossed)
+        found += _modes(problem.plants[k], f, loops[k], crossed)
+    return found
+
+
+def _alone(problem: TuningProblem, result: WishResult) -> str:
+    """Return what the structure gives where only this wish, and stability, counts."""
+    one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f)
+    best = float(np.exp(one.worst(search(one))))
+    value = result.wish.value * best if result.wish.least else result.wish.value / best
+    much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)
+    return f"{result.wish.name} alone: {much}" + ("" if best >= 1.0 else ", too little by itself")
+
+
+def _delay(loop: Loop, at: Any, plant: Plant, crossed: float) -> list[str]:
+    """Return what the communication step and the wires that wait for it cost in phase at the crossover."""
+    try:
+        finer = loop.plants([at], loop.step / FINER)[0]
+    except GyrobenchError:
+        return []
+    ratio = plant.response(np.array([crossed])) / finer.response(np.array([crossed]))
+    cost = -np.degrees(np.angle(ratio[0])) * FINER / (FINER - 1.0)
+    if cost < 1.0:
+        return []
+    return [
+        f"at the crossover of {crossed:.3g} Hz the plant has lost {cost:.2g}° to the communication step of "
+        f"{loop.step:g} s and the wires that wait for it"
+    ]
+
+
+def _modes(plant: Plant, f: Array, L: Complex, crossed: float) -> list[str]:
+    """Return the bending modes at which the loop comes near to its limit."""
+    at = [x for x, g in gain_limits(f, L) if g > 1.0] + [float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])]
+    found = []
+    for mode in plant.modes():
+        hz = abs(mode) / (2.0 * np.pi)
+        if any(1.0 / NEAR < hz / x < NEAR for x in at) and hz > 0.5 * crossed:
+            damping = -mode.real / abs(mode)
+            found.append(f"a mode at {hz:.3g} Hz with a damping of {damping:.2g} limits the loop: try a notch there")
+    return found[:2]

@@ -1,0 +1,270 @@
+"""Tune the stabilizer of a system: linear plants over the spread, search, worst case, proof in co-simulation."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.bench import Bench, UsageError, suggest_names
+from gyrobench.component import Component, ComponentError
+from gyrobench.engine.session import Session
+from gyrobench.errors import GyrobenchError
+from gyrobench.linear.linear_model import LinearizationError
+from gyrobench.packaging import load_part
+from gyrobench.system.system import System
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
+from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
+from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
+from gyrobench.tuning.reasons import reasons_of
+from gyrobench.tuning.robustness import crossovers, measured
+from gyrobench.tuning.spread import Range, parse_spread, points
+from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.tuned_loop import TunedLoop, WishResult
+from gyrobench.tuning.wishes import Wish, parse_wishes
+
+ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
+NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
+DENSE = 1500  # frequencies of the final figures
+ROUNDS = 3  # of the search for worse points between those of the spread
+
+
+class TuningError(GyrobenchError, ValueError):
+    """A loop that cannot be tuned; the text says why."""
+
+
+def tune(
+    system: System,
+    want: Sequence[str],
+    over: Sequence[str] = (),
+    structure: str = "lead-lag",
+    *,
+    parts: Mapping[str, str] | None = None,
+    maps: Mapping[str, Path] | None = None,
+    seed: int = 1,
+    given: Mapping[str, Any] | None = None,
+) -> TunedLoop:
+    """Return the controller of a structure with the largest worst ratio of got to wanted over the spread, proven.
+
+    want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
+    Raises UsageError, TuningError, and what a session raises.
+    """
+    wishes, shape = parse_wishes(want), ControllerStructure(structure)
+    _require_loop(system, parts or {})
+    began = time.perf_counter()
+    system.nominal = dict(system.overrides)
+    with Session(system, parts, maps, bench=Bench.find().folder, child=True) as session:
+        now, _, document = session.prepare({}, seed)
+        nominal = document.parameters
+        ranges = parse_spread(over, lambda name: _known(session, nominal, name))
+        loop = _Loop(session, now, nominal, ranges)
+        problem = loop.problem(shape, wishes)
+        x = search(problem)
+        x = _worse_points(loop, problem, x)
+    controller = problem.controller(x)
+    seconds = time.perf_counter() - began
+    f = frequencies(problem.plants, problem.box, wishes, DENSE)
+    held = HeldController(controller, now.step)
+    responses = held.response(np.exp(2j * np.pi * f * now.step))
+    loops = np.array([p.response(f) for p in problem.plants]) * responses
+    if np.max(np.abs(held.poles(problem.plants))) > 1.0 + 1e-8:
+        raise TuningError(
+            f"{system.name}: no {structure} was found that holds the loop stable over the whole spread; take another "
+            "structure, or a smaller spread"
+        )
+    results = _results(wishes, f, loops, problem.plants)
+    part, settings = _settings(shape, controller, nominal)
+    settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]))
+    had = all(r.ratio >= 1.0 for r in results)
+    reasons = () if had else tuple(reasons_of(loop, problem, x, results, f, loops))
+    swaps = {**(parts or {}), **({SLOT: part} if part else {})}
+    worst = sorted(results, key=lambda r: r.ratio)[0].at
+    runs = [{}, worst] if worst else [{}]
+    proofs = []
+    with Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
+        for at in runs:
+            k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
+            proofs.append(proof_of(session, settings, at, f, loops[k], wishes, seed))
+    return TunedLoop(
+        system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
+        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops, seconds,
+        problem.evaluations, reasons, tuple(_notes(proofs, part)),
+    )  # fmt: skip
+
+
+class _Loop:
+    """The loop of a system at its nominal parameters, and elsewhere in the spread."""
+
+    def __init__(
+        self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range]
+    ) -> None:  # fmt: skip
+        self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
+        self.system, self.nominal, self.ranges = system, nominal, ranges
+        self.step = system.step
+
+    def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
+        """Return the plants at points of the spread.  Raises TuningError."""
+
+        def part_of(slot: str) -> type[Component]:
+            if slot not in self.names:
+                raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
+            return load_part(self.names[slot], self.bench)
+
+        try:
+            return plants(self.assembly, self.nominal, part_of, step or self.step, at)
+        except (LinearizationError, ComponentError) as error:
+            raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
+
+    def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
+        models = self.plants(points(self.ranges))
+        wanted = self.system.crossovers().get("stabilizer")
+        decades = box(shape, wishes, wanted, self.step)
+        return TuningProblem(shape, wishes, models, decades, frequencies(models, decades, wishes))
+
+
+def _has_loop(system: System) -> bool:
+    """Return whether a system has one loop, whose stabilizer gives a voltage and which its plan can open."""
+    driven = any("stabilizer -> platform: v" in line for line in system.wires.splitlines())
+    return dict(system.loops) == LOOP and driven and {INSIDE, TEST} <= set(system.channels)
+
+
+def _require_loop(system: System, parts: Mapping[str, str]) -> None:
+    """Raise UsageError for a system without one stabilizer that drives a platform by its voltage."""
+    if not _has_loop(system):
+        able = ", ".join(tunable())
+        raise UsageError(f"{system.name} has no single loop whose stabilizer drives a motor; tune works for {able}")
+    if SLOT in parts:
+        raise UsageError(f"--part {SLOT}={parts[SLOT]}: tune chooses the stabilizer")
+
+
+def tunable() -> list[str]:
+    """Return the systems of the bench that can be tuned."""
+    from gyrobench.system.system import load_system
+
+    found = []
+    for name in sorted(Bench.find().systems()):
+        with contextlib.suppress(GyrobenchError):
+            system = load_system(name)
+            if isinstance(system, System) and _has_loop(system):
+                found.append(name)
+    return found
+
+
+def _known(session: Session, nominal: Mapping[str, Any], name: str) -> tuple[float, str]:
+    slot, dot, parameter = name.partition(".")
+    if not dot or slot not in session.assembly.bindings:
+        raise UsageError(f"--over {name}: write SLOT.PARAMETER; slots: {', '.join(session.assembly.bindings)}")
+    if slot == SLOT:
+        raise UsageError(f"--over {name}: the stabilizer is what is tuned")
+    bound = session.assembly.bindings[slot].parameters.get(parameter)
+    value = nominal.get(name)
+    if bound is None or isinstance(value, bool | list) or not isinstance(value, int | float):
+        known = [n.partition(".")[2] for n, v in nominal.items() if n.startswith(slot + ".") and isinstance(v, float)]
+        raise UsageError(f"--over {name}: {slot} has no such number; {suggest_names(parameter, known)}")
+    return float(value), units.unit(bound.unit or "1").dimension
+
+
+def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
+    """Return the controller after worse points of the spread, where there are any, were added to the problem."""
+    from scipy.optimize import minimize
+
+    for _ in range(ROUNDS if loop.ranges else 0):
+        controller = problem.controller(x)
+        ratios = problem.judged(controller)
+        k = int(np.argmin(ratios.min(axis=1)))
+        start = np.array([problem.plants[k].values.get(r.name, loop.nominal[r.name]) for r in loop.ranges])
+        low, high = np.array([[r.low, r.high] for r in loop.ranges]).T
+
+        def at(share: Any, low: Any = low, high: Any = high) -> dict[str, float]:
+            inside = low + np.clip(share, 0.0, 1.0) * (high - low)
+            return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
+
+        def ratio(share: Any, controller: Controller = controller) -> float:
+            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f)
+            return float(one.judged(controller).min())
+
+        found = minimize(
+            ratio, np.clip((start - low) / (high - low), 0.05, 0.95), method="Nelder-Mead",
+            options={"maxfev": 15 * len(low), "xatol": 0.02, "fatol": 1e-3},
+        )  # fmt: skip
+        if found.fun > ratios.min() - 2e-3:
+            break
+        problem.plants.append(loop.plants([at(found.x)])[0])
+        x = polished(problem, x)
+    return x
+
+
+def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]) -> list[WishResult]:
+    got = measured(wishes, f, loops)
+    found = []
+    for k, wish in enumerate(wishes):
+        worst = int(np.argmin([wish.ratio(g) for g in got[:, k]]))
+        found.append(WishResult(wish, float(got[0, k]), float(got[worst, k]), models[worst].values))
+    return found
+
+
+def _settings(
+    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any]
+) -> tuple[str, dict[str, Any]]:  # fmt: skip
+    """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
+    if shape.is_lead_lag and all(f"{SLOT}.{n}" in nominal for n in NETWORK):
+        neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
+        values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
+        return "", {f"{SLOT}.{n}": float(f"{values[n]:.9g}") for n in NETWORK}
+    direct = len(np.trim_zeros(controller.num, "b")) == len(np.trim_zeros(controller.den, "b"))
+    return _part_of_any(), {
+        f"{SLOT}.form": 1,
+        f"{SLOT}.num": list(np.trim_zeros(controller.num, "b")),
+        f"{SLOT}.den": list(np.trim_zeros(controller.den, "b")),
+        **({f"{SLOT}.conditioned": 1} if direct else {}),
+    }
+
+
+def _part_of_any() -> str:
+    """Return the part of the bench that takes any transfer function.  Raises TuningError where there is none."""
+    bench = Bench.find()
+    for name, folder in bench.parts().items():
+        text = (folder / "model.py").read_text(encoding="utf-8")
+        if all(f"    {n} = Parameter(" in text for n in ANY):
+            return name
+    raise TuningError(
+        f"the bench has no part that takes a transfer function ({', '.join(ANY)}); use structure lead-lag"
+    )
+
+
+def _crossover(
+    system: System, nominal: Mapping[str, Any], session: Session, settings: Mapping[str, Any],
+    crossed: Sequence[tuple[float, float]],
+) -> dict[str, Any]:  # fmt: skip
+    """Return the option crossover, whose sines the system's own plan has, where nothing else follows it."""
+    option = system.options.get("crossover")
+    if option is None or not crossed:
+        return {}
+    at = float(f"{max(c[0] for c in crossed):.4g}")
+    if not (option.min or 0.0) <= at <= (option.max or np.inf):
+        return {}
+    try:
+        other = session.prepare({"crossover": at})[2].parameters
+    except GyrobenchError:
+        return {}
+    plain = {n: v for n, v in nominal.items() if n.partition(".")[0] not in (SLOT, "exciter")}
+    return {"crossover": f"{at:g}Hz"} if all(other.get(n) == v for n, v in plain.items()) else {}
+
+
+def _notes(proofs: Sequence[Proof], part: str) -> list[str]:
+    notes = []
+    for p in proofs:
+        if p.friction and not all(w.agrees for w in p.wishes):
+            notes.append(
+                f"the friction ({p.friction}) is not in the linear model: at the amplitude of the test sines the loop "
+                "is another one (describing function)"
+            )
+            break
+    if any(p.limits for p in proofs):
+        notes.append("a part was at its limit in the test sines: what was measured there is not linear")
+    return notes

@@ -1,0 +1,190 @@
+"""A tuned loop: its controller as values and as a command, what came of each wish, its proof, and its text."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.arrays import Array
+from gyrobench.record.frequency_response import Complex
+from gyrobench.tuning.plant import SLOT
+from gyrobench.tuning.proof import Proof, ProvenWish
+from gyrobench.tuning.spread import Range
+from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.wishes import Wish
+
+
+@dataclass(frozen=True)
+class WishResult:
+    """worst: over the spread, at the point ``at``; nominal: with all parts as they are."""
+
+    wish: Wish
+    nominal: float
+    worst: float
+    at: Mapping[str, float]
+
+    @property
+    def ratio(self) -> float:
+        return self.wish.ratio(self.worst)
+
+
+@dataclass(frozen=True)
+class TunedLoop:
+    """settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
+
+    reasons: why what is wanted cannot be had, else ().  loops: L over f (Hz) at each point of the spread, nominal
+    first.
+    """
+
+    system: str
+    structure: ControllerStructure
+    given: Mapping[str, Any]
+    part: str
+    settings: Mapping[str, Any]
+    controller: Controller
+    spread: tuple[Range, ...]
+    points: tuple[Mapping[str, float], ...]
+    wishes: tuple[WishResult, ...]
+    proofs: tuple[Proof, ...]
+    f: Array = field(repr=False)
+    loops: Complex = field(repr=False)
+    seconds: float = 0.0
+    evaluations: int = 0
+    reasons: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def had(self) -> bool:
+        """True where every wish is fulfilled over the whole spread, by the linear model."""
+        return all(w.ratio >= 1.0 for w in self.wishes)
+
+    @property
+    def proven(self) -> bool:
+        """True where it was, and the co-simulation does not contradict."""
+        return self.had and bool(self.proofs) and all(p.holds for p in self.proofs)
+
+    @property
+    def command(self) -> str:
+        """Return the command that runs the system with this controller."""
+        part = f" --part {SLOT}={self.part}" if self.part else ""
+        text = " ".join(f"--set {shlex.quote(f'{n}={_text(v)}')}" for n, v in {**self.given, **self.settings}.items())
+        return f"gyrobench run {self.system}{part} {text}".rstrip()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain JSON values; unlimited margins are null."""
+        return {
+            "system": self.system,
+            "structure": self.structure.name,
+            "had": self.had,
+            "proven": self.proven,
+            "controller": {
+                "num": list(self.controller.num), "den": list(self.controller.den),
+                "values": {k: float(v) for k, v in self.controller.values.items()},
+            },
+            "settings": {n: _text(v) for n, v in self.settings.items()},
+            "part": self.part,
+            "command": self.command,
+            "wishes": [
+                {
+                    "name": w.wish.name, "wanted": w.wish.value, "unit": w.wish.unit or "factor",
+                    "nominal": _finite(w.nominal), "worst": _finite(w.worst), "at": dict(w.at),
+                }
+                for w in self.wishes
+            ],
+            "proofs": [
+                {
+                    "at": dict(p.values), "holds": p.holds, "why_not": p.why_not, "sines": p.counted,
+                    "wishes": [
+                        _measured(w)
+                        for w in p.wishes
+                    ],
+                }
+                for p in self.proofs
+            ],
+            "reasons": list(self.reasons),
+            "notes": list(self.notes),
+            "seconds": self.seconds,
+            "evaluations": self.evaluations,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self))
+
+
+def _measured(w: ProvenWish) -> dict[str, Any]:
+    return {"name": w.wish.name, "value": _finite(w.value), "U": _finite(w.U), "model": _finite(w.expected)}
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_text(v) for v in value)}]"
+    return value if isinstance(value, str) else f"{value:.9g}"
+
+
+def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
+    """Return a point of the spread as text."""
+    unit = {r.name: r.unit for r in spread}
+    return ", ".join(f"{n} = {units.format_quantity(float(f'{v:.4g}'), unit[n])}" for n, v in at.items()) or "nominal"
+
+
+def _lines(t: TunedLoop) -> list[str]:
+    state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
+    over = ", ".join(f"{r.name} {where({r.name: r.low}, t.spread)[len(r.name) + 3:]} to "
+                     f"{where({r.name: r.high}, t.spread)[len(r.name) + 3:]}" for r in t.spread)  # fmt: skip
+    lines = [
+        f"{t.system}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
+        f"over {over}: {len(t.points)} points" if over else "at nominal values",
+        "",
+    ]
+    rows = [["wish", "worst case", "nominal", "worst at"]]
+    rows += [
+        [str(w.wish), w.wish.shown(w.worst) + ("" if w.ratio >= 1.0 else "  !"), w.wish.shown(w.nominal),
+         where(w.at, t.spread)]
+        for w in t.wishes
+    ]  # fmt: skip
+    width = [max(len(r[k]) for r in rows) for k in range(3)]
+    lines += ["  " + "  ".join([*(c.ljust(n) for c, n in zip(r, width, strict=False)), r[3]]) for r in rows]
+    for p in t.proofs:
+        lines += ["", f"co-simulation, {where(p.values, t.spread)}:"]
+        if p.why_not:
+            lines.append(f"  not measured: {p.why_not}")
+        for w in p.wishes:
+            end = "" if w.kept else "  ! below what is wanted"
+            end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
+            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{_margin(w)}{end}")
+        if p.limits:
+            lines.append(f"  at its limit in the test sines: {p.limits}")
+        if p.step is not None:
+            peak = float(np.abs(p.step[1]).max())
+            lines.append(f"  a load of {p.load:g} N·m turns the platform by up to {1e6 * peak:.4g} µrad")
+    lines += [f"\nwhy: {t.reasons[0]}", *(f"     {r}" for r in t.reasons[1:])] if t.reasons else []
+    lines += ["", *(f"note: {n}" for n in t.notes)] if t.notes else []
+    values = ", ".join(f"{n} = {v:.5g}" for n, v in t.controller.values.items())
+    title = "controller" if t.had else "the best that was found"
+    return [*lines, "", f"{title}: {values}", "", t.command]
+
+
+def _margin(w: ProvenWish) -> str:
+    """Return the expanded uncertainty of a measured wish as text."""
+    if not math.isfinite(w.value) or not w.U > 0.0:
+        return ""
+    match w.wish.unit:
+        case "rad":
+            return f" ± {math.degrees(w.U):.2g}°"
+        case "":
+            return f" ± {20.0 * math.log10(1.0 + w.U / max(w.value, 1e-15)):.2g} dB"
+        case "s":
+            return f" ± {1e3 * w.U:.2g} ms"
+        case "Hz":
+            return f" ± {w.U:.2g} Hz"
+    return f" ± {w.U:.2g}"

@@ -1,0 +1,134 @@
+"""Wishes for a loop, as a person writes them: "phase margin=40deg", "bandwidth>20Hz", "S at 1Hz<-40dB".
+
+Inside all are SI: rad, s, Hz; ratios of amplitudes as factors (6dB = 1.995).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gyrobench import units
+from gyrobench.bench import UsageError, suggest_names
+
+FACTOR = ""  # unit of a ratio of amplitudes: a number, or dB
+#: measure -> unit, least (True) or most (False) wanted, meaning
+MEASURES: dict[str, tuple[str, bool, str]] = {
+    "phase margin": ("rad", True, "phase that a gain crossover lies away from -180 degrees, the smallest"),
+    "gain margin": (FACTOR, True, "factor up or down that brings the loop to its limit, the smaller one"),
+    "delay margin": ("s", True, "further delay that brings the loop to its limit"),
+    "disk margin": ("1", True, "1 / largest |S - 1/2|: gain and phase together"),
+    "bandwidth": (
+        "Hz",
+        True,
+        "up to it |S| is below that of an integrator that crosses there: -3 dB, and 20 dB a decade down",
+    ),
+    "peak S": (FACTOR, False, "largest |S|, S = 1/(1 + L)"),
+    "peak T": (FACTOR, False, "largest |T|, T = L/(1 + L)"),
+}
+AT = "S at "  # "S at 1Hz": |S| at a frequency, at most
+
+
+@dataclass(frozen=True)
+class Wish:
+    """One wish: ``value`` of a measure, SI, at least (``least``) or at most; f: Hz of "S at", else 0."""
+
+    name: str
+    value: float
+    unit: str
+    least: bool
+    f: float = 0.0
+
+    def ratio(self, got: float) -> float:
+        """Return how far a value fulfils the wish: 1 just so, more is better."""
+        return got / self.value if self.least else self.value / max(got, 1e-300)
+
+    def shown(self, value: float) -> str:
+        """Return a value of this measure as text with its unit."""
+        if math.isinf(value):
+            return "unlimited"
+        match self.unit:
+            case "rad":
+                return f"{math.degrees(value):.3g}°"
+            case "":
+                return f"{20.0 * math.log10(max(value, 1e-15)):.3g} dB"
+            case "s":
+                return f"{1e3 * value:.3g} ms"
+            case "Hz":
+                return f"{value:.4g} Hz"
+        return f"{value:.3g}"
+
+    def __str__(self) -> str:
+        return f"{self.name} {'at least' if self.least else 'at most'} {self.shown(self.value)}"
+
+
+def parse_wishes(texts: Sequence[str]) -> list[Wish]:
+    """Return the wishes; raises UsageError."""
+    if not texts:
+        raise UsageError(f'nothing is wanted; say for example --want "phase margin=40deg"; there are: {_known()}')
+    wishes = [_wish(text) for text in texts]
+    for k, w in enumerate(wishes):
+        if w.name in [other.name for other in wishes[:k]]:
+            raise UsageError(f"--want {w.name}: given twice")
+    if not any(w.name == "bandwidth" or w.f for w in wishes):
+        raise UsageError(
+            "margins are largest in a loop that does nothing: want what the loop is for, too, "
+            '--want "bandwidth>20Hz" or --want "S at 1Hz<-40dB"'
+        )
+    return wishes
+
+
+def _known() -> str:
+    return f"{', '.join(MEASURES)}, S at FREQUENCY"
+
+
+def _wish(text: str) -> Wish:
+    found = re.fullmatch(r"\s*([^<>=]+?)\s*(<=|>=|<|>|=)\s*(.+?)\s*", text)
+    if not found:
+        raise UsageError(f'--want {text}: write MEASURE=VALUE, for example "phase margin=40deg"; there are: {_known()}')
+    name, sign, value = found.groups()
+    name = " ".join(name.split())
+    f = 0.0
+    if name.startswith(AT):
+        f = _positive(text, name.removeprefix(AT), "Hz")
+        unit, least = FACTOR, False
+    elif name in MEASURES:
+        unit, least, _ = MEASURES[name]
+    else:
+        raise UsageError(f"--want {text}: no measure '{name}'; {suggest_names(name, [*MEASURES, 'S at 1Hz'])}")
+    if sign[0] in "<>" and (sign[0] == ">") is not least:
+        better, right = ("more", ">") if least else ("less", "<")
+        raise UsageError(f"--want {text}: of {name} {better} is better; write {right} or =")
+    number = _factor(text, value) if unit == FACTOR else _positive(text, value, unit)
+    if name in ("gain margin", "peak S") and number <= 1.0:
+        raise UsageError(f"--want {text}: must be above 0 dB, a factor above 1")
+    if name == "phase margin" and number >= math.pi:
+        raise UsageError(f"--want {text}: must be below 180deg; a number without unit is in rad")
+    if name == "disk margin" and number >= 2.0:
+        raise UsageError(f"--want {text}: is below 2 in every loop")
+    return Wish(name, number, unit, least, f)
+
+
+def _positive(text: str, value: str, unit: str) -> float:
+    try:
+        number = units.parse_quantity(value, unit)
+    except units.UnitError as error:
+        raise UsageError(f"--want {text}: {error}") from None
+    if not number > 0.0:
+        raise UsageError(f"--want {text}: must be > 0")
+    return number
+
+
+def _factor(text: str, value: str) -> float:
+    """Return a ratio of amplitudes, given as a factor or in dB."""
+    bare = value.removesuffix("dB").strip()
+    try:
+        number = units.parse_quantity(bare, "1")
+    except units.UnitError:
+        raise UsageError(f"--want {text}: a factor or decibels are expected, such as 2 or 6dB") from None
+    factor = 10.0 ** (number / 20.0) if value.endswith("dB") else number
+    if not factor > 0.0:
+        raise UsageError(f"--want {text}: must be > 0 as a factor; did you mean dB?")
+    return factor

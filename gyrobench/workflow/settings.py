@@ -1,0 +1,52 @@
+"""Systems and suites with the values that a user gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gyrobench.bench import UsageError
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
+from gyrobench.system.values import InvalidValueError
+from gyrobench.workflow.inputs import load_test
+
+HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
+
+
+def load_with_values(
+    name: str, values: Mapping[str, str], step: float | None = None, coupling: str = "sequential"
+) -> System | Suite:
+    """Return a system or suite with the values of --set, see :func:`gyrobench.workflow.inputs.load_test`."""
+    test = load_test(name, step)
+    if coupling == "parallel":
+        if isinstance(test, Suite):
+            raise UsageError(f"--coupling: {name} is a suite; run its tests one by one: {', '.join(test.tests())}")
+        test.coupling = coupling
+    apply_values(test, values)
+    return test
+
+
+def load_system(name: str, values: Mapping[str, str], coupling: str = "sequential") -> System:
+    """Return a system with the values of --set.  Raises UsageError for a suite too, naming its tests."""
+    test = load_with_values(name, values, None, coupling)
+    if isinstance(test, Suite):
+        raise UsageError(f"{name} is a suite; name one of its tests: {', '.join(test.tests())}")
+    return test
+
+
+def apply_values(test: System | Suite, values: Mapping[str, Any]) -> None:
+    """Set values.  Raises UsageError."""
+    for key, value in values.items():
+        try:
+            test.set(key, value)
+        except InvalidValueError as error:
+            raise UsageError(f"--set {error}{_unit_hint(test, key, value)}") from None
+
+
+def _unit_hint(test: System | Suite, key: str, value: Any) -> str:
+    """Return the end of a message about a number that was given without its unit."""
+    option = test.options.get(key)
+    if option is None or option.unit not in HINTS or str(value)[-1:].isalpha():
+        return ""
+    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS[option.unit]}"

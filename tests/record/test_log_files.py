@@ -1,0 +1,237 @@
+"""Logs of other programs, written here by the libraries of their formats, become the text that the bench reads."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import csv as arrow
+from pyarrow import feather, parquet
+
+from gyrobench.record import log_contents
+from gyrobench.record.csv_reader import DataError
+from gyrobench.record.log_files import as_text, is_log, tables_of
+
+T = np.arange(5) * 0.01
+RATE = np.array([0.1, -0.2, 1.0 / 3.0, 0.4, -1e-7])
+TEMPERATURE = np.array([20.0, 20.5])
+
+
+def write_parquet(file: Path) -> None:
+    parquet.write_table(pa.table({"time": T, "rate": RATE}), file)
+
+
+def write_feather(file: Path) -> None:
+    feather.write_feather(pa.table({"time": T, "rate": RATE}), str(file))
+
+
+def write_npz(file: Path) -> None:
+    np.savez(file, time=T, rate=RATE, temperature=TEMPERATURE)
+
+
+def write_npy(file: Path) -> None:
+    np.save(file, np.array(list(zip(T, RATE, strict=True)), dtype=[("time", "f8"), ("rate", "f8")]))
+
+
+def write_mat(file: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(file, {"log": {"time": T, "rate": RATE[:, None]}, "temperature": TEMPERATURE})
+
+
+def write_hdf5(file: Path) -> None:
+    import h5py
+
+    with h5py.File(file, "w") as content:
+        content["imu/time"], content["imu/rate"] = T, RATE
+        content["imu/time"].attrs["units"], content["imu/rate"].attrs["units"] = "s", "rad/s"
+        content["climate/temperature"] = TEMPERATURE
+
+
+def write_mat73(file: Path) -> None:
+    """Write as MATLAB 7.3 does: HDF5 behind 512 bytes that say so, vectors as rows."""
+    import h5py
+
+    with h5py.File(file, "w", userblock_size=512) as content:
+        content["time"], content["rate"] = T[None, :], RATE[None, :]
+    with file.open("r+b") as data:
+        data.write(b"MATLAB 7.3 MAT-file".ljust(512))
+
+
+def write_mdf(file: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF() as log:
+        log.append([Signal(RATE, T, unit="rad/s", name="rate")])
+        log.append([Signal(TEMPERATURE, T[:2], unit="degC", name="temperature")])
+        log.save(file)
+
+
+def write_tdms(file: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    stamped = {"wf_increment": 0.01, "wf_start_offset": 0.0, "unit_string": "rad/s"}
+    with TdmsWriter(file) as log:
+        log.write_segment([ChannelObject("imu", "rate", RATE, stamped)])
+        log.write_segment([ChannelObject("climate", "temperature", TEMPERATURE)])
+
+
+def write_ulog(file: Path) -> None:
+    """Write the header, two formats, a subscription each, and the data, by the format's description."""
+
+    def message(kind: bytes, body: bytes) -> bytes:
+        return struct.pack("<H", len(body)) + kind + body
+
+    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    out += message(b"F", b"sensor_gyro:uint64_t timestamp;double rate;")
+    out += message(b"F", b"climate:uint64_t timestamp;double temperature;")
+    out += message(b"A", b"\0" + struct.pack("<H", 0) + b"sensor_gyro")
+    out += message(b"A", b"\0" + struct.pack("<H", 1) + b"climate")
+    for t, rate in zip(T, RATE, strict=True):
+        out += message(b"D", struct.pack("<HQd", 0, round(t * 1e6), rate))
+    for t, temperature in zip(T, TEMPERATURE, strict=False):
+        out += message(b"D", struct.pack("<HQd", 1, round(t * 1e6), temperature))
+    file.write_bytes(out)
+
+
+def write_mcap(file: Path) -> None:
+    """Write a ROS 2 bag: a topic with Imu messages, a stamp of 10 ms each."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    folder = file.parent / "bag"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as log:
+        connection = log.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=store)
+        vector, zeros = types["geometry_msgs/msg/Vector3"], np.zeros(9)
+        for k, rate in enumerate(RATE):
+            stamp = types["builtin_interfaces/msg/Time"](0, k * 10_000_000)
+            made = types["sensor_msgs/msg/Imu"](
+                types["std_msgs/msg/Header"](stamp, "imu"), types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
+                zeros, vector(rate, 0.0, 0.0), zeros, vector(0.0, 0.0, 9.8), zeros,
+            )  # fmt: skip
+            log.write(connection, k * 10_000_000, store.serialize_cdr(made, "sensor_msgs/msg/Imu"))
+    (found,) = folder.glob("*.mcap")
+    found.rename(file)
+
+
+def write_excel(file: Path) -> None:
+    from openpyxl import Workbook
+
+    book = Workbook()
+    sheet = book.active
+    sheet.title = "Messung"
+    sheet.append(["Laborbuch 7"])
+    sheet.append(["time [s]", "rate [rad/s]"])
+    for row in zip(T.tolist(), RATE.tolist(), strict=True):
+        sheet.append(row)
+    climate = book.create_sheet("Klima")
+    climate.append(["Datum", "temperature [degC]"])
+    for k, value in enumerate(TEMPERATURE.tolist()):
+        climate.append([datetime.datetime(2026, 3, 1, 8, k), value])
+    book.save(file)
+
+
+#: end of the name -> writer, the table that is read (""; the only one), how time and rate are called in the text
+Call = Callable[..., tuple[int, str, str]]
+FORMATS: dict[str, tuple[Callable[[Path], None], str, tuple[str, str]]] = {
+    ".parquet": (write_parquet, "", ("time", "rate")),
+    ".feather": (write_feather, "", ("time", "rate")),
+    ".npy": (write_npy, "", ("time", "rate")),
+    ".npz": (write_npz, "5 rows", ("time", "rate")),
+    ".mat": (write_mat, "5 rows", ("log.time", "log.rate")),
+    ".h5": (write_hdf5, "imu", ("time [s]", "rate [rad/s]")),
+    "-7.3.mat": (write_mat73, "", ("time", "rate")),
+    ".mf4": (write_mdf, "1 Python", ("time [s]", "rate [rad/s]")),
+    ".tdms": (write_tdms, "imu", ("time [s]", "rate [rad/s]")),
+    ".ulg": (write_ulog, "sensor_gyro", ("timestamp [us]", "rate")),
+    ".mcap": (write_mcap, "", ("time [s]", "angular_velocity.x")),
+}
+
+
+@pytest.mark.parametrize("end", FORMATS)
+def test_every_number_comes_back_as_it_was_written(end: str, tmp_path: Path) -> None:
+    write, table, (time, rate) = FORMATS[end]
+    file = tmp_path / f"log{end}"
+    write(file)
+    assert is_log(file)
+    read = arrow.read_csv(as_text(file, table))
+    factor = 1e-6 if time.endswith("[us]") else 1.0
+    assert np.allclose(read[time].to_numpy() * factor, T, rtol=0, atol=1e-12)
+    assert read[rate].to_numpy().tolist() == RATE.tolist()  # every bit
+    if table:
+        with pytest.raises(DataError, match=r"several tables: .*name one in a column map: table = "):
+            as_text(file)
+        with pytest.raises(DataError, match=r"no table 'x'; there are: |no table 'x'; did you mean"):
+            as_text(file, "x")
+    else:
+        assert len(tables_of(file)) == 1
+
+
+def test_a_sheet_is_read_as_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "log.xlsx"
+    write_excel(file)
+    assert tables_of(file) == ["Messung", "Klima"]
+    lines = as_text(file, "Messung").read_text(encoding="utf-8").splitlines()
+    assert lines[:3] == ["Laborbuch 7,", "time [s],rate [rad/s]", "0,0.1"]
+    assert as_text(file, "Klima").read_text(encoding="utf-8").splitlines()[1] == "2026-03-01 08:00:00.000000,20"
+
+
+def test_dates_are_seconds_since_the_first_and_gaps_are_empty(tmp_path: Path) -> None:
+    file = tmp_path / "log.parquet"
+    stamps = np.datetime64("2026-03-01T08:00:00") + np.array([0, 10, 25]) * np.timedelta64(1, "ms")
+    parquet.write_table(pa.table({"stamp": stamps, "rate": [1.0, None, 3.0], "note": ["a", "b", "c"]}), file)
+    assert as_text(file).read_text().split() == ["stamp", "[s],rate", "0,1", "0.01,", "0.025,3"]
+
+
+@pytest.mark.parametrize("end", [e for e in FORMATS if e != "-7.3.mat"] + [".xlsx"])
+def test_a_damaged_file_ends_in_a_message(end: str, tmp_path: Path) -> None:
+    file = tmp_path / f"log{end}"
+    file.write_bytes(b"nothing of the kind" * 50)
+    with pytest.raises(DataError, match=r"cannot be read as|no table of numbers"):
+        as_text(file)
+
+
+def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "h5py.py").write_text("raise ImportError('none', name='h5py')")
+    file = tmp_path / "log.h5"
+    write_hdf5(file)
+    program = tmp_path / "log_contents.py"  # beside a h5py that is not there
+    program.write_text(Path(log_contents.__file__).read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.setattr(log_contents, "__file__", str(program))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(DataError, match=r"\.h5 files need a further package \(h5py\): pip install 'gyrobench\[logs\]'"):
+        tables_of(file)
+
+
+def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Call, tmp_path: Path) -> None:
+    """A drift record of white noise 0.01 °/s at 100 Hz: N = 0.01·60/√100 = 0.06 °/√h, from the table that has rates."""
+    import h5py
+
+    random = np.random.default_rng(4)
+    with h5py.File(tmp_path / "log.h5", "w") as content:
+        content["imu/time"], content["imu/gyro"] = np.arange(20_000) * 0.01, 0.01 * random.normal(size=20_000)
+        content["imu/time"].attrs["units"], content["imu/gyro"].attrs["units"] = "s", "deg/s"
+        content["climate/temperature"] = TEMPERATURE
+    assert gyrobench("fit", "log.h5", "--system", "drift_record", "--out", "map.toml")[0] == 0
+    assert 'table = "imu"' in Path("map.toml").read_text(encoding="utf-8")
+    code, out, err = gyrobench("reduce", "drift_record", "--data", "log.h5", "--columns", "map.toml", "--json")
+    assert code == 0, err
+    n = next(c for c in json.loads(out)["coefficients"] if c["name"].startswith("N"))
+    assert n["estimate"] == pytest.approx(0.06, rel=0.02)
+
+
+def test_columns_of_the_bench_need_no_map(gyrobench: Call, tmp_path: Path) -> None:
+    made = {"time [s]": np.arange(2000) * 0.01, "rate [deg/s]": 0.01 * np.random.default_rng(4).normal(size=2000)}
+    parquet.write_table(pa.table(made), tmp_path / "log.parquet")
+    code, out, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--json")
+    assert code == 0 and json.loads(out)["provenance"]["data"]["file"] == "log.parquet", err
+    code, _, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--columns", "none.toml")
+    assert code == 2 and "none.toml" in err

@@ -1,0 +1,69 @@
+"""Views of long signals: every extreme is there, nothing is invented, few points."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from gyrobench.record.signal_view import SignalPyramid
+
+
+@pytest.mark.parametrize("length", [0, 1, 2, 15, 16, 17, 63, 64, 65, 1000, 4097, 100_003])
+def test_extremes_of_any_stretch_are_in_its_view(length: int) -> None:
+    random = np.random.default_rng(length)
+    t = np.cumsum(random.uniform(0.1, 1.0, length))
+    y = random.standard_normal(length)
+    pyramid = SignalPyramid(t, y)
+    for _ in range(20):
+        begin, end = sorted(random.uniform(-5.0, (t[-1] if length else 0.0) + 5.0, 2))
+        view = pyramid.view(begin, end, 200)
+        assert len(view.time) <= 2 * 200 + 4 and np.all(np.diff(view.time) > 0.0)
+        at = np.searchsorted(t, view.time)
+        assert np.array_equal(t[at], view.time) and np.array_equal(y[at], view.values), "points that are no samples"
+        inside = y[(t >= begin) & (t <= end)]
+        if len(inside):
+            assert view.values.min() <= inside.min() and view.values.max() >= inside.max()
+            # and beyond the edges no more than the sample beside each
+            assert view.time[0] >= t[max(0, np.searchsorted(t, begin) - 1)]
+
+
+def test_every_sample_of_a_short_stretch() -> None:
+    t = np.arange(10_000.0)
+    view = SignalPyramid(t, np.sin(t)).view(100.0, 200.0, 500)
+    assert np.array_equal(view.time, np.arange(99.0, 202.0)) and view.every == 1
+
+
+def test_one_sample_that_stands_out_is_never_lost() -> None:
+    y = np.zeros(1_000_000)
+    y[654_321] = 1.0
+    pyramid = SignalPyramid(np.arange(1e6), y)
+    for begin in (0.0, 600_000.0, 654_000.0):
+        view = pyramid.view(begin, 1e6, 1000)
+        assert view.values.max() == 1.0 and view.time[np.argmax(view.values)] == 654_321.0
+
+
+def test_what_is_not_finite_hides_nothing() -> None:
+    y = np.arange(10_000.0)
+    y[::2] = np.nan
+    y[5000:5100] = np.nan
+    view = SignalPyramid(np.arange(10_000.0), y).view(0.0, 1e4, 400)
+    assert np.nanmax(view.values) == 9999.0 and np.nanmin(view.values) == 1.0
+    all_gone = SignalPyramid(np.arange(100.0), np.full(100, np.nan)).view(0.0, 100.0, 20)
+    assert np.all(np.isnan(all_gone.values)) and len(all_gone.time)
+
+
+def test_times_and_values_belong_together() -> None:
+    with pytest.raises(ValueError, match="3 times, 2 values"):
+        SignalPyramid(np.arange(3.0), np.arange(2.0))
+
+
+def test_a_view_does_not_depend_on_the_length() -> None:
+    """A million samples, any stretch: some milliseconds, where reading them all takes tens."""
+    t = np.arange(1e6)
+    pyramid = SignalPyramid(t, np.sin(1e-3 * t))
+    began = time.perf_counter()
+    for k in range(100):
+        pyramid.view(1e3 * k, 1e6 - 1e3 * k)
+    assert (time.perf_counter() - began) / 100 < 0.02

@@ -1,0 +1,148 @@
+"""Jobs of the studio: each in a process of its own, their state in the bench's folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gyrobench.bench import Bench, UsageError
+from gyrobench.studio.job_process import REQUEST
+from gyrobench.studio.jobs import StudioJob, StudioJobs
+from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
+
+SHORT = JobRequest("fixed_position", {"dwell": "60s"}, seed=3)
+LONG = JobRequest("fixed_position", {"dwell": "20000000s"})  # hours
+LIMIT = 120.0  # s
+
+
+@pytest.fixture
+def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StudioJobs:
+    monkeypatch.chdir(tmp_path)
+    return StudioJobs(Bench.find(), most=1)
+
+
+def until(jobs: StudioJobs, key: str, there: Callable[[StudioJob], bool]) -> StudioJob:
+    """Return a job once it is as wanted."""
+    end = time.monotonic() + LIMIT
+    while not there(job := jobs.find(key)):
+        assert time.monotonic() < end, job
+        jobs.advance()
+        time.sleep(0.05)
+    return job
+
+
+def ended(job: StudioJob) -> bool:
+    return not job.active
+
+
+def under_way(job: StudioJob) -> bool:
+    return job.state == "running" and job.report.fraction > 0.0
+
+
+def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> None:
+    done = until(jobs, jobs.submit(SHORT), ended)
+    assert (done.state, done.report.message) == ("done", "")
+    folder = Path(done.report.folder)
+    assert (folder / "report.html").is_file() and folder.is_relative_to(tmp_path / "reports" / "out" / "fixed_position")
+    digest = json.loads((folder / "run.json").read_text())["tables"]
+    shutil.rmtree(folder)
+    words = shlex.split(SHORT.command())
+    subprocess.run([sys.executable, "-m", *words, "--no-report"], check=True, capture_output=True)
+    assert json.loads((folder / "run.json").read_text())["tables"] == digest, "another run, or in another folder"
+    subprocess.run([sys.executable, "-c", SHORT.python()], check=True, capture_output=True)
+    assert json.loads(Path("report/run.json").read_text())["tables"] == digest, "the lines of Python are another run"
+
+
+def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
+    first, second = jobs.submit(LONG), jobs.submit(SHORT)
+    until(jobs, first, under_way)
+    assert jobs.find(second).state == "waiting"
+    jobs.stop(second)
+    assert jobs.find(second).state == "stopped"
+    jobs.stop(first)
+    stopped = until(jobs, first, ended)
+    assert stopped.state == "stopped" and "--resume" in stopped.report.message, stopped
+    again = jobs.resume(first)
+    assert jobs.find(again).request == LONG and jobs.find(again).resume
+    on = until(jobs, again, under_way)
+    assert on.report.fraction > stopped.report.fraction * 0.5, "it went on, it did not begin anew"
+    jobs.stop(again)
+    assert until(jobs, again, ended).state == "stopped"
+
+
+def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs) -> None:
+    """A new object has what a new studio has: the folders alone."""
+    key = jobs.submit(LONG)
+    until(jobs, key, under_way)
+    new = StudioJobs(Bench.find(), most=1)
+    assert new.find(key).state == "running" and not new._started
+    waiting = new.submit(SHORT)
+    new.advance()
+    assert new.find(waiting).state == "waiting", "the run of the studio before counts"
+    process = new._process(key)
+    assert process is not None
+    os.kill(process, signal.SIGKILL)
+    jobs._started[key].wait()  # it is no child of a new studio
+    assert until(new, key, ended).state == "lost"
+    assert until(new, waiting, ended).state == "done", "what waited was started by the new studio"
+    on = until(new, new.resume(key), lambda j: under_way(j) or ended(j))
+    assert on.state == "running", on
+    new.stop(on.key)
+    assert until(new, on.key, ended).state == "stopped"
+
+
+def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:
+    failed = until(jobs, jobs.submit(JobRequest("fixed_position", {"latitude": "3 kg"})), ended)
+    assert failed.state == "failed" and "latitude" in failed.report.message
+    missing = until(jobs, jobs.submit(JobRequest("fixed_positio")), ended)
+    assert "did you mean fixed_position?" in missing.report.message and not missing.resumable
+
+
+def test_a_show_starts_nothing(jobs: StudioJobs) -> None:
+    show = StudioJobs(Bench.find(), read_only=True)
+    for action in (lambda: show.submit(SHORT), lambda: show.stop("x"), lambda: show.resume("x")):
+        with pytest.raises(UsageError):
+            action()
+    assert not show.folder.exists()
+
+
+@pytest.mark.parametrize("key", ["", ".", "..", "../..", "a/b", "/etc", "none", "x\0y"])
+def test_no_key_leads_out(jobs: StudioJobs, key: str) -> None:
+    with pytest.raises(UsageError, match="no job"):
+        jobs.find(key)
+
+
+def test_damaged_jobs_are_left_out(jobs: StudioJobs) -> None:
+    for name, text in (("a", "{"), ("b", "[]"), ("c", '{"request": {"x": 1}, "resume": false, "created": 1}')):
+        (jobs.folder / name).mkdir(parents=True)
+        (jobs.folder / name / REQUEST).write_text(text)
+    (jobs.folder / "d").mkdir()
+    assert jobs.all() == []
+    jobs.advance()
+
+
+def test_lines_of_a_request() -> None:
+    request = JobRequest(
+        "tumble", {"latitude": "45.75deg", "tests": "a b"}, {"gyro": "v 1.fmu"}, {"gyro": "m.toml"}, 0, "limits"
+    )
+    assert read_request(json.loads(json.dumps(request.as_dict()))) == request
+    assert shlex.split(request.command()) == [
+        "gyrobench", "run", "tumble", "--set", "latitude=45.75deg", "--set", "tests=a b", "--part", "gyro=v 1.fmu",
+        "--map", "gyro=m.toml", "--seed", "0", "--spec", "limits",
+    ]  # fmt: skip
+    compile(request.python(), "lines", "exec")
+    measured = JobRequest("tumble", {"latitude": "1deg"}, data="it's.csv", columns="m.toml")
+    assert shlex.split(measured.command())[:5] == ["gyrobench", "reduce", "tumble", "--data", "it's.csv"]
+    for text in (measured.python(), comparison_python(["a", "b'c"]), request.python(suite=True)):
+        compile(text, "lines", "exec")
+    assert shlex.split(comparison_command(["a b", "c"])) == ["gyrobench", "compare", "a b", "c"]

@@ -1,0 +1,254 @@
+"""The studio in headless Chromium: the way of a new user from the first page to a report, by mouse and by keyboard."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from messy_file import messy
+
+from gyrobench.record.record import Record
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: the studio is not looked at")
+LIMIT = 60_000  # ms, for one thing to come
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    """The first address of a studio, and the folder it was started in."""
+    home = tmp_path_factory.mktemp("bench")
+    command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0"]
+    process = subprocess.Popen(command, cwd=home, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    address = re.search(r"http://\S+", line)
+    assert address, line
+    yield address[0], home
+    process.terminate()
+    process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        found = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
+    """A page at the first address; every request, and every complaint of the page, is looked at in the end."""
+    context = browser.new_context(viewport={"width": 1300, "height": 900})
+    page = context.new_page()
+    page.set_default_timeout(LIMIT)
+    base = studio[0].partition("/?")[0]
+    outside: list[str] = []
+    complaints: list[str] = []
+    page.on("request", lambda r: outside.append(r.url) if not r.url.startswith((base, "data:", "blob:")) else None)
+    page.on("websocket", lambda w: None if w.url.startswith(base.replace("http", "ws")) else outside.append(w.url))
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda e: complaints.append(str(e)))
+    page.goto(studio[0])
+    yield page
+    context.close()
+    assert outside == [] and complaints == []
+
+
+def base_of(studio: tuple[str, Path]) -> str:
+    return studio[0].partition("/?")[0]
+
+
+def run_of(page: Any, home: Path) -> Path:
+    """Return the folder of the run that a page shows."""
+    page.wait_for_url("**/run/**")
+    return home / "reports" / "out" / page.url.partition("/run/")[2]
+
+
+def test_from_the_first_page_to_a_report(page: Any, studio: tuple[str, Path]) -> None:
+    began = time.monotonic()
+    page.get_by_label("Search").fill("fixed-position")
+    page.get_by_text("Fixed-position test", exact=True).click()
+    page.get_by_label("dwell", exact=True).fill("60s")
+    page.get_by_label("latitude", exact=True).fill("45.75deg")
+    command = page.locator(".code").first
+    page.wait_for_function("document.querySelector('.code').textContent.includes('45.75deg')")
+    assert command.text_content() == "gyrobench run fixed_position --set dwell=60s --set latitude=45.75deg"
+    assert "gb.load('fixed_position', {'dwell': '60s'" in (page.locator(".code").nth(1).text_content() or "")
+    page.get_by_role("button", name="Run").click()
+    folder = run_of(page, studio[1])
+    report = page.frame_locator("iframe.report")
+    report.get_by_text("Coefficients", exact=False).first.wait_for()
+    assert time.monotonic() - began < 60.0
+    options = json.loads((folder / "run.json").read_text())["options"]
+    assert options["dwell"] == 60.0 and options["latitude"] == pytest.approx(0.7984881, abs=1e-6)  # 45.75 pi / 180
+    page.get_by_role("tab", name="Signals").click()
+    page.locator(".chart canvas").first.wait_for()
+    page.goto(base_of(studio) + "/runs")
+    page.get_by_role("link", name=f"fixed_position/{folder.name}").wait_for()
+
+
+def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("latitude", exact=True).fill("3 kg")
+    page.locator(".q-field__messages").get_by_text(re.compile("latitude.*kg")).wait_for()
+    page.get_by_role("button", name="Run").click()
+    page.locator(".q-notification").wait_for()
+    assert "/system/" in page.url
+
+
+def test_a_part_is_swapped_and_its_parameters_follow(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/tumble_single_axis")
+    page.get_by_label("part in gyro").click()
+    page.get_by_role("option", name="compliant_gyro").click()
+    page.wait_for_function("document.querySelector('.code').textContent.includes('--part gyro=compliant_gyro')")
+    page.get_by_role("button", name="Parameters of gyro").click()
+    page.get_by_label("gyro.H", exact=True).fill("0.3")
+    page.wait_for_function("document.querySelector('.code').textContent.includes('--set gyro.H=0.3')")
+    page.get_by_label("part in gyro").click()
+    page.get_by_role("option", name="floated_gyro").click()
+    page.wait_for_function("document.querySelector('.code').textContent === 'gyrobench run tumble_single_axis'")
+
+
+def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("dwell", exact=True).fill("20000000s")
+    page.wait_for_function("document.querySelector('.code').textContent.includes('20000000s')")
+    page.get_by_role("button", name="Run").click()
+    page.wait_for_url("**/job/**")
+    address = page.url
+    page.goto(base_of(studio) + "/")  # the page of the run is closed
+    page.goto(address)
+    page.wait_for_function("parseFloat(document.querySelector('[role=progressbar]').ariaValueNow) > 0")
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Resume").click()
+    page.wait_for_function("document.querySelector('[role=status]').textContent === 'running'")
+    assert page.url != address
+    page.wait_for_function("parseFloat(document.querySelector('[role=progressbar]').ariaValueNow) > 0")
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Resume").wait_for()
+
+
+def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
+    """The same record as by the two commands, tests/record/test_messy_file.py."""
+    data, mean = messy()
+    (tmp_path / "Messung <b>1.csv").write_bytes(data)
+    page.goto(base_of(studio) + "/data?test=fixed_position")
+    page.locator("input[type=file]").set_input_files(tmp_path / "Messung <b>1.csv")
+    page.get_by_text("Every column has its place").wait_for()
+    page.get_by_text("Strom / mA").first.wait_for()
+    page.get_by_label("unit of mean").fill("deg")
+    page.get_by_text("deg is no unit of").wait_for()
+    page.get_by_label("unit of mean").fill("uA")
+    page.get_by_role("button", name="Check the file").click()
+    page.get_by_text("faults:").wait_for()
+    page.get_by_text("'latitude' is not given").wait_for()
+    for name, value in (("latitude", "45.75deg"), ("k", "17.2deg/h/mA"), ("attitude", "E U -N")):
+        page.get_by_label(name, exact=True).fill(value)
+    page.wait_for_function("document.querySelector('.code').textContent.includes('attitude=E U -N')")
+    page.get_by_role("button", name="Check the file").click()
+    page.get_by_text("it can be reduced").wait_for()
+    page.get_by_role("button", name="Reduce").click()
+    folder = run_of(page, studio[1])
+    kept = [k for k in range(47) if k != 7]
+    np.testing.assert_allclose(Record.load(folder).windows["mean"], mean[kept] * 1e-6, rtol=1e-12)  # µA, as was said
+
+
+def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
+    for seed in ("11", "12"):
+        page.goto(base_of(studio) + "/system/fixed_position")
+        page.get_by_label("dwell", exact=True).fill("60s")
+        page.get_by_label("Seed of the noise").fill(seed)
+        page.wait_for_function(f"document.querySelector('.code').textContent.endsWith('--seed {seed}')")
+        page.get_by_role("button", name="Run").click()
+        run_of(page, studio[1])
+    page.goto(base_of(studio) + "/runs")
+    page.get_by_label("Filter").fill("fixed_position")
+    for box in page.get_by_role("checkbox").all()[:2]:
+        box.click()
+    page.get_by_role("button", name="Compare").click()
+    page.wait_for_url("**/compare?**")
+    page.frame_locator("iframe.report").get_by_text("baseline", exact=False).first.wait_for()
+
+
+def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("latitude", exact=True).wait_for()
+    reached = set()
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        focus = page.evaluate("(e => e.getAttribute('aria-label') || e.textContent)(document.activeElement)") or ""
+        reached.add(focus.strip())
+        if focus == "latitude":
+            page.keyboard.type("45deg")
+        if focus == "dwell":
+            page.keyboard.type("60s")
+        if focus.strip().endswith("Run"):
+            break
+    assert {"latitude", "dwell"} <= reached, reached
+    page.wait_for_function("document.querySelector('.code').textContent.includes('latitude=45deg')")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/run/**")
+
+
+def test_every_page_fits_a_telephone(page: Any, studio: tuple[str, Path]) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    for path in ("/", "/system/fixed_position", "/data", "/runs"):
+        page.goto(base_of(studio) + path)
+        page.locator("h1").wait_for()
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/files/../../../../etc/passwd", "/files/..%2f..%2f..%2f..%2fetc/passwd", "/files/%2fetc%2fpasswd",
+        "/files/fixed_position", "/files/studio/jobs", "/files/%00", "/files/" + "a" * 5000, "/picture/../x",
+        "/picture/%2e%2e", "/wiring/<script>", "/run/../../..", "/job/..%2f..", "/system/..%2f..%2fetc",
+        "/compare?run=../..", "/_nicegui/../../x", "/nothing",
+    ],
+)  # fmt: skip
+def test_no_path_leads_out(studio: tuple[str, Path], path: str) -> None:
+    token = studio[0].partition("token=")[2]
+    port = re.search(r":(\d+)/", studio[0])
+    assert port
+    request = urllib.request.Request(base_of(studio) + path.replace("<", "%3C").replace(">", "%3E"))
+    request.add_header("Cookie", f"gyrobench_studio_{port[1]}={token}")
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            text = answer.read().decode("utf-8", "replace")
+    except urllib.error.HTTPError as error:
+        assert error.code < 500, error
+        text = error.read().decode("utf-8", "replace")
+    assert "root:" not in text and "Traceback" not in text and str(Path(os.devnull)) not in text
+
+
+def test_without_the_token_nothing_is_shown(studio: tuple[str, Path]) -> None:
+    for path in ("/", "/runs", "/files/x", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
+        with pytest.raises(urllib.error.HTTPError) as error:
+            urllib.request.urlopen(base_of(studio) + path)
+        assert error.value.code == 403
+
+
+def test_a_second_studio_of_the_bench_only_looks_on(studio: tuple[str, Path]) -> None:
+    command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0"]
+    done = subprocess.run(command, cwd=studio[1], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and "a studio has this bench open" in done.stderr
+    remote = subprocess.run([*command, "--host", "0.0.0.0"], cwd=studio[1], capture_output=True, text=True, timeout=60)
+    assert remote.returncode == 2 and "--allow-remote" in remote.stderr
