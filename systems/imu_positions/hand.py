@@ -45,10 +45,9 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import ARCSEC, DPH
 
-from . import norms, tables, turns
+from . import norms, tables, turn_errors, turns
 from .channels import AXES, CHANNELS, UG, ImuInstrument, overview
 from .hand_positions import COLUMNS, HandSetup, Positions
-from .turns import Turn
 
 UNKNOWN = "unknown"  # option attitudes
 STEADY = math.radians(2.0)  # rad/s, beyond what bias and g-sensitivity change from position to position
@@ -56,6 +55,10 @@ ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimat
 LEVEL_RATE = Source(
     "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
 )
+AT_REST_A = Source(
+    "accelerometers.at_rest", "accelerometers at rest", "m/s²", note="noise, by the directions of gravity"
+)
+AT_REST_G = Source("gyros.at_rest", "gyros at rest", "rad/s", note="noise, by the biases")
 WHITE = "noise of the instrument and what the model does not hold, from the residuals"
 CONVENTIONS = [
     "Axes of the case: x along the input axis of the accelerometer x, y in the plane of those of x and y, z "
@@ -144,16 +147,13 @@ class HandTurns(HandChannel):
         X = -turns.slopes(found.turned, found.matrix)
         y = turns.left(found.turned, found.matrix) + X @ found.matrix.ravel()
         number = np.repeat(np.arange(1.0, len(found.turned) + 1), 2)
-        ends = np.array([[t.time[0], t.time[-1]] for t in found.turned])
-        t0, t1 = (
-            np.column_stack(v).ravel() for v in ((ends[:, 0], ends.mean(axis=1)), (ends.mean(axis=1), ends[:, 1]))
-        )
-        span = np.repeat(ends[:, 1] - ends[:, 0], 2)
-        weights = 1.0 / (span + np.median(span))  # white noise of a rate, and what does not grow with time
+        w, place = turn_errors.weights(self.at), np.arange(float(y.size))  # both data of a turn have its time
         group = Group("turns", np.arange(y.size), number, "number of the turn", "")
         names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        unit = ("direction of gravity after a turn", "″", ARCSEC)
-        return Regression(names, X, y, t0, t1, [group], *unit, noise="white", weights=weights, limit=norms.LIMIT)
+        unit = ("direction of gravity after a turn, less for long ones", "″", ARCSEC)
+        return Regression(
+            names, w[:, None] * X, w * y, place, place + 1.0, [group], *unit, "estimated", limit=norms.LIMIT
+        )
 
     def derived(self, found: Findings) -> Findings:
         counts, D = "g" in self.setup.counts, self.at.scale_g
@@ -173,19 +173,14 @@ class HandTurns(HandChannel):
         return found.derive(quantities, of)
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the level Earth rate, which the readings at rest hold and the turn has otherwise."""
-        own = self.at.found
-        clean, step, errors = turns.left(own.turned, own.matrix), 1e-6, []
-        for axis in range(2):
-            moved = []
-            for k, t in enumerate(own.turned):
-                rest = 0.5 * (own.level[k][axis] + own.level[k + 1][axis])
-                span = float(t.time[-1] - t.time[0])
-                before = t.before + step * span * np.cross(own.level[k][axis], t.before)
-                moved.append(Turn(t.time, t.rate + step * rest, before, t.after))
-            # a rate that the model lacks: the opposite of what it changes
-            errors.append(-(turns.left(moved, own.matrix) - clean) / step)
-        return [LEVEL_RATE.effect(own.u, np.array(errors), parts=("first", "second"))]
+        """Return the level Earth rate, and the noise of what was read at rest, which several data share."""
+        at, w = self.at, turn_errors.weights(self.at)
+        level = w * turn_errors.of_level_rate(at)
+        return [
+            LEVEL_RATE.effect(at.found.u, level, parts=("first", "second")),
+            AT_REST_A.effect(at.noise_a, w * turn_errors.of_accelerometers(at)),
+            AT_REST_G.effect(at.noise_g, w * turn_errors.of_gyros(at)),
+        ]
 
 
 class HandGyro(HandChannel):

@@ -74,7 +74,7 @@ def own_axes(truth: Mapping[str, float]) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Solution:
+class TurnSolution:
     """Turns with the Earth rate in them; S (3, 3) of the gyros; two level directions (2, 3) at each position; level
     Earth rate there (n, 3), rad/s, and the standard uncertainty of its components.
     """
@@ -161,18 +161,18 @@ class Positions:
         return len(self.raw_turns) >= LEAST_TURNS
 
     @cached_property
-    def found(self) -> Solution:
+    def found(self) -> TurnSolution:
         """Return the matrix of the gyros and the level Earth rate, which need one another: in three rounds."""
         level, matrix, rate, u = [turns.across(u) for u in self.up], np.zeros((3, 3)), np.zeros(2), self.level_size
         if not self.enough:
-            return Solution([], matrix, level, np.zeros_like(self.up), u)
+            return TurnSolution([], matrix, level, np.zeros_like(self.up), u)
         for _ in range(ROUNDS):
             earth = self.vertical + np.array([rate @ d for d in level])
             turned = [self._turn(k, t, earth, rate @ level[k]) for k, t in enumerate(self.raw_turns)]
             matrix = turns.solve(turned, matrix)
             level = turns.headings(turned, np.asarray(np.linalg.inv(np.eye(3) + matrix)), self.up[0])
             rate, u = self._level_rate(level, matrix)
-        return Solution(turned, matrix, level, np.array([rate @ d for d in level]), u)
+        return TurnSolution(turned, matrix, level, np.array([rate @ d for d in level]), u)
 
     def _turn(self, k: int, t: Turn, earth: Array, level: Array) -> Turn:
         """Return a turn with readings over D, the Earth rate (n, 3) of the positions in them; level (3,): at the start.
@@ -199,6 +199,20 @@ class Positions:
         precision = X.T @ X / variance + np.eye(2) / self.level_size**2
         covariance = np.linalg.inv(precision)
         return covariance @ (X.T @ data) / variance, float(np.sqrt(np.max(np.diag(covariance))))
+
+    @cached_property
+    def noise_a(self) -> float:
+        """Standard deviation of a reading of an accelerometer at rest, m/s2, from what is left of the sizes."""
+        left = np.linalg.norm(self.force, axis=1) - self.setup.gravity
+        return math.sqrt(float(left @ left) / max(len(left) - len(norms.NAMES), 1))
+
+    @cached_property
+    def noise_g(self) -> float:
+        """Standard deviation of a reading of a gyro at rest, rad/s, from what is left of bias and g-sensitivity."""
+        y = self.gyro / self.scale_g - self.vertical - self.found.rate
+        own = np.column_stack([np.ones(len(y)), self.force])
+        left = y - own @ np.linalg.lstsq(own, y, rcond=None)[0]
+        return math.sqrt(float(np.sum(left**2)) / max(3 * (len(y) - 4), 1))
 
     @property
     def level_size(self) -> float:

@@ -293,3 +293,31 @@ def test_turns_without_samples_leave_the_gyros_bias_and_sensitivity(tmp_path: Pa
     assert any(r.id == "turns.none" and "not estimable: Sg" in r.text for r in result.reasons)
     level = next(line for line in result.budget if "level Earth rate" in line.source)
     assert level.size == pytest.approx(15.0410686 * math.cos(0.7) / math.sqrt(2.0) * DPH, rel=1e-6)
+
+
+def test_readings_at_rest_change_the_turns_as_the_budget_says(tmp_path: Path) -> None:
+    """One reading of an accelerometer 1e-4 m/s2 off: gravity after each turn, with the matrix held, is off by the row
+    of the source, fit of the nine unknowns included; to first order of 1e-5 rad."""
+    rng = np.random.default_rng(16)
+    series = handled(Unit.drawn(rng, 0.01), poses(rng, 12), rng, gyro=1e-7, acc=1e-6)
+    read = record(write(tmp_path / "log.csv", *series))
+    positions: Any = importlib.import_module(".hand_positions", room)
+    errors: Any = importlib.import_module(".turn_errors", room)
+    turns: Any = importlib.import_module(".turns", room)
+    said = positions.HandSetup.of_record(read)
+    at = positions.Positions(read.windows, said)
+    rows = errors.of_accelerometers(at)
+    clean = turns.left(at.found.turned, at.found.matrix)
+    for place, axis in ((0, 0), (5, 1), (11, 2)):
+        off = {n: np.array(v, dtype=float) for n, v in read.windows.items()}
+        off[f"mean_a{'xyz'[axis]}"][place] += 1e-4
+        other = positions.Positions(off, said)
+        moved = [turns.Turn(t.time, t.rate, other.up[k], other.up[k + 1]) for k, t in enumerate(at.raw_turns)]
+        plain = [turns.Turn(t.time, t.rate, at.up[k], at.up[k + 1]) for k, t in enumerate(at.raw_turns)]
+        change = turns.left(moved, at.found.matrix) - turns.left(plain, at.found.matrix)
+        assert change == pytest.approx(1e-4 * rows[3 * place + axis], abs=2e-8)
+        assert np.abs(change).max() > 1e-6
+    rest = errors.of_gyros(at)
+    half = [turns.Turn(t.time, t.rate - (0.5e-5 if k in (3, 4) else 0.0) * np.eye(3)[1], t.before, t.after)
+            for k, t in enumerate(at.found.turned)]  # fmt: skip
+    assert turns.left(half, at.found.matrix) - clean == pytest.approx(1e-5 * rest[3 * 4 + 1], abs=1e-9)
