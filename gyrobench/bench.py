@@ -155,6 +155,11 @@ class Bench:
             found.update({f.stem: f for f in sorted((root / "reports" / "specs").glob("*.toml"))})
         return found
 
+    def instruments(self) -> dict[str, Path]:
+        """Data sheets of instruments: name -> file."""
+        roots = (standard_folder(), self.folder)
+        return {f.stem: f for root in roots for f in sorted((root / "instruments").glob("*.toml"))}
+
     def existing(self, file: Path) -> Path:
         """Return a file as the user names it where it is there, else of that path in the bench (systems/X/FILE)."""
         candidates = (root / file for root in (Path(), self.folder, standard_folder()))

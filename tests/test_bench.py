@@ -104,7 +104,7 @@ def test_short_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 # --------------------------------------------------------------------------------- list and init
 def test_listing_reads_what_each_part_says_of_itself() -> None:
     found = list_contents(Bench(standard_folder()))
-    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+    assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
     assert all(r["what"] for rows in found.values() for r in rows)
     rows = {r["name"]: r for title in ("parts", "systems") for r in found[title]}
     assert rows["floated_gyro"]["what"] == "Single-degree-of-freedom floated gyro"

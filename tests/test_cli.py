@@ -77,7 +77,7 @@ def test_list(gyrobench: Call) -> None:
     for name in (*Bench(standard_folder()).parts(), NAME, "SdfGyro"):
         assert f"  {name} " in out
     found = json.loads(gyrobench("list", "--json")[1])
-    assert list(found) == ["parts", "systems", "sockets", "specifications"]
+    assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
 
 
 # ------------------------------------------------------------------------------------------------ show

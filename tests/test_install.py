@@ -45,7 +45,7 @@ def test_the_wheel_holds_tool_and_standard_bench(wheel: Path) -> None:
         inside = {n for n in archive.namelist() if not n.endswith("/")}
     tool = {str(f.relative_to(ROOT)) for f in (ROOT / "gyrobench").rglob("*") if f.suffix in (".py", ".c", ".h")}
     assert tool <= inside
-    for room in ("components", "systems", "docs", "reports/specs", "reports/templates"):
+    for room in ("components", "systems", "docs", "instruments", "reports/specs", "reports/templates"):
         files = [f for f in (ROOT / room).rglob("*") if f.is_file() and "__pycache__" not in f.parts]
         assert files and {f"gyrobench/_bench/{f.relative_to(ROOT)}" for f in files} <= inside
     assert {"gyrobench/_bench/reports/result.schema.json", "gyrobench/py.typed"} <= inside

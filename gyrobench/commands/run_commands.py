@@ -37,6 +37,12 @@ def run(
     values: Set = None,
     part: Part = None,
     mapping: Map = None,
+    instrument: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Data sheet of a rate gyro (instruments/NAME.toml, or a file) for the slot gyro."
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the noise; default 1.", min=0)] = None,
     engine: Annotated[
         Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
@@ -72,17 +78,19 @@ def run(
       gyrobench run tumble_single_axis --set latitude=45.75deg --set gyro.D_I=0.9deg/h/g --seed 7
       gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml
       gyrobench run tumble_single_axis --spec floated_gyro --strict
+      gyrobench run drift_record --instrument adis16405
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench.commands import print_runs
-    from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time
+    from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time, with_instrument
     from gyrobench.report import FORMATS
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
 
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
-    test = load_with_values(system, parse_settings(values), time_step, coupling.value)
+    sheet = with_instrument(instrument, parts) if instrument else {}
+    test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
     request = RunRequest(
         parts=parts,
         maps=maps,

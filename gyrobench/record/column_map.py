@@ -32,6 +32,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -44,6 +45,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.boundary import faults_of
+from gyrobench.record.column_numbers import write_numbers
 from gyrobench.record.csv_reader import DataError, regular, row_list
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.row_faults import NOTHING
@@ -371,9 +373,28 @@ def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
     if columns.table and not is_log(file):
         raise DataError(file, [f"table = '{columns.table}': a text file has one table; leave it out"])
     text = as_text(file, columns.table) if is_log(file) else file
+    if _quick(text, done, to):
+        return done
+    done = MappedRows(columns, file)
     with to.open("w", encoding="utf-8", newline="\n") as out:
         for line in done.lines(cells_of_file(text, columns.encoding, columns.delimiter)):
             out.write(line + "\n")
     if not done.read:
         raise DataError(file, [f"no names of columns in row {columns.skip + 1} (skip = {columns.skip})"])
     return done
+
+
+def _quick(file: Path, done: MappedRows, to: Path) -> bool:
+    """Write a file of plain numbers under its map at once; return False, having written what is written anew, else."""
+    m = done.map
+    if any(c.time or c.next for c in m.columns.values()):
+        return False
+    head = m.skip + 1 + m.below
+    above = list(itertools.islice(cells_of_file(file, m.encoding, m.delimiter), head))
+    with to.open("wb") as out:
+        for line in done.lines(above):
+            out.write(line.encode() + b"\n")
+        places = [places[0] for _, _, _, places in done.read]
+        factors = [c.factor for _, c, _, _ in done.read]
+        layout = {"encoding": m.encoding, "delimiter": m.delimiter, "decimal": m.decimal}
+        return write_numbers(file, head, places, factors, out, **layout)

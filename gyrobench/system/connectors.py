@@ -62,3 +62,11 @@ def out(name: str, unit: str, meaning: str, *shape: int, optional: bool = False,
 def limit_flag(name: str, meaning: str) -> Connector:
     """An optional output that is 1 while a limit is reached; meaning: "1 while ..."."""
     return Connector(name, "output", "1", meaning, optional=True, whole=True, limit=True)
+
+
+#: what temperature and magnetic field do to a gyro
+EXPOSED = (
+    inp("temperature", "K", "mean temperature above that of the coefficients", optional=True),
+    inp("B", "T", "magnetic field along the axes of the case", 3, optional=True),
+    inp("dB", "T", "differences of the magnetic field over the gyro, axes of the case", 3, optional=True),
+)

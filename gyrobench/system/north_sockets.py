@@ -6,7 +6,7 @@ about z seen from above, headings count clockwise from north.  [NORTH-COMMON]
 
 from __future__ import annotations
 
-from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.connectors import EXPOSED, Socket, inp, limit_flag, out
 
 NORTH: tuple[Socket, ...] = (
     Socket(
@@ -14,7 +14,12 @@ NORTH: tuple[Socket, ...] = (
         "gyro with its loop closed inside: inertial rate in, measured rate out",
         (
             inp("omega", "rad/s", "inertial rate, head axes", 3),
+            inp("f", "m/s2", "specific force, head axes", 3, optional=True),
+            inp("dT", "K", "temperature differences along x, y, z", 3, optional=True),
+            *EXPOSED,
             out("rate", "rad/s", "measured rate along x and y", 2),
+            out("density", "rad/s/sqrt(Hz)", "two-sided density of its white noise (diagnostic)", optional=True),
+            limit_flag("saturated", "1 while a rate is beyond the range"),
         ),
     ),
     Socket(

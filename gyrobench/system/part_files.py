@@ -23,7 +23,7 @@ def resolve_parts(
     elsewhere.  Raises InvalidConfigurationError, BenchError and BuildError.
     """
     for slot in parts:
-        system.request(slot)
+        system.place(slot, parts[slot], bench)
     unknown = [s for s in parts if s not in system.slots]
     if unknown:
         raise InvalidConfigurationError(
@@ -54,3 +54,24 @@ def resolve_parts(
             built[slot] = "python"
             notes.append(f"{slot}: Python target (a thousand times slower): {error}")
     return paths, built
+
+
+def has_port(part: str | Path, name: str, bench: Path | None) -> bool:
+    """Return whether an FMU or a part of the bench has this input or output, a number or an array; False where there is
+    no such part.
+    """
+    if str(part).endswith(".fmu"):
+        from gyrobench.system.fmu_variables import read_description, variables
+
+        if not Path(part).is_file():
+            return False
+        found = variables(read_description(Path(part)))
+        return any(v.causality in ("input", "output") and n.split("[")[0] == name for n, v in found.items())
+    from gyrobench.bench import BenchError
+    from gyrobench.component import Input, Output
+    from gyrobench.packaging import load_part
+
+    try:
+        return isinstance(load_part(str(part), bench).declarations.get(name), Input | Output)
+    except BenchError:
+        return False

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.component.declarations import element_names
-from gyrobench.system.connectors import Connector, Shape, Socket, inp, limit_flag, out
+from gyrobench.system.connectors import EXPOSED, Connector, Shape, Socket, inp, limit_flag, out
 from gyrobench.system.loop_sockets import LOOPS
 from gyrobench.system.north_sockets import NORTH
 from gyrobench.system.table_sockets import TABLES
@@ -33,12 +33,6 @@ TABLE = (
     out("alpha", "rad/s2", "angular acceleration in face axes", 3, optional=True),
     out("f", "m/s2", "specific force in face axes", 3),
     out("in_position", "1", "1 when the target is reached", whole=True),
-)
-#: what temperature and magnetic field do to a gyro
-EXPOSED = (
-    inp("temperature", "K", "mean temperature above that of the coefficients", optional=True),
-    inp("B", "T", "magnetic field along the axes of the case", 3, optional=True),
-    inp("dB", "T", "differences of the magnetic field over the gyro, axes of the case", 3, optional=True),
 )
 SOCKETS: dict[str, Socket] = {
     s.name: s

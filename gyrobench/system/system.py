@@ -199,6 +199,10 @@ class System(Configurable):
             more["windows"] = replace(self.windows, columns={**self.windows.columns, **wanted.columns})
         vars(self).update(more)
 
+    def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
+        """Make room for a part, the name of one of the bench or the file of an FMU, before it is put into its slot."""
+        self.request(slot)
+
     def all_slots(self) -> dict[str, Slot]:
         """Return the slots, and those that can be asked for."""
         return {**self.slots, **{n: r.slots[n] for n, r in self.on_request.items() if n not in self.slots}}

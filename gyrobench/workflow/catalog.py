@@ -53,7 +53,7 @@ def _title(file: Path) -> str:
 
 
 def list_contents(bench: Bench) -> dict[str, list[dict[str, Any]]]:
-    """Return parts, systems, sockets and acceptance specifications: a list of {name, what, spec, folder} each."""
+    """Return parts, systems, sockets, specifications, data sheets: a list of {name, what, spec, folder} each."""
     from gyrobench.system.sockets import SOCKETS
 
     return {
@@ -61,6 +61,7 @@ def list_contents(bench: Bench) -> dict[str, list[dict[str, Any]]]:
         "systems": [_entry(n, f / "system.py") for n, f in bench.systems().items()],
         "sockets": [{"name": s.name, "what": s.meaning} for s in SOCKETS.values()],
         "specifications": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.specifications().items()],
+        "instruments": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.instruments().items()],
     }
 
 

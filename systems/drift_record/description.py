@@ -18,6 +18,7 @@ from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
+from gyrobench.reduction.setup.run_metadata import reads_rate
 from gyrobench.result import Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
@@ -73,7 +74,8 @@ def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]],
 def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     """Return what sampling did to the rate, and what of the file was left out."""
     if run.series is None:
-        return ["A sample is the mean of the current over a window, as an integrating meter reads it."]
+        read = "rate" if reads_rate(run) else "current"
+        return [f"A sample is the mean of the {read} over a window, as an integrating meter reads it."]
     unused = run.series.get("unused", [])
     out = [
         f"Columns of the file that were not used: {shorten(', '.join(unused), 200)}. One that the rate may follow is "

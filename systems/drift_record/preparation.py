@@ -11,7 +11,6 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.checks import SeriesError
@@ -84,15 +83,18 @@ def columns_of(record: Record) -> Columns:
         return Columns(start - start[0], rates, others, run.window_units, step)
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
-    k = run_metadata.number(run, "k", "gyro.k", "torquer scale factor")
+    k = run_metadata.rate_per_reading(run)
     site = run_metadata.Location.of(run)
     input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
     rate = input_rate - k * np.asarray(w["mean"], dtype=float)
     step = float(np.mean(np.asarray(w["t_end"]) - np.asarray(w["t_start"])))
     others = {n: np.asarray(v, dtype=float) for n, v in w.items() if n not in OWN}
+    earth = f"Earth rate along the input axis {input_rate / DPH:.6g} °/h."
     said = [
-        "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
-        f"k = {k * 1e-3 / DPH:.6g} °/h/mA, Earth rate along the input axis {input_rate / DPH:.6g} °/h.",
+        f"Drift rate ω_IA less the mean rate of a window, axis x: the sign of a precession. {earth}"
+        if run_metadata.reads_rate(run)
+        else "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
+        f"k = {k * 1e-3 / DPH:.6g} °/h/mA, {earth}"
     ]
     return Columns(step * np.arange(float(rate.size)), {"drift": rate}, others, run.window_units, step, said)
 
@@ -129,13 +131,25 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
 GIVEN = {"B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
 
 
-def truth_of(run: RunDocument) -> dict[str, float]:
+#: the same of the axis x of a rate gyro
+GIVEN_X = {"B": "flicker_x", "K": "walk_x"}
+
+
+def truth_of(record: Record) -> dict[str, float]:
     """Return the noise coefficients that the gyro of a run was given, SI; {} for measured data.
 
-    The noise of the current reading is part of N.  Pickoff noise is angle noise that the loop shapes: with it Q has no
-    stated truth.
+    N of a rate gyro is the density that it shows, or its parameter; otherwise the noise of the current reading is part
+    of N.  Pickoff noise is angle noise that the loop shapes: with it Q has no stated truth.
     """
+    run = record.run
     p: dict[str, Any] = dict(run.parameters)
+    if run_metadata.reads_rate(run):
+        out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN_X.items() if f"gyro.{name}" in p}
+        if "gyro.density" in record.channels:
+            out["N"] = float(record.channels["gyro.density"][0])
+        elif "gyro.white_x" in p:
+            out["N"] = float(p["gyro.white_x"])
+        return out
     out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN.items() if f"gyro.{name}" in p}
     if p.get("gyro.pickoff") or not p.get("gyro.quantization"):
         out.pop("Q", None)

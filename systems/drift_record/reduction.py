@@ -75,6 +75,7 @@ def from_record(record: Record) -> DriftRecordResult:
     columns = columns_of(record)
     analysed = [analyse(name, columns, run) for name in columns.rates]
     several = len(analysed) > 1
+    truth = truth_of(record)
     return DriftRecordResult(
         method="Noise model of greatest evidence whose deviation is the record's own, deviations, spectrum, models",
         sources=["DRIFT-NOISE-MODEL, DRIFT-ALLAN; IEEE 952, annex C",
@@ -82,7 +83,7 @@ def from_record(record: Record) -> DriftRecordResult:
         equation='S(f) = N^2 abs(H)^2 + sum_i (2 sigma_i^2 tau_i)/(1 + (2 pi f tau_i)^2) + B^2/(2 pi f) + '
         'K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0)',
         conventions=[*columns.conventions, *description.conventions(run)],
-        coefficients=[c for a in analysed for c in _coefficients(a, run, several)],
+        coefficients=[c for a in analysed for c in _coefficients(a, run, truth, several)],
         reasons=[r for a in analysed for r in _reasons(a, run, several)],
         summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
         instrument=run.instrument,
@@ -127,8 +128,8 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
     return Deviation(long.kind, **{n: np.append(getattr(short, n)[below], getattr(long, n)) for n in FIELDS})
 
 
-def _coefficients(a: Analysed, run: RunDocument, several: bool) -> list[Coefficient]:
-    truth, relative = truth_of(run), float(run.options.get("u_scale_factor", 0.0))
+def _coefficients(a: Analysed, run: RunDocument, truth: Mapping[str, float], several: bool) -> list[Coefficient]:
+    relative = float(run.options.get("u_scale_factor", 0.0))
     out = [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
     least, when = a.noise.minimum.deviation, a.noise.minimum.tau
     meaning = f"bias instability as the least Allan deviation, at {noise_tables.range_text(when)} s"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
-from gyrobench.system.families.rebalance_test import RebalanceTest
+from gyrobench.system.families.rate_reading import RateReading
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
@@ -20,9 +19,9 @@ from .measured import MEASURED
 FLICKER, WALK, ANGLE = 0.005 * DPH, 0.03 * DPH / 60.0, 0.02 * ARCSEC
 
 
-class DriftRecord(RebalanceTest):
-    """A gyro at rest in torque rebalance; the mean current of each window becomes an evenly sampled drift rate, and
-    that the model of the random drift: N, B, K, R, Q.
+class DriftRecord(RateReading):
+    """A gyro at rest in torque rebalance, or a rate gyro; the mean current or rate of each window becomes an evenly
+    sampled drift rate, and that the model of the random drift: N, B, K, R, Q.
 
     [DRIFT-STATS-RUNS, DRIFT-AR-BURG, DAQ-DRIFT; Xia 2008, ch. 3; IEEE 952]
     """
@@ -30,10 +29,12 @@ class DriftRecord(RebalanceTest):
     title = "Drift record"
     spec = ("DRIFT-RANDOM-CLASSES", "DAQ-DRIFT", "RED-RATE", "GYRO-DYN-1", "LOOP-REBALANCE")
     reduction = "reduction"
-    slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
+    slots = RateReading.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
+    rate_gyro = "gyro_rate"
     options = (
         SITE
         | ATTITUDE
+        | RateReading.reads
         | {
             "duration": Option("8h", "s", "length of the record", 60.0),
             "window": Option(1.0, "s", "averaging time of a sample", 0.01),
@@ -84,10 +85,4 @@ class DriftRecord(RebalanceTest):
         ]  # fmt: skip
         if self["counts"] not in ("cumulative", "increments"):
             problems.append(f"counts = {self['counts']}: must be 'cumulative' or 'increments'")
-        return problems
-
-    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        problems = super().check_parameters(parameters)
-        if not (self["k"] or parameters.get("gyro.k")):
-            problems.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
         return problems

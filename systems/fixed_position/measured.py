@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import CsvColumn, read_head
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -26,6 +27,7 @@ TEMPLATE = """\
 # attitude: directions of the gyro axes I, O and S (S may be left out): E east, N north, U up, P pole of the sky,
 #   Q along E x P, or minus these; or a matrix [[..],[..],[..]] with the axes I, O, S as rows in east, north, up.
 # mean: torquer current averaged over the reading, positive where it precesses positively (k i = input rate - drift).
+# reading = rate: of a rate gyro; mean and std are then its rate along the input axis [deg/h], and k is not needed.
 # day: optional; several days are reduced one by one and then together.  std, flagged (suspect samples): optional.
 # Units in brackets may be others of the same kind (min, uA ...).
 #
@@ -33,7 +35,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],mean [mA]
 """
 ATTITUDE = "service attitude"
-COLUMNS = (
+COLUMNS: tuple[CsvColumn, ...] = (
     CsvColumn("t_start", "s", "start of the reading"),
     CsvColumn("t_end", "s", "end of the reading"),
     CsvColumn("mean", "A", "mean torquer current"),
@@ -48,8 +50,11 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     runs = read_runs(data, system.name, values)
     if runs is not None:
         return runs
-    needed = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}
-    record = read_record(system, data, values, needed=needed, columns=COLUMNS, time=None)
+    needed, columns = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}, COLUMNS
+    if {**read_head(data).comments, **values}.get("reading", "") == "rate":
+        del needed["k"]
+        columns = tuple(c if c.unit != "A" else replace(c, unit="rad/s") for c in COLUMNS)
+    record = read_record(system, data, values, needed=needed, columns=columns, time=None)
     windows = dict(record.windows)
     day = windows.pop("day", np.ones(len(windows["mean"]), dtype=np.int64))
     days = np.unique(day)

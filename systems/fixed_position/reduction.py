@@ -1,6 +1,6 @@
 """Reduction of the fixed-position test: one composite drift, its noise, its stability over repeats.
 
-    omega_d = omega_IA - k i,   omega_IA = W I . (0, cos phi, sin phi)
+    omega_d = omega_IA - k i,   omega_IA = W I . (0, cos phi, sin phi)          a rate gyro: its rate instead of k i
 
 mean over the readings under a noise model estimated from them.  One attitude: no coefficient can be told from another.
 Repeats on several days are reduced day by day and then together (gyrobench.reduction.estimation.repeatability).
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
+from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate
 from gyrobench.reduction.setup.setups import scale_factor_problems
 from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE
 from gyrobench.reduction.toolkit import (
@@ -40,7 +42,6 @@ from gyrobench.reduction.toolkit import (
     SiteSetup,
     Table,
     attitude_of,
-    number,
     told,
     truth_of,
     window_problems,
@@ -48,15 +49,17 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 LEAST = 8  # readings
+RATE_SCALE = replace(TORQUER_SCALE, id="gyro.scale_factor", name="scale factor of the rate gyro", large=())
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixedPositionSetup(SiteSetup):
-    """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A.  quantum: resolution of the current
-    reading.
+    """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A, 1 where a rate is read.  quantum:
+    resolution of the current reading.
     """
 
     k: float
+    rate: bool = False
     attitude: Array = field(default_factory=lambda: np.eye(3))
     u_attitude: float = 0.0
     u_latitude: float = 0.0
@@ -86,7 +89,8 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         return FixedPositionSetup.of(
             run,
             attitude=attitude_of(run),
-            k=number(run, "k", "gyro.k", "torquer scale factor"),
+            k=rate_per_reading(run),
+            rate=reads_rate(run),
             truth=truth_of(run, drift.NAMES),
             quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
         )
@@ -120,11 +124,16 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         by_latitude = s.earth_rate * float(
             s.attitude[0] @ (frames.pole(s.latitude + small) - frames.pole(s.latitude - small)) / (2.0 * small)
         )
-        offset = found.error(-s.k)
-        return [
+        offset, scale = found.error(-s.k), RATE_SCALE if s.rate else TORQUER_SCALE
+        of_site = [
             *attitude_effects(s, found, EARTH_ONLY),
             LATITUDE.effect(s, found.error(by_latitude)),
-            TORQUER_SCALE.effect(s, found.error(-s.k * self.current)),
+            scale.effect(s, found.error(-s.k * self.current)),
+        ]
+        if s.rate:
+            return of_site
+        return [
+            *of_site,
             CURRENT_OFFSET.effect(s, offset),
             CURRENT_RESOLUTION.effect(s.quantum / 12.0**0.5, offset),
         ]
@@ -135,11 +144,14 @@ class Reduction(DriftReduction[FixedPositionSetup]):
     def account(self, found: Findings) -> Account:
         s, trend = self.setup, self.trend
         return Account(
-            method="Torque rebalance in one attitude; mean of the readings under an estimated noise model [TEST-FIXED]",
+            method=f"{'Rate gyro' if s.rate else 'Torque rebalance'} in one attitude; mean of the readings under an "
+            "estimated noise model [TEST-FIXED]",
             sources=["TEST-FIXED; Hu 1981, ch. 3 par. 2.2", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
-            equation='omega_d = omega_"IA" - k i, quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
+            equation=f'omega_d = omega_"IA" - {"omega_g" if s.rate else "k i"}, '
+            'quad omega_"IA" = omega_E (I_N cos phi + I_U sin phi)',
             conventions=_conventions(s),
-            closed_caption="Least squares under the noise model; closed: ω_IA − k times the mean current",
+            closed_caption="Least squares under the noise model; closed: ω_IA − "
+            + ("the mean rate" if s.rate else "k times the mean current"),
             tables=[_table(s, self.current, self.t0, self.t1, self.book)],
             repeatability={} if trend is None else {
                 "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
@@ -189,25 +201,32 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
 def _conventions(s: FixedPositionSetup) -> list[str]:
     axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
     return [
-        "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
+        "Drift ω_d in precession sign; the rate ω_g of axis x (input axis) is ω_IA − ω_d."
+        if s.rate
+        else "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
         f"Attitude, in east, north, up: {axes}.",
-        f"k = {s.k * 1e-3 / DPH:.6g} °/h/mA.",
+        *([] if s.rate else [f"k = {s.k * 1e-3 / DPH:.6g} °/h/mA."]),
         "One attitude gives one number: no separation of constant, g and g² terms.",
     ]
 
 
 def _table(s: FixedPositionSetup, i: Array, t0: Array, t1: Array, book: float) -> Table:
     X, Y, Z = s.xyz.tolist()
+    mean = float(np.average(i, weights=t1 - t0))
+    read: list[list[Any]] = (
+        [["mean rate ω_g", mean / DPH, "°/h"]]
+        if s.rate
+        else [["mean current i", mean * 1e3, "mA"], ["k i", s.k * mean / DPH, "°/h"]]
+    )
     return Table(
         "from_current_to_drift",
-        "From current to drift",
+        "From rate to drift" if s.rate else "From current to drift",
         "Means over the record",
         ["quantity", "value", "unit"],
         [
             ["Earth rate along the input axis ω_IA", s.input_rate / DPH, "°/h"],
-            ["mean current i", float(np.average(i, weights=t1 - t0)) * 1e3, "mA"],
-            ["k i", s.k * float(np.average(i, weights=t1 - t0)) / DPH, "°/h"],
-            ["ω_d = ω_IA − k i", book / DPH, "°/h"],
+            *read,
+            ["ω_d = ω_IA − ω_g" if s.rate else "ω_d = ω_IA − k i", book / DPH, "°/h"],
             ["X, Y, Z = −f/g0 along I, O, S", f"{X:.6f}, {Y:.6f}, {Z:.6f}", "1"],
             ["time of the readings", float(np.sum(t1 - t0)), "s"],
         ],

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from gyrobench.attitudes import attitude_problems, parse
 from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
-from gyrobench.system.families.rebalance_test import RebalanceTest
+from gyrobench.system.families.rate_reading import RateReading
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
@@ -16,9 +13,9 @@ from .measured import ATTITUDE as FACE
 from .measured import MEASURED
 
 
-class FixedPosition(RebalanceTest):
-    """The gyro stands still in its service attitude with its rebalance loop closed: one composite drift, and by
-    repeats its stability.
+class FixedPosition(RateReading):
+    """The gyro stands still in its service attitude with its rebalance loop closed, or a rate gyro does: one composite
+    drift, and by repeats its stability.
 
     [TEST-FIXED; Hu 1981, ch. 3 par. 2.2]
     """
@@ -26,11 +23,13 @@ class FixedPosition(RebalanceTest):
     title = "Fixed-position test"
     spec = ("TEST-FIXED", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
     reduction = "reduction"
-    slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
+    slots = RateReading.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
+    rate_gyro = "gyro_rate"
     options = (
         SITE
         | PHYSICAL_FORM
         | ATTITUDE
+        | RateReading.reads
         | {
             "dwell": Option(3600.0, "s", "time of the readings"),
             "readings": Option(30, int, "readings (averaging windows)", 8, 10000),
@@ -57,9 +56,3 @@ class FixedPosition(RebalanceTest):
 
     def check(self) -> list[str]:
         return attitude_problems(self["attitude"], self["latitude"]) + super().check()
-
-    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        problems = super().check_parameters(parameters)
-        if not (self["k"] or parameters.get("gyro.k")):
-            problems.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
-        return problems

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from gyrobench.arrays import Array
 from gyrobench.system.families.moving_bases import BASES
 from gyrobench.system.families.option_groups import NUISANCES, SITE, type_b
 from gyrobench.system.families.table_test import TableTest, on_table, sampled
+from gyrobench.system.part_files import has_port
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
@@ -119,6 +122,11 @@ class NorthFinding(TableTest):
                 "site": replace(self.slots["site"], part=moving),
             }
 
+    def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
+        super().place(slot, part, bench)
+        if slot == "gyro" and has_port(part, "f", bench):
+            vars(self)["wires"] = f"{self.wires}\ntable -> gyro: f"
+
     @property
     def auto(self) -> tuple[float, str] | None:
         """Total time, s, and method, where the shortest is asked for; None otherwise, or without what it needs."""
@@ -160,12 +168,26 @@ class NorthFinding(TableTest):
         finder = {
             "finder.latitude?": self["latitude"],
             "finder.gravity?": gravity,
-            "finder.density?": self["density"] or parts.get("gyro.white_y", 0.0) or 1e-9,
+            "finder.density?": self["density"] or self._density(parts) or 1e-9,
         }
         if self.chosen == "two":
             finder["finder.rough?"] = self["rough"]
         moved = {"table.acceleration": plans.ACCELERATION, "table.index_rate": plans.RATE}
         return {**super().parameters(parts), **moved, **BASES.get(self["base"], {}), **finder}
+
+    def _density(self, parts: PartValues) -> float:
+        """Return the white noise of the gyro in the slot, as its parameters state it."""
+        names = [n for n in ("gyro.white_y", "gyro.white") if n in parts]
+        return float(parts.get(names[0] if names else "gyro.white_y", 0.0))
+
+    def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
+        problems = super().check_parameters(parameters)
+        if not (self["density"] or {"gyro.white_y", "gyro.white"} & set(parameters)):
+            problems.append(
+                "density unknown: the parameters of the gyro do not state its white noise; give the option density "
+                "(the output density of the gyro, as 0.3deg/h/sqrt(Hz))"
+            )
+        return problems
 
     def check(self) -> list[str]:
         problems = super().check()

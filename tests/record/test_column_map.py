@@ -238,3 +238,37 @@ def test_spreadsheets_are_refused_with_a_word(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").write_bytes(b"PK\x03\x04" + bytes(100))
     with pytest.raises(UsageError, match="not a text file; save the table as CSV"):
         find_layout(tmp_path / "a.xlsx")
+
+
+PLAIN = """delimiter = ";"
+decimal = ","
+skip = 1
+[columns.t_start]
+from = "t"
+unit = "s"
+[columns.mean]
+from = 3
+unit = "nA"
+factor = -0.5
+"""
+ROWS = ["0;x;1,5e-3;", "10;y;-2,25;", "20;z;0,1;"]
+
+
+def test_plain_numbers_go_the_quick_way_to_the_same_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """-0.5 * 1.5e-3 = -0.00075, -0.5 * -2.25 = 1.125, -0.5 * 0.1 = -0.05; a remark stays above the names."""
+    text = "\n".join(["# operator = A", "t;text;I;", *ROWS, ""])
+    monkeypatch.setattr(MappedRows, "_row", None)  # the way row by row cannot be gone
+    lines, done = mapped(tmp_path, text, PLAIN)
+    assert lines[:2] == ["# operator = A", "t_start [s],mean [nA]"] and not done.problems()
+    assert [[float(c) for c in line.split(",")] for line in lines[2:]] == [[0, -0.00075], [10, 1.125], [20, -0.05]]
+
+
+@pytest.mark.parametrize(
+    "row", ["30;;−1;", "30;;;", "# a remark", "30;;1.5;", "", "30;;nan;", "30;;1;;7", '30;"a\nb";1;']
+)
+def test_what_is_not_plain_goes_row_by_row(row: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "\n".join(["lab", "t;text;I;", *ROWS, row, "40;;2;", ""])
+    found = mapped(tmp_path, text, PLAIN)
+    monkeypatch.setattr("gyrobench.record.column_map._quick", lambda *of: False)
+    lines, done = mapped(tmp_path, text, PLAIN)
+    assert (found[0], found[1].problems()) == (lines, done.problems())

@@ -70,6 +70,19 @@ def number(run: RunDocument, option: str, parameter: str, what: str = "") -> flo
     return float(value)
 
 
+def reads_rate(run: RunDocument) -> bool:
+    """Return whether the mean of a window is a rate of a rate gyro, not a current of a torquer."""
+    return bool(run.options.get("reading") == "rate")
+
+
+def rate_per_reading(run: RunDocument) -> float:
+    """Return k of omega_d = omega_IA - k mean: 1 of a rate gyro, else the torquer scale factor, rad/s/A.
+
+    Raises ReductionError where that is not known.
+    """
+    return 1.0 if reads_rate(run) else number(run, "k", "gyro.k", "torquer scale factor")
+
+
 def truth_of(run: RunDocument, names: Iterable[str], slot: str = "gyro") -> dict[str, float] | None:
     """Return those of ``names`` that are parameters of the part in ``slot``, SI; None where there are none."""
     return {n: float(run.parameters[f"{slot}.{n}"]) for n in names if f"{slot}.{n}" in run.parameters} or None

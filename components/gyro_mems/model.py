@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from gyrobench.component import Discrete, Noise, Output, Parameter, State, sampled
+from gyrobench.component.blocks.rate_gyro import RateGyro
+from gyrobench.component.math import Vector, floor, pi, sqrt, vector
+
+DEG = pi / 180.0
+
+
+class GyroMems(RateGyro):
+    """Two-axis rate gyro as a data sheet describes it: noise, bias instability, filter, range, word.  [GYRO-MEMS]
+
+        s_j = scaled rate along row j of axes + cubic w3 + drift_j + white
+        y'' = wn2 (s - y) - sqrt(2) wn y',   wn = 2 pi bandwidth                              Butterworth, second order
+        rate = y within +-range_max, sampled every `period`, in steps of `resolution`
+
+    white: two-sided density N, the angle random walk; a data sheet's noise density is one-sided, N sqrt(2).
+    Refused: axes that are not unit vectors within 10 %.
+    Not modelled: the resonator (drive, quadrature, mode split), delay beyond the filter, vibration rectification.
+    Source: IEEE 2700; IEEE 1431; own behavioural form.
+    """
+
+    version = "1.0.0"
+    white_noise = "white"
+
+    axes = Parameter([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], "1", "rows: sensitive axes in gyro axes (misalignment)")
+    cubic = Parameter(0.0, "s2/rad2", "nonlinearity: relative change of the scale factor per rate squared")
+    white = Noise(0.035 * DEG, "rad/s/sqrt(Hz)", "white noise density N (0.05 deg/s/sqrt(Hz) one-sided)", samples=2)
+    bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
+    range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
+    period = Parameter(0.0, "s", "time between two output samples; 0: every step", min=0.0)
+    resolution = Parameter(0.0, "rad/s", "step of the output word; 0: none", min=0.0)
+
+    density = Output("rad/s/sqrt(Hz)", "density N of the white noise (angle random walk)")
+
+    y = State([0.0, 0.0], "rad/s", "filtered rate")
+    v = State([0.0, 0.0], "rad/s2", "its derivative")
+    number = Discrete(-1.0, "1", "number of the output sample")
+
+    def start(self) -> None:
+        for j in range(2):
+            size = sqrt(vector(self.axes[j]) @ self.axes[j])
+            self.refuse(size < 0.9 or size > 1.1, "axes: each row must be a unit vector within 10 %")
+        self.y = self.sensed()
+
+    def sensed(self) -> Vector:
+        """Return the rates of both axes without white noise."""
+        w = self.mount @ self.omega
+        leaning = vector([vector(self.axes[0]) @ w, vector(self.axes[1]) @ w])
+        out = self.scaled(leaning, self.temperature) + self.drift_rates(self.temperature)
+        for j in range(2):
+            out[j] = out[j] + self.cubic * leaning[j] * leaning[j] * leaning[j]
+        return vector(out)
+
+    def flow(self) -> None:
+        wn = 2.0 * pi * self.bandwidth
+        s = self.sensed() + self.noise.white
+        for j in range(2):
+            self.der.y[j] = self.v[j]
+            self.der.v[j] = wn * wn * (s[j] - self.y[j]) - sqrt(2.0) * wn * self.v[j]
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        due = 1.0
+        if self.period > 0.0:
+            now = floor(self.t / self.period + 1e-6)
+            due = 1.0 if now > self.number else 0.0
+            self.number = now
+        if due > 0.5:
+            self.measured = self.y
+            self.limit(self.range_max)
+            if self.resolution > 0.0:
+                for j in range(2):
+                    self.measured[j] = self.resolution * floor(self.measured[j] / self.resolution + 0.5)
+
+    def outputs(self) -> None:
+        self.density = self.white

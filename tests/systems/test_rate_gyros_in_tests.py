@@ -1,0 +1,103 @@
+"""Rate gyros in the tests of a gyro at rest and in the north finder: slots, truth, sign, refusals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gyrobench import frames
+from gyrobench.engine.session import Session
+from gyrobench.result import Result
+from gyrobench.system.system import InvalidConfigurationError, System, load_system
+
+DPH = math.pi / 648000.0
+PARTS = ("gyro_rate", "gyro_fog", "gyro_laser", "gyro_mems")
+#: not counted, so that a short record is white
+PLAIN = {"gyro_laser": {"gyro.counting": 0.0}}
+
+
+def reduced(name: str, part: str, values: dict[str, object], seed: int = 1) -> tuple[System, Result]:
+    system = load_system(name).with_values({})
+    with Session(system, {"gyro": part}) as session:
+        record = session.run({**PLAIN.get(part, {}), **values}, seed=seed)
+    result: Result = system.with_values(record.run.options).reduce(record)
+    return system, result
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_drift_record_gives_the_density_that_the_gyro_shows(part: str) -> None:
+    system, result = reduced("drift_record", part, {"duration": 600.0, "window": 0.2})
+    assert system["reading"] == "rate" and "rebalance" not in system.slots
+    n = next(c for c in result.coefficients if c.name == "N")
+    assert n.truth is not None and n.truth > 0.0
+    assert abs(n.estimate - n.truth) < 4.0 * n.u  # fixed seed
+    assert n.u < 0.1 * n.truth
+
+
+def test_sign_and_earth_rate_in_the_fixed_position() -> None:
+    """The input axis up reads W sin(latitude) + bias: the drift in precession sign is -bias."""
+    values: dict[str, object] = {"attitude": "U E", "gyro.bias": [3.0 * DPH, 0.0], "dwell": 60.0, "readings": 10}
+    _, result = reduced("fixed_position", "gyro_fog", {**values, "gyro.optical": 0.0})
+    drift = result.coefficients[0]
+    assert drift.estimate == pytest.approx(-3.0, abs=1e-9)
+    table = next(t for t in result.tables if t.id == "from_current_to_drift")
+    earth = frames.EARTH_RATE * math.sin(math.radians(45.75)) / DPH
+    assert dict((r[0], r[1]) for r in table.rows)["mean rate ω_g"] == pytest.approx(earth + 3.0, rel=1e-9)
+
+
+def test_g_sensitivity_reaches_the_rate() -> None:
+    """Axis up, f = g: 1e-6 s/m of 9.8 m/s2 are 2 deg/h more."""
+    values: dict[str, object] = {
+        "attitude": "U E", "gyro.g": [[1e-6, 0.0, 0.0], [0.0, 0.0, 0.0]], "dwell": 60.0, "readings": 10,
+        "gyro.white": 0.0, "gravity": 9.81,
+    }  # fmt: skip
+    _, result = reduced("fixed_position", "gyro_mems", values)
+    assert result.coefficients[0].estimate == pytest.approx(-9.81e-6 / DPH, rel=1e-9)
+
+
+def test_a_measured_file_of_rates(tmp_path: Path) -> None:
+    file = tmp_path / "rates.csv"
+    rng = np.random.default_rng(2)
+    rows = [f"{60 * k},{60 * (k + 1)},{x:.9f}" for k, x in enumerate(7.0 + 0.1 * rng.normal(size=30))]
+    head = ["# latitude = 30deg", "# attitude = U E", "# reading = rate", "t_start [s],t_end [s],mean [deg/h]"]
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    system = load_system("fixed_position").with_values({})
+    result = system.reduce(system.read_measured(file, {}))
+    earth = frames.EARTH_RATE * 0.5 / DPH
+    assert result.coefficients[0].estimate == pytest.approx(earth - 7.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [({"reading": "voltage"}, "must be current or rate"), ({"reading": "rate", "k": "1deg/h/mA"}, "of a torquer")],
+)
+def test_refused(values: dict[str, object], said: str) -> None:
+    system = load_system("fixed_position").with_values(values)
+    with pytest.raises(InvalidConfigurationError, match=said):
+        system.refuse()
+
+
+def test_back_to_the_current() -> None:
+    system = load_system("fixed_position")
+    system.set("reading", "rate")
+    system.request("surroundings")
+    system.set("reading", "current")
+    assert "rebalance" in system.slots and "surroundings" in system.slots and "gyro.i" not in system.open
+
+
+@pytest.mark.parametrize("part", ["gyro_fog", "gyro_mems"])
+def test_north_finder_takes_them(part: str) -> None:
+    """Without noise the heading that is put in; with it the density must be known."""
+    quiet = {"gyro.optical": 0.0} if part == "gyro_fog" else {"gyro.white": 0.0}
+    system = load_system("north_finder").with_values({})
+    with Session(system, {"gyro": part}) as session:
+        if part == "gyro_fog":
+            with pytest.raises(InvalidConfigurationError, match="density unknown"):
+                session.run({"time": 60.0})
+        still = {f"accelerometers.white_{a}": 0.0 for a in "xyz"}
+        record = session.run({"time": 60.0, "density": 1e-9, **quiet, **still})
+    result = system.with_values(record.run.options).reduce(record)
+    assert result.coefficients[0].estimate == pytest.approx(40.0, abs=0.01)
