@@ -55,10 +55,6 @@ ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimat
 LEVEL_RATE = Source(
     "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
 )
-AT_REST_A = Source(
-    "accelerometers.at_rest", "accelerometers at rest", "m/s²", note="noise, by the directions of gravity"
-)
-AT_REST_G = Source("gyros.at_rest", "gyros at rest", "rad/s", note="noise, by the biases")
 WHITE = "noise of the instrument and what the model does not hold, from the residuals"
 CONVENTIONS = [
     "Axes of the case: x along the input axis of the accelerometer x, y in the plane of those of x and y, z "
@@ -147,13 +143,13 @@ class HandTurns(HandChannel):
         X = -turns.slopes(found.turned, found.matrix)
         y = turns.left(found.turned, found.matrix) + X @ found.matrix.ravel()
         number = np.repeat(np.arange(1.0, len(found.turned) + 1), 2)
-        w, place = turn_errors.weights(self.at), np.arange(float(y.size))  # both data of a turn have its time
+        W = turn_errors.whitener(self.at, X, y)
+        ends = np.array([[t.time[0], t.time[-1]] for t in found.turned])
+        halves = np.column_stack([ends[:, 0], ends.mean(axis=1), ends.mean(axis=1), ends[:, 1]]).reshape(-1, 2)
         group = Group("turns", np.arange(y.size), number, "number of the turn", "")
         names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        unit = ("direction of gravity after a turn, less for long ones", "″", ARCSEC)
-        return Regression(
-            names, w[:, None] * X, w * y, place, place + 1.0, [group], *unit, "estimated", limit=norms.LIMIT
-        )
+        unit = ("direction of gravity after a turn, its noise made white", "″", ARCSEC)
+        return Regression(names, W @ X, W @ y, halves[:, 0], halves[:, 1], [group], *unit, "white", limit=norms.LIMIT)
 
     def derived(self, found: Findings) -> Findings:
         counts, D = "g" in self.setup.counts, self.at.scale_g
@@ -173,14 +169,11 @@ class HandTurns(HandChannel):
         return found.derive(quantities, of)
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the level Earth rate, and the noise of what was read at rest, which several data share."""
-        at, w = self.at, turn_errors.weights(self.at)
-        level = w * turn_errors.of_level_rate(at)
-        return [
-            LEVEL_RATE.effect(at.found.u, level, parts=("first", "second")),
-            AT_REST_A.effect(at.noise_a, w * turn_errors.of_accelerometers(at)),
-            AT_REST_G.effect(at.noise_g, w * turn_errors.of_gyros(at)),
-        ]
+        """Return the level Earth rate; what readings at rest share between turns is in the weights."""
+        at, own = self.at, self.at.found
+        X = -turns.slopes(own.turned, own.matrix)
+        W = turn_errors.whitener(at, X, turns.left(own.turned, own.matrix) + X @ own.matrix.ravel())
+        return [LEVEL_RATE.effect(own.u, turn_errors.of_level_rate(at) @ W, parts=("first", "second"))]
 
 
 class HandGyro(HandChannel):

@@ -14,15 +14,37 @@ from .hand_positions import Positions
 from .turns import Turn
 
 STEP = 1e-6  # rad/s
+SIZES, GUESSES = (1e-3, 1e5), 65  # variance of the turns over that of the readings at rest
 
 
-def weights(at: Positions) -> Array:
-    """Return the weight (2 n,) of the data: white noise of a rate grows with the time of a turn, the rest does not.
+def whitener(at: Positions, X: Array, y: Array) -> Array:
+    """Return a symmetric matrix (2 n, 2 n) that makes the noise of the data y, with regressors X, white and alike.
 
-    It is 1 for a turn of the usual length.
+    The noise is that of the readings at rest, whose size is known, and one of the turns, which grows with their time
+    (white noise of a rate) and besides; its size is the likeliest (restricted likelihood).  Typical data keep theirs.
     """
+    rest = at.noise_a**2 * _square(of_accelerometers(at)) + at.noise_g**2 * _square(of_gyros(at))
     span = np.array([t.time[-1] - t.time[0] for t in at.found.turned])
-    return np.repeat(np.sqrt(2.0 * np.median(span) / (span + np.median(span))), 2)
+    own = np.diag(np.repeat(0.5 * (1.0 + span / np.median(span)), 2))
+    usual = float(np.mean(np.diag(rest)))
+    sizes = usual * np.concatenate([[1e-6], np.geomspace(*SIZES, GUESSES)])
+    best = max(sizes, key=lambda size: _likelihood(rest + size * own, X, y))
+    values, vectors = np.linalg.eigh(rest + best * own)
+    scale = np.sqrt(float(np.median(np.diag(rest + best * own))))
+    return np.asarray((vectors * (scale / np.sqrt(values))) @ vectors.T)
+
+
+def _square(errors: Array) -> Array:
+    return np.asarray(errors.T @ errors)
+
+
+def _likelihood(covariance: Array, X: Array, y: Array) -> float:
+    """Return the logarithm of the restricted likelihood, but for a constant."""
+    root = np.linalg.cholesky(covariance)
+    Z, d = np.linalg.solve(root, X), np.linalg.solve(root, y)
+    left = d - Z @ np.linalg.lstsq(Z, d, rcond=None)[0]
+    volume = 2.0 * float(np.sum(np.log(np.diag(root)))) + float(np.linalg.slogdet(Z.T @ Z)[1])
+    return -0.5 * (volume + float(left @ left))
 
 
 def of_level_rate(at: Positions) -> Array:
