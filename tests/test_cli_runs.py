@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from openpyxl import load_workbook
 from processes import unhurried
 
 from gyrobench.bench import Bench
@@ -140,7 +142,7 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
 def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "a", tmp_path / "a")
     code, out, _ = gyrobench("record", "a", "--to", "csv", "--out", "t")
-    assert (code, out.split()) == (0, ["t/windows.csv", "t/channels.csv"])
+    assert (code, out.split()[:2]) == (0, ["t/windows.csv", "t/channels.csv"])
     record = Record.load(tmp_path / "a")
     for name, columns in (("windows", record.windows), ("channels", record.channels)):
         head, *rows = (tmp_path / "t" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
@@ -148,10 +150,29 @@ def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path)
         table = np.array([[float(x) for x in r.split(",")] for r in rows])
         assert all(np.array_equal(table[:, k], v) for k, v in enumerate(columns.values()))  # bit for bit
         assert {"mean [A]", "phase", "angle_end [rad]"} <= set(head.split(",")) or "gyro.u [V]" in head.split(",")
-    assert gyrobench("record", "a", "--to", "csv")[1].split() == ["a/csv/windows.csv", "a/csv/channels.csv"]
+    assert gyrobench("record", "a", "--to", "csv")[1].split()[:2] == ["a/csv/windows.csv", "a/csv/channels.csv"]
     assert Record.load(tmp_path / "a").same_data(record)  # the run stays a record
     code, _, err = gyrobench("record", "nothing", "--to", "csv")
     assert code == 2 and "nothing: no run there" in err
+
+
+def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+    shutil.copytree(runs / "a", tmp_path / "a")
+    result = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))
+    files = gyrobench("record", "a", "--to", "csv", figures=False)[1].split()[2:]
+    (coefficients,) = (f for f in files if "Coefficients" in f)
+    rows = list(csv.DictReader((tmp_path / coefficients).read_text(encoding="utf-8-sig").splitlines()))
+    for row, c in zip(rows, result["coefficients"], strict=True):
+        assert (row["name"], float(row["estimate"]), float(row["u"])) == (c["name"], c["estimate"], c["u"])
+        assert row["group"] == f"in {c['unit']}"
+    assert gyrobench("record", "a", "--to", "xlsx", figures=False)[:2] == (0, "a/tables.xlsx\n")
+    book = load_workbook(tmp_path / "a" / "tables.xlsx")
+    assert book.sheetnames[:3] == ["contents", "windows", "channels"] and len(book.sheetnames) == 3 + len(files)
+    sheet = book[next(n for n in book.sheetnames if "Coefficients" in n)]
+    estimates = [c["estimate"] for c in result["coefficients"]]
+    assert [r[3] for r in sheet.iter_rows(min_row=2, values_only=True)] == pytest.approx(estimates, rel=1e-15)
+    windows = [r[0] for r in book["windows"].iter_rows(min_row=2, values_only=True)]
+    assert windows == Record.load(tmp_path / "a").windows["phase"].tolist()
 
 
 def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:

@@ -119,6 +119,7 @@ class Target(StrEnum):
 
 class TableFormat(StrEnum):
     csv = "csv"
+    xlsx = "xlsx"
 
 
 class Form(StrEnum):

@@ -221,11 +221,14 @@ def compare(
 def record(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     to: Annotated[
-        TableFormat, typer.Option("--to", help="csv: windows.csv and channels.csv, SI, units in the header.")
+        TableFormat,
+        typer.Option("--to", help="csv: a file a table, those of the report in report/; xlsx: a workbook."),
     ],
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder; default csv/ in the run.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder; default: of the run, csv/ in it for csv.")
+    ] = None,
 ) -> None:
-    """Write the record of a run as tables for other programs.
+    """Write the record of a run, and the tables of its report, for other programs.
 
     A row of windows.csv is a completed window (its columns: docs/systems.md), one of channels.csv a time; names are
     those of the record, "gyro.u [V]" with the SI unit where it is not 1.  Numbers read back bit for bit.
@@ -233,11 +236,9 @@ def record(
     \b
     Example: gyrobench record reports/out/tumble_single_axis/1a2b3c4d --to csv --out tables
     """
-    from gyrobench.record.record import Record
-    from gyrobench.workflow.inputs import require_run
+    from gyrobench.workflow.run_tables import write_tables
 
-    assert to is TableFormat.csv
-    for file in Record.load(require_run(folder)).to_csv(out or folder / "csv"):
+    for file in write_tables(folder, to.value, out):
         echo(display_path(file))
 
 

@@ -38,7 +38,9 @@ def record_of(name: str) -> str:
     """A record of the corpus, or the template of the test with a row."""
     if name in RECORDS:
         return RECORDS[name].read_text(encoding="utf-8")
-    return empty_record(load_system(name)) + "1,0,1,0,0,0.1,0.01,0\n"
+    template = empty_record(load_system(name))
+    width = template.strip().rsplit("\n", 1)[-1].count(",") + 1
+    return template + ",".join(["1", "0", "1", "0", "0", "0.1", "0.01", *["0"] * width][:width]) + "\n"
 
 
 def known(system: System) -> Keys:
