@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         reduce,
         site,
         sweep,
+        tune,
     )
 
 __all__ = [
@@ -51,6 +52,7 @@ __all__ = [
     "reduce",
     "site",
     "sweep",
+    "tune",
 ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gyrobench.bench import Bench, UsageError, standard_folder
@@ -57,12 +58,14 @@ def test_the_figures_of_one_by_hand() -> None:
     assert found["white"] == pytest.approx(2.0 * PER_ROOT_HOUR)
     assert found["flicker_x"] == pytest.approx(0.007 * DEG / 0.6643, rel=1e-4)  # (2 ln 2/pi)^0.5 = 0.6643
     assert found["turn_on"] == pytest.approx(3.0 * DEG)
-    assert found["cubic"] == pytest.approx(0.004 / (300.0 * DEG) ** 2)
+    assert found["cubic"] == pytest.approx(0.0025 / (300.0 * DEG) ** 2)
     assert found["g"][0] == pytest.approx([0.05 * DEG / 9.80665, 0.0, 0.0])
     assert found["axes"][0] == pytest.approx([1.0, 0.05 * DEG, 0.0])
     assert found["bandwidth"] == 330.0 and "period" not in found
-    # a cubic c w3 over +-R is c R3/4 off the line that is nearest to it (Chebyshev): 0.1 % of R
-    assert found["cubic"] * (300.0 * DEG) ** 3 / 4.0 == pytest.approx(1e-3 * 300.0 * DEG)
+    # the least-squares line through a cubic over +-R: by numpy on 2001 rates
+    x = np.linspace(-300.0 * DEG, 300.0 * DEG, 2001)
+    y = found["cubic"] * x**3
+    assert np.max(np.abs(y - np.polyval(np.polyfit(x, y, 1), x))) == pytest.approx(1e-3 * 300.0 * DEG, rel=2e-3)
 
 
 def test_limits_set_nothing() -> None:
@@ -85,12 +88,29 @@ def test_drift_record_returns_the_random_walk(name: str) -> None:
     assert n.interval[0] <= expected <= n.interval[1] or n.estimate == pytest.approx(expected, rel=0.05)
 
 
+def test_rate_table_returns_the_nonlinearity_of_a_sheet() -> None:
+    """ADIS16405: 0.1 % of 300 deg/s, as the table of departures has it; ten steps, noise off.
+
+    Up to 280 deg/s, for the turn-on bias takes its part of the range; the departure goes with the square of it.
+    """
+    sheet = find_instrument("adis16405")
+    values = {"full_scale": 280.0 * DEG, "steps": 10, "cycles": 1, "dwell": 0.5, "settle": 0.2}
+    quiet = {"gyro.white": 0.0, "gyro.flicker_x": 0.0, "gyro.flicker_y": 0.0, "gyro.resolution": 0.0}
+    system = load_system("rate_table_test").with_values(values)
+    with Session(system, {"gyro": sheet.part}) as session:
+        result = system.reduce(session.run({**values, **settings(sheet), **quiet}, seed=2))
+    rows = next(t for t in result.tables if t.id == "rate.departures").rows
+    assert max(abs(row[2]) for row in rows) == pytest.approx(1000.0 * (280.0 / 300.0) ** 2, rel=0.05)  # ppm
+
+
 def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for room in ("components", "systems", "reports", "instruments"):
         (tmp_path / room).mkdir()
     (tmp_path / "instruments" / "mine.toml").write_text(MINE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    assert with_instrument("mine", {}) == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
+    title, values = with_instrument("mine", {})
+    assert title == "Me Mine (own sheet, 2020), simulated"
+    assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
 @pytest.mark.parametrize(

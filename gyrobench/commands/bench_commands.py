@@ -27,7 +27,7 @@ from gyrobench.commands.options import (
 
 @app.command("list")
 def list_command(as_json: Json = False) -> None:
-    """List parts, systems, sockets, acceptance specifications and data sheets of instruments.
+    """List parts, systems, sockets, specifications and data sheets.
 
     A socket is the list of inputs and outputs, with units, that a part must have to stand in a slot of a system.
 

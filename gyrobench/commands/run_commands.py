@@ -89,8 +89,9 @@ def run(
 
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
-    sheet = with_instrument(instrument, parts) if instrument else {}
+    title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
     test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
+    vars(test)["instrument"] = title
     request = RunRequest(
         parts=parts,
         maps=maps,
@@ -228,7 +229,7 @@ def record(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder; default: of the run, csv/ in it for csv.")
     ] = None,
 ) -> None:
-    """Write the record of a run, and the tables of its report, for other programs.
+    """Write the record of a run and the tables of its report.
 
     A row of windows.csv is a completed window (its columns: docs/systems.md), one of channels.csv a time; names are
     those of the record, "gyro.u [V]" with the SI unit where it is not 1.  Numbers read back bit for bit.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gyrobench.commands.app import app, echo
-from gyrobench.commands.options import Json, Map, Part, Seed, Set, System
+from gyrobench.commands.options import Json, Map, Out, Part, Seed, Set, System
 
 
 @app.command()
@@ -41,13 +41,15 @@ def tune(
     part: Part = None,
     mapping: Map = None,
     seed: Seed = 1,
+    out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Tune a stabilizer loop for wanted margins.
 
     The linear models are those of the parts; what is wanted holds in the worst case over the spread, and is proven in
     co-simulation with noise, friction and limits as they are.  Print the controller as values that are ready to run.
-    Exit code 1: it cannot be had (the text says why), or the co-simulation contradicts.
+    --out DIR writes a page with Nichols and
+    Nyquist plots, S and T.  Exit code 1: it cannot be had (the text says why), or the co-simulation contradicts.
 
     \b
     Example: gyrobench tune platform_single_axis --want "phase margin=40deg" --want "bandwidth>10Hz"
@@ -63,5 +65,10 @@ def tune(
         given=settings,
     )  # fmt: skip
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
+    if out is not None:
+        from gyrobench.bench import display_path
+
+        for path in found.write(out).values():
+            echo(display_path(path), err=True)
     if not found.proven:
         raise typer.Exit(1)

@@ -63,10 +63,10 @@ class RunFiles:
                     for block in blocks:
                         file.write(np.ascontiguousarray(block).data)
 
-    def rows(self, name: str, width: int) -> Array:
-        """Return the rows that were kept."""
+    def rows(self, name: str, width: int, first: int = 0) -> Array:
+        """Return the rows that were kept, from the row ``first`` on."""
         file = self.file(name)
-        values = np.fromfile(file) if file.is_file() else np.empty(0)
+        values = np.fromfile(file, offset=8 * width * first) if file.is_file() else np.empty(0)
         return values[: len(values) // width * width].reshape(-1, width)
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+from gyrobench.arrays import Array
 from gyrobench.engine.checkpoint import CheckpointManager
 from gyrobench.engine.reference_engine import RunState
 from gyrobench.errors import GyrobenchError
@@ -25,7 +26,8 @@ class ProgressReport:
     """Progress of a run.
 
     total: s, expected end of the simulated time; rate: steps per second of wall time; steps, elapsed (s of wall time):
-    since the run was started or resumed, which was at the simulated time ``since``, s.
+    since the run was started or resumed, which was at the simulated time ``since``, s.  rows: gives the rows of the
+    channels since its last call, names and [time, values ...], to look at: they may be torn while they are read.
     """
 
     time: float
@@ -35,6 +37,7 @@ class ProgressReport:
     rate: float
     elapsed: float
     since: float = 0.0
+    rows: Callable[[], tuple[Sequence[str], Array]] | None = None
 
     @property
     def fraction(self) -> float:

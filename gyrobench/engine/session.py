@@ -360,7 +360,7 @@ class Session:
         return RunDocument(
             system=system.name,
             title=system.title,
-            instrument=f"{item.name} {item.version}, simulated" if item else "",
+            instrument=system.instrument or (f"{item.name} {item.version}, simulated" if item else ""),
             spec=list(system.spec),
             date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             seed=seed,

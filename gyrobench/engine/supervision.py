@@ -14,9 +14,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.engine.child import Loads, RunFiles, read_ending, run_job
@@ -140,6 +142,7 @@ class _Supervisor:
         self.began = self.looked = self.moved = time.monotonic()
         self.seen: tuple[int, ...] = ()
         self.reported = (self.began, 0)  # time and steps
+        self.given = 0  # rows of the channels that were shown
         self.due = self.checked = self.began  # of the next report, of the next look at memory and prints
 
     def run(self) -> Ending:
@@ -219,8 +222,17 @@ class _Supervisor:
                 rate,
                 now - self.began,
                 s.first * h,
+                self._newest,
             )
         )
+
+    def _newest(self) -> tuple[Sequence[str], Array]:
+        """Return the names of the channels and the rows that came since the last call, some perhaps once more."""
+        names = self.job.program.channel.names
+        board = self.board.rows()[0]  # first: what leaves it meanwhile is in the file
+        kept = self.files.rows("channel", 1 + len(names), self.given)
+        self.given += len(kept)
+        return names, np.concatenate([kept, board])
 
     def _kill(self, why: str) -> None:
         if not self.killed:

@@ -11,6 +11,7 @@
     gb.reduce("tumble_single_axis", "data.csv", latitude="45.75deg", k="17.2deg/h/mA")
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
     gb.sweep("tumble_single_axis", {"latitude": "0deg..80deg:9"}, seeds=20)   # a data frame, a row a run
+    gb.tune("platform_single_axis", ["phase margin=40deg", "bandwidth>10Hz"], ["platform.J=±30%"])
     gb.campaign("campaign.toml", out="folder")
     gb.site("folder").index                      # the page of a stored campaign
 
@@ -21,7 +22,7 @@ part or a system passes unchanged before a run, and after it as a PostRunError t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ from gyrobench.workflow.run_comparison import Comparison, compare_results, read_
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
+    from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
     "Comparison",
@@ -58,6 +60,7 @@ __all__ = [
     "reduce",
     "site",
     "sweep",
+    "tune",
 ]
 
 
@@ -170,4 +173,36 @@ def design(
         test.system, wants, time=time_of("time", time), criterion=criterion, instruments=instruments,
         noise_of=None if noise is None else Path(noise), parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
         count=count, given={k: str(v) for k, v in given.items()},
+    )  # fmt: skip
+
+
+@checked
+def tune(
+    name: str,
+    want: Sequence[str],
+    over: Sequence[str] = (),
+    structure: str = "lead-lag",
+    *,
+    seed: int = 1,
+    values: Mapping[str, Any] | None = None,
+    parts: Mapping[str, File] | None = None,
+    maps: Mapping[str, File] | None = None,
+    **options: Any,
+) -> TunedLoop:
+    """Return the controller of a stabilizer loop for what is wanted, worst case over a spread, proven in co-simulation.
+
+    want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+".
+    values, options, parts, maps: as of :func:`load`.  ``had``: whether all of it can be had, by the linear models;
+    ``proven``: and the co-simulation does not contradict; ``reasons``: why not.  ``settings`` and ``part`` are for
+    :func:`load`; ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
+    GyrobenchError.
+    """
+    from gyrobench.library.experiment import mapping_files
+    from gyrobench.tuning.tune_loop import tune as tune_loop
+
+    given = {**(values or {}), **options}
+    test = load(name, given, parts=parts, maps=maps)
+    return tune_loop(
+        test.system, want, over, structure, parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
+        given={k: str(v) for k, v in given.items()},
     )  # fmt: skip

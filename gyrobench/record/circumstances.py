@@ -19,7 +19,7 @@ from textwrap import shorten
 WORD = r"[^\W\d][\w.-]*"
 KEY = rf"{WORD}(?: [\w.-]+){{0,2}}"
 VALUE = r"(?:[-+.\d]\S* )?[^\s'\"();:]+"  # a quantity, or one word; words in quotes are quoted
-BEGIN = r"[#\s]*(?:[•*-]\s+)?"
+BEGIN = r"[#\s]*+(?:[•*-]\s++)?"  # possessive: ten thousand spaces took seconds to be given back
 STATED = re.compile(rf"{BEGIN}({KEY})\s*=(.*)", re.S)
 COLON = re.compile(rf"{BEGIN}({KEY})\s*:\s*({VALUE})\s*")
 WITHIN = re.compile(rf"{BEGIN}[^=]*\s({WORD})\s*=\s*({VALUE})\s*")

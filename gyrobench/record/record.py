@@ -13,6 +13,7 @@ complete.  The digests are checked whenever a record is read.
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -115,6 +116,34 @@ def read_table(stem: Path) -> dict[str, AnyArray] | None:
     return None
 
 
+class ColumnsOnRequest(Mapping[str, AnyArray]):
+    """Columns of a Parquet table by name, each read when it is first asked for."""
+
+    def __init__(self, file: Path) -> None:
+        import pyarrow.parquet as pq
+
+        self.file = file
+        self.read: dict[str, AnyArray] = {}
+        with file.open("rb") as data, pq.ParquetFile(data) as table:
+            self.names = list(table.schema_arrow.names)
+
+    def __getitem__(self, name: str) -> AnyArray:
+        if name not in self.names:
+            raise KeyError(name)
+        if name not in self.read:
+            import pyarrow.parquet as pq
+
+            with self.file.open("rb") as data, pq.ParquetFile(data) as table:
+                self.read[name] = _numpy(table.read(columns=[name]).column(0))
+        return self.read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
 @dataclass(repr=False)
 class Record(Displayed):
     """The record of a run: windows, channels and their provenance (run.json).
@@ -146,8 +175,11 @@ class Record(Displayed):
 
     @classmethod
     @checked
-    def load(cls, folder: Path) -> Record:
-        """Read a folder.  Raises RecordError when it is not a record, or when a table is not the one that was saved."""
+    def load(cls, folder: Path, on_request: bool = False) -> Record:
+        """Read a folder.  Raises RecordError when it is not a record, or when a table is not the one that was saved.
+
+        on_request: a channel is read when it is first asked for by ``channels[name]``, to look at long records.
+        """
         folder = Path(folder)
         run = read_run(folder)
         if isinstance(run, SuiteDocument):
@@ -156,7 +188,8 @@ class Record(Displayed):
         _check_tables(folder, run)
         try:
             windows = read_table(folder / "record")
-            channels = read_table(folder / "channels")
+            long = on_request and (folder / "channels.parquet").is_file()
+            channels: Any = ColumnsOnRequest(folder / "channels.parquet") if long else read_table(folder / "channels")
         except (OSError, ValueError, IndexError, NotImplementedError, csv.Error) as error:
             raise RecordError(f"{folder}: not a readable record: {error}") from None
         if windows is None:

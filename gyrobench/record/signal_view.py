@@ -64,6 +64,49 @@ class SignalPyramid:
         return SignalView(np.asarray(self.time[at], dtype=float), self.values[at], every)
 
 
+class LiveSignals:
+    """Signals while they come: rows [time, values ...], thinned evenly so that every signal keeps its extremes.
+
+    Of every stretch of time the smallest and the largest sample of each signal is kept; the stretches double as the
+    record grows.  most: rows that are kept, about.
+    """
+
+    def __init__(self, most: int = 2000) -> None:
+        self.most = most
+        self.stretch = 0.0  # s; 0: every row is kept
+        self.rows: Array = np.empty((0, 0))
+
+    def add(self, rows: Array) -> None:
+        """Take rows; those that are not after the last one, or not in order, are left out."""
+        if not rows.size:
+            return
+        if self.rows.shape[1] != rows.shape[1]:
+            self.rows = np.empty((0, rows.shape[1]))
+        last = self.rows[-1, 0] if len(self.rows) else -np.inf
+        before = np.concatenate([[last], np.maximum.accumulate(np.nan_to_num(rows[:-1, 0], nan=-np.inf))])
+        self.rows = np.concatenate([self.rows, rows[rows[:, 0] > np.maximum(before, last)]])
+        if len(self.rows) > self.most:
+            stretches = max(4, self.most // (2 * max(1, self.rows.shape[1] - 1)))
+            span = self.rows[-1, 0] - self.rows[0, 0]
+            self.stretch = self.stretch or span / stretches
+            while span > stretches * self.stretch:
+                self.stretch *= 2.0
+            self.rows = self.rows[self._kept()]
+
+    def _kept(self) -> AnyArray:
+        """Return the places of the rows that hold the extremes of a signal in a stretch, and the last one."""
+        time = self.rows[:, 0]
+        number = np.floor(time / self.stretch)
+        ends = np.flatnonzero(np.diff(number, append=np.inf))  # the last of each stretch
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        found = [np.array([len(time) - 1])]
+        for column in self.rows[:, 1:].T:
+            finite = np.isfinite(column)
+            found.append(np.lexsort((np.where(finite, column, np.inf), number))[starts])
+            found.append(np.lexsort((np.where(finite, column, -np.inf), number))[ends])
+        return np.unique(np.concatenate(found))
+
+
 def _extremes(values: Array, at: AnyArray | None, factor: int, pick: Callable[..., Any]) -> AnyArray:
     """Return the places of the extremes of buckets of ``factor`` places ``at`` each (None: of all samples, in order).
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,8 @@ from gyrobench.report.channel_figure import scaled
 POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
-FIRST = 4  # signals shown at first
-RECORDS = 4  # kept open
+TEXT, GRID = "#7b8791", "rgba(128, 140, 150, 0.3)"  # read on light and on dark ground
+RECORDS = 3  # kept open
 
 
 class RecordSignals:
@@ -27,7 +28,7 @@ class RecordSignals:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self.time = record.channels.get("time", np.empty(0))
+        self.time = record.channels["time"] if "time" in record.channels else np.empty(0)
         self.names = [n for n in record.channels if n != "time"]
         self._pyramids: dict[str, SignalPyramid] = {}
 
@@ -64,14 +65,70 @@ def signals_of(folder: Path) -> RecordSignals:
 
 @functools.lru_cache(maxsize=RECORDS)
 def _signals(folder: Path, _changed: int) -> RecordSignals:
-    return RecordSignals(Record.load(folder))
+    return RecordSignals(Record.load(folder, on_request=True))
 
 
-def first_shown(names: Sequence[str], shown: Sequence[Any]) -> list[str]:
-    """Return the signals that are drawn at first: those that the system's report draws, else the first ones."""
-    wanted = [n for entry in shown for n in (entry if isinstance(entry, list | tuple) else [entry])]
-    found = [n for n in names if n in wanted or n.partition("[")[0] in wanted]
-    return (found or list(names))[:FIRST]
+def panels(titles: Sequence[str], begin: float, end: float) -> dict[str, Any]:
+    """Return the options of a chart over time, s: a panel for each title, one above the other, without series."""
+    top = [TOP + k * (PANEL + GAP) for k in range(len(titles))]
+    last = len(titles) - 1
+    return {
+        "animation": False, "color": list(COLOURS), "backgroundColor": "transparent",
+        "textStyle": {"color": TEXT},
+        "legend": {"type": "scroll", "top": 0, "textStyle": {"color": TEXT}}, "tooltip": {"trigger": "axis"},
+        "axisPointer": {"link": [{"xAxisIndex": "all"}]},
+        "grid": [{"left": 64, "right": 18, "top": t + 24, "height": PANEL} for t in top],
+        "title": [
+            {"text": text, "top": t, "left": 0, "textStyle": {"fontSize": 12, "color": TEXT}}
+            for text, t in zip(titles, top, strict=True)
+        ],
+        "xAxis": [
+            {"type": "value", "gridIndex": k, "min": begin, "max": end, "name": "time in s" if k == last else "",
+             "nameLocation": "middle", "nameGap": 24, "axisLabel": {"show": k == last, "color": TEXT},
+             "splitLine": {"lineStyle": {"color": GRID}}}
+            for k in range(len(titles))
+        ],
+        "yAxis": [{"type": "value", "gridIndex": k, "scale": True, "splitNumber": 4, "axisLabel": {"color": TEXT},
+             "splitLine": {"lineStyle": {"color": GRID}}} for k in range(len(titles))],
+    }  # fmt: skip
+
+
+def height_of(count: int) -> str:
+    """Return the style of a chart with so many panels."""
+    return f"height: {TOP + BOTTOM + max(1, count) * (PANEL + GAP)}px"
+
+
+class LiveChart:
+    """Signals of a run while it is under way, from the file that its process writes."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.read = file, 0
+        self.chart = ui.echart({"series": []}).classes("chart").props('role=img aria-label="Signals so far"')
+        self.chart.set_visibility(False)
+
+    def look(self) -> None:
+        """Draw the signals where there are new ones."""
+        try:
+            changed = self.file.stat().st_mtime_ns
+            content = json.loads(self.file.read_text(encoding="utf-8")) if changed != self.read else None
+        except (OSError, ValueError):
+            return
+        if content is None or not content["time"]:
+            return
+        self.read = changed
+        names, time = content["names"], content["time"]
+        options = panels([f"{n}, SI" for n in names], time[0], time[-1])
+        options["legend"] = {"show": False}
+        options["series"] = [
+            {"type": "line", "name": n, "id": n, "showSymbol": False, "xAxisIndex": k, "yAxisIndex": k,
+             "lineStyle": {"width": 1.2}, "data": [list(point) for point in zip(time, values, strict=True)]}
+            for k, (n, values) in enumerate(zip(names, content["values"], strict=True))
+        ]  # fmt: skip
+        self.chart.set_visibility(True)
+        self.chart.style(height_of(len(names)))
+        self.chart.options.clear()
+        self.chart.options.update(options)
+        self.chart.update()
 
 
 class SignalChart:
@@ -91,38 +148,22 @@ class SignalChart:
         self.names = list(names)
         self.view = (self.begin, self.end)
         options = await asyncio.to_thread(self.options)
-        height = TOP + BOTTOM + max(1, len(options["grid"])) * (PANEL + GAP)
-        self.chart.style(f"height: {height}px")
+        self.chart.style(height_of(len(options["grid"])))
         self.chart.options.clear()
         self.chart.options.update(options)
         self.chart.update()
 
     def options(self) -> dict[str, Any]:
-        """Return the options of the chart: a grid for each unit, the series of a view of each signal."""
+        """Return the options of the chart: a panel for each unit, the series of a view of each signal."""
         units = list(dict.fromkeys(self._unit(n) for n in self.names))
         scales = {u: self._scale(u) for u in units}
-        top = [TOP + k * (PANEL + GAP) for k in range(len(units))]
-        grids = [{"left": 64, "right": 18, "top": t + 24, "height": PANEL} for t in top]
+        chart = panels([f"in {scales[u][1] or '1'}" for u in units], self.begin, self.end)
         axes = list(range(len(units)))
-        last = len(units) - 1
-        return {
-            "animation": False, "color": list(COLOURS), "backgroundColor": "transparent",
-            "legend": {"type": "scroll", "top": 0}, "tooltip": {"trigger": "axis"},
-            "axisPointer": {"link": [{"xAxisIndex": "all"}]}, "grid": grids,
-            "title": [
-                {"text": f"in {scales[u][1] or '1'}", "top": t, "left": 0, "textStyle": {"fontSize": 12}}
-                for u, t in zip(units, top, strict=True)
-            ],
-            "xAxis": [
-                {"type": "value", "gridIndex": k, "min": self.begin, "max": self.end, "nameLocation": "middle",
-                 "name": "time in s" if k == last else "", "nameGap": 24, "axisLabel": {"show": k == last}}
-                for k in axes
-            ],
-            "yAxis": [{"type": "value", "gridIndex": k, "scale": True, "splitNumber": 4} for k in axes],
-            "dataZoom": [{"type": "inside", "xAxisIndex": axes, "filterMode": "none"},
-                         {"type": "slider", "xAxisIndex": axes, "filterMode": "none", "bottom": 8, "height": 22}],
-            "series": self._series(units, scales),
-        }  # fmt: skip
+        chart["dataZoom"] = [
+            {"type": "inside", "xAxisIndex": axes, "filterMode": "none"},
+            {"type": "slider", "xAxisIndex": axes, "filterMode": "none", "bottom": 8, "height": 22},
+        ]
+        return {**chart, "series": self._series(units, scales)}
 
     def _unit(self, name: str) -> str:
         return next(s.unit(name) for s in self.records.values() if name in s.names)

@@ -128,7 +128,7 @@ def _preview(mapping: _Mapping) -> None:
     """Add the first rows of the file as they are."""
     layout = mapping.proposal.layout
     rows = []
-    for number, cells in cells_of_file(mapping.proposal.file, layout.encoding, layout.delimiter):
+    for number, cells in cells_of_file(mapping.proposal.text_file, layout.encoding, layout.delimiter):
         if number > layout.skip:
             rows.append([str(number), *cells[:WIDE]])
         if len(rows) > ROWS:
@@ -285,7 +285,7 @@ def add_data_page(studio: Studio) -> None:
                 ui.navigate.to(f"/data?file={place}&test={chosen.value or ''}")
 
             chosen.on_value_change(show)
-            drop = ui.upload(label="Drop a file of your laboratory here: CSV, text", on_upload=taken, auto_upload=True)
+            drop = ui.upload(label="Drop a file of your laboratory here: text, or a log", on_upload=taken, auto_upload=True)
             drop.props("flat bordered").classes("full").props(f"max-file-size={UPLOAD - 4096}")
             if there is None:
                 return

@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
-from gyrobench.studio.request import JobRequest, read_request
+from gyrobench.studio.request import JobRequest, first_shown, read_request
+
+if TYPE_CHECKING:
+    from gyrobench.arrays import Array
+    from gyrobench.record.signal_view import LiveSignals
 
 REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
+LIVE_SIGNALS = 4
 WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
 
 
@@ -55,6 +61,7 @@ class _Writer:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.report = folder, JobReport()
+        self.shown: Callable[[Sequence[str]], Sequence[str]] = lambda names: names  # those that are looked at first
         self.write()
 
     def write(self) -> None:
@@ -67,14 +74,27 @@ class _Writer:
 
     @contextlib.contextmanager
     def progress(self, label: str) -> Iterator[Callable[[Any], None]]:
+        from gyrobench.record.signal_view import LiveSignals
         from gyrobench.workflow.progress_words import format_status
+
+        live = LiveSignals()
 
         def show(status: Any) -> None:
             self.report.label, self.report.fraction = label, float(status.fraction)
             self.report.words = format_status(status)
             self.write()
+            if (rows := getattr(status, "rows", None)) is not None:
+                self._signals(live, *rows())
 
         yield show
+
+    def _signals(self, live: LiveSignals, names: Sequence[str], rows: Array) -> None:
+        """Write the first signals as they are so far; SI."""
+        shown = [*self.shown(names)][:LIVE_SIGNALS]
+        live.add(rows[:, [0, *(1 + list(names).index(n) for n in shown)]])
+        columns = [[x if math.isfinite(x) else None for x in c] for c in live.rows.T.tolist()]
+        content = {"names": shown, "time": columns[0] if columns else [], "values": columns[1:]}
+        write_whole(self.folder / LIVE, json.dumps(content).encode(), durable=False)
 
 
 def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
@@ -97,6 +117,7 @@ def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
         columns = Path(request.columns) if request.columns else None
         return reduce_measured(system, Path(request.data), request.values, spec, feedback=feedback, columns=columns)
     test = load_with_values(request.system, request.values)
+    writer.shown = lambda names: first_shown(names, list(getattr(test, "shown", ())))
     seed = getattr(test, "seed", 1) if request.seed is None else request.seed
     maps = {slot: Path(file) for slot, file in request.maps.items()}
     run = RunRequest(parts=request.parts, maps=maps, seed=seed, spec=spec, resume=resume)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+FIRST = 4  # signals shown at first
 
 
 @dataclass(frozen=True)
@@ -75,3 +78,10 @@ def comparison_command(runs: list[str]) -> str:
 def comparison_python(runs: list[str]) -> str:
     """Return lines of Python that compare folders of runs."""
     return f"import gyrobench as gb\n\nprint(gb.compare({', '.join(map(repr, runs))}))"
+
+
+def first_shown(names: Sequence[str], shown: Sequence[Any]) -> list[str]:
+    """Return the signals that are drawn at first: those that the system's report draws, else the first ones."""
+    wanted = [n for entry in shown for n in (entry if isinstance(entry, list | tuple) else [entry])]
+    found = [n for n in names if n in wanted or n.partition("[")[0] in wanted]
+    return (found or list(names))[:FIRST]

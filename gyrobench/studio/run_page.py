@@ -13,17 +13,22 @@ from nicegui import ui
 from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
-from gyrobench.studio.chart import SignalChart, first_shown, signals_of
+from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
 from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
+from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
-from gyrobench.studio.request import comparison_command, comparison_python
+from gyrobench.studio.picture import MovingPicture
+from gyrobench.studio.request import comparison_command, comparison_python, first_shown
+from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
+from gyrobench.workflow.run_folders import short_names
 from gyrobench.workflow.run_list import RunEntry, list_runs
 
 TICK = 0.4  # s between two looks at a job
 LISTED = 300  # runs shown at a time
+HOW = "The wheel or two fingers zoom, dragging moves; every point drawn is a sample of the record."
 
 
 def add_run_pages(studio: Studio) -> None:
@@ -65,6 +70,7 @@ def _add_job_page(studio: Studio) -> None:
                     "resume"
                 )
                 done = ui.link("Report and signals", "#").mark("result")
+            chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
             gone = {"there": False}
@@ -86,6 +92,7 @@ def _add_job_page(studio: Studio) -> None:
                 if now.state == "done" and place and not message.text and not gone["there"]:
                     gone["there"] = True
                     ui.navigate.to(address("run", place))
+                chart.look()
                 if not now.active:
                     timer.deactivate()
 
@@ -126,22 +133,29 @@ def _add_run_page(studio: Studio) -> None:
                 CopyLines().show(*lines_of)
                 return
             with ui.tabs().props("no-caps align=left dense") as tabs:
-                names = ["Report", "Signals", "As a command"]
+                names = ["Report", "Signals", "Moving picture", "As a command"]
                 made = {n: ui.tab(n) for n in names}
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
                     _report(folder, place)
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
+                with ui.tab_panel(made["Moving picture"]):
+                    moving = ui.element("div").classes("rows")
                 with ui.tab_panel(made["As a command"]):
                     CopyLines().show(*lines_of)
-            drawn: list[bool] = []
+            drawn: list[str] = []
 
             async def opened() -> None:
-                if tabs.value == "Signals" and not drawn:
-                    drawn.append(True)
+                if tabs.value in drawn:
+                    return
+                drawn.append(tabs.value)
+                if tabs.value == "Signals":
                     with body:
                         await _signals(folder, document)
+                if tabs.value == "Moving picture":
+                    with moving:
+                        await _picture(studio, folder, document)
 
             tabs.on_value_change(opened)
 
@@ -179,19 +193,25 @@ def _tests(document: SuiteDocument, place: str) -> None:
 
 
 async def _signals(folder: Path, document: RunDocument) -> None:
+    wait = ui.label("The record is being read.").classes("soft").props("role=status")
     signals = await asyncio.to_thread(signals_of, folder)
+    wait.delete()
     if not signals.names or not len(signals.time):
         ui.label("The record holds no signals over time.").classes("soft")
         return
     first = first_shown(signals.names, _shown_by_report(document.system))
-    menu = ui.select(signals.names, value=first, multiple=True, label="Signals", with_input=True)
-    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
-    ui.label("The wheel or two fingers zoom, dragging moves; every point drawn is a sample of the record.").classes(
-        "soft"
-    )
-    chart = SignalChart({folder.name: signals})
-    menu.on_value_change(lambda e: chart.show(e.value or []))
-    await chart.show(first)
+    await _chosen({folder.name: signals}, signals.names, first)
+
+
+async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
+    signals = await asyncio.to_thread(signals_of, folder)
+    try:
+        bodies = parse_bodies(getattr(load_test(document.system), "bodies", ""))
+    except Exception:  # a run of a system that is not there any more
+        bodies = []
+    shown = MovingPicture(signals.record, bodies, studio.dark) if len(signals.time) else None
+    if shown is None or not shown.names:
+        ui.label("The record holds no angle of a body that moves.").classes("soft")
 
 
 def _shown_by_report(name: str) -> list[Any]:
@@ -306,6 +326,44 @@ def _add_comparison_page(studio: Studio) -> None:
             with ui.element("div").classes("bar"):
                 for place in asked:
                     ui.link(place, address("run", place))
-            if target.is_dir():
-                _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
-            CopyLines().show(comparison_command(shown), comparison_python(shown))
+            with ui.tabs().props("no-caps align=left dense") as tabs:
+                made = {n: ui.tab(n) for n in ("Report", "Signals", "As a command")}
+            with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
+                with ui.tab_panel(made["Report"]):
+                    if target.is_dir():
+                        _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
+                with ui.tab_panel(made["Signals"]):
+                    body = ui.element("div").classes("rows")
+                with ui.tab_panel(made["As a command"]):
+                    CopyLines().show(comparison_command(shown), comparison_python(shown))
+            drawn: list[str] = []
+
+            async def opened() -> None:
+                if tabs.value == "Signals" and not drawn:
+                    drawn.append(tabs.value)
+                    with body:
+                        await _overlay(folders)
+
+            tabs.on_value_change(opened)
+
+
+async def _overlay(folders: list[Path]) -> None:
+    """Draw the signals of several runs over each other."""
+    names = short_names(folders)
+    records = {n: await asyncio.to_thread(signals_of, f) for n, f in zip(names, folders, strict=True)}
+    common = [n for n in next(iter(records.values())).names if all(n in s.names for s in records.values())]
+    if not common:
+        ui.label("The runs have no signal in common.").classes("soft")
+        return
+    document = await asyncio.to_thread(read_run, folders[0])
+    await _chosen(records, common, first_shown(common, _shown_by_report(document.system))[:2])
+
+
+async def _chosen(records: dict[str, RecordSignals], names: list[str], first: list[str]) -> None:
+    """Add a menu of signals and their chart."""
+    menu = ui.select(names, value=first, multiple=True, label="Signals", with_input=True)
+    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
+    ui.label(HOW).classes("soft")
+    chart = SignalChart(records)
+    menu.on_value_change(lambda e: chart.show(e.value or []))
+    await chart.show(first)

@@ -257,7 +257,8 @@ def add_system_page(studio: Studio) -> None:
     @ui.page("/system/{name}", response_timeout=60)
     async def system(name: str) -> None:
         def load() -> tuple[System | Suite, dict[str, list[str]]]:
-            test = load_test(name) if name in studio.bench.systems() else load_test("")
+            studio.bench.system_folder(name)  # refuses what is no name
+            test = load_test(name)
             return test, {} if isinstance(test, Suite) else fitting_parts(test, load_parts(studio.bench))
 
         try:

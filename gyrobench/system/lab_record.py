@@ -37,6 +37,7 @@ Time series may stand here instead of windows: columns `time [s]`, `current` for
 TEXTS = (
     "title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement",
 )  # fmt: skip
+ARRANGED = ("phase", "cycle", "current", "t_start")  # first columns of what is arranged by attitudes or settings
 POLARITY = "polarity"  # read by the tumbles alone: RebalanceSetup
 WITH_POLARITY = (*TEXTS, POLARITY)
 ELSEWHERE = {
@@ -59,12 +60,12 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
         "each or by --set; where there is none, 'type_b = none'. Without a statement no verdict is pass."
     )
     checked = (
-        "arrangement: attitudes, signs, zeros of the angles, latitude and scale factors may be mistaken without a sign "
+        "arrangement: attitudes, signs, zeros of the angles, latitude and scales may be mistaken without a sign "
         "in the residuals; the report names such mistakes.  'arrangement = checked': they were looked at once more; "
         "without this statement nothing that rests on them passes."
     )
     notes = [
-        *(wrap(checked, 116, subsequent_indent="  ") if names and "phase" in lines[-1] else []),
+        *(wrap(checked, 116, subsequent_indent="  ") if names and lines[-1].startswith(ARRANGED) else []),
         *(wrap(text, 116, subsequent_indent="  ") if names else []),
         f"{', '.join(ABOUT)} (its calibration): optional, a comment each like instrument; the report prints them.",
     ]

@@ -132,6 +132,7 @@ class System(Configurable):
     #: channels that a report draws, a panel an entry: names, of a vector without its index; (): the first ones
     shown: ClassVar[Iterable[str]] = ()
     channel_period: float = 1.0  # s
+    bodies: ClassVar[str] = ""  # what moves, as the record tells it: gyrobench.system.moving_bodies
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
@@ -146,6 +147,7 @@ class System(Configurable):
     ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
+    instrument: str = ""  # of whose data sheet its gyro is; "": the part is named
     step: float = 1e-3  # s, communication step
     coupling: str = ""  # "parallel": every wire carries the value of the communication step before (Jacobi)
     stop: float | None = None  # s, or a property; None: only `done` ends the run

@@ -10,7 +10,7 @@ the corners and some inside; what is worse between them is added, and the search
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,8 +38,13 @@ class TuningProblem:
     plants: list[Plant]
     box: Array  # (numbers, 2)
     f: Array
+    corners: int = 1  # plants at nominal values and at the corners, which come first
     evaluations: int = 0
     _responses: list[Complex] = field(default_factory=list)
+
+    def of(self, count: int) -> TuningProblem:
+        """Return the problem with the first plants alone."""
+        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[])
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -79,9 +84,9 @@ def search(problem: TuningProblem) -> Array:
     from scipy.stats import qmc
 
     low, high = problem.box.T
-    many = TuningProblem(problem.structure, problem.wishes, problem.plants[:1], problem.box, problem.f)
+    nominal, corners = problem.of(1), problem.of(problem.corners)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
-    looked = [(many.worst(x), x) for x in low + cube * (high - low)]
+    looked = [(nominal.worst(x), x) for x in low + cube * (high - low)]
     starts: list[Array] = []
     for _, x in sorted(looked, key=lambda p: -p[0]):
         if all(np.linalg.norm((x - s) / (high - low)) > 0.25 for s in starts):
@@ -91,7 +96,7 @@ def search(problem: TuningProblem) -> Array:
 
     def refused(x: Array) -> float:
         inside = np.clip(x, low, high)
-        return -problem.worst(inside) + float(np.sum(np.abs(x - inside)))
+        return -corners.worst(inside) + float(np.sum(np.abs(x - inside)))
 
     ends = []
     for x in starts:
@@ -105,7 +110,9 @@ def search(problem: TuningProblem) -> Array:
         )  # fmt: skip
         ends.append(np.clip(found.x, low, high))
     ends.sort(key=lambda x: -problem.worst(x))
-    return max((polished(problem, x) for x in ends[:2]), key=problem.worst)
+    best = max((polished(problem, x) for x in ends[:2]), key=problem.worst)
+    problem.evaluations += nominal.evaluations + corners.evaluations
+    return best
 
 
 def polished(problem: TuningProblem, x: Array, rounds: int = 40) -> Array:

@@ -59,35 +59,43 @@ def plants(
     points: Sequence[Mapping[str, float]],
 ) -> list[Plant]:
     """Return the plant at each point of the spread.  Raises LinearizationError and ComponentError."""
-    found = []
-    for values in points:
-        parts = operating_point(assembly, {**parameters, **values}, part_of)
-        linear = Linear(assembly, parts, step)
-        own = linear.blocks[SLOT]
-        d = np.zeros((len(own.outputs), len(own.inputs)))
-        d[own.outputs.index("v"), own.inputs.index("u")] = -1.0
-        m, p = len(own.inputs), len(own.outputs)
-        linear.blocks[SLOT] = LinearBlock(
-            SLOT, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d,
-            [np.zeros((0, m))],
-        )  # fmt: skip
-        linear.sampled.pop(SLOT, None)
-        linear.states = [f"{s}.{v}" for s in linear.order for v in linear.blocks[s].states]
-        found.append(_connected(linear.discrete(LOOP[SLOT]), values))
-    return found
-
-
-def _connected(model: LinearModel, values: Mapping[str, float]) -> Plant:
-    """Return the model without states that no input moves or that no output sees."""
-    n = len(model.states)
-    a, b, c = (np.asarray(m, float) for m in (model.A, model.B, model.C))
-    a, b, c = a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
-    if np.any(np.asarray(model.D, float)):
-        raise UsageError("the loop has no delay of a step: it cannot be tuned")
-    between = reached(a, b) & reached(a.T, c.T)
+    models = [_opened(assembly, {**parameters, **values}, part_of, step) for values in points]
+    if len({len(m.states) for m in models}) > 1:
+        raise UsageError("--over: the parts have other states at some points of the spread: narrow it")
+    matrices = [_matrices(m) for m in models]
+    between = np.any([reached(a, b) & reached(a.T, c.T) for a, b, c in matrices], axis=0)
     if not between.any():
         raise UsageError("the voltage of the stabilizer does not reach its input: the loop is open")
-    return Plant(a[between][:, between], b[between], c[:, between], model.step, values)
+    return [
+        Plant(a[between][:, between], b[between], c[:, between], step, values)
+        for (a, b, c), values in zip(matrices, points, strict=True)
+    ]
+
+
+def _opened(
+    assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float
+) -> LinearModel:
+    """Return the loop with -1 in the place of the controller, opened before it."""
+    linear = Linear(assembly, operating_point(assembly, parameters, part_of), step)
+    own = linear.blocks[SLOT]
+    d = np.zeros((len(own.outputs), len(own.inputs)))
+    d[own.outputs.index("v"), own.inputs.index("u")] = -1.0
+    m, p = len(own.inputs), len(own.outputs)
+    linear.blocks[SLOT] = LinearBlock(
+        SLOT, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d, [np.zeros((0, m))]
+    )
+    linear.sampled.pop(SLOT, None)
+    linear.states = [f"{s}.{v}" for s in linear.order for v in linear.blocks[s].states]
+    return linear.discrete(LOOP[SLOT])
+
+
+def _matrices(model: LinearModel) -> tuple[Array, Array, Array]:
+    """Return a, b, c of a model with one input and one output."""
+    n = len(model.states)
+    if np.any(np.asarray(model.D, float)):
+        raise UsageError("the loop has no delay of a step: it cannot be tuned")
+    a, b, c = (np.asarray(m, float) for m in (model.A, model.B, model.C))
+    return a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
 
 
 class HeldController:

@@ -7,8 +7,7 @@ found on the model at the same frequencies and counts to the uncertainty.
 from __future__ import annotations
 
 import cmath
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,8 +27,11 @@ from gyrobench.tuning.robustness import crossovers, gain_limits, measured
 from gyrobench.tuning.wishes import Wish
 
 INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
+LIMITED = "stabilizer.saturated"
 SINES = 14  # beside those at the limits
-PERIODS = 32
+DRIVEN = 0.3  # of the largest voltage, at most, is taken by a test sine
+PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
+SLOWER = 40.0
 SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
@@ -78,7 +80,7 @@ class Proof:
         return not self.why_not and all(w.kept for w in self.wishes)
 
 
-def test_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
+def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
     """Return the sines, Hz: about the crossovers, the limits and the largest |S - 1/2|."""
     crossed = [at for at, _ in crossovers(f, L)]
     upper = max(crossed, default=float(f[len(f) // 2]))
@@ -94,8 +96,13 @@ def test_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
     return found
 
 
-def loop_plan(system: System, frequencies: Sequence[float]) -> tuple[LoopPlan, float]:
-    """Return the plan of a proof and the torque of its load step, N.m."""
+def loop_plan(
+    system: System, frequencies: Sequence[float], largest: Callable[[float], float]
+) -> tuple[LoopPlan, float]:  # fmt: skip
+    """Return the plan of a proof and the torque of its load step, N.m.
+
+    The sines have the amplitude of the system's own plan, and at most ``largest`` at a frequency: no limit is met.
+    """
     own = system.plan()
     phases = list(getattr(own, "phases", []))
     sines = [p for p in phases if p.kind == "test" and p.amplitude]
@@ -103,36 +110,40 @@ def loop_plan(system: System, frequencies: Sequence[float]) -> tuple[LoopPlan, f
 
     def amplitude(f: float) -> float:
         near = min(sines, key=lambda p: abs(np.log(p.frequency / f)), default=None)
-        return float(near.amplitude) if near else AMPLITUDE
+        return min(float(near.amplitude) if near else AMPLITUDE, largest(f))
 
     slowest = min(frequencies)
     rest = LoopPhase("rest", "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
     steps = [replace(load, dwell=min(load.dwell, 20.0 / slowest), settle=2.0 / slowest)] if load else []
-    sines_ahead = sweep("loop", "test", frequencies, amplitude, periods=PERIODS, settle=0.5 / slowest)
+    fast = [f for f in frequencies if f * SLOWER > max(frequencies)]
+    slow = [f for f in frequencies if f not in fast]
+    sines_ahead = [
+        *sweep("loop", "test", slow, amplitude, periods=PERIODS // 3, settle=0.5 / slowest),
+        *sweep("loop", "test", fast, amplitude, periods=PERIODS, settle=0.5 / slowest),
+    ]
     plan = LoopPlan([rest, *sines_ahead, *steps])
     return plan, float(load.amplitude) if load else 0.0
 
 
 def proof_of(
-    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], f: Array, L: Complex,
+    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], f: Array, L: Complex, G: Complex,
     wishes: Sequence[Wish], seed: int = 1,
 ) -> Proof:  # fmt: skip
-    """Run the loop test at a point of the spread.  L: the linear loop at this point over f.  Raises RunError."""
+    """Run the loop test at a point of the spread.  L, G: loop and controller at this point over f.  Raises RunError."""
     system = session.system
     step = system.step
-    chosen = test_frequencies(f, L, wishes, step)
-    plan, load = loop_plan(system, chosen)
+    chosen = sine_frequencies(f, L, wishes, step)
+    known = session.prepare(settings, seed)[2].parameters
+    v_max = min(float(known.get(f"{slot}.v_max", np.inf)) for slot in ("stabilizer", "platform"))
+    effort = np.abs(G / (1.0 + L))
+    plan, load = loop_plan(system, chosen, lambda x: DRIVEN * v_max / float(np.interp(x, f, effort)))
     kept = dict(vars(system))
     vars(system).update(
         plan=lambda: plan, channel_period=step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), nominal={}
     )
-    log = logging.getLogger("gyrobench")
-    level = log.level
-    log.setLevel(logging.ERROR)  # what the run would warn of, the parts off their nominal values, is meant
     try:
         record = session.run({**settings, **at}, seed)
     finally:
-        log.setLevel(level)
         vars(system).clear()
         vars(system).update(kept)
     return _read(record, at, f, L, wishes, load)

@@ -63,7 +63,7 @@ def _rolloff(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
 BLOCKS = {
     "lag": ControllerFactor(((-2.0, 0.0), (0.0, 3.0)), _lag),
     "lead": ControllerFactor(((-0.7, 1.0), (0.0, 2.3)), _lead),
-    "pi": ControllerFactor(((-2.5, 0.0),), _pi),
+    "pi": ControllerFactor(((-1.5, 0.0),), _pi),
     "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), _notch),
     "rolloff": ControllerFactor(((0.0, 2.0),), _rolloff),
 }

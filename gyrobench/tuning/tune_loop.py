@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,24 +14,26 @@ import numpy as np
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
 from gyrobench.component import Component, ComponentError
-from gyrobench.engine.session import Session
+from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
 from gyrobench.system.system import System
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
-from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
+from gyrobench.tuning.proof import INSIDE, LIMITED, TEST, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.tuned_loop import TunedLoop, WishResult
+from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import Wish, parse_wishes
+from gyrobench.tuning.written_loop import TunedLoop
 
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
+HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
@@ -56,12 +59,17 @@ def tune(
     """
     wishes, shape = parse_wishes(want), ControllerStructure(structure)
     _require_loop(system, parts or {})
+    system = system.with_values({})
     began = time.perf_counter()
     system.nominal = dict(system.overrides)
     with Session(system, parts, maps, bench=Bench.find().folder, child=True) as session:
         now, _, document = session.prepare({}, seed)
         nominal = document.parameters
         ranges = parse_spread(over, lambda name: _known(session, nominal, name))
+        for w in wishes:
+            if w.f >= HIGHEST / now.step:
+                raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
+                                 f"{HIGHEST / now.step:g} Hz")  # fmt: skip
         loop = _Loop(session, now, nominal, ranges)
         problem = loop.problem(shape, wishes)
         x = search(problem)
@@ -78,7 +86,7 @@ def tune(
             "structure, or a smaller spread"
         )
     results = _results(wishes, f, loops, problem.plants)
-    part, settings = _settings(shape, controller, nominal)
+    part, settings = _settings(shape, controller, nominal, system)
     settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]))
     had = all(r.ratio >= 1.0 for r in results)
     reasons = () if had else tuple(reasons_of(loop, problem, x, results, f, loops))
@@ -86,14 +94,20 @@ def tune(
     worst = sorted(results, key=lambda r: r.ratio)[0].at
     runs = [{}, worst] if worst else [{}]
     proofs = []
-    with Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
+    system.channels = tuple(dict.fromkeys((*system.channels, LIMITED)))  # type: ignore[misc]
+    with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
-            proofs.append(proof_of(session, settings, at, f, loops[k], wishes, seed))
+            try:
+                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed))
+            except RunError as error:
+                proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
-        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops, seconds,
-        problem.evaluations, reasons, tuple(_notes(proofs, part)),
+        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
+        swaps={slot: str(name) for slot, name in (parts or {}).items()},
+        maps={slot: str(file) for slot, file in (maps or {}).items()},
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=tuple(_notes(proofs)),
     )  # fmt: skip
 
 
@@ -124,7 +138,21 @@ class _Loop:
         models = self.plants(points(self.ranges))
         wanted = self.system.crossovers().get("stabilizer")
         decades = box(shape, wishes, wanted, self.step)
-        return TuningProblem(shape, wishes, models, decades, frequencies(models, decades, wishes))
+        return TuningProblem(
+            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges)
+        )
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Keep back what the runs of a proof would warn of: that parts are off their nominal values is meant."""
+    log = logging.getLogger("gyrobench")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def _has_loop(system: System) -> bool:
@@ -209,13 +237,15 @@ def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]
 
 
 def _settings(
-    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any]
+    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any], system: System
 ) -> tuple[str, dict[str, Any]]:  # fmt: skip
     """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
     if shape.is_lead_lag and all(f"{SLOT}.{n}" in nominal for n in NETWORK):
         neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
         values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
-        return "", {f"{SLOT}.{n}": float(f"{values[n]:.9g}") for n in NETWORK}
+        owners = {option.sets: name for name, option in system.options.items()}  # "stabilizer.K" -> its option
+        names = (f"{SLOT}.{n}" for n in NETWORK)
+        return "", {owners.get(n, n): float(f"{values[n.partition('.')[2]]:.9g}") for n in names}
     direct = len(np.trim_zeros(controller.num, "b")) == len(np.trim_zeros(controller.den, "b"))
     return _part_of_any(), {
         f"{SLOT}.form": 1,
@@ -256,13 +286,13 @@ def _crossover(
     return {"crossover": f"{at:g}Hz"} if all(other.get(n) == v for n, v in plain.items()) else {}
 
 
-def _notes(proofs: Sequence[Proof], part: str) -> list[str]:
+def _notes(proofs: Sequence[Proof]) -> list[str]:
     notes = []
     for p in proofs:
         if p.friction and not all(w.agrees for w in p.wishes):
             notes.append(
-                f"the friction ({p.friction}) is not in the linear model: at the amplitude of the test sines the loop "
-                "is another one (describing function)"
+                f"the linear model takes the friction ({p.friction}) for an elastic contact that does not slip: at the "
+                "amplitude of the test sines the loop is another one (describing function)"
             )
             break
     if any(p.limits for p in proofs):

@@ -35,8 +35,10 @@ class WishResult:
 
 
 @dataclass(frozen=True)
-class TunedLoop:
+class LoopTuning:
     """settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
+
+    swaps, maps: parts and mapping files of other slots that were given.
 
     reasons: why what is wanted cannot be had, else ().  loops: L over f (Hz) at each point of the spread, nominal
     first.
@@ -54,6 +56,8 @@ class TunedLoop:
     proofs: tuple[Proof, ...]
     f: Array = field(repr=False)
     loops: Complex = field(repr=False)
+    swaps: Mapping[str, str] = field(default_factory=dict)
+    maps: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     evaluations: int = 0
     reasons: tuple[str, ...] = ()
@@ -72,9 +76,10 @@ class TunedLoop:
     @property
     def command(self) -> str:
         """Return the command that runs the system with this controller."""
-        part = f" --part {SLOT}={self.part}" if self.part else ""
-        text = " ".join(f"--set {shlex.quote(f'{n}={_text(v)}')}" for n, v in {**self.given, **self.settings}.items())
-        return f"gyrobench run {self.system}{part} {text}".rstrip()
+        parts = {**self.swaps, **({SLOT: self.part} if self.part else {})}
+        named = [("part", parts), ("map", self.maps), ("set", {**self.given, **self.settings})]
+        words = [f"--{option} {shlex.quote(f'{n}={_text(v)}')}" for option, values in named for n, v in values.items()]
+        return " ".join(["gyrobench run", self.system, *words])
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain JSON values; unlimited margins are null."""
@@ -113,7 +118,8 @@ class TunedLoop:
             "evaluations": self.evaluations,
         }  # fmt: skip
 
-    def __str__(self) -> str:
+    def text(self) -> str:
+        """Return all of it as a text."""
         return "\n".join(_lines(self))
 
 
@@ -137,10 +143,15 @@ def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
     return ", ".join(f"{n} = {units.format_quantity(float(f'{v:.4g}'), unit[n])}" for n, v in at.items()) or "nominal"
 
 
-def _lines(t: TunedLoop) -> list[str]:
+def range_text(r: Range) -> str:
+    """Return a range as text."""
+    low, high = (units.format_quantity(float(f"{x:.4g}"), r.unit) for x in (r.low, r.high))
+    return f"{r.name} {low} to {high}"
+
+
+def _lines(t: LoopTuning) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
-    over = ", ".join(f"{r.name} {where({r.name: r.low}, t.spread)[len(r.name) + 3:]} to "
-                     f"{where({r.name: r.high}, t.spread)[len(r.name) + 3:]}" for r in t.spread)  # fmt: skip
+    over = ", ".join(range_text(r) for r in t.spread)
     lines = [
         f"{t.system}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
         f"over {over}: {len(t.points)} points" if over else "at nominal values",
@@ -161,7 +172,7 @@ def _lines(t: TunedLoop) -> list[str]:
         for w in p.wishes:
             end = "" if w.kept else "  ! below what is wanted"
             end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
-            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{_margin(w)}{end}")
+            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{margin_text(w)}{end}")
         if p.limits:
             lines.append(f"  at its limit in the test sines: {p.limits}")
         if p.step is not None:
@@ -174,7 +185,7 @@ def _lines(t: TunedLoop) -> list[str]:
     return [*lines, "", f"{title}: {values}", "", t.command]
 
 
-def _margin(w: ProvenWish) -> str:
+def margin_text(w: ProvenWish) -> str:
     """Return the expanded uncertainty of a measured wish as text."""
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""

@@ -58,6 +58,11 @@ class ColumnProposal:
     stated: Mapping[str, str]
     table: str = ""  # of a log with several
 
+    @property
+    def text_file(self) -> Path:
+        """The file as a text: itself, or the table of a log."""
+        return as_text(self.file, self.table) if is_log(self.file) else self.file
+
     def text(self) -> tuple[str, list[str]]:
         """Return the text of the map, and what it lacks."""
         text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)

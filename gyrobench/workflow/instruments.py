@@ -138,8 +138,9 @@ def parameters(sheet: Instrument) -> dict[str, Any]:
 
     angle random walk, or the one-sided noise density over sqrt 2: white noise.  bias instability, the least Allan
     deviation: flicker noise of that floor.  bias: rms of the turn-on bias.  nonlinearity, largest departure from the
-    best line over the range: a cubic of that departure, c range2 = 4 nonlinearity.  The output rate sets nothing: a
-    sample is taken every communication step (held over several, `gyro.period`, samples are used twice here and there).
+    best line over the range: a cubic, whose least-squares line over +-range leaves 0.4 c range3 at the ends.  The
+    output rate sets nothing: a sample is taken every communication step (held over several, `gyro.period`, samples are
+    used twice here and there).
     Raises UsageError for a part that takes no data sheets.
     """
     part = load_part(sheet.part, Bench.find().folder)
@@ -158,7 +159,7 @@ def parameters(sheet: Instrument) -> dict[str, Any]:
     if (g := sheet.si("g_sensitivity")) is not None:
         found["g"] = [[g, 0.0, 0.0], [0.0, g, 0.0]]
     if (nonlinearity := sheet.si("nonlinearity")) is not None and (full := sheet.si("range")) is not None:
-        found["cubic"] = 4.0 * nonlinearity / full**2
+        found["cubic"] = nonlinearity / 0.4 / full**2
     if lean := sheet.si("misalignment") or sheet.si("cross_axis"):
         found["axes"] = [[1.0, lean, 0.0], [0.0, 1.0, lean]]
     return {n: v for n, v in found.items() if n in part.declarations}

@@ -23,6 +23,7 @@ from gyrobench.system.system import Option, Slot, Windows
 from . import plans
 from .measured import MEASURED
 
+FORCE = "\ntable -> gyro: f"  # of a gyro that feels it
 FACES = {plans.FACE: np.eye(3).tolist()}
 
 
@@ -124,8 +125,8 @@ class NorthFinding(TableTest):
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
-        if slot == "gyro" and has_port(part, "f", bench):
-            vars(self)["wires"] = f"{self.wires}\ntable -> gyro: f"
+        if slot == "gyro" and FORCE not in self.wires and has_port(part, "f", bench):
+            vars(self)["wires"] = self.wires + FORCE
 
     @property
     def auto(self) -> tuple[float, str] | None:

@@ -31,6 +31,12 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     title = "Three-axis stabilized platform"
     spec = ("PLATFORM-3AXIS-DYN", "PLATFORM-3AXIS-KIN", "DECOUPLE-T2", "DECOUPLE-BENCH-83MIL", "GYRO-OA-COUPLING-Y2")
     reduction = "reduction"
+    bodies = """
+        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        roll gimbal: base, y platform.theta[2]
+        pitch gimbal: roll gimbal, x platform.theta[1]
+        inner element: pitch gimbal, z platform.theta[3]
+    """
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "platform": Slot("Platform", "platform_three_axis"),
         **{gyro: Slot("SdfGyro", "floated_gyro") for gyro in GYROS},

@@ -5,7 +5,9 @@ read by an autocollimator, a random walk with the time:
 
     V = s2 I + t2 (same place) + w2 min(t, t')            each part of its own rows
 
-The variances are those of restricted maximum likelihood (Patterson and Thompson), none below its least.
+The variances are those of restricted maximum likelihood (Patterson and Thompson), none below its least.  Where a walk
+and the errors of visits are all there is, the fit is averaged over the size of the walk instead
+(:func:`averaged_over_walk`): a walk that hides under the noise is often estimated as none.
 [TABLE-POSITION; derived]
 """
 
@@ -17,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy import special
+from scipy.optimize import brentq, nnls
 
 from gyrobench.reduction.loops.loop_toolkit import Array
 
@@ -25,6 +28,9 @@ ROUNDS = 30  # of variances and weights, at most
 REDUNDANT = 0.1  # rows more than values; fewer are rounding of the arithmetic
 ALONE = 1e-9  # of the largest information of a combination of variances: less is none
 SAME = 1e-3  # relative change of the variances at which they stay
+STILL = 0.25  # probability that nothing walks, before the data are seen
+#: variance of a walk at its end over that of a visit, all but none equally likely
+WALKS = np.concatenate([[0.0], np.geomspace(0.1, 3000.0, 13)])
 NOTHING = 1e-9  # of the variance of the data: the least of a visit
 
 
@@ -120,6 +126,59 @@ def least_squares(X: Array, y: Array, parts: Sequence[Part]) -> PlacesFit:
     return PlacesFit(
         gain @ y, np.sqrt(u2), X, y - X @ gain @ y, gain, V, variance, free, redundant, shapes, error
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """Estimates, their standard uncertainties and the coverage factors of 95 %; dof: of the residuals."""
+
+    value: Array
+    u: Array
+    k: Array
+    dof: float
+
+
+def averaged_over_walk(X: Array, y: Array, part: Part) -> Averaged:
+    """Return the mean over walks of the generalized least squares solutions, weighed by their restricted likelihood.
+
+    V = s2 (I + r shape) with r of :data:`WALKS`.  With a flat prior of the values and of log s the likelihood of r is
+    |V|^-1/2 |X' V^-1 X|^-1/2 (y' P y)^-(n-p)/2, and the values are t distributed with n - p degrees of freedom; the
+    interval is that of the mixture.
+    """
+    n, p = X.shape
+    dof = float(n - p)
+    size, axes = np.linalg.eigh(part.shape)
+    size, Z, z = np.maximum(size, 0.0), axes.T @ X, axes.T @ y
+    score, values, spreads = [], [], []
+    for r in WALKS:
+        w = 1.0 / (1.0 + r * size)
+        normal = Z.T @ (w[:, None] * Z)
+        covariance = np.linalg.inv(normal)
+        found = covariance @ (Z.T @ (w * z))
+        square = float(w @ (z - Z @ found) ** 2) + 1e-300
+        score.append(0.5 * (float(np.sum(np.log(w))) - np.linalg.slogdet(normal)[1] - dof * math.log(square)))
+        values.append(found)
+        spreads.append(np.sqrt(np.diag(covariance) * square / dof))
+    prior = np.where(WALKS > 0.0, (1.0 - STILL) / (WALKS.size - 1), STILL)
+    weight = prior * np.exp(np.array(score) - max(score))
+    weight /= weight.sum()
+    b, s = np.array(values), np.array(spreads)
+    value = weight @ b
+    u = np.sqrt(weight @ (s**2 * dof / max(dof - 2.0, 1.0) + (b - value) ** 2))
+    half = np.array([_half_width(weight, b[:, j] - value[j], s[:, j], dof) for j in range(p)])
+    return Averaged(value, u, np.divide(half, u, out=np.full(p, 2.0), where=u > 0.0), dof)
+
+
+def _half_width(weight: Array, off: Array, spread: Array, dof: float) -> float:
+    """Return h with a probability of 95 % within +-h of a mixture of t distributions."""
+    if not np.all(spread > 0.0):
+        return 0.0
+
+    def missing(h: float) -> float:
+        inside = special.stdtr(dof, (h - off) / spread) - special.stdtr(dof, (-h - off) / spread)
+        return float(weight @ inside) - 0.95
+
+    return float(brentq(missing, 0.0, 1e3 * float(np.max(np.abs(off) + spread))))
 
 
 def _not_negative(F: Array, q: Array) -> Array:

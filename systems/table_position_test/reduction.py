@@ -34,7 +34,7 @@ from gyrobench.reduction.loops.scale_errors import truth, waves
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import Series, Table
 
-from .places_fit import PlacesFit, least_squares, visits, walk
+from .places_fit import Averaged, PlacesFit, averaged_over_walk, least_squares, visits, walk
 
 SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
 JITTER = 0.005  # of the variance of a rounding is left where the loop moves the table by a count while it is read
@@ -142,7 +142,7 @@ def position_fit(r: Readings) -> tuple[PlacesFit, list[int], bool]:
     return least_squares(X, y, parts), orders, len(nuisances) > len(ways)
 
 
-def level_fit(r: Readings) -> tuple[PlacesFit, list[str]]:
+def level_fit(r: Readings) -> tuple[Averaged, list[str]]:
     """Return the fit of the level, real and imaginary parts in turn, and the names of its complex terms.
 
     Its zero drifts evenly with the time, beside a random walk.
@@ -155,9 +155,8 @@ def level_fit(r: Readings) -> tuple[PlacesFit, list[str]]:
     X = np.column_stack(list(columns.values()))
     real = np.block([[X.real, -X.imag], [X.imag, X.real]])
     y = np.concatenate([r.level.real, r.level.imag])
-    of = slice(0, 2 * n)
-    parts = [*visits(of, np.arange(2 * n)), walk(of, np.tile(r.t, 2), np.repeat([0, 1], n))]
-    return least_squares(real, y, parts), list(columns)
+    both = walk(slice(0, 2 * n), np.tile(r.t, 2), np.repeat([0, 1], n))
+    return averaged_over_walk(real, y, both), list(columns)
 
 
 #: complex term of the level -> its imaginary part and its real one, negated: tilts about the axes of the base
@@ -283,13 +282,13 @@ class Reduction(MeasureReduction):
         for term, names in TILTS.items():
             at = terms.index(term)
             for (name, meaning), i, sign, true in zip(names, (half + at, at), (1.0, -1.0), known[term], strict=True):
-                self._add(name, meaning, sign * level.value[i], level.u[i], level.freedom(level.gain[i]), true)
+                self._add(name, meaning, sign * level.value[i], level.u[i], level.dof, true, k=float(level.k[i]))
         same = "one mount: not told from the level's zero"
         at, none = (terms.index("plate"), "") if "plate" in terms else (0, same)
         for axis, i, true in zip("xy", (at, half + at), p.get("reference.plate", UNKNOWN), strict=True):
             meaning = f"tilt of the plate against the axis, {axis}"
             self._add(
-                f"squareness {axis}", meaning, level.value[i], level.u[i], level.freedom(level.gain[i]), true, none
+                f"squareness {axis}", meaning, level.value[i], level.u[i], level.dof, true, none, k=float(level.k[i])
             )
 
     def _polygon(self) -> None:

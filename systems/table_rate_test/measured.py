@@ -27,7 +27,7 @@ TEMPLATE = """\
 # angle: cumulative reading of the table at the ends of the window, counted on through the turns.
 # error, error_std: mean of the tracking error (command less reading) over the window, and its standard deviation.
 # u_angle1, u_angle2, u_cycle: amplitudes of the errors of the readings once and twice a turn and in a cycle of the
-#   scale; they are in u with their defaults unless set.
+#   scale; they are in u with their defaults unless set.  u_reading: noise of a reading beyond its rounding.
 # Units in brackets may be others of the same kind (deg/s, rad, min ...).
 phase,t_start [s],t_end [s],rate [ERU],angle_start [deg],angle_end [deg],error [arcsec],error_std [arcsec]
 """

@@ -13,6 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.frames import EARTH_RATE as ERU
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCSEC,
     Account,
@@ -25,7 +26,7 @@ from gyrobench.reduction.loops.loop_toolkit import (
 )
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
-from gyrobench.result import BudgetLine, Response, Table
+from gyrobench.result import BudgetLine, Reason, Response, Table
 
 from .closed_form import SampledLoop
 
@@ -33,6 +34,8 @@ PPM = 1e-6
 SHOWN = 1500  # intervals of a drawn line
 RAMP = 0.6  # s of a change of rate that is drawn
 COUNTS = Source("reader.counts", "quantization of the counts", "rad")
+NOISE = Source("reader.noise", "noise of a reading beyond its rounding", "rad", "u_reading")
+BEYOND = 1e-3  # p of a scatter that rounding does not explain
 #: errors of the readings by cycles a turn, u of their amplitudes; the last: twice in a cycle of the scale
 SCALE = (
     (1.0, Source("reader.once", "readings, once a turn", "rad", "u_angle1")),
@@ -163,6 +166,7 @@ class Reduction(MeasureReduction):
                       k=k, truth=None if true is None else float(true))  # fmt: skip
         for rate, both in pairs.items():
             self._error(f"error {rate / ERU:.6g} ERU", both)
+        self._noise(pairs)
         for rate, both in pairs.items():
             sizes, u_each = zip(*(r.ripple for r in both), strict=True)
             found.measure(f"ripple {rate / ERU:.6g} ERU", "standard deviation of the tracking error", "arcsec",
@@ -210,7 +214,9 @@ class Reduction(MeasureReduction):
         The counts err at each reading anew, the scale errs alike over the same angles.
         """
         angle = min(r.angle for r in both)
-        parts = [(COUNTS, self.quantum / math.sqrt(12.0), math.sqrt(2.0 / len(both))), *scale_parts(self.run, angle)]
+        ends = math.sqrt(2.0 / len(both))
+        own = [(COUNTS, self.quantum / math.sqrt(12.0), ends), (NOISE, NOISE.size(self.run.options), ends)]
+        parts = [*(x for x in own if x[1]), *scale_parts(self.run, angle)]
         shares = [(s, u / ARCSEC, f / angle / PPM * ARCSEC) for s, u, f in parts if f > 0.0]
         self.found.budget += [
             BudgetLine(s.id, s.name, u, "arcsec", f, "1e-6/arcsec", u * f, "1e-6", name) for s, u, f in shares
@@ -222,9 +228,35 @@ class Reduction(MeasureReduction):
             truth=float(np.mean(known)) if len(known) == len(both) else None,
         )  # fmt: skip
 
+    def _noise(self, pairs: Mapping[float, Sequence[AtRate]]) -> None:
+        """Ask for the noise of the reader where measured readings scatter by more than rounding does: a table that
+        moves about its command has such a scatter, too, and the mean of its rates then is the true one.
+        """
+        if not self.run.measured or NOISE.size(self.run.options):
+            return
+        names, sizes = [], []
+        for rate, both in pairs.items():
+            squares, dof = (sum(x) for x in zip(*(r.scatter for r in both), strict=True))
+            if float(special.chdtrc(dof, squares / (self.quantum**2 / 12.0))) < BEYOND:
+                names.append(f"error {rate / ERU:.6g} ERU")
+                sizes.append(math.sqrt(squares / dof) / ARCSEC)
+        text = (
+            f"Angles at the ends of windows scatter by up to {max(sizes, default=0.0):.2g}″ about their line, rounding "
+            f"makes {self.quantum / math.sqrt(12.0) / ARCSEC:.2g}″: the table moves, or its reader is noisy, which is "
+            "not in u of the mean rates. State the noise of a reading (u_reading), if only as an upper limit."
+        )
+        if names:
+            self.found.reasons.append(
+                Reason(f"reader.noise{UNSTATED}", text, ("pass",), tuple(names), severity="doubt")
+            )
+
     def _row(self, r: AtRate) -> list[float | None]:
         """Return rate by counts, gate and inverse rate, with the tracking and the true ripple."""
-        u = math.hypot(self.quantum / math.sqrt(6.0), *(s * f for _, s, f in scale_parts(self.run, r.angle))) / r.angle
+        noise = math.sqrt(2.0) * NOISE.size(self.run.options)
+        u = (
+            math.hypot(self.quantum / math.sqrt(6.0), noise, *(s * f for _, s, f in scale_parts(self.run, r.angle)))
+            / r.angle
+        )
         beside = [None if x is None else x / PPM for x in (r.shown("gate"), r.shown("inverse"))]
         jitter = _rms(r.rows["jitter"][1:]) / ERU if "jitter" in r.rows else None
         tracking = (r.mean / ARCSEC, r.ripple[0] / ARCSEC)

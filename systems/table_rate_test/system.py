@@ -80,6 +80,7 @@ class TableRateTest(System):
         "u_angle1": Option(0.3 * ARCSEC, "rad", "error of the readings once a turn, std. unc. of its amplitude", 0.0),
         "u_angle2": Option(0.15 * ARCSEC, "rad", "error of the readings twice a turn, std. unc. of its amplitude", 0.0),
         "u_cycle": Option(0.1 * ARCSEC, "rad", "error twice in a cycle of the scale, std. unc. of its amplitude", 0.0),
+        "u_reading": Option(0.0, "rad", "noise of a reading beyond its rounding, standard uncertainty", 0.0),
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }
     windows = Windows.of(

@@ -50,6 +50,11 @@ class TumbleTwoAxis(RebalanceTest):
         {sampled("sampler_inner", "table: angle_y_read")}
     """
     on_request = surroundings("table: angle_x_read", TWO_AXES)
+    bodies = """
+        outer ring: base table.base, x table.angle_x
+        plate: outer ring, y table.angle_y
+        instrument: plate, faces sequencer
+    """
     options = (
         SITE
         | PHYSICAL_FORM

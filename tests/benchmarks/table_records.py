@@ -196,10 +196,11 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=300)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--test", choices=TESTS, default=None)
+    parser.add_argument("--case", default="", help="cases whose name begins so")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for test in [given.test] if given.test else TESTS:
-            for case in TESTS[test][0]:
+            for case in (c for c in TESTS[test][0] if c.startswith(given.case)):
                 count(test, case, range(given.first, given.first + given.runs), Path(folder))
 
 

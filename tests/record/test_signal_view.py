@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
-from gyrobench.record.signal_view import SignalPyramid
+from gyrobench.record.signal_view import LiveSignals, SignalPyramid
 
 
 @pytest.mark.parametrize("length", [0, 1, 2, 15, 16, 17, 63, 64, 65, 1000, 4097, 100_003])
@@ -59,11 +57,40 @@ def test_times_and_values_belong_together() -> None:
         SignalPyramid(np.arange(3.0), np.arange(2.0))
 
 
-def test_a_view_does_not_depend_on_the_length() -> None:
-    """A million samples, any stretch: some milliseconds, where reading them all takes tens."""
+def test_no_stretch_needs_more_than_its_points() -> None:
+    """A million samples, any stretch: the level that is taken has 2 (last - first) / every <= points places."""
     t = np.arange(1e6)
     pyramid = SignalPyramid(t, np.sin(1e-3 * t))
-    began = time.perf_counter()
-    for k in range(100):
-        pyramid.view(1e3 * k, 1e6 - 1e3 * k)
-    assert (time.perf_counter() - began) / 100 < 0.02
+    for k in range(0, 500, 7):
+        view = pyramid.view(1e3 * k, 1e6 - 1e3 * k)
+        assert 100 < len(view.time) <= 2000 + 4  # the edges, and a bucket cut at each
+
+
+# ---------------------------------------------------------------------------------------- while they come
+def test_live_signals_keep_the_extremes_of_every_stretch() -> None:
+    random = np.random.default_rng(3)
+    t = np.arange(100_000.0)
+    table = np.column_stack([t, random.standard_normal((len(t), 3))])
+    table[60_000, 2] = 50.0
+    live = LiveSignals(1200)
+    for begin in range(0, len(t), 700):
+        live.add(table[max(0, begin - 50) : begin + 700])  # some rows come once more
+        assert len(live.rows) <= 1200 + 700
+    assert np.all(np.diff(live.rows[:, 0]) > 0.0)
+    assert np.array_equal(live.rows, table[live.rows[:, 0].astype(int)]), "rows that are none of the record"
+    assert 50.0 in live.rows[:, 2]
+    for number in range(int(t[-1] // live.stretch)):
+        stretch = table[(t // live.stretch) == number]
+        kept = live.rows[(live.rows[:, 0] // live.stretch) == number]
+        assert np.array_equal(stretch[:, 1:].min(axis=0), kept[:, 1:].min(axis=0))
+        assert np.array_equal(stretch[:, 1:].max(axis=0), kept[:, 1:].max(axis=0))
+
+
+def test_live_signals_take_what_is_torn() -> None:
+    """Rows out of order, and of no time at all, come from memory that is written meanwhile."""
+    live = LiveSignals()
+    live.add(np.array([[0.0, 1.0], [1.0, 2.0], [0.5, 9.0], [np.nan, 9.0], [2.0, 3.0]]))
+    live.add(np.empty((0, 2)))
+    live.add(np.array([[2.0, 9.0], [3.0, np.nan]]))
+    assert live.rows[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert 9.0 not in live.rows[:, 1]

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pytest
 
-from gyrobench.record.record import read_table, write_table
+from gyrobench.record.record import ColumnsOnRequest, Record, read_table, write_table
+from gyrobench.record.run_document import RecordError
 
 LOADED = "import sys; from pathlib import Path; from gyrobench.record.record import read_table; {}; print(*sys.modules)"
 
@@ -42,3 +44,19 @@ def test_files_of_other_programs(tmp_path: Path) -> None:
     assert np.isnan(found["none"]).all()
     pq.write_table(table.slice(0, 0), tmp_path / "record.parquet")
     assert {len(v) for v in (read_table(tmp_path / "record") or {}).values()} == {0}
+
+
+def test_channels_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
+    """The same numbers, whatever way they are asked for; a changed table is refused all the same."""
+    channels = {"time": np.arange(1000.0), "a.x": np.linspace(0.0, 1.0, 1000), "a.y": np.full(1000, np.nan)}
+    Record({"mean": np.array([1.0])}, channels).save(tmp_path)
+    record = Record.load(tmp_path, on_request=True)
+    held = record.channels
+    assert isinstance(held, ColumnsOnRequest) and list(held) == list(channels) and held.read == {}
+    np.testing.assert_array_equal(held["a.x"], channels["a.x"])
+    assert list(held.read) == ["a.x"]
+    assert record.same_data(Record.load(tmp_path)) and {*dict(held)} == {*channels}
+    assert held.get("b") is None and "b" not in held
+    (tmp_path / "channels.parquet").write_bytes((tmp_path / "channels.parquet").read_bytes() + b"x")
+    with pytest.raises(RecordError, match="changed after it was saved"):
+        Record.load(tmp_path, on_request=True)

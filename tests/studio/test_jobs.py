@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import Bench, UsageError
-from gyrobench.studio.job_process import REQUEST
+from gyrobench.studio.job_process import LIVE, REQUEST
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
 
@@ -67,6 +67,9 @@ def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     first, second = jobs.submit(LONG), jobs.submit(SHORT)
     until(jobs, first, under_way)
     assert jobs.find(second).state == "waiting"
+    live = json.loads((jobs.folder / first / LIVE).read_text())
+    assert live["names"] and all(len(v) == len(live["time"]) > 10 for v in live["values"])
+    assert sorted(live["time"]) == live["time"]
     jobs.stop(second)
     assert jobs.find(second).state == "stopped"
     jobs.stop(first)

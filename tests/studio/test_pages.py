@@ -19,7 +19,9 @@ import numpy as np
 import pytest
 from messy_file import messy
 
+import gyrobench as gb
 from gyrobench.record.record import Record
+from gyrobench.system.moving_bodies import attitudes, parse_bodies
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: the studio is not looked at")
@@ -112,6 +114,16 @@ def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str,
     assert "/system/" in page.url
 
 
+def test_what_is_not_there_is_said_with_what_is_near(page: Any, studio: tuple[str, Path]) -> None:
+    for path, said in (
+        ("/system/fixed_positio", "did you mean fixed_position"),
+        ("/job/x", "no job 'x'"),
+        ("/run/x/y", "x/y"),
+    ):
+        page.goto(base_of(studio) + path)
+        page.get_by_role("alert").get_by_text(said).wait_for()
+
+
 def test_a_part_is_swapped_and_its_parameters_follow(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/tumble_single_axis")
     page.get_by_label("part in gyro").click()
@@ -169,6 +181,62 @@ def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str
     np.testing.assert_allclose(Record.load(folder).windows["mean"], mean[kept] * 1e-6, rtol=1e-12)  # µA, as was said
 
 
+MOVING = {
+    "tumble_single_axis": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": "12"},
+    "tumble_two_channel": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": "12"},
+    "tumble_two_axis": {"positions": "12"},
+    "platform_three_axis": {"hold": "5s"},
+    "accelerometer_four": {}, "accelerometer_multipoint": {}, "attitude_estimator": {}, "north_finder": {},
+    "pickoff_scale_factor": {}, "rebalance_loop_test": {},
+}  # fmt: skip
+#: axes of the bodies as they are drawn: name -> x, y, z axes in east, north, up
+DRAWN = """() => {
+  const scene = getElement(document.querySelector('.scene').id.slice(1));
+  const found = {};
+  for (const {mesh} of scene.objects.values()) {
+    if (!mesh?.name?.startsWith('body ')) continue;
+    mesh.updateWorldMatrix(true, false);
+    const e = mesh.matrixWorld.elements;
+    found[mesh.name.slice(5)] = [[e[0], e[1], e[2]], [e[4], e[5], e[6]], [e[8], e[9], e[10]]];
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_what_is_drawn_stands_as_the_record_says(page: Any, studio: tuple[str, Path], name: str) -> None:
+    """Read from the scene, at four times, by keyboard and mouse: the axes of all bodies, to 1e-9.
+
+    That the record's attitudes are the true ones: tests/system/test_moving_bodies.py.
+    """
+    folder = studio[1] / "reports" / "out" / name / "moving"
+    test = gb.load(name, MOVING[name])
+    record = test.run(out=folder, check_step=False).record
+    page.goto(base_of(studio) + f"/run/{name}/moving")
+    page.get_by_role("tab", name="Moving picture").click()
+    slider = page.get_by_role("slider")
+    page.locator(".scene canvas").first.wait_for()
+    bodies = parse_bodies(test.system.bodies)
+    rows = set()
+    for share in (None, 0.0, 0.4, 0.7):
+        if share is None:
+            pass  # as it is at first
+        elif share:
+            box = slider.bounding_box()
+            page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+        else:
+            page.locator(".time [tabindex='0']").press("ArrowRight")
+        page.wait_for_timeout(1000)
+        row = int(slider.get_attribute("aria-valuenow"))
+        rows.add(row)
+        expected = attitudes(bodies, record, np.array([row]))
+        drawn = page.evaluate(DRAWN)
+        assert set(drawn) == set(expected)
+        for body, axes in expected.items():
+            assert np.abs(np.array(drawn[body]) - axes[0]).max() < 1e-9, (body, row)
+    assert len(rows) == 4
+
+
 def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
     for seed in ("11", "12"):
         page.goto(base_of(studio) + "/system/fixed_position")
@@ -184,6 +252,13 @@ def test_two_runs_are_compared(page: Any, studio: tuple[str, Path]) -> None:
     page.get_by_role("button", name="Compare").click()
     page.wait_for_url("**/compare?**")
     page.frame_locator("iframe.report").get_by_text("baseline", exact=False).first.wait_for()
+    page.get_by_role("tab", name="Signals").click()
+    page.locator(".chart canvas").first.wait_for()
+    page.wait_for_timeout(500)
+    names = page.evaluate(
+        "getElement(document.querySelector('.chart').id.slice(1)).chart.getOption().series.map(s => s.name)"
+    )
+    assert len(names) == 4 and len({n.partition(", ")[0] for n in names}) == 2, "two signals of two runs"
 
 
 def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:

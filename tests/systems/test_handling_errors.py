@@ -114,7 +114,7 @@ def test_a_refused_record_says_what_would_make_it_one(command: Command, text: st
 def test_exchanged_currents_of_a_torquer(command: Command, tmp_path: Path) -> None:
     """Eight rows, no test of residuals: currents of neighbouring rows exchanged make K_n of twice and half the size."""
     table = (standard_folder() / "systems" / "torquer_scale_factor" / "book_table.csv").read_text("utf-8")
-    table += "# type_b = none\n"
+    table += "# type_b = none\n# arrangement = checked\n"
     code, found = strict(command, tmp_path, "torquer_scale_factor", table, ("K", "°/h/mA"))
     assert code == 0 and not any(w.startswith("Handling error") for w in found["warnings"])
     rows = [k for k, line in enumerate(table.splitlines()) if line[:1].isdigit()]

@@ -10,6 +10,8 @@ import pytest
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
+from gyrobench.exchange.ssp_export import export_ssp
+from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
@@ -101,3 +103,12 @@ def test_north_finder_takes_them(part: str) -> None:
         record = session.run({"time": 60.0, "density": 1e-9, **quiet, **still})
     result = system.with_values(record.run.options).reduce(record)
     assert result.coefficients[0].estimate == pytest.approx(40.0, abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["drift_record", "north_finder"])
+def test_an_archive_holds_the_rate_gyro(name: str, tmp_path: Path) -> None:
+    """Export of the system as its parts make it, and the same system again from the archive."""
+    system = load_system(name).with_values({"density": 1e-6} if name == "north_finder" else {})
+    export_ssp(system, tmp_path / "x.ssp", {"gyro": "gyro_fog"})
+    again = read_ssp(tmp_path / "x.ssp")
+    assert again.wires.count("gyro.f[1]") <= 1 and "rebalance" not in again.slots

@@ -14,8 +14,8 @@ TABLE = re.compile(r"^\| option \| default \| unit \| meaning \|\n\|---\|---\|--
 #: their table has all options, in the words of the declarations
 WHOLE = {
     "accelerometer_four", "accelerometer_multipoint", "drift_record", "eight_position", "fixed_position",
-    "imu_positions", "open_loop_drift", "pickoff_scale_factor", "servo_polar", "servo_two_axis", "servo_vertical_level",
-    "torquer_scale_factor", "tumble_single_axis", "tumble_two_axis", "tumble_two_channel",
+    "imu_positions", "open_loop_drift", "pickoff_scale_factor", "rate_table_test", "servo_polar", "servo_two_axis",
+    "servo_vertical_level", "torquer_scale_factor", "tumble_single_axis", "tumble_two_axis", "tumble_two_channel",
 }  # fmt: skip
 #: they leave most options to docs/systems.md, which lists all
 PART = {

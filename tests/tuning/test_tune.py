@@ -135,20 +135,37 @@ def test_the_search_finds_what_a_grid_finds() -> None:
     assert np.exp(best) < 1.1 * np.exp(max(every))  # a grid of 70 is not far off
 
 
+def test_the_test_sines_of_a_proof_meet_no_limit() -> None:
+    """A lead of 200 makes 600 V of the test voltage of the system's own plan: the motor has 27.  The sines are smaller,
+    so that what is measured is the linear loop; and the saturation of the stabilizer is watched.
+    """
+    system = load_system(NAMES[1])
+    system.set("motor", "real")
+    found = tune(system, ["phase margin=40deg", "peak S<6dB", "bandwidth>12Hz", "S at 1Hz<-30dB"])
+    effort = found.controller.response(2j * np.pi * np.array([40.0]))[0] / (
+        1.0 + np.interp(40.0, found.f, found.loops[0])
+    )
+    assert abs(effort) * 1e-3 > 27.0
+    assert found.proven and found.proofs[0].limits == ""
+    for w in found.proofs[0].wishes:
+        assert w.agrees, w
+
+
 def run(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
 
 
 def test_the_command_and_what_it_prints() -> None:
-    """A structure for stabilizer_lti; its last line is a command that runs."""
+    """A structure for stabilizer_lti, another estimator in the loop: the command that is printed has both."""
     wishes = [x for w in ("phase margin=45deg", "bandwidth>4Hz") for x in ("--want", w)]
-    answer = run("tune", NAMES[0], *wishes, "--structure", "pi+lead+rolloff", "--json")
+    other = ["--part", "estimator=estimator_kalman_rate"]
+    answer = run("tune", NAMES[0], *wishes, *other, "--structure", "pi+lead+rolloff", "--json")
     assert answer.exit_code == 0, answer.output
     found = json.loads(answer.stdout)
     assert found["had"] and found["proven"] and found["part"] == "stabilizer_lti"
     assert all(w["worst"] >= w["wanted"] for w in found["wishes"])
     words = shlex.split(found["command"])
-    assert words[:5] == ["gyrobench", "run", NAMES[0], "--part", "stabilizer=stabilizer_lti"]
+    assert words[:7] == ["gyrobench", "run", NAMES[0], *other, "--part", "stabilizer=stabilizer_lti"]
     shown = run("show", *words[2:])
     assert shown.exit_code == 0 and "stabilizer_lti" in shown.stdout
 
@@ -182,3 +199,9 @@ def test_spreads_of_parts_refused(over: str, message: str) -> None:
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], [over])
     with pytest.raises(UsageError, match="tune chooses the stabilizer"):
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], parts={"stabilizer": "servo_three_loop"})
+
+
+def test_a_wish_beyond_the_communication_step_is_refused() -> None:
+    """A step of 0.5 ms: up to 800 Hz."""
+    with pytest.raises(UsageError, match=r"S at 900Hz: the communication step of 0\.0005 s reaches up to 800 Hz"):
+        tune(load_system(NAMES[0]), ["S at 900Hz<3dB"])

@@ -2,11 +2,11 @@
 
     reasons = unshown(record, result, reduce, regression_of)       # of a record that does not state that it was checked
 
-A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another city
-are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of the record.  Where the copy can be
-fitted as well - no F test of the two scatters with p < LEVEL - and an estimate changes by more than its u, the record
-rests on that mistake not having been made, and passes only where it states so: ``arrangement = checked``.  A plan whose
-redundancy shows a mistake is not asked about it.
+A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another
+city, a meter that is off by a factor are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of
+the record.  Where the copy can be fitted as well - no F test of the two scatters with p < LEVEL - and an estimate
+changes by more than its u, the record rests on that mistake not having been made, and passes only where it states so:
+``arrangement = checked``.  A plan whose redundancy shows a mistake is not asked about it.
 
 The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
 mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
@@ -51,14 +51,22 @@ from gyrobench.units import DEG
 ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
+#: scales that nobody states, what begins their columns, and what states an uncertainty of them
+METERS = (
+    ("the readings", ("mean",), ("u_voltage",)),
+    ("the currents", ("current",), ("u_current",)),
+    ("the rates", ("rate_",), ("u_time",)),
+    ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
+    ("the times", ("t_",), ("u_time",)),
+)
 NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
 UNITY = 1.0  # u, least change of an estimate that counts
 
 
 def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
-    readings reversed, latitude, scale factors and the zero of the angles in an attitude off - but for what a standard
-    uncertainty is stated of.
+    readings reversed, latitude, scale factors, scales of meters and the zero of the angles in an attitude off - but for
+    what a standard uncertainty is stated of.
     """
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
@@ -74,6 +82,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
+    yield from _meters(record)
     if options.get("u_mount") or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)
@@ -82,6 +91,22 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         columns = {n: np.where(here, record.windows[n] + OFF, record.windows[n]) for n in ANGLES}
         yield HandlingCandidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
+
+
+def _meters(record: Record) -> Iterator[HandlingCandidate]:
+    """The scale of a meter wrong, or creeping from the first row to the last, where no scale factor of it is stated."""
+    options, w = record.run.options, record.windows
+    for what, beginnings, stated in METERS:
+        names = [n for n in w if n.startswith(beginnings) and np.any(np.isfinite(w[n]) & (w[n] != 0.0))]
+        scaled = what == "the readings" and any(n in options for n in SCALES)  # mistaken by itself, above
+        if not names or scaled or any(map(options.get, stated)):
+            continue
+        columns = {n: TOO_LARGE * np.asarray(w[n], dtype=float) for n in names}
+        yield HandlingCandidate(f"{what} wrong by 2 %", changed(record, **columns))
+        if what in ("the readings", "the currents"):
+            creep = np.linspace(2.0 - TOO_LARGE, TOO_LARGE, len(w[names[0]]))
+            columns = {n: creep * np.asarray(w[n], dtype=float) for n in names}
+            yield HandlingCandidate(f"a scale of {what} that creeps by 4 %", changed(record, **columns))
 
 
 def _two_pairs(record: Record) -> Iterator[HandlingCandidate]:

@@ -44,7 +44,7 @@ class RateReading(RebalanceTest):
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
-        if slot == "gyro" and has_port(part, "rate", bench):
+        if slot == "gyro" and not self.reads_rate and has_port(part, "rate", bench):
             self.set("reading", RATE)
 
     def set(self, name: str, value: Any) -> None:

@@ -104,6 +104,7 @@ class ServoTest(TableTest):
     {sampled()}
     """
     on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=ON_STAND)
+    bodies = ""  # the stand turns the site, phase by phase
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
         | PHYSICAL_FORM

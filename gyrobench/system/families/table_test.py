@@ -93,6 +93,10 @@ class TableTest(System):
     windows = Windows.of("sampler")
     done = "sequencer.done"
     channel_period = 10.0
+    bodies = """
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table, faces sequencer
+    """
 
     def base(self) -> Array:
         """Return the table axes (rows) in east, north, up at angle 0."""

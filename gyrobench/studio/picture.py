@@ -1,0 +1,136 @@
+"""The moving picture of a run: table, gimbals and instrument turn as its record says."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from gyrobench.arrays import Array
+from gyrobench.frames import pole
+from gyrobench.record.record import Record
+from gyrobench.system.moving_bodies import MovingBody, attitudes
+
+AXES = ("#d03030", "#1f8f3a", "#2f6fd0")  # x, y, z of every body
+ALONG = ((0.0, 0.0, -np.pi / 2.0), (0.0, 0.0, 0.0), (np.pi / 2.0, 0.0, 0.0))  # turns a rod, which lies along y
+THICK = 0.014
+SHADES = ("#9aa7b4", "#b9a37c", "#8fae8b", "#a58fb0", "#7c9cb9")
+SIZE = 2.6  # of the outermost body; each that stands on it is smaller
+FRAMES = 400  # of a whole record while it plays
+TICK = 0.1  # s between two frames
+#: the front end's own call turns by Euler angles, whose extraction loses digits near 90 degrees; a quaternion does not
+#: what is newest counts, and what is not there yet is waited for
+TURN = """(() => {
+  const turns = %s, place = %d;
+  (window.bodiesTurned ??= {})[place] = turns;
+  const turn = left => {
+    if (window.bodiesTurned[place] !== turns) return;
+    const objects = getElement(place)?.objects;
+    let waiting = !objects;
+    for (const [id, r] of objects ? turns : []) {
+      const mesh = objects.get(id)?.mesh;
+      if (!mesh) { waiting = true; continue; }
+      const m = mesh.matrix.clone();
+      m.set(r[0][0], r[1][0], r[2][0], 0, r[0][1], r[1][1], r[2][1], 0, r[0][2], r[1][2], r[2][2], 0, 0, 0, 0, 1);
+      mesh.setRotationFromMatrix(m);
+    }
+    if (waiting && left > 0) setTimeout(() => turn(left - 1), 50);
+  };
+  turn(200);
+})()"""
+
+
+class MovingPicture:
+    """A scene with a slider for the time; ``groups``: body -> what turns with it.
+
+    Axes of the scene: east, north, up.  Nothing is to scale, and all bodies stand in one place.
+    """
+
+    def __init__(self, record: Record, bodies: list[MovingBody], dark: bool | None) -> None:
+        self.record, self.bodies = record, bodies
+        self.time = np.asarray(record.channels["time"], dtype=float)
+        found = attitudes(bodies, record, np.arange(1))
+        self.names = [b.name for b in bodies if b.name in found]
+        self.groups: dict[str, Any] = {}
+        self.row = 0
+        if not self.names:
+            return
+        with ui.element("div").classes("bar"):
+            self.button = ui.button(icon="play_arrow", on_click=self._play).props('flat round aria-label="Play"')
+            last = max(1, len(self.time) - 1)
+            self.slider = ui.slider(min=0, max=last, value=0, step=1).classes("time")
+            self.slider.props('aria-label="time"')
+            self.label = ui.label().classes("soft")
+        self.scene = ui.scene(width=900, height=520, grid=False, background_color="#20262d" if dark else "#f2f4f6")
+        self.scene.classes("scene").props('role=img aria-label="Moving picture"')
+        with self.scene:
+            self._ground(record.run.parameters)
+            for depth, name in enumerate(self.names):
+                self.groups[name] = self._body(depth, name)
+        self.scene.move_camera(x=1.7, y=-2.2, z=1.3, look_at_z=0.0, duration=0.0)
+        legend = ", ".join(f"{c} {n}" for c, n in (("red", "x or I"), ("green", "y or O"), ("blue", "z or S")))
+        ui.label(f"Axes of each body: {legend}. E, N, U, the pole and gravity are fixed. Not to scale.").classes("soft")
+        self.slider.on_value_change(lambda e: self.show(int(e.value)))
+        self.timer = ui.timer(TICK, self._step, active=False)
+        self.show(0)
+
+    def attitudes(self, row: int) -> Mapping[str, Array]:
+        """Return the axes of the bodies at a row of the channels."""
+        return {n: a[0] for n, a in attitudes(self.bodies, self.record, np.array([row])).items()}
+
+    def show(self, row: int) -> None:
+        """Turn the bodies as they are at a row of the channels."""
+        self.row = row
+        turns = [[self.groups[n].id, a.tolist()] for n, a in self.attitudes(row).items() if n in self.groups]
+        self.label.set_text(f"t = {self.time[row]:,.6g} s")
+        ui.run_javascript(TURN % (json.dumps(turns), self.scene.id))
+
+    def _play(self) -> None:
+        self.timer.active = not self.timer.active
+        self.button.props(f"icon={'pause' if self.timer.active else 'play_arrow'}")
+
+    def _step(self) -> None:
+        last = len(self.time) - 1
+        following = self.row + max(1, last // FRAMES)
+        self.slider.set_value(0 if self.row >= last else min(last, following))
+
+    def _ground(self, parameters: Mapping[str, Any]) -> None:
+        """Add east, north, up, the pole of the sky where the latitude is known, and gravity."""
+        scene = self.scene
+        for end, name in (([2.0, 0, 0], "E"), ([0, 2.0, 0], "N"), ([0, 0, 1.9], "U")):
+            scene.line([0, 0, 0], end).material("#8a939c")
+            scene.text(name, "color: #7a838c; font-size: 14px").move(*[1.05 * x for x in end])
+        latitude = parameters.get("site.latitude", parameters.get("motion.latitude"))
+        if isinstance(latitude, int | float):
+            end = (1.9 * pole(float(latitude))).tolist()
+            scene.line([0, 0, 0], end).material("#c09000")
+            scene.text("pole", "color: #b08000; font-size: 14px").move(*[1.05 * x for x in end])
+        scene.line([0, 0, 0], [0, 0, -1.5]).material("#777777")
+        scene.text("g", "color: #888888; font-size: 14px").move(0, 0, -1.6)
+
+    def _body(self, depth: int, name: str) -> Any:
+        """Add a body: a plate or a ring, with its three axes; return the group that turns."""
+        size = SIZE * 0.8**depth
+        with self.scene.group() as group:
+            shade = SHADES[depth % len(SHADES)]
+            if depth == len(self.names) - 1:
+                self.scene.box(0.5 * size, 0.32 * size, 0.24 * size).material(shade, 0.9)
+            elif depth == 0:  # a plate in its x-y plane
+                self.scene.cylinder(0.4 * size, 0.4 * size, 0.04 * size, 48).rotate(np.pi / 2, 0, 0).material(
+                    shade, 0.5
+                )
+            else:
+                self.scene.ring(0.36 * size, 0.42 * size, 48).material(shade, 0.8, "both")
+            length = 0.62 * size
+            for k, colour in enumerate(AXES):
+                middle, tip = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+                middle[k], tip[k] = 0.5 * length, length
+                self.scene.cylinder(THICK, THICK, length, 8).rotate(*ALONG[k]).move(*middle).material(colour)
+                self.scene.cylinder(0.0, 3.0 * THICK, 8.0 * THICK, 12).rotate(*ALONG[k]).move(*tip).material(colour)
+            place = [0.0, 0.0, 0.0]
+            place[depth % 3] = 1.16 * length  # on another axis than the name of the body before
+            self.scene.text(name, "font-size: 13px; color: #6a737c").move(*place)
+        return group.with_name(f"body {name}")

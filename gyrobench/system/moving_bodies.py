@@ -1,0 +1,121 @@
+"""Attitudes of what moves in a system, from its record: tables, gimbals, instruments.
+
+    bodies = '''
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table, faces sequencer
+        inner gimbal: outer gimbal, x platform.theta[1]
+    '''
+
+A line is a body: what it stands on ("ENU" where none of the bodies is named), then turns, each about an axis of the
+body as it is turned so far, passive and right-handed (CONV-GIMBALS): "x CHANNEL" by an angle of the record, or by a
+parameter of a part where no channel has this name; "base PARAMETER", a matrix whose rows are its axes on what it stands
+on; "faces SLOT", the mounts of the plan of this sequencer, phase by phase.
+
+Not modelled: what the record does not hold (wobble of an axis, bending), and where the bodies are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gyrobench.arrays import AnyArray, Array
+from gyrobench.record.record import Record
+from gyrobench.system.values import nest
+
+ROOT = "ENU"
+TURN = re.compile(r"(x|y|z|base|faces)\s+([\w.]+(?:\[\d+\])?)")
+
+
+@dataclass(frozen=True)
+class MovingBody:
+    """A body: its name, what it stands on, and its turns: (kind, name of a channel, a parameter or a slot)."""
+
+    name: str
+    on: str
+    turns: tuple[tuple[str, str], ...]
+
+
+def parse_bodies(text: str) -> list[MovingBody]:
+    """Return the bodies of a declaration, each behind what it stands on.  Raises ValueError naming the line."""
+    found: list[MovingBody] = []
+    for line in filter(None, map(str.strip, text.splitlines())):
+        name, colon, rest = (x.strip() for x in line.partition(":"))
+        words = [w.strip() for w in rest.split(",")] if rest else []
+        known = {b.name for b in found}
+        on = words.pop(0) if words and words[0] in {*known, ROOT} else ROOT
+        turns = [TURN.fullmatch(w) for w in words]
+        if not (name and colon) or name in {*known, ROOT} or not all(turns):
+            raise ValueError(f"bodies: '{line}': write NAME: [BODY,] x|y|z CHANNEL, base PARAMETER or faces SLOT, ...")
+        found.append(MovingBody(name, on, tuple((m[1], m[2]) for m in turns if m)))
+    return found
+
+
+def attitudes(bodies: list[MovingBody], record: Record, at: AnyArray) -> dict[str, Array]:
+    """Return the axes of each body in east, north, up: body -> array (rows of ``at``, 3, 3), rows: its x, y, z axes.
+
+    at: rows of the channels.  A body whose channels or parameters the record lacks is left out, and what stands on it.
+    """
+    found: dict[str, Array] = {ROOT: np.broadcast_to(np.eye(3), (len(at), 3, 3))}
+    for body in bodies:
+        if body.on not in found:
+            continue
+        turns = [_turn(kind, name, record, at) for kind, name in body.turns]
+        known = [t for t in turns if t is not None]
+        if len(known) == len(turns):
+            axes = found[body.on]
+            for turn in known:
+                axes = turn @ axes
+            found[body.name] = axes
+    return {name: axes for name, axes in found.items() if name != ROOT}
+
+
+def _turn(kind: str, name: str, record: Record, at: AnyArray) -> Array | None:
+    """Return the passive rotations of a turn, an array that broadcasts to (rows, 3, 3); None where it is not known."""
+    if kind == "faces":
+        return _faces(name, record, at)
+    if kind == "base":
+        base = record.run.parameters.get(name)
+        return None if base is None else np.asarray(base, dtype=float).reshape(3, 3)
+    if name in record.channels:
+        return passive("xyz".index(kind), np.asarray(record.channels[name], dtype=float)[at])
+    value = _parameter(record.run.parameters, name)
+    return None if value is None else passive("xyz".index(kind), np.asarray([value]))
+
+
+def _parameter(parameters: Mapping[str, object], name: str) -> float | None:
+    """Return a parameter, or an element of one: ``table.tilt[1]``; None where there is none."""
+    whole, _, index = name.partition("[")
+    held = parameters.get(name, parameters.get(whole))
+    if isinstance(held, list | tuple) and index:
+        held = held[int(index[:-1]) - 1]
+    return float(held) if isinstance(held, int | float) else None
+
+
+def passive(axis: int, angle: Array) -> Array:
+    """Return v_turned = R v about an axis (0, 1, 2) by angles, rad: an array (angles, 3, 3).  [CONV-GIMBALS]"""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.zeros((len(angle), 3, 3))
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    turn[:, axis, axis] = 1.0
+    turn[:, second, second] = turn[:, third, third] = c
+    turn[:, second, third], turn[:, third, second] = s, -s
+    return turn
+
+
+def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
+    """Return the mounts of the plan at rows of the channels: a phase lasts until the end of its last window."""
+    parameters = nest(record.run.parameters)
+    faces, order = parameters.get(f"{slot}.faces"), parameters.get(f"{slot}.face_of")
+    if not faces or not order or not {"phase", "t_end"} <= set(record.windows) or not len(record.windows["phase"]):
+        return None
+    mounts = np.asarray(faces, dtype=float).reshape(-1, 3, 3)
+    phases = np.asarray(record.windows["phase"], dtype=int)
+    ends = np.asarray(record.windows["t_end"], dtype=float)
+    rows = np.minimum(np.searchsorted(ends, np.asarray(record.channels["time"], dtype=float)[at]), len(ends) - 1)
+    which = np.asarray(order, dtype=int)[phases[rows] - 1] - 1
+    found: Array = mounts[which]
+    return found

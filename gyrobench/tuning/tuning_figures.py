@@ -1,0 +1,197 @@
+"""Figures of a tuned loop: Nichols, Nyquist, open loop, S and T with what is wanted of them, load step."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.record.frequency_response import Complex
+from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
+from gyrobench.tuning.robustness import FLOOR
+from gyrobench.tuning.tuned_loop import LoopTuning
+
+SPAN = 40.0  # figures over frequency show so much about the crossover
+LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
+OTHER: dict[str, Any] = {"color": MUTED, "linewidth": 0.5, "alpha": 0.6, "zorder": 2}
+DOTS: dict[str, Any] = {"color": VERMILION, "marker": "o", "linestyle": "", "markersize": 3.2, "zorder": 4}
+
+
+def disk(margin: float) -> Complex:
+    """Return the circle in the plane of L on which |S - 1/2| = 1/margin; L must stay outside."""
+    far, near = -(2.0 + margin) / (2.0 - margin), -(2.0 - margin) / (2.0 + margin)
+    return np.asarray(0.5 * (far + near) + 0.5 * (near - far) * np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361)))
+
+
+def margin_disks(t: LoopTuning) -> list[tuple[str, float, str]]:
+    """Return the disks to show: name, margin, colour."""
+    from gyrobench.tuning.robustness import peak
+
+    reached = min(1.0 / peak(t.f, np.abs(1.0 / (1.0 + L) - 0.5)) for L in t.loops)
+    wanted = [w.wish.value for w in t.wishes if w.wish.name == "disk margin"]
+    shown = [("worst case", reached, GREEN)] if reached < 1.99 else []
+    return [*((f"wanted {x:.3g}", x, VERMILION) for x in wanted), *((f"{n} {x:.3g}", x, c) for n, x, c in shown)]
+
+
+def near(t: LoopTuning) -> tuple[float, float]:
+    """Return the range of frequencies that the figures show, Hz."""
+    size = np.abs(t.loops[0])
+    crossed = t.f[np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))]
+    middle = float(crossed[-1]) if crossed.size else float(np.sqrt(t.f[0] * t.f[-1]))
+    return max(float(t.f[0]), middle / SPAN), min(float(t.f[-1]), middle * SPAN)
+
+
+def _inside(t: LoopTuning) -> Array:
+    low, high = near(t)
+    return np.asarray((t.f >= low) & (t.f <= high))
+
+
+def nyquist(t: LoopTuning) -> str:
+    """Return L near the critical point, with the disks that it must not enter."""
+    fig, axes = figure(HALF, 78)
+    ax = axes[0, 0]
+    for k, L in reversed(list(enumerate(t.loops))):
+        ax.plot(L.real, L.imag, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
+    for name, margin, colour in margin_disks(t):
+        ring = disk(margin)
+        ax.fill(ring.real, ring.imag, color=SHADE, zorder=0)
+        ax.plot(ring.real, ring.imag, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
+    if t.proofs and t.proofs[0].points:
+        measured = np.array([p.value for p in t.proofs[0].points])
+        ax.plot(measured.real, measured.imag, **DOTS, label="co-simulation")
+    ax.plot([-1.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=5)
+    zero_line(ax)
+    ax.set(xlim=(-3.2, 1.2), ylim=(-2.4, 2.4), xlabel="Re L", ylabel="Im L", aspect="equal")
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
+    return svg(fig, "nyquist")
+
+
+def nichols(t: LoopTuning) -> str:
+    """Return gain over phase of L, the disks in these coordinates."""
+    fig, axes = figure(HALF, 78)
+    ax = axes[0, 0]
+    pick = _inside(t)
+    for k, L in reversed(list(enumerate(t.loops))):
+        size, turn = _polar(L[pick], t.f[pick])
+        ax.plot(turn, size, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
+    for name, margin, colour in margin_disks(t):
+        ring = disk(margin)
+        x, y = np.degrees(np.unwrap(np.angle(-ring))) - 180.0, 20.0 * np.log10(np.abs(ring))
+        ax.fill(x, y, color=SHADE, zorder=0)
+        ax.plot(x, y, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
+    if t.proofs and t.proofs[0].points:
+        points = t.proofs[0].points
+        size, turn = _polar(np.array([p.value for p in points]), np.array([p.f for p in points]))
+        nominal = _polar(t.loops[0], t.f)[1]
+        there = np.interp([p.f for p in points], t.f, nominal)
+        turn = turn + 360.0 * np.round((there - turn) / 360.0)
+        ax.plot(turn, size, **DOTS, label="co-simulation")
+    ax.plot([-180.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=5)
+    zero_line(ax)
+    ax.set(xlabel=axis_label("phase of L", "°"), ylabel=axis_label("|L|", "dB"), ylim=(-40.0, 40.0), xlim=(-360.0, 0.0))
+    ax.set_xticks([-360, -270, -180, -90, 0])
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
+    return svg(fig, "nichols")
+
+
+def _polar(L: Complex, f: Array) -> tuple[Array, Array]:
+    """Return |L| in dB and the phase in degrees, unwrapped, between -360 and 0 at the crossover."""
+    size, turn = 20.0 * np.log10(np.maximum(np.abs(L), 1e-300)), np.degrees(np.unwrap(np.angle(L)))
+    at = turn[int(np.argmin(np.abs(size)))]
+    return size, turn - 360.0 * math.ceil(at / 360.0)
+
+
+def open_loop(t: LoopTuning) -> str:
+    """Return gain and phase of L over frequency, with the points that the co-simulation measured."""
+    fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
+    pick = _inside(t)
+    for k, L in reversed(list(enumerate(t.loops))):
+        size, turn = _polar(L, t.f)
+        for ax, y in zip(axes[:, 0], (size, turn), strict=True):
+            ax.semilogx(t.f[pick], y[pick], **(OTHER if k else LINE), label=_of(k))
+    if t.proofs and t.proofs[0].points:
+        points = t.proofs[0].points
+        f = np.array([p.f for p in points])
+        axes[0, 0].plot(f, [20.0 * math.log10(abs(p.value)) for p in points], **DOTS, label="co-simulation, nominal")
+        there = np.interp(f, t.f, _polar(t.loops[0], t.f)[1])
+        turn = np.degrees(np.angle([p.value for p in points]))
+        axes[1, 0].plot(f, turn + 360.0 * np.round((there - turn) / 360.0), **DOTS)
+    zero_line(axes[0, 0])
+    axes[1, 0].axhline(-180.0, color=MUTED, linewidth=0.8, zorder=1)
+    axes[0, 0].set_ylabel(axis_label("|L|", "dB"))
+    axes[1, 0].set(ylabel=axis_label("phase", "°"), xlabel=axis_label("frequency", "Hz"), xlim=near(t))
+    _frequencies(axes[1, 0])
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.6)
+    return svg(fig, "open-loop")
+
+
+def _of(k: int) -> str | None:
+    return "nominal" if k == 0 else "spread" if k == 1 else None
+
+
+def _frequencies(ax: Any) -> None:
+    """Write frequencies as numbers, not as powers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+
+
+def sensitivities(t: LoopTuning) -> str:
+    """Return |S| and |T| over frequency with the bounds that the wishes set."""
+    fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
+    pick = _inside(t)
+    f = t.f[pick]
+    for k, L in reversed(list(enumerate(t.loops))):
+        S = 1.0 / (1.0 + L[pick])
+        for ax, y in zip(axes[:, 0], (np.abs(S), np.abs(L[pick] * S)), strict=True):
+            ax.semilogx(f, 20.0 * np.log10(np.maximum(y, 1e-12)), **(OTHER if k else LINE), label=_of(k))
+    top, bottom = axes[:, 0]
+    for w in (w.wish for w in t.wishes):
+        style: dict[str, Any] = {"color": VERMILION, "linestyle": "--", "linewidth": 1.0}
+        if w.name == "bandwidth":
+            low = f[f <= w.value]
+            bound = np.maximum(low / np.hypot(low, w.value), FLOOR)
+            top.plot(low, 20.0 * np.log10(bound), **style, label="wanted")
+        elif w.name in ("peak S", "peak T"):
+            ax = top if w.name == "peak S" else bottom
+            ax.axhline(20.0 * math.log10(w.value), **style, label="wanted")
+        elif w.f:
+            top.plot([w.f], [20.0 * math.log10(w.value)], "v", color=VERMILION, markersize=6, label="wanted", zorder=5)
+    if t.proofs and t.proofs[0].points:
+        points = t.proofs[0].points
+        top.plot(
+            [p.f for p in points],
+            [-20.0 * math.log10(abs(1.0 + p.value)) for p in points],
+            **DOTS,
+            label="co-simulation",
+        )
+        bottom.plot([p.f for p in points], [20.0 * math.log10(abs(p.value / (1.0 + p.value))) for p in points], **DOTS)
+    for ax, name in ((top, "|S|"), (bottom, "|T|")):
+        zero_line(ax)
+        ax.set_ylabel(axis_label(name, "dB"))
+        ax.set_ylim(max(-90.0, ax.get_ylim()[0]), max(6.0, ax.get_ylim()[1]))
+    bottom.set(xlabel=axis_label("frequency", "Hz"), xlim=near(t))
+    _frequencies(bottom)
+    handles = dict(zip(*reversed(top.get_legend_handles_labels()), strict=True))
+    fig.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=4, handlelength=1.6)
+    return svg(fig, "sensitivities")
+
+
+def load_step(t: LoopTuning) -> str:
+    """Return the platform's angle after a step of torque in the co-simulation; "" where the plan has none."""
+    shown = [p for p in t.proofs if p.step is not None]
+    if not shown:
+        return ""
+    fig, axes = figure(WIDE * 0.8, 56)
+    ax = axes[0, 0]
+    for p, style in zip(shown, (LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--"}), strict=False):
+        assert p.step is not None
+        ax.plot(p.step[0], 1e6 * p.step[1], **style, label="worst point" if p.values else "nominal")
+    zero_line(ax)
+    ax.set(xlabel=axis_label("time", "s"), ylabel=axis_label("platform angle", "µrad"))
+    if len(shown) > 1:
+        fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.8)
+    return svg(fig, "load-step")

@@ -1,0 +1,172 @@
+"""The page of a tuned loop, in HTML and PDF: wishes and what came, figures, proof, controller, command."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench
+from gyrobench.report import FORMATS
+from gyrobench.report.page_model import (
+    BulletList,
+    Page,
+    PageTable,
+    Picture,
+    Row,
+    Section,
+    Text,
+    columns,
+    pictures,
+    text_cell,
+)
+from gyrobench.report.report_files import write_files
+from gyrobench.report.style import styled
+from gyrobench.tuning import tuning_figures as draw
+from gyrobench.tuning.proof import ProvenWish
+from gyrobench.tuning.tuned_loop import LoopTuning, margin_text, range_text, where
+
+NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
+
+
+def write_tuning(tuned: LoopTuning, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+    """Write tuning.json, tuning.html, tuning.pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
+    return write_files(tuned.as_dict(), lambda: page(tuned), folder, formats, NAMES, Bench.find().folder)
+
+
+def page(t: LoopTuning) -> Page:
+    """Return the page."""
+    report_id = hashlib.sha256(json.dumps(t.as_dict(), sort_keys=True).encode()).hexdigest()[:12]
+    over = "; ".join(range_text(r) for r in t.spread) or "none"
+    head = [
+        ("Report", report_id),
+        ("System", t.system),
+        ("Structure", t.structure.name),
+        ("Spread", over),
+        ("Set", ", ".join(f"{n} = {v}" for n, v in t.given.items()) or "nothing"),
+    ]
+    with styled():
+        sections = [
+            Section("Wishes and what came", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
+            Section("Margins", "margins", _margins(t)),
+            Section("Sensitivities and open loop", "responses", _responses(t)),
+            Section("Proof in co-simulation", "proof", [*_proofs(t), *_step(t), *_notes(t)]),
+            Section("Controller", "controller", _controller(t)),
+            Section("Method", "method", _method(t)),
+        ]
+    return Page(f"Tuned loop: {t.system}", report_id, head, sections, what="Tuning").finish()
+
+
+def summary(t: LoopTuning) -> str:
+    """Return the answer in a sentence."""
+    where_ = f"over the whole spread ({len(t.points)} points of it)" if t.spread else "at nominal values"
+    if t.proven:
+        return f"Every wish is fulfilled {where_}, and the co-simulation does not contradict."
+    if t.had:
+        return f"The linear model fulfils every wish {where_}; the co-simulation does not confirm it, see the proof."
+    return f"What is wanted cannot be had {where_} with this structure; shown is the best compromise that was found."
+
+
+def minus(text: str) -> str:
+    """Return a number's text with the sign of print."""
+    return text.replace("-", "−")
+
+
+def _wishes(t: LoopTuning) -> PageTable:
+    rows = []
+    for w in t.wishes:
+        good = w.ratio >= 1.0
+        wanted, worst, nominal = (minus(w.wish.shown(x)) for x in (w.wish.value, w.worst, w.nominal))
+        cells = [w.wish.name, ("≥ " if w.wish.least else "≤ ") + wanted, worst, nominal, where(w.at, t.spread),
+                 "fulfilled" if good else "not fulfilled"]  # fmt: skip
+        marks = ["strong", "", "", "", "", "pass" if good else "fail"]
+        rows.append(Row([text_cell(c, m) for c, m in zip(cells, marks, strict=True)]))
+    heads = columns("measure", "wanted", "worst case", "nominal", "worst at", "", wide=["worst at"])
+    return PageTable(heads, rows, "Wishes, with the worst case of the linear models over the spread.")
+
+
+def _reasons(t: LoopTuning) -> list[Any]:
+    return [BulletList(list(t.reasons), warn=True)] if t.reasons else []
+
+
+def _margins(t: LoopTuning) -> list[Any]:
+    return pictures(
+        Picture("nichols", draw.nichols(t), "Gain over phase of L; inside a dashed curve the disk margin is smaller.",
+                "Nichols plot of the open loop", half=True),
+        Picture("nyquist", draw.nyquist(t), "L near −1. The disks are what the disk margins keep free.",
+                "Nyquist plot of the open loop", half=True),
+    )  # fmt: skip
+
+
+def _responses(t: LoopTuning) -> list[Any]:
+    both = (
+        Picture("sensitivities", draw.sensitivities(t), "S = 1/(1 + L) and T = L/(1 + L), and what was wanted.",
+                "gain of S and T over frequency"),
+        Picture("open-loop", draw.open_loop(t), "Open loop L, step and delays of the co-simulation in it.",
+                "Bode plot of the open loop"),
+    )  # fmt: skip
+    return [*pictures(both[0]), *pictures(both[1])]
+
+
+def _proofs(t: LoopTuning) -> list[Any]:
+    rows: list[Row] = []
+    for p in t.proofs:
+        if p.why_not:
+            rows.append(Row([text_cell(x) for x in (where(p.values, t.spread), "not measured", p.why_not, "", "")]))
+        rows += [Row(_proven(where(p.values, t.spread), w)) for w in p.wishes]
+    if not rows:
+        return [Text("No run was made.")]
+    heads = columns("point", "measure", "co-simulation (95 %)", "linear model", "", wide=["point"])
+    caption = (
+        "Measured with test sines in the co-simulation, noise, friction and limits as they are. The interval holds the "
+        "noise and what the interpolation between the sines does."
+    )
+    return [PageTable(heads, rows, caption)]
+
+
+def _proven(point: str, w: ProvenWish) -> list[Any]:
+    state = ("holds", "pass") if w.kept else ("below what is wanted", "fail")
+    if w.kept and not w.agrees:
+        state = ("holds, unlike the linear model", "warn")
+    cells = [point, w.wish.name, minus(w.wish.shown(w.value) + margin_text(w)), minus(w.wish.shown(w.expected))]
+    return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
+
+
+def _step(t: LoopTuning) -> list[Any]:
+    load = next((p.load for p in t.proofs if p.step is not None), 0.0)
+    caption = f"Angle of the platform after a load of {load:g} N·m, in the co-simulation."
+    return pictures(Picture("load-step", draw.load_step(t), caption, "platform angle after a load step"))
+
+
+def _notes(t: LoopTuning) -> list[Any]:
+    return [BulletList([f"{n[:1].upper()}{n[1:]}." for n in t.notes], warn=True)] if t.notes else []
+
+
+def _controller(t: LoopTuning) -> list[Any]:
+    rows = [Row([text_cell(n), text_cell(f"{v:.6g}")]) for n, v in t.controller.values.items()]
+    parts = [("numerator", t.controller.num), ("denominator", t.controller.den)]
+    rows += [
+        Row([text_cell(f"{n}, rising powers of s"), text_cell(", ".join(f"{x:.9g}" for x in p))]) for n, p in parts
+    ]
+    heads = columns("value", "", wide=[""])
+    return [
+        PageTable(heads, rows, "Controller G(s), SI; v = −G e."),
+        Text("The system runs with it by:"),
+        Text(t.command),
+    ]
+
+
+def _method(t: LoopTuning) -> list[Any]:
+    names = {w.wish.name: w.wish for w in t.wishes}
+    from gyrobench.tuning.wishes import MEASURES
+
+    meant = [f"{n}: {MEASURES[n][2]}." if n in MEASURES else f"{n}: |S| there." for n in names]
+    text = (
+        "The linear models come from the Jacobians of the parts, with the communication step, the order of the parts "
+        "and every inserted delay in them. The search maximizes the smallest ratio of what is got to what is wanted, "
+        f"over all wishes and points of the spread; {t.evaluations} controllers were judged. Limits, dry friction that "
+        "slides and noise are not in the linear models; they are in the proof."
+    )
+    return [Text(text), BulletList(meant), Text("Seiler 2020; Skogestad 2005, sections 2.4.5 and 2.8.2.", quiet=True)]

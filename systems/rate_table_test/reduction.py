@@ -1,0 +1,246 @@
+"""Reduction of the rate table test: scale factor error, asymmetry, cubic, hysteresis, bias; threshold, repeatability.
+
+    y - w = b + e w + a abs(w)/2 + c w (w/R)2 + h d + noise          w = table rate + Earth rate along the axis
+
+d is 1 where a rate was reached from below, -1 from above; R the largest rate.  By least squares under a noise model
+estimated from the readings, with a trend and temperature weighed by the data.  Small rates are left out; of them the
+ratio of response to rate says where the gyro begins to respond (threshold: half of it).  Where one of them is not
+answered the readings at rest are left out, too: there the gyro does not answer the Earth rate.  Beside the fit the
+line alone, the departures of each level from it, and the scale factor of each cycle.
+[TEST-RATE-GYRO; IEEE 952, IEEE 647, IEEE 1431; RED-GLS]
+
+Not modelled: hysteresis that is not the same at all rates, response of the gyro to the changes of rate, Earth rate
+across the axis that a leaning input axis feels (it averages out over whole turns).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, LATITUDE, TIME_BASE
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftReduction,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Record,
+    Regression,
+    RunDocument,
+    SiteSetup,
+    Source,
+    told,
+    window_problems,
+)
+from gyrobench.units import DEG, DPH
+
+from . import handling, tables, threshold
+from .steps import cycle_of, direction, levels, scatter
+
+PPM = 1e-6
+LEAST = 8  # readings of the sweep
+COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateTableSetup(SiteSetup):
+    """steps: of the plan of a run, 0 of a measured record, whose cycles are a column.  cosine: simulated, less 1."""
+
+    steps: int = 0
+    cosine: float = 0.0
+    u_axis: float = 0.0
+    u_mount: float = 0.0
+    u_latitude: float = 0.0
+    u_time: float = 0.0
+    u_angle1: float = 0.0
+    u_angle2: float = 0.0
+
+    @property
+    def earth(self) -> float:
+        """Earth rate along the axis, rad/s."""
+        return self.earth_rate * math.sin(self.latitude)
+
+
+class Reduction(DriftReduction[RateTableSetup]):
+    """Scale factor and its errors of a rate gyro."""
+
+    handling = staticmethod(handling.candidates)
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> RateTableSetup:
+        steps = 0 if run.measured else int(run.options["steps"])
+        mount = np.reshape(run.parameters.get("gyro.mount", np.eye(3)), (3, 3))
+        return RateTableSetup.of(run, truth=truth_of(run), steps=steps, cosine=float(mount[0, 0]) - 1.0)
+
+    def problems(self) -> list[str]:
+        s = self.setup
+        problems = frames.latitude_problems(s.latitude)
+        names = ("t_start", "t_end", "mean", *(("rate",) if "rate" in self.windows else ("angle_start", "angle_end")))
+        problems += window_problems(self.windows, names)
+        if problems:
+            return problems
+        self._read()
+        if np.count_nonzero(self.large) < LEAST:
+            problems.append(f"{np.count_nonzero(self.large)} readings of the sweep: at least {LEAST} are needed")
+        elif np.unique(np.round(self.w[self.large] / self.full, 3)).size < 3:
+            problems.append("fewer than three rates: no scale factor with its errors can be told from them")
+        elif not (np.any(self.w > 0.1 * self.full) and np.any(self.w < -0.1 * self.full)):
+            problems.append("rates of one sense only: the asymmetry needs both")
+        return problems
+
+    def _read(self) -> None:
+        w = self.windows
+        self.t0, self.t1, self.y = (np.asarray(w[n], dtype=float) for n in ("t_start", "t_end", "mean"))
+        if "rate" in w:
+            self.table = np.asarray(w["rate"], dtype=float)
+        else:
+            self.table = (np.asarray(w["angle_end"]) - np.asarray(w["angle_start"])) / (self.t1 - self.t0)
+        self.w = self.table + self.setup.earth
+        self.full = float(np.max(np.abs(self.table)))
+        still = np.abs(self.table) < 1e-9 * max(self.full, 1e-12)
+        self.large = still | (np.abs(self.table) > threshold.SMALL * self.full)
+        self.small = threshold.SmallRates.of(
+            self.w[~self.large], self.y[~self.large], scatter(levels(self.table), self.y)
+        )
+        if self.small.silent:
+            self.large &= ~still
+        if self.setup.steps:
+            self.cycle = cycle_of(np.asarray(w["phase"]).astype(int), self.setup.steps)
+        else:
+            self.cycle = np.asarray(w.get("cycle", np.ones(self.y.size))).astype(int)
+
+    def regression(self) -> Regression:
+        w, y, R, truth = self.w[self.large], self.y[self.large], self.full, self.setup.truth or {}
+        self.d = direction(self.table)[self.large]
+        line = np.polyfit(w, y - w, 1)
+        rows: list[tuple[str, str, str, Array]] = [
+            ("e", "scale factor error, of both senses together, at small rates", "ppm", w),
+            ("a", "asymmetry: scale factor of positive less that of negative rates", "ppm", np.abs(w) / 2.0),
+            ("c", f"change of the scale factor from 0 to {R / DEG:.6g} °/s, as its square", "ppm", w**3 / R**2),
+            ("h", "hysteresis: half of what a rate reached from below reads more than from above", "deg/h", self.d),
+            ("b", "bias, without the Earth rate", "deg/h", np.ones_like(w)),
+        ]  # fmt: skip
+        closed = {"e": float(line[0]), "b": float(line[1])}
+        wanted = [Quantity.of(n, m, unit, truth.get(n), closed.get(n)) for n, m, unit, _ in rows]
+        X = np.column_stack([column for *_, column in rows])
+        ways = {"reached from below": self.d >= 0.0, "reached from above": self.d < 0.0}
+        shown = [Group(f"rate error, {n}", at, w[at] / DEG, "rate", "°/s") for n, at in ways.items() if at.any()]
+        kept = {n: np.asarray(v)[self.large] for n, v in self.windows.items()}
+        candidates = nuisances.common(kept) if self.setup.nuisances else ()
+        return Regression(
+            wanted, X, y - w, self.t0[self.large], self.t1[self.large], shown, "rate error", candidates=candidates
+        )
+
+    def effects(self, found: Findings) -> list[Effect]:
+        """Return the sources: what the stated rate is wrong by, times 1 + e, is in the data."""
+        s, large = self.setup, self.large
+        table, dt = self.table[large], (self.t1 - self.t0)[large]
+        across = s.earth_rate * math.cos(s.latitude)
+        lean = math.sqrt(2.0) * s.u_mount**2  # rms of (x2 + y2)/2
+        encoder = []
+        if "angle_start" in self.windows:
+            a0, a1 = (np.asarray(self.windows[n])[large] for n in ("angle_start", "angle_end"))
+            for source, n in ((ANGLE_ONCE, 1), (ANGLE_TWICE, 2)):
+                misread = [(f(n * a1) - f(n * a0)) / dt for f in (np.sin, np.cos)]
+                encoder.append(source.effect(s, np.array([found.error(-x) for x in misread])))
+        return [
+            TIME_BASE.effect(s, found.error(-table)),
+            COSINE.effect(lean, found.error(self.w[large]), simulated=(s.cosine,) if s.truth is not None else ()),
+            AXIS_VERTICAL_EAST.effect(s, found.error(-across)),
+            LATITUDE.effect(s, found.error(-across)),
+            *encoder,
+        ]
+
+    def test(self, found: Findings) -> None:
+        x = self.w[self.large] / self.full
+        found.f_test(
+            "fifth", "square and fifth power of the rate", np.column_stack([x * x, x**5]),
+            "shape of the scale factor", "the scale factor has a shape beyond asymmetry and cubic",
+            "no shape beyond asymmetry and cubic",
+        )  # fmt: skip
+
+    def account(self, found: Findings) -> Account:
+        large = self.large
+        w, y = self.w[large], self.y[large]
+        noise = found.residual_std * found.y_scale
+        self.departures = tables.Departures.of(w, y, levels(self.table[large]), self.d, self.full, noise)
+        self.cycles = tables.Cycles.of(w, y, self.cycle[large], noise)
+        return Account(
+            method="Rates in steps through both senses; least squares under an estimated noise model [TEST-RATE-GYRO]",
+            sources=["TEST-RATE-GYRO; IEEE 952; IEEE 647; IEEE 1431", "RED-GLS"],
+            equation="y - w = b + e w + a/2 abs(w) + c w (w/R)^2 + h d",
+            conventions=[
+                f"w: rate of the table and the Earth rate along its axis, {self.setup.earth / DPH:.6g} °/h.",
+                f"R = {self.full / DEG:.6g} °/s, the largest rate; d = 1 where a rate was reached from below, −1 from "
+                "above.",
+                "e is the error of the scale factor that the gyro is read with: 0 where that is right.",
+            ],
+            closed_caption="Least squares under the noise model; closed: the straight line alone, unweighted",
+            tables=[self.departures.table(), *self.cycles.table(), *self.small.table()],
+            repeatability=self.cycles.shown(),
+            random="random drift and noise of the readings",
+        )  # fmt: skip
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        truth = (self.setup.truth or {}).get("threshold")
+        added = self.small.coefficient(truth)
+        reasons = handling.implausible(result.coefficients[0])
+        return replace(
+            result,
+            coefficients=[*result.coefficients, *([added] if added else [])],
+            correlation=result.correlation,
+            reasons=[*result.reasons, *reasons],
+        )
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        return [
+            *told(coefficients, "Scale factor error {e}, asymmetry {a}, cubic {c}, hysteresis {h}; bias {b}."),
+            self.departures.sentence(),
+            *self.cycles.sentence(),
+            *self.small.sentence(),
+            found.noise_sentence("readings"),
+            *found.nuisance_sentences(),
+        ]
+
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        return cls.reduce(record.windows, cls.setup_of(record.run))
+
+
+reduce = Reduction.reduce
+
+
+def truth_of(run: RunDocument) -> dict[str, float] | None:
+    """Return what the parameters of a simulated gyro make of the coefficients, SI; None where they do not say it.
+
+    A gyro with a dead band or lock-in passes sqrt(r2 - d2): it begins to answer with half of a rate at d/sqrt(3/4), and
+    its scale factor depends on the rate in a way that is not that of the model.
+    """
+    p: dict[str, Any] = dict(run.parameters)
+    if "gyro.scale" not in p or run.measured:
+        return None
+    locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
+    band = float(p.get("gyro.dead_band", 0.0)) or locks
+    out = {"threshold": band / math.sqrt(0.75)} if band else {}
+    if not any(p.get(f"gyro.{n}") for n in ("turn_on", "flicker_x", "walk_x")):  # which are part of the bias
+        out["b"] = float(np.ravel(p["gyro.bias"])[0])
+    if p.get("gyro.closed", 1.0) < 0.5:  # a sine of the rate
+        return out
+    out["h"] = float(p.get("gyro.hysteresis", 0.0))
+    if not band:
+        reset = float(p.get("gyro.reset_error", 0.0))
+        out["a"] = float(p.get("gyro.asymmetry", 0.0))
+        out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) / (1.0 - reset) - 1.0
+        out["c"] = float(p.get("gyro.cubic", 0.0)) * float(run.options["full_scale"]) ** 2
+    return out

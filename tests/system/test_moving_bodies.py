@@ -1,0 +1,107 @@
+"""Attitudes of what moves, against what the parts themselves make of gravity and Earth rate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gyrobench as gb
+from gyrobench import frames
+from gyrobench.arrays import Array
+from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
+from gyrobench.system.moving_bodies import attitudes, parse_bodies, passive
+
+SHORT: dict[str, dict[str, Any]] = {
+    "tumble_single_axis": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": 12, "latitude": "20deg"},
+    "tumble_two_channel": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": 12},
+    "accelerometer_multipoint": {"settle": "1s", "dwell": "1s"},
+    "accelerometer_four": {"settle": "1s", "dwell": "1s"},
+    "tumble_two_axis": {"positions": 12},
+    "north_finder": {},
+    "pickoff_scale_factor": {},
+    "rebalance_loop_test": {},
+    "torquer_scale_factor": {},
+}
+
+
+def run(name: str, values: dict[str, Any], *channels: str) -> Record:
+    """Return the record of a run with further channels, ten rows a second or more."""
+    test = gb.load(name, values)
+    test.system.channels = (*test.system.channels, *channels)
+    test.system.channel_period = min(0.1, test.system.channel_period)
+    return test.run().record
+
+
+def vector(record: Record, name: str) -> Array:
+    return np.column_stack([record.channels[f"{name}[{k}]"] for k in (1, 2, 3)])
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_the_instrument_feels_gravity_where_its_axes_are(name: str) -> None:
+    """f = C (0, 0, g) with the axes in east, north, up as rows of C; the table gives f in the axes of the instrument.
+
+    Rows within a second of a change of mount are left out: the sequencer changes it between two rows.
+    """
+    record = run(name, SHORT[name], *(f"table.f[{k}]" for k in (1, 2, 3)))
+    time = record.channels["time"]
+    found = attitudes(parse_bodies(gb.load(name).system.bodies), record, np.arange(len(time)))
+    axes = found["instrument"]
+    assert np.allclose(axes @ np.swapaxes(axes, 1, 2), np.eye(3), atol=1e-12)
+    f = vector(record, "table.f")
+    away = np.min(np.abs(time[:, None] - np.asarray(record.windows["t_end"])[None, :]), axis=1) > 0.15
+    assert away.sum() > 20 and np.ptp(record.channels[next(c for c in record.channels if "angle" in c)]) > 1e-3
+    expected = np.linalg.norm(f[0]) * axes[:, :, 2]
+    assert np.abs(f - expected)[away].max() < 1e-9 * np.linalg.norm(f[0])
+
+
+def test_the_table_turns_earth_rate_as_its_axes_say() -> None:
+    """omega = C omega_E + mount (0, 0, rate): the part about the vertical, which gravity does not show."""
+    name, rate = "tumble_single_axis", [f"table.omega[{k}]" for k in (1, 2, 3)]
+    record = run(name, SHORT[name], *rate, "table.rate")
+    time = record.channels["time"]
+    found = attitudes(parse_bodies(gb.load(name).system.bodies), record, np.arange(len(time)))
+    mount = found["instrument"] @ np.swapaxes(found["table"], 1, 2)
+    earth = frames.earth_rate_local(float(record.run.parameters["site.latitude"]))
+    expected = found["instrument"] @ earth + mount[:, :, 2] * record.channels["table.rate"][:, None]
+    away = np.min(np.abs(time[:, None] - np.asarray(record.windows["t_end"])[None, :]), axis=1) > 0.15
+    assert np.abs(vector(record, "table.omega") - expected)[away].max() < 1e-12
+
+
+def test_the_inner_element_feels_the_force_of_its_base() -> None:
+    """f of the platform is that of the base through roll, pitch and azimuth gimbal; of the base, C (0, 0, g)."""
+    names = [f"{slot}.f[{k}]" for slot in ("platform", "motion") for k in (1, 2, 3)]
+    record = run("platform_three_axis", {"hold": "5s"}, *names)
+    bodies = parse_bodies(gb.load("platform_three_axis").system.bodies)
+    found = attitudes(bodies, record, np.arange(len(record.channels["time"])))
+    base, inner = found["base"], found["inner element"]
+    f_base, f_inner = vector(record, "motion.f"), vector(record, "platform.f")
+    g = np.linalg.norm(f_base[0])
+    assert np.ptp(record.channels["platform.theta[1]"]) > 1e-3
+    assert np.abs(f_base - g * base[:, :, 2]).max() < 1e-9 * g
+    turned = np.einsum("nij,nj->ni", inner @ np.swapaxes(base, 1, 2), f_base)
+    assert np.abs(f_inner - turned).max() < 1e-6 * g  # the force is that of the step before
+
+
+def test_rotations_are_passive_and_right_handed() -> None:
+    """A turn by +90 degrees about z brings x to where y was: east in the new axes is -y."""
+    assert np.allclose(passive(2, np.array([np.pi / 2]))[0] @ [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])
+    assert np.allclose(passive(2, np.array([0.3]))[0], frames.passive_z(0.3))
+    for axis in range(3):
+        about = np.eye(3)[axis]
+        assert np.allclose(passive(axis, np.array([0.7]))[0], frames.rotation(about, 0.7).T)
+
+
+def test_what_the_record_lacks_is_left_out() -> None:
+    record = Record(
+        {}, {"time": np.arange(2.0), "a.q": np.array([0.0, 0.5])}, RunDocument(parameters={"a.tilt": [0.1, 0.2]})
+    )
+    bodies = parse_bodies("one: x a.tilt[2], z a.q\ntwo: one, y b.q\nthree: two, x a.q\nfour: ENU, z a.tilt[1]")
+    found = attitudes(bodies, record, np.arange(2))
+    assert list(found) == ["one", "four"]
+    assert np.allclose(found["one"][1], passive(2, np.array([0.5]))[0] @ passive(0, np.array([0.2]))[0])
+    for text in ("one", "one: w a.q", "ENU: x a.q", "one: x a.q\none: x a.q", "one: two, x a.q"):
+        with pytest.raises(ValueError, match="bodies: "):
+            parse_bodies(text)
