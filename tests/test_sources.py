@@ -23,6 +23,8 @@ WORDS = {
     "UTF-16",
     "SHA-256",
     "BSD-3",
+    "IMU-TK",
+    "LN-100",
     "NO-BREAK",
     "SIM-1",
     "RIG-7",

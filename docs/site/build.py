@@ -27,7 +27,7 @@ CONTENTS = {
     "Tests and loops": ["docs/tests_and_loops", "docs/gallery", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
-    "Reference": ["docs/systems", "docs/public_interface", "reports/README", "fmus/README"],
+    "Reference": ["docs/systems", "docs/public_interface", "instruments/README", "reports/README", "fmus/README"],
     "Python API": ["api/gyrobench", "api/*"],
     "Figures": ["docs/speed", "docs/validation", "tests/benchmarks/README", "tests/spec/README"],
     "Project": ["CONTRIBUTING", "docs/architecture", "CHANGELOG", "docs/licences", "docs/README"],

@@ -18,6 +18,7 @@ SINGLE = (
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "fmus/README.md",
+    "instruments/README.md",
     "reports/README.md",
     "tests/benchmarks/README.md",
     "tests/spec/README.md",

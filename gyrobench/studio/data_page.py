@@ -285,7 +285,7 @@ def add_data_page(studio: Studio) -> None:
                 ui.navigate.to(f"/data?file={place}&test={chosen.value or ''}")
 
             chosen.on_value_change(show)
-            drop = ui.upload(label="Drop a file of your laboratory here: text, or a log", on_upload=taken, auto_upload=True)
+            drop = ui.upload(label="Drop a file of your laboratory: text, or a log", on_upload=taken, auto_upload=True)
             drop.props("flat bordered").classes("full").props(f"max-file-size={UPLOAD - 4096}")
             if there is None:
                 return

@@ -23,7 +23,7 @@ from gyrobench.reduction.loops.margins import interpolate_response
 from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_loop_point
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import System
-from gyrobench.tuning.robustness import crossovers, gain_limits, measured
+from gyrobench.tuning.robustness import bandwidth_limit, crossovers, gain_limits, measured
 from gyrobench.tuning.wishes import Wish
 
 INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
@@ -32,6 +32,7 @@ SINES = 14  # beside those at the limits
 DRIVEN = 0.3  # of the largest voltage, at most, is taken by a test sine
 PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
 SLOWER = 40.0
+SLOWEST = 300.0  # below the crossover over this no sine is made for the bandwidth
 SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
@@ -88,9 +89,13 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
     hump = float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])
     low, high = upper / 8.0, min(max([2.5 * upper, 1.3 * hump, *(1.2 * x for x in limits)]), 0.2 / step)
     at = [x * q for x in (*crossed, *limits, hump) for q in (0.93, 1.0, 1.07)]
-    asked = [*np.geomspace(low, high, SINES), *at, *(w.f for w in wishes if w.f)]
+    own = [w.f for w in wishes if w.f]
+    if any(w.name == "bandwidth" for w in wishes):
+        slow = bandwidth_limit(f, np.abs(1.0 / (1.0 + L)))[1]
+        own += [x for x in (0.93 * slow, slow, 1.07 * slow) if x > max(upper / SLOWEST, float(f[0]))]
+    asked = [*np.geomspace(low, high, SINES), *at, *own]
     found: list[float] = []
-    for x in sorted(float(x) for x in asked if upper / 20.0 <= x <= 0.2 / step or x in [w.f for w in wishes]):
+    for x in sorted(float(x) for x in asked if upper / 20.0 <= x <= 0.2 / step or x in own):
         if not found or x > 1.02 * found[-1]:
             found.append(x)
     return found

@@ -71,16 +71,24 @@ def bandwidth(f: Array, S: Array) -> float:
     That is |S| of the loop b/(jf): at b it is -3 dB, below b it falls by 20 dB a decade.  Where |S| is below FLOOR no
     more is asked.  0 where it does not cross.
     """
+    return bandwidth_limit(f, S)[0]
+
+
+def bandwidth_limit(f: Array, S: Array) -> tuple[float, float]:
+    """Return the bandwidth, and the frequency at which |S| limits it, Hz; 0, 0 where there is none."""
     above = S >= HALF_POWER
     rises = np.flatnonzero(~above[:-1] & above[1:])
     if not rises.size:
-        return 0.0
+        return 0.0, 0.0
     k = rises[0]
     share = np.log(HALF_POWER / S[k]) / np.log(S[k + 1] / S[k])
-    crossing = f[k] * (f[k + 1] / f[k]) ** share
+    crossing = float(f[k] * (f[k + 1] / f[k]) ** share)
     counts = S[: k + 1] > FLOOR
-    bound = f[: k + 1][counts] * np.sqrt(np.maximum(S[: k + 1][counts] ** -2.0 - 1.0, 0.0))
-    return float(min([crossing, *bound]))
+    at = f[: k + 1][counts]
+    bound = at * np.sqrt(np.maximum(S[: k + 1][counts] ** -2.0 - 1.0, 0.0))
+    if not bound.size or crossing <= bound.min():
+        return crossing, crossing
+    return float(bound.min()), float(at[np.argmin(bound)])
 
 
 def measure(wish: Wish, f: Array, L: Complex) -> float:

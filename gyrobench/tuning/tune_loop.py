@@ -194,7 +194,8 @@ def _known(session: Session, nominal: Mapping[str, Any], name: str) -> tuple[flo
     if bound is None or isinstance(value, bool | list) or not isinstance(value, int | float):
         known = [n.partition(".")[2] for n, v in nominal.items() if n.startswith(slot + ".") and isinstance(v, float)]
         raise UsageError(f"--over {name}: {slot} has no such number; {suggest_names(parameter, known)}")
-    return float(value), units.unit(bound.unit or "1").dimension
+    unit = units.unit(bound.unit or "1")
+    return float(value), unit.name if unit.factor == 1.0 and not unit.offset else unit.dimension
 
 
 def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
@@ -279,7 +280,8 @@ def _crossover(
     if not (option.min or 0.0) <= at <= (option.max or np.inf):
         return {}
     try:
-        other = session.prepare({"crossover": at})[2].parameters
+        with quiet():
+            other = session.prepare({"crossover": at})[2].parameters
     except GyrobenchError:
         return {}
     plain = {n: v for n, v in nominal.items() if n.partition(".")[0] not in (SLOT, "exciter")}

@@ -20,6 +20,7 @@ SMALL = 1e-5  # rad, step of the perturbations (they are linear to 1e-10)
 AXIS_LEVEL = Source("outer.axis.level", "outer axis out of level, about north", "rad", "u_axis")
 AXIS_AZIMUTH = Source("outer.axis.azimuth", "outer axis off east, about the vertical", "rad", "u_axis")
 ZERO = Source("{axis}.angle.zero", "zero of the {axis} angle", "rad", "u_zero", "table stands further than it reads")
+MOUNT = Source("mount.{k}", "case turned about its {axis} axis", "rad", "u_mount")
 GYRO_SCALE = Source(
     "gyro.scale.unseen", "scale factors and misalignments not shown by the plan", sources.RELATIVE, "u_gyro_scale"
 )
@@ -91,7 +92,7 @@ class Kinematics:
                 for k, n in enumerate(AXES)
             ),
             *((sources.WOBBLE_OF.of(axis=n), w) for n, w in zip(AXES, wobbles, strict=True)),
-            *((sources.TURNED[n], w) for n, w in zip("xyz", mount, strict=True)),
+            *((MOUNT.of(axis=n, k=str(k)), w) for k, (n, w) in enumerate(zip("xyz", mount, strict=True), 1)),
             (sources.LATITUDE, self._change(m, step=-SMALL, latitude=self.setup.latitude + SMALL)),
             (sources.GRAVITY, (np.zeros_like(self.felt[1]), -self.felt[1] / self.setup.gravity)),
             (sources.TIME_BASE, (self._table_rate(), np.zeros_like(self.felt[1]))),

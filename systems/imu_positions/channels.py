@@ -10,6 +10,8 @@ import numpy as np
 
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.sentences import told
+from gyrobench.result import Coefficient
 from gyrobench.units import DPH
 
 UG = 1e-6 * G0  # m/s2
@@ -84,3 +86,18 @@ def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, floa
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
     return found
+
+
+def overview(every: Sequence[Coefficient]) -> list[str]:
+    """Return the largest coefficient of each kind, as sentences."""
+
+    def largest(*prefixes: str, unit: str = "") -> str:
+        mine = [c for c in every if c.name.split("_")[0] in prefixes and unit in c.unit]
+        return max(mine, key=lambda c: abs(c.estimate)).name if mine else ""
+
+    kinds = (
+        ("Largest gyro bias", largest("bg")), ("Largest accelerometer bias", largest("ba")),
+        ("Largest scale factor error", largest("Sg", "Sa", unit="ppm")),
+        ("Largest misalignment", largest("Sg", "Sa", unit="″")), ("Largest g-sensitivity", largest("G")),
+    )  # fmt: skip
+    return told(every, *(f"{words}: {n} = {{{n}}}." for words, n in kinds if n))

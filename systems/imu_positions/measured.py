@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Mapping
+from pathlib import Path
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
+from gyrobench.record.drift_columns import open_table
+from gyrobench.record.record import Record
 from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.system import MeasuredData, System
 
 from .channels import CHANNELS
 from .geometry import ANGLES
+from .hand import UNKNOWN
+from .log import UP_DOWN, read_log
 
 TEMPLATE = """\
 # Positions and turns of an inertial measurement unit on a table with two axes: a row for each average, several a phase.
@@ -26,6 +31,11 @@ TEMPLATE = """\
 # Rows in which the table turns determine scale factors and misalignments of the gyros; the turns about three axes are
 #   needed for all of them.  Without turns the gyros have bias and g-sensitivity alone.
 # Units in brackets may be others of the same kind (deg/h, g, mg, arcsec ...).
+#
+# '# attitudes = unknown' and latitude in place of all this: a logger's samples, CSV or Parquet, of a unit put by hand
+#   into 10 positions or more, spread over all directions, in which it stands still for some seconds; 24 are better.
+#   Columns time [s], gx, gy, gz [deg/s], ax, ay, az [g], or [counts] where the scale factors are not known.  Positions
+#   are found, or numbered in a column 'position' (0 or empty: moved).  '# attitudes = up_down': one axis up and down.
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean_gx [deg/s],mean_gy [deg/s],mean_gz [deg/s],mean_ax [m/s2],mean_ay [m/s2],mean_az [m/s2]
 """  # noqa: E501
 COLUMNS = (
@@ -34,4 +44,17 @@ COLUMNS = (
     *(CsvColumn(f"mean_{c.name}", "rad/s" if c.gyro else "m/s2", f"mean reading of the {c.words}") for c in CHANNELS),
 )
 NEEDED = {"latitude": "45.75deg"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS))
+
+
+def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """Return the record of a file: of positions that a table read, or of a logger where attitudes are unknown.
+
+    Raises DataError and InvalidValueError.
+    """
+    stated = open_table(data).head.comments if data.is_file() else {}
+    if values.get("attitudes", stated.get("attitudes", "table")) in (UNKNOWN, UP_DOWN):
+        return read_log(system, data, values)
+    return read_record(system, data, values, needed=NEEDED, columns=COLUMNS)
+
+
+MEASURED = MeasuredData(TEMPLATE, read)

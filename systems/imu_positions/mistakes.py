@@ -106,7 +106,9 @@ def _scaled(size: float, kind: str) -> list[str]:
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
-    """Yield mistakes with angles and rows that residuals may show."""
+    """Yield mistakes with angles and rows that residuals may show; none of a record without angles."""
+    if "outer_start" not in record.windows:
+        return
     means = [f"mean_{c.name}" for c in CHANNELS]
     pairs = list(zip(common.OUTER, common.INNER, strict=True))
     yield from common.exchanged_columns(record, pairs, "outer and inner angle exchanged")

@@ -15,6 +15,7 @@ trend or by its noise.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -33,17 +34,20 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Group,
     Reason,
+    Record,
     Regression,
     RunDocument,
     Table,
-    told,
     window_problems,
 )
 from gyrobench.units import DPH
 
 from . import geometry, mistakes, tables
 from .budget import GYRO_SCALE, ImuSetup, Kinematics
-from .channels import BY_NAME, CHANNELS, UG, truth_of
+from .channels import BY_NAME, CHANNELS, UG, overview, truth_of
+from .hand import UNKNOWN, HandReduction
+from .log import UP_DOWN
+from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
@@ -167,6 +171,25 @@ class Reduction(ChannelTests[ImuSetup]):
     label = "{}"
 
     @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says, of attitudes that the table reads or of unknown ones."""
+        if record.run.options.get("attitudes") == UNKNOWN:
+            return HandReduction.of_record(record)
+        if record.run.options.get("attitudes") == UP_DOWN:
+            return UpDownReduction.of_record(record)
+        return super().of_record(record)
+
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says.  Attitudes that nobody states are not mistaken where a value is near the Earth
+        rate, and half of up less down should be near it.
+        """
+        result = super().from_record(record)
+        if record.run.options.get("attitudes", "table") == "table":
+            return result
+        return replace(result, reasons=[r for r in result.reasons if r.id != "plausibility.earth_rate"])
+
+    @classmethod
     def setup_of(cls, run: RunDocument) -> ImuSetup:
         return ImuSetup.of(run, truth=None if run.measured else truth_of(run.parameters))
 
@@ -203,18 +226,7 @@ class Reduction(ChannelTests[ImuSetup]):
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         """Return the largest of each kind."""
-        every = [c for r in results.values() for c in r.coefficients]
-
-        def largest(*prefixes: str, unit: str = "") -> str:
-            mine = [c for c in every if c.name.split("_")[0] in prefixes and unit in c.unit]
-            return max(mine, key=lambda c: abs(c.estimate)).name if mine else ""
-
-        kinds = (
-            ("Largest gyro bias", largest("bg")), ("Largest accelerometer bias", largest("ba")),
-            ("Largest scale factor error", largest("Sg", "Sa", unit="ppm")),
-            ("Largest misalignment", largest("Sg", "Sa", unit="″")), ("Largest g-sensitivity", largest("G")),
-        )  # fmt: skip
-        return told(every, *(f"{words}: {n} = {{{n}}}." for words, n in kinds if n))
+        return overview([c for r in results.values() for c in r.coefficients])
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
         return tables.tables(coefficients)

@@ -15,8 +15,9 @@ from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, parse_visits
 
-from . import geometry, plans
+from . import geometry, norms, plans
 from .channels import CHANNELS
+from .hand import UNKNOWN
 from .measured import MEASURED
 
 IMU = Socket(
@@ -37,11 +38,11 @@ class ImuPositions(TableTest):
     accelerometers, and the g-sensitivity of the gyros: gravity, the Earth rate and the rate of the table are known in
     every position.
 
-    [IMU-POSITIONS; IEEE 1559]
+    [IMU-POSITIONS, IMU-HAND, IMU-UPDOWN; IEEE 1559, Tedaldi 2014]
     """
 
     title = "Multi-position and rate test of an inertial measurement unit"
-    spec = ("IMU-POSITIONS",)
+    spec = ("IMU-POSITIONS", "IMU-HAND", "IMU-UPDOWN")
     reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
@@ -62,6 +63,7 @@ class ImuPositions(TableTest):
     options = (
         SITE
         | {
+            "attitudes": Option("table", str, "table (read by it), unknown (gravity and turns), up_down (of a file)"),
             "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
@@ -102,6 +104,11 @@ class ImuPositions(TableTest):
     )
     channels = ("table.angle_x", "table.angle_y", *(f"imu.{c.output}[{c.axis + 1}]" for c in CHANNELS))
 
+    @property
+    def channel_period(self) -> float:  # type: ignore[override]
+        """Every step where the turns between the positions are integrated."""
+        return self.step if self["attitudes"] == UNKNOWN else 10.0
+
     def times(self) -> plans.Times:
         """Return dwells and turns.  Raises InvalidValueError."""
         axes = self["rate_axes"]
@@ -126,7 +133,10 @@ class ImuPositions(TableTest):
         return {**super().parameters(parts), "table.index_rate": INDEX_RATE, "table.acceleration": ACCELERATION}
 
     def check(self) -> list[str]:
-        return super().check() + geometry.force_problems(self._directions())
+        if self["attitudes"] not in ("table", UNKNOWN):
+            return [f"attitudes = {self['attitudes']}: a run has table or unknown; up_down is of files"]
+        problems = norms.problems if self["attitudes"] == UNKNOWN else geometry.force_problems
+        return super().check() + problems(self._directions())
 
     def _directions(self) -> np.ndarray[Any, Any]:
         """Return the directions of the case that point up in the phases at rest."""
@@ -135,5 +145,7 @@ class ImuPositions(TableTest):
         return np.column_stack([-np.cos(x) * np.sin(y), np.sin(x), np.cos(x) * np.cos(y)])
 
     def warnings(self) -> list[str]:
+        if self["attitudes"] == UNKNOWN:
+            return []
         axes = self["rate_axes"] if self.times().rates else ""
         return geometry.unseen_rates(tuple("xyz".index(a) for a in axes))

@@ -14,24 +14,31 @@ from gyrobench.units import factor
 
 AXES = "xyz"
 TRIADS = {"g": ("gyros", "rad/s"), "a": ("accelerometers", "m/s²")}
-SCALE = {"ppm": 1e-6, "″": factor("arcsec"), "°/h": factor("deg/h"), "°/h/g": factor("deg/h"), "µg": factor("ug")}
+SCALE = {
+    "ppm": 1e-6, "″": factor("arcsec"), "°/h": factor("deg/h"), "°/h/g": factor("deg/h"), "µg": factor("ug"),
+    "counts": 1.0, "counts/(rad/s)": 1.0, "counts/(m/s²)": 1.0,
+}  # fmt: skip
 
 
 def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
-    """Return the corrections in SI and the angles between the axes of each triad that the record determines."""
-    si = {c.name: c.estimate * SCALE[c.unit] for c in coefficients if c.unit in SCALE}
-    type_a = {c.name: (c.u_a or 0.0) * SCALE[c.unit] for c in coefficients if c.unit in SCALE}
+    """Return the corrections and the angles between the axes of each triad, as far as the record determines them."""
+    by_name = {c.name: c for c in coefficients if c.unit in SCALE}
     corrections: list[list[Any]] = []
     angles: list[list[Any]] = []
     for kind, (words, unit) in TRIADS.items():
-        matrix = np.eye(3) + np.array([[si.get(f"S{kind}_{a}{b}", 0.0) for b in AXES] for a in AXES])
+        if f"b{kind}_x" not in by_name:
+            continue
+        matrix = _matrix(kind, by_name)
         inverse = np.linalg.inv(matrix)
         for i, a in enumerate(AXES):
-            corrections.append([words, a, *(float(x) for x in inverse[i]), si[f"b{kind}_{a}"], unit])
-        angles += _angles(kind, words, matrix, type_a)
+            bias = by_name[f"b{kind}_{a}"]
+            counts = bias.unit == "counts"
+            value = bias.estimate * SCALE[bias.unit]
+            corrections.append([words, a, *(float(x) for x in inverse[i]), value, "counts" if counts else unit])
+        angles += _angles(kind, words, matrix, by_name)
     caption = (
-        "true = C (reading − b), gyros: C (reading − b − G f/g0), SI; C is the inverse of the unit matrix plus S. "
-        "Elements that the record does not determine are taken as zero"
+        "true = C (reading − b), gyros: C (reading − b − G f/g0), SI; C is the inverse of the unit matrix plus S, of "
+        "counts that of the scale factors times it. Elements that the record does not determine are taken as zero"
     )
     head = ["triad", "row", "C, x", "C, y", "C, z", "b", "unit of b"]
     out = [Table("imu.correction", "Correction of readings", caption, head, corrections)]
@@ -42,14 +49,31 @@ def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
     return out
 
 
-def _angles(kind: str, words: str, matrix: Array, type_a: Mapping[str, float]) -> list[list[Any]]:
+def _matrix(kind: str, by_name: Mapping[str, Coefficient]) -> Array:
+    """Return readings over inputs (3, 3), SI or counts."""
+    matrix = np.eye(3)
+    for i, a in enumerate(AXES):
+        scale, counts = by_name.get(f"S{kind}_{a}{a}"), by_name.get(f"k{kind}_{a}")
+        for j, b in enumerate(AXES):
+            if (c := by_name.get(f"S{kind}_{a}{b}")) is not None and i != j:
+                matrix[i, j] = c.estimate * SCALE[c.unit]
+        if counts is not None:
+            matrix[i] *= counts.estimate
+        elif scale is not None:
+            matrix[i, i] += scale.estimate * SCALE[scale.unit]
+    return matrix
+
+
+def _angles(kind: str, words: str, matrix: Array, by_name: Mapping[str, Coefficient]) -> list[list[Any]]:
     rows = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         names = f"S{kind}_{AXES[i]}{AXES[j]}", f"S{kind}_{AXES[j]}{AXES[i]}"
-        if not all(n in type_a for n in names):
+        there = [by_name[n] for n in names if n in by_name]
+        if len(there) < (2 if kind == "g" else 1):
             continue
         a, b = matrix[i], matrix[j]
+        # the angle in the direction of a misalignment: towards the other axis it is smaller than 90°
         angle = math.acos(float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b))) - math.pi / 2.0
-        u = math.hypot(*(type_a[n] for n in names))
-        rows.append([words, f"{AXES[i]}{AXES[j]}", angle / factor("arcsec"), u / factor("arcsec")])
+        u = math.hypot(*((c.u_a or 0.0) for c in there))
+        rows.append([words, f"{AXES[i]}{AXES[j]}", angle / factor("arcsec"), u])
     return rows

@@ -178,7 +178,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         self.cycles = tables.Cycles.of(w, y, self.cycle[large], noise)
         return Account(
             method="Rates in steps through both senses; least squares under an estimated noise model [TEST-RATE-GYRO]",
-            sources=["TEST-RATE-GYRO; IEEE 952; IEEE 647; IEEE 1431", "RED-GLS"],
+            sources=["TEST-RATE-GYRO; IEEE 952; IEEE 647; IEEE 1431", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
             equation="y - w = b + e w + a/2 abs(w) + c w (w/R)^2 + h d",
             conventions=[
                 f"w: rate of the table and the Earth rate along its axis, {self.setup.earth / DPH:.6g} °/h.",

@@ -6,6 +6,7 @@ are sums over 720 even steps of each turn.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -126,3 +127,59 @@ def plan(places: Any = (*FACES, *EDGES), rate: float = 0.5, turns: int = 5, dwel
             rates = (0.0, sign * rate) if axis == "y" else (sign * rate, 0.0)
             found.append((0.1, inner, *rates, one, turns))
     return found
+
+
+def own_axes(unit: Unit) -> dict[str, float]:
+    """Coefficients in the axes of the accelerometers: x along the first input axis, y in the plane of the first two, by
+    Gram and Schmidt from the rows of 1 + Sa.
+    """
+    K = np.eye(3) + unit.Sa
+    x = K[0] / np.linalg.norm(K[0])
+    y = K[1] - (K[1] @ x) * x
+    y /= np.linalg.norm(y)
+    axes = np.array([x, y, np.cross(x, y)])  # rows: the new axes in the old ones
+    turned = Unit(unit.bg, (np.eye(3) + unit.Sg) @ axes.T - np.eye(3), unit.G @ axes.T, unit.ba, K @ axes.T - np.eye(3))
+    return turned.coefficients()
+
+
+DIRECTIONS = np.array([d for d in itertools.product((1.0, 0.0, -1.0), repeat=3) if any(d)])
+
+
+def poses(rng: np.random.Generator, count: int = 26) -> list[Rotation]:
+    """Attitudes (instrument to room) with faces, edges and corners up, each some degrees off and of any heading."""
+    order = rng.permutation(len(DIRECTIONS))[:count]
+    found = []
+    for d in DIRECTIONS[order]:
+        up = d / np.linalg.norm(d) + 0.1 * rng.normal(size=3)
+        axis = np.cross(up / np.linalg.norm(up), [0.0, 0.0, 1.0])
+        size = np.linalg.norm(axis)
+        angle = math.atan2(size, up[2] / np.linalg.norm(up))
+        level = Rotation.from_rotvec(axis / size * angle if size > 1e-9 else [angle, 0.0, 0.0])
+        found.append(Rotation.from_rotvec([0.0, 0.0, rng.uniform(-math.pi, math.pi)]) * level)
+    return found
+
+
+def handled(
+    unit: Unit, at: list[Rotation], rng: np.random.Generator, *, rest: float = 4.0, turn: float = 2.0,
+    rate: float = 100.0, gyro: float = 0.0, acc: float = 0.0, latitude: float = 0.7, gravity: float = 9.805,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Time (n,), readings of gyros and of accelerometers (n, 3) of a unit that is put from attitude to attitude.
+
+    gyro, acc: noise densities.  Between the attitudes the instrument turns about one axis as a cycloid does.
+    """
+    earth = EARTH * np.array([0.0, math.cos(latitude), math.sin(latitude)])
+    omega, force = [], []
+    still, moving = round(rest * rate), round(turn * rate)
+    for k, here in enumerate(at):
+        way = (here.inv() * at[k + 1]).as_rotvec() if k + 1 < len(at) else np.zeros(3)
+        tau = np.concatenate([np.zeros(still), np.arange(1, moving) / moving if k + 1 < len(at) else []])
+        part = tau - np.sin(2.0 * np.pi * tau) / (2.0 * np.pi)
+        speed = (1.0 - np.cos(2.0 * np.pi * tau)) / turn
+        to_room = here * Rotation.from_rotvec(np.outer(part, way))
+        omega.append(np.outer(speed, way) + to_room.inv().apply(earth))
+        force.append(to_room.inv().apply([0.0, 0.0, gravity]))
+    w, f = np.concatenate(omega), np.concatenate(force)
+    size = math.sqrt(rate)
+    read_g = w + w @ unit.Sg.T + f @ unit.G.T / 9.80665 + unit.bg + gyro * size * rng.normal(size=w.shape)
+    read_a = f + f @ unit.Sa.T + unit.ba + acc * size * rng.normal(size=f.shape)
+    return np.arange(len(w)) / rate, read_g, read_a

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -226,3 +227,67 @@ def test_angles_between_the_axes_do_not_see_the_mount() -> None:
         math.degrees(math.acos(row[0] @ row[1] / np.linalg.norm(row[0]) / np.linalg.norm(row[1]))) * 3600.0 - 324000.0
     )
     assert found["straight"][3] == pytest.approx(true, abs=0.01)
+
+
+def laboratory(folder: Path, w: dict[str, Any], world: World) -> Any:
+    """A laboratory's file of the windows, read."""
+    units = {"phase": "", **dict.fromkeys(("t_start", "t_end"), " [s]"), **dict.fromkeys(geometry.ANGLES, " [rad]")}
+    units |= {f"mean_g{a}": " [rad/s]" for a in "xyz"} | {f"mean_a{a}": " [m/s2]" for a in "xyz"}
+    rows = "\n".join(",".join(f"{v:.15g}" for v in row) for row in np.column_stack([w[n] for n in units]).tolist())
+    path = folder / "lab.csv"
+    head = f"# latitude = {math.degrees(world.latitude):.12g}deg\n# gravity = {world.gravity}m/s2\n"
+    path.write_text(f"{head}{','.join(n + u for n, u in units.items())}\n{rows}\n", encoding="utf-8")
+    system = load_system("imu_positions")
+    assert system.measured_data is not None
+    return system.measured_data.read(system, path, {})
+
+
+def exchanged(w: dict[str, Any]) -> dict[str, Any]:
+    """The angles of the first two positions exchanged."""
+    out = dict(w)
+    for n in geometry.ANGLES:
+        out[n] = w[n].copy()
+        out[n][w["phase"] == 1], out[n][w["phase"] == 2] = w[n][w["phase"] == 2], w[n][w["phase"] == 1]
+    return out
+
+
+LABELS = {
+    "outer and inner angle exchanged": lambda w: (
+        w
+        | {a.replace("outer", "inner"): w[a] for a in geometry.ANGLES[:2]}
+        | {a.replace("inner", "outer"): w[a] for a in geometry.ANGLES[2:]}
+    ),
+    "the outer rotation reversed": lambda w: w | {a: -w[a] for a in geometry.ANGLES[:2]},
+    "the inner rotation reversed": lambda w: w | {a: -w[a] for a in geometry.ANGLES[2:]},
+    "positions 1 and 2 exchanged": exchanged,
+}
+
+
+@pytest.mark.parametrize("said", LABELS)
+def test_mistaken_angles_of_a_file_are_named(said: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(10)
+    world, places = World(), (*EDGES[4:], *EDGES[:4], *FACES)
+    w = LABELS[said](world.windows(plan(places), Unit.drawn(rng), white(rng)))
+    with pytest.raises(ReductionError) as error:
+        reduction.Reduction.from_record(laboratory(tmp_path, w, world))
+    assert said in str(error.value)
+
+
+def test_a_file_gives_what_its_windows_give(tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    world, unit = World(), Unit.drawn(rng)
+    w = world.windows(plan(), unit, white(rng))
+    file = estimates(reduction.Reduction.from_record(laboratory(tmp_path, w, world)))
+    own = estimates(reduction.reduce(w, setup(world, nuisances=True)))
+    assert file == pytest.approx(own, rel=1e-6, abs=1e-12)
+
+
+def test_position_that_is_off_contradicts_the_model(tmp_path: Path) -> None:
+    """One position a degree off: the constants of the phases differ by more than the noise, and nothing passes."""
+    rng = np.random.default_rng(13)
+    world = World()
+    w = world.windows(plan(), Unit.drawn(rng), white(rng))
+    for n in geometry.ANGLES[:2]:
+        w[n] = np.where(w["phase"] == 8, w[n] + math.radians(1.0), w[n])
+    result = reduction.Reduction.from_record(laboratory(tmp_path, w, world))
+    assert any(r.id.startswith("residuals.contradict") and "constants of the phases" in r.text for r in result.reasons)

@@ -112,3 +112,16 @@ def test_an_archive_holds_the_rate_gyro(name: str, tmp_path: Path) -> None:
     export_ssp(system, tmp_path / "x.ssp", {"gyro": "gyro_fog"})
     again = read_ssp(tmp_path / "x.ssp")
     assert again.wires.count("gyro.f[1]") <= 1 and "rebalance" not in again.slots
+
+
+def test_a_rate_of_the_other_sign_is_named(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    rate = 7.0 + 0.1 * rng.normal(size=30)
+    rate[4:6] *= -1.0
+    rows = [f"{60 * k},{60 * (k + 1)},{x:.9f}" for k, x in enumerate(rate)]
+    head = ["# latitude = 30deg", "# attitude = U E", "# reading = rate", "t_start [s],t_end [s],mean [deg/h]"]
+    file = tmp_path / "rates.csv"
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    system = load_system("fixed_position").with_values({})
+    said = " ".join(r.text for r in system.reduce(system.read_measured(file, {})).reasons)
+    assert "the rate of the opposite sign in rows 5 to 6" in said

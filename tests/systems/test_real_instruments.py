@@ -17,7 +17,7 @@ PER_ROOT_HOUR = math.pi / 180.0 / 60.0
 
 
 #: record -> sheet, sampling rate, and how many times N is by what folds from above half of that rate: of points, the
-#: root of the noise band of the sensor (1.11 x 256 Hz of the MPU-6050, Butterworth) over it
+#: root of the noise band of the sensor (1.11 x 256 Hz for MPU6050, Butterworth) over it
 RECORDS = {
     "adis16405_unit1": ("adis16405", 100.0, 1.0),  # its output was filtered to the sampling rate
     "mpu6050_static": ("mpu6050", 99.3, math.sqrt(1.11 * 256.0 / 49.65)),

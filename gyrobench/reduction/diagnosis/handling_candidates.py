@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate, with_options
+from gyrobench.reduction.setup.run_metadata import reads_rate
 
 ANGLES = ("angle_start", "angle_end")
 TIMES = ("t_start", "t_end")
@@ -299,8 +300,8 @@ def two_axes(record: Record) -> Iterator[HandlingCandidate]:
 
 
 def at_rest(record: Record) -> Iterator[HandlingCandidate]:
-    """Currents in one attitude: only rows that are unlike the others can be seen."""
-    yield from odd_rows(record, "mean", "the current")
+    """Currents, or rates, in one attitude: only rows that are unlike the others can be seen."""
+    yield from odd_rows(record, "mean", "the rate" if reads_rate(record.run) else "the current")
 
 
 def table_of_rates(record: Record) -> Iterator[HandlingCandidate]:

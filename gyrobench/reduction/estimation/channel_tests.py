@@ -58,7 +58,7 @@ class ChannelTests(DriftReduction[S]):
 
     def result(self) -> DriftTestResult:
         """Return what all channels say, without the checks of :meth:`problems`."""
-        self.each = {c: self.of_channel(c) for c in type(self).names}
+        self.each = {c: self.of_channel(c) for c in self.names}
         results = {self.label.format(c): test.result() for c, test in self.each.items()}
         noise = " ".join(f"{name}: {r.summary[0]}" for name, r in results.items())
         others = [f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]]

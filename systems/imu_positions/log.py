@@ -1,0 +1,169 @@
+"""A logger's file of an inertial measurement unit that was put into positions by hand: samples of six channels.
+
+    time [s],gx [deg/s],gy [deg/s],gz [deg/s],ax [g],ay [g],az [g]
+
+CSV or Parquet.  Positions at rest are found (still.py), or numbered in a column ``position`` (0 or empty: moved).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from gyrobench.arrays import AnyArray, Array
+from gyrobench.record.circumstances import Keys, faults
+from gyrobench.record.csv_reader import CsvColumn, DataError, Head
+from gyrobench.record.drift_columns import open_table
+from gyrobench.record.record import Record
+from gyrobench.system.lab_record import TEXTS, measured_run, set_options
+from gyrobench.system.system import System
+
+from . import norms, still
+from .channels import CHANNELS
+
+UP_DOWN = "up_down"  # option attitudes
+
+GYRO = re.compile(r"(?:mean_)?(?:g|gyro|gyr|omega|w|rate)[ _.]?([xyz])", re.I)
+ACC = re.compile(r"(?:mean_)?(?:a|acc|accel|accelerometer|f)[ _.]?([xyz])", re.I)
+COUNTS = ("counts", "count", "lsb", "digits")
+NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
+FEW = 20  # samples of a position, or of a piece of it
+MOVED = 6.0  # times the usual scatter
+PIECES = 20  # of a position up or down
+
+
+def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
+    """Return the record of a file: a row for each position, and the samples of the gyros.
+
+    Raises DataError with all that is wrong, InvalidValueError for an option of ``values`` that does not fit.
+    """
+    table = open_table(data)
+    for name in values:
+        if name not in system.options and name not in TEXTS:
+            system.set(name, values[name])  # says which options there are
+    problems = faults(table.head.statements, Keys((*system.options, *TEXTS)))
+    problems += set_options(system, table.head.statements, values)
+    if "latitude" not in system.given:
+        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
+    head, columns, unclear = _columns(table.head)
+    problems += unclear
+    if problems:
+        raise DataError(data, problems)
+    for place, name in enumerate(head.names):
+        table.head.names[place] = name
+    blocks = list(table.blocks(columns))
+    samples = {c.name: np.concatenate([b[c.name] for b in blocks]) for c in columns}
+    time, every, problems = _checked(samples)
+    if problems:
+        raise DataError(data, problems)
+    up_down = system["attitudes"] == UP_DOWN
+    windows, problems = _windows(time, every, samples, 2 if up_down else norms.LEAST, PIECES if up_down else 1)
+    if problems:
+        raise DataError(data, problems)
+    said = {**table.head.comments, **values}
+    run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
+    si = {c.name: c.unit for c in columns}
+    run.window_units = {f"mean_{c.name}": si[c.name] for c in CHANNELS} | {"t_start": "s", "t_end": "s"}
+    channels = {"time": time, **{f"imu.rate[{k + 1}]": every[:, k] for k in range(3)}}
+    run.units = {n: si["gx"] for n in channels if n != "time"}
+    return Record(windows, channels, run)
+
+
+def _columns(head: Head) -> tuple[Head, list[CsvColumn], list[str]]:
+    """Return the head with the bench's names, the columns to read, and what is wrong with them."""
+    names, found, problems = list(head.names), dict[str, str](), list[str]()
+    for place, text in enumerate(head.names):
+        name, _, rest = text.partition("[")
+        unit = rest.rstrip("] ").strip()
+        for kind, pattern in (("g", GYRO), ("a", ACC)):
+            if match := pattern.fullmatch(name.strip()):
+                own = kind + match[1].lower()
+                if own in found:
+                    problems.append(f"columns '{found[own]}' and '{text}' are both {own}; leave one of them out")
+                    continue
+                found[own] = text
+                names[place] = f"{own} [1]" if unit.lower() in COUNTS else f"{own} [{unit}]" if unit else own
+        if name.strip().lower() in ("position", "phase", "pose"):
+            names[place] = "position"
+    lost = [c.name for c in CHANNELS if c.name not in found]
+    if lost:
+        problems.append(
+            f"columns not found: {', '.join(lost)} (gx or gyro_x, ax or acc_x ... with their units); columns of the "
+            f"file: {', '.join(head.names)}"
+        )
+    columns = [CsvColumn("time", "s", "time of the sample")]
+    for kind, si in (("g", "rad/s"), ("a", "m/s2")):
+        mine = [names[head.names.index(found[kind + a])] for a in "xyz" if kind + a in found]
+        counted = [n for n in mine if n.endswith("[1]")]
+        if counted and len(counted) < len(mine):
+            problems.append(f"columns {', '.join(mine)}: counts and another unit in one triad")
+        columns += [CsvColumn(kind + a, "1" if counted else si, "reading") for a in "xyz" if kind + a in found]
+    if "position" in names:
+        columns.append(NUMBER)
+    return Head(names, head.statements, head.line, head.delimiter, head.decimal_comma), columns, problems
+
+
+def _checked(samples: Mapping[str, Array]) -> tuple[Array, Array, list[str]]:
+    """Return time, the six channels (n, 6), and what is wrong with them; rows in which one is missing are left out."""
+    time = samples["time"]
+    every = np.column_stack([samples[c.name] for c in CHANNELS])
+    there = np.isfinite(time) & np.all(np.isfinite(every), axis=1)
+    time, every = time[there], every[there]
+    problems = []
+    if time.size < 2 * still.SHORT:
+        return time, every, [f"{time.size} complete rows: no record of positions"]
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        problems.append(f"time does not increase at t = {time[back[0] + 1]:.9g} s and in {back.size - 1} more rows")
+    for c in CHANNELS:
+        column = every[:, CHANNELS.index(c)]
+        if np.ptp(column) == 0.0:
+            problems.append(f"column {c.name}: all values are the same, the {c.words} was not read")
+    alike = [
+        (a.name, b.name) for k, a in enumerate(CHANNELS) for b in CHANNELS[k + 1 :]
+        if a.kind == b.kind and np.array_equal(every[:, CHANNELS.index(a)], every[:, CHANNELS.index(b)])
+        and np.ptp(every[:, CHANNELS.index(a)]) > 0.0
+    ]  # fmt: skip
+    problems += [f"columns {a} and {b} are the same: one of them stands twice" for a, b in alike]
+    return time, every, problems
+
+
+def _windows(
+    time: Array, every: Array, samples: Mapping[str, Array], least: int, pieces: int
+) -> tuple[dict[str, AnyArray], list[str]]:
+    """Return a row for each of so many pieces of each position at rest, and what is wrong with them."""
+    if "position" in samples:
+        found = [(a, b) for a, b in still.labelled(samples["position"]) if b - a >= FEW]
+    else:
+        found = still.at_rest(time, every)
+    if len(found) < least:
+        how = "numbered" if "position" in samples else "found in the samples (at rest for two seconds or more)"
+        why = "an axis up and down" if pieces > 1 else "three accelerometers in unknown attitudes"
+        return {}, [
+            f"{len(found)} positions at rest {how}; at least {least} in different directions are needed for {why}"
+        ]
+    cuts = [np.linspace(a, b - 1, min(pieces, (b - a) // FEW) + 1).astype(int) for a, b in found]
+    rows = [(k, a, b) for k, c in enumerate(cuts, 1) for a, b in pairwise(c.tolist())]
+    phase, start, end = (np.array(x) for x in zip(*rows, strict=True))
+    out: dict[str, AnyArray] = {"phase": phase, "t_start": time[start], "t_end": time[end], "n": end - start}
+    for k, c in enumerate(CHANNELS):
+        out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for _, a, b in rows])
+        out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for _, a, b in rows])
+    return out, _moved(out)
+
+
+def _moved(windows: Mapping[str, AnyArray]) -> list[str]:
+    """Return the positions in which a channel scatters far more than it usually does."""
+    problems = []
+    for c in CHANNELS:
+        scatter = windows[f"std_{c.name}"] / max(float(np.median(windows[f"std_{c.name}"])), 1e-300)
+        problems += [
+            f"position {windows['phase'][k]} (t = {windows['t_start'][k]:.6g} s): {c.name} scatters {scatter[k]:.3g} "
+            "times as much as in the others: it was moved, or its number reaches into the motion"
+            for k in np.flatnonzero(scatter > MOVED)
+        ]
+    return problems

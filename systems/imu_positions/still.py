@@ -1,0 +1,74 @@
+"""Positions at rest in a series of samples: where all channels scatter no more than they do at their quietest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from gyrobench.arrays import Array
+
+WIDTH = 1.0  # s over which the scatter is taken
+QUIET = 0.1  # quantile of the scatter that is the noise at rest
+LOUD = 2.0  # times that: moved
+LEAST = 1.0  # s of a position
+EDGE = 0.25  # of the width that is left out at both ends
+BLOCK = 4096  # windows at a time
+SHORT = 16  # samples of the width at least
+
+
+def at_rest(time: Array, samples: Array) -> list[tuple[int, int]]:
+    """Return first and one past the last sample of each stretch at rest; time (n,) s, samples (n, channels).
+
+    A gap in time of more than five steps ends a stretch.
+    """
+    steps = np.diff(time)
+    h = float(np.median(steps))
+    width = max(round(WIDTH / h), SHORT)
+    if len(time) < 2 * width:
+        return []
+    scatter = _moving_deviation(samples, width)
+    floor = np.maximum(np.quantile(scatter, QUIET, axis=0), _quantum(samples) / np.sqrt(12.0))
+    quiet = np.all(scatter <= LOUD * np.maximum(floor, 1e-300), axis=1)
+    covered = np.zeros(len(time) + 1)
+    first = np.flatnonzero(quiet)
+    np.add.at(covered, first, 1.0)
+    np.add.at(covered, first + width, -1.0)
+    still = np.cumsum(covered)[:-1] > 0.5
+    broken = np.flatnonzero(steps > 5.0 * h)
+    edge = round(EDGE * width)
+    found = []
+    for start, end in _stretches(still):
+        cuts = [start, *(int(b) + 1 for b in broken if start <= b < end - 1), end]
+        for a, b in pairwise(cuts):
+            if (b - a - 2 * edge) * h >= LEAST:
+                found.append((a + edge, b - edge))
+    return found
+
+
+def labelled(number: Array) -> list[tuple[int, int]]:
+    """Return the stretches of rows whose number is the same and not 0 (empty: 0)."""
+    n = np.nan_to_num(number)
+    change = np.flatnonzero(np.diff(n)) + 1
+    ends = [0, *change.tolist(), len(n)]
+    return [(a, b) for a, b in pairwise(ends) if n[a] != 0.0]
+
+
+def _stretches(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def _moving_deviation(samples: Array, width: int) -> Array:
+    """Return the standard deviation of each window of ``width`` samples, taken directly: sums would lose small ones."""
+    windows = sliding_window_view(samples, width, axis=0)
+    parts = [windows[k : k + BLOCK].std(axis=2) for k in range(0, len(windows), BLOCK)]
+    return np.concatenate(parts)
+
+
+def _quantum(samples: Array) -> Array:
+    """Return the smallest step of each channel that occurs."""
+    steps = np.abs(np.diff(samples[: 1 << 16], axis=0))
+    return np.array([float(np.min(s[s > 0.0], initial=np.inf)) if np.any(s > 0.0) else 0.0 for s in steps.T])

@@ -1,0 +1,164 @@
+"""Turns between positions at rest: what the gyros must read for gravity to be found where it is afterwards.
+
+    u_k+1 = Q_k^T E^T u_k,    Q_k: product of the turns of each sample, from (1 + S)^-1 (r/D - b)
+                                                                          [IMU-HAND; Tedaldi 2014, eq. 11..13]
+
+u: directions of gravity in axes of the case, from the accelerometers; b: mean of the readings at rest before and after.
+A sample's rotation vector is the trapezoid of the rate with the first coning term, w_1 x w_2 h2/12 [Savage 1998].
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from gyrobench.arrays import Array
+
+STEP = 1e-6  # of S, for slopes
+GUESSES = 90  # of a scale factor that is not known
+TURNED = (0.15, 15.0)  # rad, between which the mean turn lies where it is not known
+FEW = 12  # turns that a guess looks at
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One turn: times (m,), readings over D less the bias (m, 3), directions of gravity before and after (3,)."""
+
+    time: Array
+    rate: Array
+    before: Array
+    after: Array
+
+    def rotations(self, inverses: Array) -> Array:
+        """Return Q (b, 3, 3) for several inverses (b, 3, 3) of 1 + S; columns: axes afterwards in those before."""
+        w = np.einsum("bij,mj->bmi", inverses, self.rate)
+        h = np.diff(self.time)[:, None]
+        vector = 0.5 * h * (w[:, 1:] + w[:, :-1]) + h * h / 12.0 * np.cross(w[:, :-1], w[:, 1:])
+        size = np.linalg.norm(vector, axis=2, keepdims=True)
+        q = np.concatenate([np.cos(0.5 * size), vector * (0.5 * np.sinc(0.5 * size / np.pi))], axis=2)
+        return _matrices(_product(q))
+
+    def rotation(self, inverse: Array) -> Array:
+        """Return Q (3, 3) for one inverse."""
+        return np.asarray(self.rotations(inverse[None])[0])
+
+    @property
+    def tangents(self) -> Array:
+        """Two directions (2, 3) at right angles to gravity afterwards."""
+        return across(self.after)
+
+
+def across(direction: Array) -> Array:
+    """Return two directions (2, 3) at right angles to a unit vector and to one another."""
+    least = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    first = np.cross(direction, least)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(direction, first)])
+
+
+def _times(a: Array, b: Array) -> Array:
+    """Return products of quaternions (..., 4), scalar first."""
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    W, X, Y, Z = np.moveaxis(b, -1, 0)
+    return np.stack([
+        w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
+        w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W,
+    ], axis=-1)  # fmt: skip
+
+
+def _product(q: Array) -> Array:
+    """Return products (b, 4) of quaternions (b, m, 4) in the order of m."""
+    while q.shape[1] > 1:
+        if q.shape[1] % 2:
+            one = np.zeros_like(q[:, :1])
+            one[..., 0] = 1.0
+            q = np.concatenate([q, one], axis=1)
+        q = _times(q[:, ::2], q[:, 1::2])
+    return np.asarray(q[:, 0] / np.linalg.norm(q[:, 0], axis=1, keepdims=True))
+
+
+def _matrices(q: Array) -> Array:
+    w, x, y, z = q.T
+    zero = np.zeros_like(w)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    out: Array = np.eye(3) + 2.0 * w[:, None, None] * cross + 2.0 * cross @ cross
+    return out
+
+
+def _left(turns: list[Turn], matrices: Array) -> Array:
+    """Return what gravity is found off by (b, 2 n), rad, for several S (b, 3, 3)."""
+    inverses: Array = np.asarray(np.linalg.inv(np.eye(3) + matrices), dtype=float)
+    each = [t.before @ t.rotations(inverses) @ t.tangents.T for t in turns]
+    return np.concatenate(each, axis=1)
+
+
+def left(turns: list[Turn], matrix: Array) -> Array:
+    """Return by how much gravity is found off, along two tangents of each turn (2 n,), rad; matrix: S (3, 3)."""
+    return np.asarray(_left(turns, matrix[None])[0])
+
+
+def slopes(turns: list[Turn], matrix: Array) -> Array:
+    """Return the change (2 n, 9) of :func:`left` for each element of S, row by row."""
+    steps = STEP * np.eye(9).reshape(9, 3, 3)
+    both = _left(turns, np.concatenate([matrix + steps, matrix - steps]))
+    return np.asarray((both[:9] - both[9:]).T / (2.0 * STEP))
+
+
+def solve(turns: list[Turn], start: Array) -> Array:
+    """Return S (3, 3) that fits best."""
+
+    def of(unknowns: Array) -> Array:
+        return left(turns, unknowns.reshape(3, 3))
+
+    found = least_squares(of, start.ravel(), lambda x: slopes(turns, x.reshape(3, 3)), method="lm", xtol=1e-12)
+    return np.asarray(found.x.reshape(3, 3))
+
+
+def nominal(turns: list[Turn], known: bool) -> tuple[float, Array]:
+    """Return the scale factor (readings over rate; 1 where it is ``known``) and the signed permutation P (3, 3) of the
+    axes with which gravity is found best: readings = scale P rate.  Unit matrix: the axes are labelled as those of the
+    accelerometers.
+    """
+    some = sorted(turns, key=lambda t: -float(np.max(np.abs(t.before - t.after))))[:FEW]
+    angles = [float(np.linalg.norm(np.trapezoid(t.rate, t.time, axis=0))) for t in some]
+    middle = float(np.median(angles)) or 1.0
+    scales = [1.0] if known else [middle / a for a in np.geomspace(*TURNED, GUESSES)]
+    each = _offs(some, np.array([s * np.eye(3) for s in scales]))
+    identity, good = scales[int(np.argmin(each))], float(np.min(each))
+    if good < 0.15:  # rad: a turn by hand is found to some degrees with nominal scale factors
+        return identity, np.eye(3)
+    best = (0.5 * good, identity, np.eye(3))
+    for p in _signed():
+        each = _offs(some, np.array([s * p for s in scales]))
+        k = int(np.argmin(each))
+        if each[k] < best[0]:
+            best = float(each[k]), scales[k], p
+    return best[1], best[2]
+
+
+def _offs(turns: list[Turn], matrices: Array) -> Array:
+    """Return the root mean square (b,) of what gravity is found off by, readings = matrix · rate."""
+    return np.asarray(np.sqrt(np.mean(_left(turns, matrices - np.eye(3)) ** 2, axis=1)))
+
+
+def _signed() -> Iterator[Array]:
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            p = np.zeros((3, 3))
+            p[range(3), order] = signs
+            yield p
+
+
+def headings(turns: list[Turn], inverse: Array, first: Array) -> list[Array]:
+    """Return two level directions (2, 3) in axes of the case at each position: those of the first, carried along."""
+    level = across(first)
+    found = [level]
+    for t in turns:
+        level = level @ t.rotation(inverse)
+        level = level - np.outer(level @ t.after, t.after)
+        found.append(level)
+    return found

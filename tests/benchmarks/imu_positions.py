@@ -1,0 +1,158 @@
+"""How often the 95 % intervals of imu_positions contain the true value: random units, sites, noise, three ways.
+
+    python tests/benchmarks/imu_positions.py [table unknown up_down] [--runs 300] [--seed 1]
+
+The records are made in plain numpy and scipy (tests/support/imu_world.py), which shares nothing with the reduction.
+
+table    12 positions and turns about three axes; noise of window means white, Gauss-Markov (correlation time from 0.3
+         windows to half the record) or both
+unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; white noise of a small unit, of its
+         gyros white, Gauss-Markov (0.3 positions to half the record) or both
+up_down  an axis up and down, 120 s each at 20 Hz; the same noise of the gyros
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+from scipy.signal import lfilter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+from imu_world import EARTH, EDGES, FACES, Unit, World, handled, own_axes, plan, poses
+
+from gyrobench.system.system import load_system
+
+room = type(load_system("imu_positions")).__module__
+reduction: Any = importlib.import_module(".reduction", room)
+budget: Any = importlib.import_module(".budget", room)
+tables: Any = importlib.import_module(".tables", room)
+Rng = np.random.Generator
+DPH = math.pi / 648000.0
+
+
+def correlated(t0: Any, t1: Any, tau: float) -> Any:
+    """Covariance (n, n) of means of a Gauss-Markov process of unit variance over windows one after the other."""
+    length = t1 - t0
+    own = 2.0 * (tau / length - (tau / length) ** 2 * -np.expm1(-length / tau))
+    weight = tau / length * -np.expm1(-length / tau)
+    gap = t0[None, :] - t1[:, None]
+    upper = np.where(gap >= -1e-9, np.exp(-np.maximum(gap, 0.0) / tau), 0.0) * np.outer(weight, weight)
+    return np.diag(own) + upper + upper.T
+
+
+def noise_of(rng: Rng, t0: Any, t1: Any, size: float) -> Any:
+    """Noise (n,) of window means of standard deviation ``size`` for the usual window."""
+    length, usual = t1 - t0, float(np.median(t1 - t0))
+    share = float(rng.choice([0.0, 1.0, rng.uniform()]))
+    tau = math.exp(rng.uniform(math.log(0.3 * usual), math.log(0.5 * float(t1[-1] - t0[0]))))
+    own = float(correlated(t0[:1], t0[:1] + usual, tau)[0, 0])
+    covariance = size**2 * ((1.0 - share) * np.diag(usual / length) + share / own * correlated(t0, t1, tau))
+    return np.linalg.cholesky(covariance) @ rng.normal(size=t0.size)
+
+
+def series_of(rng: Rng, n: int, step: float, window: float, size: float) -> Any:
+    """Noise of three gyros (n, 3) whose means over ``window`` (s) have the standard deviation ``size``: shares of white
+    and of Gauss-Markov noise as in :func:`noise_of`.
+    """
+    share = float(rng.choice([0.0, 1.0, rng.uniform()]))
+    tau = math.exp(rng.uniform(math.log(0.3 * window), math.log(0.5 * n * step)))
+    own = float(correlated(np.zeros(1), np.array([window]), tau)[0, 0])
+    decay = math.exp(-step / tau)
+    shocks = rng.normal(size=(n, 3)) * math.sqrt(1.0 - decay**2)
+    shocks[0] = rng.normal(size=3)
+    slow = lfilter([1.0], [1.0, -decay], shocks, axis=0) * size * math.sqrt(share / own)
+    return slow + rng.normal(size=(n, 3)) * size * math.sqrt((1.0 - share) * window / step)
+
+
+def of_table(rng: Rng) -> tuple[Any, dict[str, float]]:
+    world, unit = World(rng.uniform(-1.2, 1.2)), Unit.drawn(rng)
+
+    def noise(t0: Any, t1: Any) -> Any:
+        return tuple(np.column_stack([noise_of(rng, t0, t1, s) for _ in "xyz"]) for s in (0.15 * DPH, 1.3e-4))
+
+    windows = world.windows(plan(FACES + EDGES), unit, noise)
+    said = budget.ImuSetup(latitude=world.latitude, gravity=world.gravity, earth_rate=EARTH)
+    return reduction.reduce(windows, said), unit.coefficients()
+
+
+def of_file(head: str, time_of: Any, gyro: Any, acc: Any) -> Any:
+    heads = "time [s]," + ",".join([f"g{a} [rad/s]" for a in "xyz"] + [f"a{a} [m/s2]" for a in "xyz"])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        np.savetxt(path, np.column_stack([time_of, gyro, acc]), "%.12g", ",", header=head + heads, comments="")
+        system = load_system("imu_positions")
+        assert system.measured_data is not None
+        return reduction.Reduction.of_record(system.measured_data.read(system, path, {}))
+
+
+def of_hand(rng: Rng) -> tuple[Any, dict[str, float]]:
+    unit, latitude = Unit.drawn(rng, 0.01), rng.uniform(-1.2, 1.2)
+    t, gyro, acc = handled(unit, poses(rng, 24), rng, rest=3.0, turn=1.5, acc=1e-3, latitude=latitude, gravity=9.805)
+    gyro = gyro + series_of(rng, len(t), 0.01, 2.5, 3.0 * DPH)
+    head = f"# attitudes = unknown\n# latitude = {math.degrees(latitude):.12g}deg\n# gravity = 9.805m/s2\n"
+    return of_file(head, t, gyro, acc), own_axes(unit)
+
+
+def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
+    unit, latitude, n = Unit.drawn(rng), rng.uniform(-1.2, 1.2), 2400
+    unit.Sa = unit.Sa * np.eye(3)
+    t = np.concatenate([np.arange(n), np.arange(n) + n + 400]) / 20.0
+    sign = np.repeat([1.0, -1.0], n)
+    earth = EARTH * math.sin(latitude)
+    gyro = np.outer(sign, unit.G[:, 0] + (np.eye(3) + unit.Sg)[:, 0] * earth) + unit.bg
+    gyro = gyro + series_of(rng, 2 * n, 0.05, 6.0, 0.2 * DPH)
+    acc = np.outer(sign * 9.805, (np.eye(3) + unit.Sa)[:, 0]) + unit.ba + rng.normal(size=gyro.shape) * 5e-3
+    head = f"# attitudes = up_down\n# latitude = {math.degrees(latitude):.12g}deg\n# gravity = 9.805m/s2\n"
+    truth = unit.coefficients()
+    truth["hg_x"] = float(unit.G[0, 0] + (1.0 + unit.Sg[0, 0]) * earth)
+    truth["Sa_xx"] = float(unit.Sa[0, 0])
+    return of_file(head, t, gyro, acc), truth
+
+
+WAYS: dict[str, Callable[[Rng], tuple[Any, dict[str, float]]]] = {
+    "table": of_table, "unknown": of_hand, "up_down": of_up_down,
+}  # fmt: skip
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("way", nargs="*", choices=[[], *WAYS], default=[])
+    parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    for way in given.way or list(WAYS):
+        hits: dict[str, list[bool]] = {}
+        z: dict[str, list[float]] = {}
+        began = time.monotonic()
+        for run in range(given.runs):
+            result, truth = WAYS[way](np.random.default_rng([given.seed, run]))
+            for c in result.coefficients:
+                if c.name not in truth:
+                    continue
+                low, high = (x * tables.SCALE[c.unit] for x in c.interval)
+                kind = c.name.split("_")[0]
+                hits.setdefault(kind, []).append(low <= truth[c.name] <= high)
+                z.setdefault(kind, []).append(
+                    (c.estimate * tables.SCALE[c.unit] - truth[c.name]) / c.u / tables.SCALE[c.unit]
+                )
+        print(f"\n{way}: {given.runs} runs in {time.monotonic() - began:.0f} s")
+        for kind, found in hits.items():
+            n, h = len(found), sum(found)
+            low, high = stats.beta.ppf(0.025, h, n - h + 1), stats.beta.ppf(0.975, h + 1, n - h) if h < n else 1.0
+            rms = float(np.sqrt(np.mean(np.square(z[kind]))))
+            print(f"{kind:<6}{n:>7} intervals {h / n:>8.3f}   {low:.3f} .. {high:.3f}   rms of z {rms:.2f}", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
