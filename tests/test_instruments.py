@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import gyrobench as gb
 from gyrobench.bench import Bench, UsageError, standard_folder
-from gyrobench.commands.arguments import with_instrument
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings
+from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instrument
 
 SHEETS = sorted(Bench(standard_folder()).instruments())
 DEG = math.pi / 180.0
@@ -113,6 +113,13 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
+def test_from_python() -> None:
+    test = gb.load("drift_record", {"duration": "600s"}, instrument="adis16405")
+    run = test.run(seed=1)
+    assert run.record.run.parts["gyro"].name == "GyroMems"
+    assert run.result.instrument.startswith("Analog Devices ADIS16405")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -133,7 +140,7 @@ def test_refused(tmp_path: Path, text: str, said: str) -> None:
 def test_refused_parts(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such data sheet; did you mean"):
         find_instrument("adis1640")
-    with pytest.raises(UsageError, match="leave --part gyro out"):
+    with pytest.raises(UsageError, match="name no part for it"):
         with_instrument("adis16405", {"gyro": "floated_gyro"})
     file = tmp_path / "mine.toml"
     file.write_text(MINE.replace("gyro_mems", "floated_gyro"), encoding="utf-8")

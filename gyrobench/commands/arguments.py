@@ -77,16 +77,3 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
 def parse_time(option: str, text: str | None) -> float | None:
     """Return the time given by an option in s.  Raises InvalidValueError."""
     return parse_number(option, text, "s") if text else None
-
-
-def with_instrument(name: str, parts: dict[str, str]) -> tuple[str, dict[str, Any]]:
-    """Put the part of a data sheet into the slot gyro; return what a report calls it, and the values of its parameters.
-
-    Raises UsageError.
-    """
-    from gyrobench.workflow.instruments import find_instrument, settings
-
-    sheet = find_instrument(name)
-    if parts.setdefault("gyro", sheet.part) != sheet.part:
-        raise UsageError(f"--instrument {name} puts {sheet.part} into the slot gyro: leave --part gyro out")
-    return f"{sheet.maker} {sheet.title} ({sheet.source}, {sheet.date}), simulated", dict(settings(sheet))

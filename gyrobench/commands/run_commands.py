@@ -82,8 +82,9 @@ def run(
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench.commands import print_runs
-    from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time, with_instrument
+    from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time
     from gyrobench.report import FORMATS
+    from gyrobench.workflow.instruments import with_instrument
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
 

@@ -36,6 +36,7 @@ from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.instruments import with_instrument
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
 
 if TYPE_CHECKING:
@@ -72,13 +73,15 @@ def load(
     parts: Mapping[str, File] | None = None,
     maps: Mapping[str, File] | None = None,
     coupling: str = "sequential",
+    instrument: str = "",
     **options: Any,
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
     mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  Raises errors of type GyrobenchError; UsageError for a suite.
+    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.  Raises
+    errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
@@ -86,8 +89,11 @@ def load(
     if coupling not in ("sequential", "parallel"):
         raise UsageError(f"coupling = '{coupling}': one of sequential, parallel")
     test.coupling = "parallel" if coupling == "parallel" else ""
-    experiment = Experiment(test, parts or {}, maps or {})
-    for key, value in {**(values or {}), **options}.items():
+    swaps: dict[str, Any] = dict(parts or {})
+    title, sheet = with_instrument(instrument, swaps) if instrument else ("", {})
+    vars(test)["instrument"] = title
+    experiment = Experiment(test, swaps, maps or {})
+    for key, value in {**sheet, **(values or {}), **options}.items():
         experiment.set(key, value)
     return experiment
 

@@ -107,7 +107,7 @@ def find_instrument(name: str) -> Instrument:
     known = bench.instruments()
     file = Path(name) if name.endswith(".toml") else known.get(name)
     if file is None or not file.is_file():
-        raise UsageError(f"--instrument {name}: no such data sheet; {suggest_names(name, known)}")
+        raise UsageError(f"instrument {name}: no such data sheet; {suggest_names(name, known)}")
     return read_instrument(file)
 
 
@@ -168,3 +168,14 @@ def parameters(sheet: Instrument) -> dict[str, Any]:
 def settings(sheet: Instrument, slot: str = "gyro") -> Mapping[str, Any]:
     """Return the parameters as values of a system: "gyro.white" -> value."""
     return {f"{slot}.{n}": v for n, v in parameters(sheet).items()}
+
+
+def with_instrument(name: str, parts: dict[str, str]) -> tuple[str, dict[str, Any]]:
+    """Put the part of a data sheet into the slot gyro; return what a report calls it, and the values of its parameters.
+
+    Raises UsageError.
+    """
+    sheet = find_instrument(name)
+    if parts.setdefault("gyro", sheet.part) != sheet.part:
+        raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
+    return f"{sheet.maker} {sheet.title} ({sheet.source}, {sheet.date}), simulated", dict(settings(sheet))
