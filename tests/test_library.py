@@ -118,7 +118,7 @@ def test_without_pandas_the_remedy_is_said(run: gb.Run, monkeypatch: pytest.Monk
 
 def test_out_keeps_record_and_result_and_report_adds_the_pages(folder: Path, run: gb.Run) -> None:
     kept = gb.load(NAME, TINY).run(seed=5, out="r")
-    files = {"run.json", "record.parquet", "channels.parquet", "result.json"}
+    files = {"run.json", "record.parquet", "channels.parquet", "result.json", "manifest.json"}
     assert kept.folder == folder / "r" and {f.name for f in (folder / "r").iterdir()} == files
     assert set(kept.report()) == {"json", "html", "pdf"}
     assert run.folder is None
@@ -184,7 +184,7 @@ def test_measured_data_are_reduced(folder: Path) -> None:
     assert measured.record.run.measured and measured.record.run.operator == "A. B." and list(folder.iterdir()) == []
     assert measured.result.array("u").min() > 0.0
     kept = gb.reduce("torquer_scale_factor", table, out="m")
-    assert sorted(f.name for f in (folder / "m").iterdir()) == ["record.parquet", "result.json", "run.json"]
+    assert sorted(f.name for f in (folder / "m").iterdir()) == ["manifest.json", "record.parquet", "result.json", "run.json"]
     assert np.array_equal(kept.result.array(), measured.result.array())
 
 
