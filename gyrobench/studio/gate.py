@@ -16,6 +16,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlencode
 
 from gyrobench.bench import UsageError
+from gyrobench.errors import GyrobenchError
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -41,7 +42,7 @@ HEADERS = (
 )
 
 
-class _TooLargeError(Exception):
+class _TooLargeError(GyrobenchError):
     """A body that is longer than it may be."""
 
 

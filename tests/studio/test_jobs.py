@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -26,9 +26,13 @@ LIMIT = 120.0  # s
 
 
 @pytest.fixture
-def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StudioJobs:
+def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StudioJobs]:
     monkeypatch.chdir(tmp_path)
-    return StudioJobs(Bench.find(), most=1)
+    made = StudioJobs(Bench.find(), most=1)
+    yield made
+    for job in made.all():  # of a test that failed
+        if job.active:
+            made.stop(job.key)
 
 
 def until(jobs: StudioJobs, key: str, there: Callable[[StudioJob], bool]) -> StudioJob:
@@ -65,10 +69,11 @@ def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> N
 
 def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     first, second = jobs.submit(LONG), jobs.submit(SHORT)
-    until(jobs, first, under_way)
+    file = jobs.folder / first / LIVE
+    until(jobs, first, lambda job: under_way(job) and file.is_file() and len(json.loads(file.read_text())["time"]) > 10)
     assert jobs.find(second).state == "waiting"
-    live = json.loads((jobs.folder / first / LIVE).read_text())
-    assert live["names"] and all(len(v) == len(live["time"]) > 10 for v in live["values"])
+    live = json.loads(file.read_text())
+    assert live["names"] and all(len(v) == len(live["time"]) for v in live["values"])
     assert sorted(live["time"]) == live["time"]
     jobs.stop(second)
     assert jobs.find(second).state == "stopped"

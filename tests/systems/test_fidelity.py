@@ -58,6 +58,14 @@ CASES = {
     ),
     "north_finder": Case({"time": 30.0}, 2e-5, "angles of a window and rates sampled each millisecond"),
     "accelerometer_four": Case({"dwell": 1.0, "settle": 0.5}, 3e-4, "1e-9 V, of coefficients of some microvolts"),
+    "imu_positions": Case({}),
+    "rate_table_test": Case(
+        {"gyro.scale[1]": 3e-4},
+        without=tuple(f"gyro.{n}" for n in (
+            "optical", "electronics", "crossings", "quantum", "turn_on_x", "turn_on_y", "markov_x", "markov_y",
+            "white_x", "white_y",
+        )),
+    ),
     "torquer_scale_factor": Case({"currents": "5 10 20 40 70 100", "range": "0.5deg", "range_large": "5deg"}),
 }  # fmt: skip
 
