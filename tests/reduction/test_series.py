@@ -112,6 +112,8 @@ def test_runs_by_hand() -> None:
     assert z == pytest.approx((2 - 4) / math.sqrt(1.2)) and p == pytest.approx(0.0339, abs=1e-4)
     assert residual_series.runs_test(np.zeros(5)) == (0.0, 1.0)
     assert residual_series.runs_test(np.resize([1.0, -1.0], 40))[1] > 0.999
+    same = np.resize([1.0, -1.0], 8)  # noise that can only be this says nothing of the number of runs
+    assert residual_series.runs_test(same, np.tile(same, (100, 1))) == (0.0, 1.0)
 
 
 def test_test_sizes_on_white_noise() -> None:

@@ -133,6 +133,8 @@ def runs_test(x: Array, null: Array | None = None) -> tuple[float, float]:
         above = null > np.median(null, axis=1, keepdims=True)
         each = 1 + np.sum(above[:, 1:] != above[:, :-1], axis=1)
         mean, variance = float(each.mean()), float(each.var())
+    if variance <= 0.0:  # as many stated errors as data: residuals of the fit that can only be these
+        return 0.0, 1.0
     z = (runs - mean) / math.sqrt(variance)
     return z, float(special.ndtr(z))
 
