@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,20 @@ def test_no_kind_of_mistake_passes(test: str, benchmark_of: Any) -> None:
             said[name] = kinds.outcome(sheet, clean)[0]
     assert set(said) >= set(UNSEEN) and set(said.values()) <= {"asked", "named", "refused", "inconclusive"}, said
     assert said["a meter 2 % off"] == "asked"
+
+
+def test_readings_in_steps_larger_than_their_noise_do_not_pass(benchmark_of: Any) -> None:
+    """Read to a tenth of their range they all lay on the model: u was 1e-17 of what the steps do, and it passed."""
+    kinds = benchmark_of("handling_kinds")
+    first = 3 + 1000 * zlib.crc32(b"eight_position") % 10_000
+    sheet = importlib.import_module("laboratory").Laboratory("eight_position", first).sheet()
+    clean = sheet.reduce(None)
+    assert kinds.KINDS["readings too coarse"](sheet, np.random.default_rng(1))
+    result = sheet.reduce(kinds.wide(clean))
+    assert result.ideal and result.verdict == "inconclusive"
+    assert any(
+        "the data lie on the model to the last digit" in text.lower() for text in result.withheld + result.warnings
+    )
 
 
 def test_noise_of_a_reader_is_asked_for(benchmark_of: Any, tmp_path: Path) -> None:

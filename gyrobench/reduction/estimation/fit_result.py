@@ -62,6 +62,16 @@ class Account:
     random: str = "random drift and reading noise"
 
 
+#: of a measured record: readings in steps larger than their noise can lie on the model to the last digit
+NO_RESIDUALS = Reason(
+    "noise.none",
+    "The data lie on the model to the last digit, which measured ones do not: they are computed, or read in steps "
+    "larger than their noise; u holds neither the noise nor the steps.",
+    ("pass", "fail"),
+    severity="doubt",
+)
+
+
 @contextlib.contextmanager
 def observed_fits() -> Iterator[list[tuple[Findings, Array]]]:
     """Collect the fits that are reported while the block runs, each with what one standard uncertainty of
@@ -83,6 +93,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         seen.append((fit, rows[1:]))
     coefficients = [coefficient(fit, j, rows[:, j].tolist()) for j in range(rows.shape[1])]
     odd = outliers.find(fit)
+    simulated = setup.truth is not None or any(q.truth is not None for q in fit.quantities)
     robust = outliers.robust(fit) if setup.robust and asked.whole() else []
     return DriftTestResult(
         title=account.title,
@@ -118,6 +129,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         ],
         reasons=[
             *_contradictions(fit),
+            *([] if simulated or not fit.ideal else [NO_RESIDUALS]),
             *_unstated(fit, effects),
             *_slow_drift(fit, coefficients, rows),
             *outliers.warnings(fit, odd),
@@ -133,7 +145,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         decision_rule=f"{DECISION_RULE} {SLOW_RULE}",
         site=setup.shown,
         instrument=setup.instrument,
-        simulated=setup.truth is not None or any(q.truth is not None for q in fit.quantities),
+        simulated=simulated,
     )
 
 
