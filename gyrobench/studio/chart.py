@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from nicegui import ui
 from gyrobench.record.record import Record
 from gyrobench.record.signal_view import SignalPyramid
 from gyrobench.report.channel_figure import scaled
+from gyrobench.studio.job_process import stored
 
 POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
@@ -110,9 +110,9 @@ class LiveChart:
         """Draw the signals where there are new ones."""
         try:
             changed = self.file.stat().st_mtime_ns
-            content = json.loads(self.file.read_text(encoding="utf-8")) if changed != self.read else None
-        except (OSError, ValueError):
+        except OSError:
             return
+        content = stored(self.file) if changed != self.read else None
         if content is None or not content["time"]:
             return
         self.read = changed

@@ -13,11 +13,12 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gyrobench import reading
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
 from gyrobench.studio.request import JobRequest, first_shown, read_request
 
@@ -48,12 +49,27 @@ class JobReport:
     verdict: str = ""
 
 
+def store(file: Path, content: Mapping[str, Any], durable: bool = True) -> None:
+    """Write a file of a job, with its digest."""
+    text = json.dumps(reading.sealed(content), ensure_ascii=False)
+    write_whole(file, text.encode("utf-8", "backslashreplace"), durable)
+
+
+def stored(file: Path) -> dict[str, Any] | None:
+    """Return the content of a file of a job; None where there is none, or it was changed after it was written."""
+    try:
+        content, has = reading.opened(
+            reading.json_object(reading.read_text(file, ValueError), file, ValueError), file, ValueError
+        )
+    except ValueError:
+        return None
+    return content if has else None
+
+
 def read_report(folder: Path) -> JobReport | None:
     """Return what a job says of itself; None before it has said anything."""
-    try:
-        return JobReport(**json.loads((folder / STATE).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return None
+    content = stored(folder / STATE)
+    return None if content is None else JobReport(**content)
 
 
 class _Writer:
@@ -65,8 +81,7 @@ class _Writer:
         self.write()
 
     def write(self) -> None:
-        text = json.dumps(vars(self.report), ensure_ascii=False)
-        write_whole(self.folder / STATE, text.encode("utf-8", "backslashreplace"), durable=False)
+        store(self.folder / STATE, vars(self.report), durable=False)
 
     def notes(self, lines: Iterable[str]) -> None:
         self.report.notes += lines
@@ -94,7 +109,7 @@ class _Writer:
         live.add(rows[:, [0, *(1 + list(names).index(n) for n in shown)]])
         columns = [[x if math.isfinite(x) else None for x in c] for c in live.rows.T.tolist()]
         content = {"names": shown, "time": columns[0] if columns else [], "values": columns[1:]}
-        write_whole(self.folder / LIVE, json.dumps(content).encode(), durable=False)
+        store(self.folder / LIVE, content, durable=False)
 
 
 def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
@@ -158,8 +173,12 @@ def main(folder: Path) -> int:
                 return 2
             time.sleep(0.05)
     with lock:
-        content = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
         writer = _Writer(folder)
+        content = stored(folder / REQUEST)
+        if content is None:
+            writer.report.state, writer.report.message = "failed", f"{REQUEST} was changed after it was written"
+            writer.write()
+            return 3
         _finish(writer.report, read_request(content["request"]), bool(content["resume"]), writer)
         writer.write()
         return 0 if writer.report.state == "done" else 3

@@ -8,7 +8,6 @@ may look, and what was waiting starts when the studio is there again.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import secrets
 import signal
@@ -20,8 +19,8 @@ from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import LOCK, FolderLock, cores, write_whole
-from gyrobench.studio.job_process import REQUEST, STARTED, STATE, JobReport, read_report
+from gyrobench.files import LOCK, FolderLock, cores
+from gyrobench.studio.job_process import REQUEST, STARTED, STATE, JobReport, read_report, store, stored
 from gyrobench.studio.request import JobRequest, read_request
 
 FOLDER = Path("studio", "jobs")  # below reports/out
@@ -74,7 +73,7 @@ class StudioJobs:
         folder = self.folder / key
         folder.mkdir(parents=True)
         content = {"request": request.as_dict(), "resume": resume, "created": time.time()}
-        write_whole(folder / REQUEST, json.dumps(content, indent=1, ensure_ascii=False).encode())
+        store(folder / REQUEST, content)
         self.advance()
         return key
 
@@ -91,7 +90,7 @@ class StudioJobs:
         job = self.find(key)
         if job.state == "waiting":
             stopped = JobReport(state="stopped", message="stopped before it began")
-            write_whole(self.folder / key / STATE, json.dumps(vars(stopped)).encode())
+            store(self.folder / key / STATE, vars(stopped))
         elif job.active and (process := self._process(key)):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGINT)
@@ -135,10 +134,10 @@ class StudioJobs:
 
     def _read(self, folder: Path) -> StudioJob | None:
         try:
-            content = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+            content = stored(folder / REQUEST) or {}
             request = read_request(content["request"])
             created, resume = float(content["created"]), bool(content["resume"])
-        except (OSError, ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError):
             return None
         report = read_report(folder)
         if report is not None and report.state in ENDED:

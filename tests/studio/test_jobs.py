@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import shlex
 import shutil
 import signal
@@ -16,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.studio import job_process
 from gyrobench.studio.job_process import LIVE, REQUEST
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
@@ -137,6 +139,24 @@ def test_damaged_jobs_are_left_out(jobs: StudioJobs) -> None:
     (jobs.folder / "d").mkdir()
     assert jobs.all() == []
     jobs.advance()
+
+
+def test_a_job_that_was_changed_is_not_run_as_another(jobs: StudioJobs) -> None:
+    """Bits of 200 places of what is asked: no job of another request is found, and its process does not begin."""
+    blocker = jobs.submit(LONG)
+    key = jobs.submit(SHORT)  # waits
+    file = jobs.folder / key / REQUEST
+    content, draw = file.read_bytes(), random.Random(3)
+    for _ in range(200):
+        changed = bytearray(content)
+        changed[draw.randrange(len(changed))] ^= 1 << draw.randrange(8)
+        file.write_bytes(bytes(changed))
+        with pytest.raises(UsageError, match="no job"):
+            jobs.find(key)
+    assert job_process.main(file.parent) == 3
+    file.write_bytes(content)
+    assert "changed after it was written" in jobs.find(key).report.message
+    jobs.stop(blocker)
 
 
 def test_lines_of_a_request() -> None:
