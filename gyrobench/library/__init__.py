@@ -91,7 +91,7 @@ def load(
     test.coupling = "parallel" if coupling == "parallel" else ""
     swaps: dict[str, Any] = dict(parts or {})
     title, sheet = with_instrument(instrument, swaps) if instrument else ("", {})
-    vars(test)["instrument"] = title
+    test.instrument = title
     experiment = Experiment(test, swaps, maps or {})
     for key, value in {**sheet, **(values or {}), **options}.items():
         experiment.set(key, value)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from gyrobench.arrays import Array
 
@@ -38,9 +39,7 @@ class Turn:
         w = np.einsum("bij,mj->bmi", inverses, self.rate)
         h = np.diff(self.time)[:, None]
         vector = 0.5 * h * (w[:, 1:] + w[:, :-1]) + h * h / 12.0 * np.cross(w[:, :-1], w[:, 1:])
-        size = np.linalg.norm(vector, axis=2, keepdims=True)
-        q = np.concatenate([np.cos(0.5 * size), vector * (0.5 * np.sinc(0.5 * size / np.pi))], axis=2)
-        return _matrices(_product(q))
+        return _product(vector)
 
     def rotation(self, inverse: Array) -> Array:
         """Return Q (3, 3) for one inverse."""
@@ -60,33 +59,16 @@ def across(direction: Array) -> Array:
     return np.array([first, np.cross(direction, first)])
 
 
-def _times(a: Array, b: Array) -> Array:
-    """Return products of quaternions (..., 4), scalar first."""
-    w, x, y, z = np.moveaxis(a, -1, 0)
-    W, X, Y, Z = np.moveaxis(b, -1, 0)
-    return np.stack([
-        w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
-        w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W,
-    ], axis=-1)  # fmt: skip
-
-
-def _product(q: Array) -> Array:
-    """Return products (b, 4) of quaternions (b, m, 4) in the order of m."""
+def _product(vectors: Array) -> Array:
+    """Return products (b, 3, 3) of turns by rotation vectors (b, m, 3), in the order of m: of pairs, then of those."""
+    count = len(vectors)
+    q = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_quat().reshape(count, -1, 4)
     while q.shape[1] > 1:
         if q.shape[1] % 2:
-            one = np.zeros_like(q[:, :1])
-            one[..., 0] = 1.0
-            q = np.concatenate([q, one], axis=1)
-        q = _times(q[:, ::2], q[:, 1::2])
-    return np.asarray(q[:, 0] / np.linalg.norm(q[:, 0], axis=1, keepdims=True))
-
-
-def _matrices(q: Array) -> Array:
-    w, x, y, z = q.T
-    zero = np.zeros_like(w)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    out: Array = np.eye(3) + 2.0 * w[:, None, None] * cross + 2.0 * cross @ cross
-    return out
+            q = np.concatenate([q, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1, 1))], axis=1)
+        pairs = [Rotation.from_quat(q[:, k::2].reshape(-1, 4)) for k in (0, 1)]
+        q = (pairs[0] * pairs[1]).as_quat().reshape(count, -1, 4)
+    return np.asarray(Rotation.from_quat(q[:, 0]).as_matrix())
 
 
 def _left(turns: list[Turn], matrices: Array) -> Array:
