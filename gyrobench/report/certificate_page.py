@@ -72,8 +72,7 @@ def page(of: Sequence[Certified], laboratory: Laboratory, number: str = "") -> P
         Section("Reports", "reports", [_reports(of)]),
         Section("Statements and signatures", "signatures", [_signatures(of, laboratory)]),
     ]
-    simulated = any(c.report.result.simulated for c in of)
-    title = f"{'Simulated test' if simulated else 'Test certificate'}: {first.result.title}"
+    title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {first.result.title}"
     return Page(title, number, _head(of, laboratory, number), sections, what="Certificate").finish()
 
 
@@ -92,7 +91,7 @@ def _head(of: Sequence[Certified], laboratory: Laboratory, number: str) -> list[
     dates = sorted({date(c.report.about.date or "not recorded") for c in of})
     return [
         ("Laboratory", ", ".join([laboratory.name, *laboratory.address])),
-        *([("Accreditation", laboratory.accreditation)] if laboratory.accreditation else []),
+        *([("Accreditation", laboratory.accreditation)] if laboratory.accreditation and not _simulated(of) else []),
         ("Certificate", number),
         *items,
         *((name, text or "not stated") for name, text in stated),
@@ -200,6 +199,11 @@ def _reports(of: Sequence[Certified]) -> PageTable:
 
 
 def _signatures(of: Sequence[Certified], laboratory: Laboratory) -> Signatures:
-    results = [c.report.result for c in of]
-    first = [SIMULATED] if any(r.simulated for r in results) else []
-    return Signatures([*first, *STATEMENTS, *laboratory.statements], [(s.role, s.name) for s in laboratory.signatories])
+    """Return the statements and who signs; what the laboratory states of measurements is not said of simulated data."""
+    simulated = _simulated(of)
+    said = [SIMULATED, *STATEMENTS] if simulated else [*STATEMENTS, *laboratory.statements]
+    return Signatures(said, [(s.role, s.name) for s in laboratory.signatories])
+
+
+def _simulated(of: Sequence[Certified]) -> bool:
+    return any(c.report.result.simulated for c in of)

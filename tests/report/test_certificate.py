@@ -44,7 +44,7 @@ def tables(page) -> list[PageTable]:
 
 
 def test_one_instrument_every_coefficient_with_its_expanded_uncertainty(laboratory: Laboratory) -> None:
-    made = of()
+    made = of(simulated=False)
     page = certificate_page.page([made], laboratory, "2026-1")
     head = dict(page.head)
     assert head["Laboratory"] == "Inertial laboratory, Example street 1, Example town" and page.report_id == "2026-1"
@@ -72,6 +72,11 @@ def test_nothing_that_a_report_warns_of_is_left_out(laboratory: Laboratory) -> N
     (remarks,) = (b for s in page.sections if s.slug == "remarks" for b in s.blocks if isinstance(b, BulletList))
     assert remarks.items == ["cold", "b: wet"] and remarks.warn
     assert "simulated" in page.sections[-1].blocks[0].statements[0] and page.title.startswith("Simulated test")
+    # neither accreditation nor traceability is claimed of what was simulated
+    assert (
+        "Accreditation" not in dict(page.head)
+        and laboratory.statements[0] not in page.sections[-1].blocks[0].statements
+    )
 
 
 def test_a_lot_names_who_failed_and_what(laboratory: Laboratory) -> None:
@@ -105,7 +110,7 @@ def test_all_that_is_wrong_with_a_profile_is_named(tmp_path: Path) -> None:
 
 
 def test_two_pages_at_most_and_the_same_in_both_renderers(laboratory: Laboratory, tmp_path: Path) -> None:
-    page = certificate_page.page([of()], laboratory, "2026-1")
+    page = certificate_page.page([of(simulated=False)], laboratory, "2026-1")
     shown = html(page)
     assert "Traceable to the national standards." in shown and "— end of certificate —" in shown
     (tmp_path / "c.pdf").write_bytes(pdf(page))
