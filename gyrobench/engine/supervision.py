@@ -105,6 +105,15 @@ def memory_limit() -> int | None:
     return int(MEMORY_SHARE * have)
 
 
+def _resident(process: int) -> int:
+    """Return the bytes of memory that a process has, 0 where the system does not say."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            pages = Path(f"/proc/{process}/statm").read_text().split()
+            return int(pages[1]) * os.sysconf("SC_PAGE_SIZE")
+    return 0
+
+
 def supervise(
     job: Job,
     fmus: dict[str, tuple[Any, Path]],
@@ -134,6 +143,7 @@ class _Supervisor:
         self.loads = Loads(fmus, None if self.memory is None else 2 * self.memory)
         files.clear()
         self.forked = can_fork()
+        self.inherited = _resident(os.getpid()) if self.forked else 0  # pages that the child shares with this process
         self.board = RunBoard(job.program, None if self.forked else files.file("board"))
         self.status = self.board.status
         self.process: Any = None
@@ -184,7 +194,7 @@ class _Supervisor:
         if now < self.checked:
             return
         self.checked = now + CHECK
-        if self.memory is not None and self._resident() > self.memory:
+        if self.memory is not None and _resident(self.process.pid) > self.memory + self.inherited:
             self._kill(
                 f"the run takes more than {self.memory / 1e9:.2g} GB of memory, {MEMORY_SHARE:.0%} of this machine's; "
                 "its process was stopped"
@@ -198,14 +208,6 @@ class _Supervisor:
         if self.status.stop or self.files.file("ending").exists():
             return min(self.timeout, ENDING)
         return self.timeout if self.status.call else max(self.timeout, START)
-
-    def _resident(self) -> int:
-        """Return the bytes of memory that the child has, 0 where the system does not say."""
-        if sys.platform == "linux":
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                pages = Path(f"/proc/{self.process.pid}/statm").read_text().split()
-                return int(pages[1]) * os.sysconf("SC_PAGE_SIZE")
-        return 0
 
     def _report(self, now: float) -> None:
         s, schedule = self.status, self.job.schedule

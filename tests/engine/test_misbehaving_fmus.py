@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import foreign_fmus
+import numpy as np
 import pytest
 
 from gyrobench.engine import supervision
@@ -135,6 +136,14 @@ def test_what_does_not_touch_the_run(
     assert found.complete and found.same_data(good) and Record.load(tmp_path / "run").same_data(good)
     assert any(words in n for n in found.run.notes)
     assert Path.cwd() == tmp_path
+
+
+def test_memory_of_the_caller_is_not_the_runs(small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A notebook that holds more data than a run may take: its fork shares them and is not stopped for them."""
+    held = np.ones(25_000_000)  # 200 MB
+    monkeypatch.setattr(supervision, "memory_limit", lambda: held.nbytes)
+    monkeypatch.setattr(supervision, "CHECK", 0.0)
+    assert run(small, values=SHORT, child=True, progress=lambda _: None).complete
 
 
 def test_nothing_is_left_of_a_process_that_an_fmu_started(small: System, foreign: Foreign) -> None:
