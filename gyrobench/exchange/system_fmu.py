@@ -186,8 +186,9 @@ def _description2(system: System, source: SystemSource, guid: str) -> str:
     co = ET.SubElement(root, "CoSimulation", {"modelIdentifier": system.name, **abilities})
     ET.SubElement(ET.SubElement(co, "SourceFiles"), "File", {"name": "fmi2.c"})
     variables = _common(root, system, face, ())
+    tunable = source.tunable()
     for s in face.layout:
-        add_variable(variables, face, s)
+        add_variable(variables, face, s, tunable)
     structure = ET.SubElement(root, "ModelStructure")
     known = " ".join(str(e.scalar.reference + 1) for e in source.exposed if e.scalar.section != "output")
     for what, on in (("Outputs", ""), ("InitialUnknowns", known)):
@@ -206,8 +207,9 @@ def _description3(system: System, source: SystemSource, guid: str) -> str:
     ET.SubElement(root, "CoSimulation", {**own, **dict.fromkeys(abilities, "true")})
     variables = _common(root, system, face, ("s",))
     add_time(variables, face)
+    tunable = source.tunable()
     for s in face.layout:
-        add_variable3(variables, face, s)
+        add_variable3(variables, face, s, tunable)
     structure = ET.SubElement(root, "ModelStructure")
     known = " ".join(reference(e.scalar) for e in source.exposed if e.scalar.section != "output")
     for what, on in (("Output", ""), ("InitialUnknown", known)):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
 from gyrobench.packaging.source import PartCode
+from gyrobench.packaging.tuning import tuning
 from gyrobench.units import OFFERED, base_unit, shown_in, unit
 
 #: section -> causality, variability, initial
@@ -48,8 +49,10 @@ def unit_attributes(name: str, start: float | None = None) -> dict[str, str]:
     return {"unit": name} if shown == name else {"unit": name, "displayUnit": shown}
 
 
-def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int]) -> None:
+    """Add a variable.  tunable: value references of the parameters that may be set between steps."""
     causality, variability, initial = ATTRIBUTES[s.section]
+    variability = "tunable" if s.reference in tunable else variability
     d = s.decl
     kind = TYPES[d.type]
     if kind != "Real" and variability == "continuous":
@@ -162,8 +165,9 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     variables = ET.SubElement(root, "ModelVariables")
+    tunable = tuning(cls).tunable
     for s in cls.layout:
-        add_variable(variables, cls, s)
+        add_variable(variables, cls, s, tunable)
     _structure(ET.SubElement(root, "ModelStructure"), cls, source)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

@@ -8,7 +8,7 @@ description; an array has that of its first element.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
@@ -25,6 +25,7 @@ from gyrobench.packaging.description import (
 )
 from gyrobench.packaging.native_target import variables
 from gyrobench.packaging.source import PartCode
+from gyrobench.packaging.tuning import tuning
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 
@@ -59,9 +60,12 @@ def array_name(s: Scalar) -> str:
     return f"der({s.decl.name})" if s.section == "derivative" else s.decl.name
 
 
-def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, array: Sequence[Scalar] = ()) -> None:
+def add_variable(
+    parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int], array: Sequence[Scalar] = ()
+) -> None:
     """Add a variable: the scalar, or the array of these elements, of which it is the first."""
     causality, variability, initial = ATTRIBUTES[s.section]
+    variability = "tunable" if s.reference in tunable else variability
     kind = TYPES[s.decl.type]
     if kind != "Float64" and variability == "continuous":
         variability = "discrete"
@@ -132,9 +136,9 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     declared = ET.SubElement(root, "ModelVariables")
     add_time(declared, cls)
-    every = variables(cls)
+    every, tunable = variables(cls), tuning(cls).tunable
     for v in every:
-        add_variable(declared, cls, v[0], v if v[0].decl.shape else ())
+        add_variable(declared, cls, v[0], tunable, v if v[0].decl.shape else ())
 
     structure = ET.SubElement(root, "ModelStructure")
     source = PartCode(cls)
