@@ -58,9 +58,9 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.integration import advance
 from gyrobench.component.math import value
-from gyrobench.component.tuned import check_bounds, tune
 from gyrobench.component.numerics import ROUNDING, normal
 from gyrobench.component.tangents import Tangent, dig, tangents
+from gyrobench.component.tuned import check_bounds, tune
 from gyrobench.component.vectors import Vector, copied, is_finite
 
 PER = ("start", "step", "second")  # when noise is drawn

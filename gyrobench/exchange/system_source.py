@@ -132,7 +132,9 @@ def model_text(s: SystemSource, guid: str) -> str:
         HELPER,
         _function("void begin_parts(Parts *parts, double t0)", [*begins, *pick], count),
         _function("void set_parameters(Parts *parts, const double *x)", ["(void)x;", *setting("parameter")], count),
-        _function("COLD void tune_parts(Parts *parts, Parts *room, const double *x)", ["(void)room; (void)x;", *tunes], count),
+        _function(
+            "COLD void tune_parts(Parts *parts, Parts *room, const double *x)", ["(void)room; (void)x;", *tunes], count
+        ),
         _function("void set_inputs(Parts *parts, const double *x)", ["(void)x;", *setting("input")], count),
         _function("void get_outputs(Parts *parts, double *x)", ["(void)x;", *getting], count),
         _function("void take_wired(Parts *parts, double *out)", taking, count),
@@ -153,8 +155,9 @@ def _tuning(s: SystemSource, slot: str, i: int, part: str, tunable: frozenset[in
             if e.scalar.reference in tunable for of, r in e.ends if of == slot]  # fmt: skip
     if not sets:
         return []
-    lines = [f"if ({' || '.join(f'{a} != {b}' for a, b in sets)}) {{ /* {slot} */", *(f"    {a} = {b};" for a, b in sets)]
-    return [*lines, f"    tune_{part}(&parts->p{i}, &room->p{i}.n);", "}", f"if (parts->p{i}.failed) return;"]
+    changed = " || ".join(f"{a} != {b}" for a, b in sets)
+    inner = [*(f"{a} = {b};" for a, b in sets), f"tune_{part}(&parts->p{i}, &room->p{i}.n);"]
+    return [f"if ({changed}) {{ /* {slot} */", *(f"    {x}" for x in inner), "}", f"if (parts->p{i}.failed) return;"]
 
 
 def source_files(s: SystemSource, guid: str, fmi: int) -> dict[str, str]:

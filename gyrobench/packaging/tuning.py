@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 
 from gyrobench.component import Component, Discrete, Input, Parameter, State
 from gyrobench.component.composition import TIMES
-from gyrobench.component.declarations import Noise
 from gyrobench.packaging.dependencies import (
     REFUSAL,
     Dependencies,
