@@ -98,7 +98,7 @@ COLD int tune_values(Instance *m, const unsigned references[], size_t n, const d
     int k, status = 0, changed = 0;
     size_t i, j = 0;
     for (i = 0; i < n; i++)
-        if (!extent(f, references[i]) || (place(f, references[i]) < U0 && !tunable[place(f, references[i])]))
+        if (!extent(f, references[i]) || (in_range(place(f, references[i]), 0, U0) && !tunable[place(f, references[i])]))
             return unsettable(m, references[i]);
     room = (Numbers *)malloc(2 * sizeof *room);
     if (!room) return wrong(m, "out of memory");
@@ -106,7 +106,7 @@ COLD int tune_values(Instance *m, const unsigned references[], size_t n, const d
     for (i = 0; i < n; i++)
         for (k = 0; k < extent(f, references[i]); k++, j++) {
             double *const v = value(p) + place(f, references[i]) + k;
-            changed |= place(f, references[i]) < U0 && *v != in[j];
+            changed |= in_range(place(f, references[i]), 0, U0) && *v != in[j];
             *v = in[j];
         }
     p->n.dirty = 1.0;
