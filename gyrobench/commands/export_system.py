@@ -43,11 +43,12 @@ def export(
     if out is not None and out.suffix != suffix:
         raise UsageError(f"--out {out}: {kind} ends in {suffix}")
     home = Bench.find()
-    if to == "mat" and name in home.parts() and name not in home.systems():
+    part = name.removeprefix("components/")
+    if to == "mat" and part in home.parts() and (part != name or name not in home.systems()):
         if parts:
-            raise UsageError(f"--part: {name} is a part; it has no slots")
-        path = out or home.products / f"{name}{suffix}"
-        mat_model.export_part_mat(load_part(name, home.folder), name, path, values)
+            raise UsageError(f"--part: {part} is a part; it has no slots")
+        path = out or home.products / f"{part}{suffix}"
+        mat_model.export_part_mat(load_part(part, home.folder), part, path, values)
         return path
     system = require_slots(load_system(name, values))
     path = out or home.products / f"{system.name}{suffix}"

@@ -8,15 +8,17 @@ description; an array has that of its first element.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
 from gyrobench.packaging.description import (
     ATTRIBUTES,
+    EMPTY,
     default_experiment,
     initial_references,
     licence,
+    nominal,
     number,
     summary,
     unit_attributes,
@@ -61,8 +63,9 @@ def array_name(s: Scalar) -> str:
 
 
 def add_variable(
-    parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int], array: Sequence[Scalar] = ()
-) -> None:
+    parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int], sizes: Mapping[str, float],
+    array: Sequence[Scalar] = (),
+) -> None:  # fmt: skip
     """Add a variable: the scalar, or the array of these elements, of which it is the first."""
     causality, variability, initial = ATTRIBUTES[s.section]
     variability = "tunable" if s.reference in tunable else variability
@@ -83,6 +86,7 @@ def add_variable(
         if s.decl.quantity:
             attributes["quantity"] = s.decl.quantity
         attributes |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
+        attributes |= nominal(array or (s,), sizes)
     if s.section == "derivative":
         attributes["derivative"] = reference(next(x for x in cls.states if x.name == s.name[4:-1]))
     if s.section in ("parameter", "input", "state"):
@@ -104,8 +108,8 @@ def add_time(parent: ET.Element, cls: type[Component]) -> None:
     ET.SubElement(parent, "Float64", {"name": time_name(cls), **time, "unit": "s"})
 
 
-def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
-    """Return the XML text of the native FMI 3.0 FMU."""
+def model_description3(cls: type[Component], guid: str, identifier: str, sizes: Mapping[str, float] = EMPTY) -> str:
+    """Return the XML text of the native FMI 3.0 FMU; sizes: see :func:`nominal`."""
     root = ET.Element(
         "fmiModelDescription",
         {
@@ -138,7 +142,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     add_time(declared, cls)
     every, tunable = variables(cls), tuning(cls).tunable
     for v in every:
-        add_variable(declared, cls, v[0], tunable, v if v[0].decl.shape else ())
+        add_variable(declared, cls, v[0], tunable, sizes, v if v[0].decl.shape else ())
 
     structure = ET.SubElement(root, "ModelStructure")
     source = PartCode(cls)

@@ -86,7 +86,7 @@ def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Pa
     times = read_model_description(str(file)).defaultExperiment
     assert float(times.stopTime).is_integer() and float(times.stepSize) == 10.0  # a row of the channels
     names = zipfile.ZipFile(file).namelist()
-    assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md"} <= set(names)
+    assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md", "model.png"} <= set(names)
 
 
 def test_an_option_that_is_the_time_of_the_run_is_built_in(tmp_path: Path) -> None:
