@@ -17,7 +17,6 @@ tried again.
 from __future__ import annotations
 
 import ast
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -47,9 +46,17 @@ class Tuning:
     derived: tuple[int, ...]
 
 
-@functools.lru_cache(maxsize=256)
+_known: dict[type[Component], Tuning] = {}
+
+
 def tuning(cls: type[Component]) -> Tuning:
     """Return what may be set between steps; see the module.  Raises SubsetError."""
+    if cls not in _known:
+        _known[cls] = _tuning(cls)
+    return _known[cls]
+
+
+def _tuning(cls: type[Component]) -> Tuning:
     source = PartCode(cls)
     declared = cls.declarations
     sizes = {n.name for n in cls.noises}
