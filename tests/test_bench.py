@@ -187,7 +187,7 @@ ROOMS["tuning"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
 ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
 #: the face in the browser; that of the shell is in FACES, and neither imports the other
-ROOMS["studio"] = BELOW | {"workflow", "library"}
+ROOMS["studio"] = BELOW | {"workflow", "library", "tuning"}
 #: rooms inside a room -> rooms beside them that they may import
 INNER: dict[str, set[str]] = {
     "campaign.execution": set(),
