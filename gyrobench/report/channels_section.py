@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report.page_model import CollapsedBlocks, Picture, Section, pictures
+from gyrobench.report.page_model import Picture, Section, pictures
 from gyrobench.report.plots import plain_log, short
 from gyrobench.report.result_json import Report
 from gyrobench.report.style import (
@@ -26,7 +26,7 @@ from gyrobench.result import DriftColumn, DriftRecordResult, Table
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
 MARKS = ("o", "s", "^", "D", "v", "P")
-FOLDED = ("correlation_by_time",)  # whose figure says it
+BY_TIME = "correlation_by_time"
 WIDE_HEADS = ("finding", "remarks", "amplitudes", "quantity")
 ROWS = 24  # pairs of a figure
 
@@ -39,7 +39,7 @@ def sections(report: Report[DriftRecordResult]) -> list[Section]:
     shown: dict[str, list[Any]] = {}
     for k, table in enumerate(result.tables):
         shown[table.id] = method_table(report.document, ("tables", k), table, WIDE_HEADS)
-    by_time = next((t for t in result.tables if t.id == "correlation_by_time"), None)
+    by_time = next((t for t in result.tables if t.id == BY_TIME), None)
     allan = Picture(
         "all-deviations", deviations(result.columns, "all-deviations"),
         "Allan deviations of all channels (points, without columns, lines, steps and wild samples) and of their models "
@@ -47,15 +47,15 @@ def sections(report: Report[DriftRecordResult]) -> list[Section]:
     )  # fmt: skip
     over_time = Picture(
         "correlation-by-time", correlation(by_time, "correlation-by-time") if by_time else "",
-        "Correlation of the channels in hundredths over averaging times; empty: not told from zero (5 % for all pairs and times "
-        "together).",
+        "Correlation of the channels in hundredths over averaging times; empty: not told from zero (5 % for all "
+        "pairs and times together).",
         "Correlation of each pair of channels against averaging time",
     )  # fmt: skip
     first = [b for id in ("gyros", "accelerometers") for b in shown.pop(id, [])]
-    folded = [b for id in FOLDED for b in shown.pop(id, [])]
+    shown.pop(BY_TIME, None)  # as a figure; its values are in result.json
     rest = [b for blocks in shown.values() for b in blocks]
     blocks = [*first, *pictures(allan), *rest, *pictures(over_time)]
-    return [Section("All channels", "channels", [*blocks, *([CollapsedBlocks("Values", folded)] if folded else [])])]
+    return [Section("All channels", "channels", blocks)]
 
 
 def deviations(columns: Sequence[DriftColumn], key: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from gyrobench.report import drift_record_figures as figures
 from gyrobench.report import channels_section, result_page
+from gyrobench.report import drift_record_figures as figures
 from gyrobench.report.page_model import (
     BulletList,
     CollapsedBlocks,
@@ -68,10 +68,11 @@ def _sections(report: Report[DriftRecordResult], k: int) -> list[Section]:
 def _figures(report: Report[DriftRecordResult], k: int, key: str) -> tuple[Picture, Picture, Picture, list[Picture]]:
     """Return the figures of a column: record, deviations, spectrum, correlations."""
     c = report.result.columns[k]
+    what = c.quantity.capitalize()
     record = Picture(
         f"{key}-record", figures.record(c, f"{key}-record"),
-        f"{c.quantity.capitalize()} of the record: band from the smallest to the largest value of each interval, line through the means. "
-        f"White: no samples.{SMOOTHED if c.record.smoothed else ''}", f"{c.quantity.capitalize()} against time with gaps", zoom=True,
+        f"{what} of the record: band from the smallest to the largest value of each interval, line through the means. "
+        f"White: no samples.{SMOOTHED if c.record.smoothed else ''}", f"{what} against time with gaps", zoom=True,
     )  # fmt: skip
     allan = Picture(
         f"{key}-deviations", figures.deviations(c, f"{key}-deviations"),

@@ -96,7 +96,7 @@ def _gravity(
         return rows, [], up
     finding = _mistaken(ratio, FORCE_UNITS)
     text = f"|f| of {_names(triad)} is {number(size)} m/s², {number(ratio)} times gravity: " + (
-        f"{finding}? Correct the unit in the file or the column map; the accelerometers' coefficients are off by as much."
+        f"{finding}? Correct it in the file or the column map: the coefficients of these channels are off by as much."
         if finding else "not gravity. Check unit, scale and names of the axes; if they are right it was not at rest."
     )  # fmt: skip
     rows = [[f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding or "not gravity"]]
@@ -147,7 +147,7 @@ def _earth(
         sentence = f"{told} is {_rate(size)}, {number(ratio)} times the Earth's rate: {finding}{also}."
         return rows, [sentence]
     rows[0][-1] = f"{number(ratio)} times Ω: the Earth's rate, gyros in their unit"
-    words = [f"{told} is {number(size / DPH, u_size / DPH)} °/h, the Earth's rate {number(EARTH_RATE / DPH)} °/h."]
+    words = [f"{told} is {number(size / DPH, u_size / DPH)} °/h, the Earth's rate {EARTH_RATE / DPH:.2f} °/h."]
     if up is None:
         return rows, words
     vertical = float(w @ up)
@@ -162,4 +162,7 @@ def _earth(
                  "Ω sin φ of the latitude as stated" if known else "no latitude was stated"])  # fmt: skip
     rows.append(["latitude φ, sin φ = ω·f/(|ω| |f|)", latitude, spread,
                  None if there is None else math.degrees(there), "°", "as far as the gyros have no bias"])  # fmt: skip
+    words[0] += (
+        f" With the direction of gravity that is the latitude {number(latitude, spread)}°, if the bias is small."
+    )
     return rows, words

@@ -39,7 +39,11 @@ def acquisition(p: Prepared, run: RunDocument) -> Table:
         ["samples", about.get("samples", int(np.count_nonzero(np.isfinite(p.rate)))), "1"],
         ["length", (p.time[-1] - p.time[0] + p.step) / 3600.0, "h"],
         [f"mean {p.units.words}", float(np.nanmean(p.rate)) / p.units.level_si, p.units.level],
-        [f"standard deviation of a {'sample' if p.step == step else 'mean'}", float(np.nanstd(p.rate)) / p.units.si, p.units.unit],
+        [
+            f"standard deviation of a {'sample' if p.step == step else 'mean'}",
+            float(np.nanstd(p.rate)) / p.units.si,
+            p.units.unit,
+        ],
     ]
     if run.series:
         rows[:0], more = _column_rows(p.name, p.units, run.series)
@@ -102,7 +106,8 @@ def regression(p: Prepared) -> list[Table]:
     for r in p.regressions:
         unit = f"{p.units.unit} per {units.display(r.unit)}" if r.unit != "1" else p.units.unit
         si = p.units.si
-        rows.append([r.name, r.slope / si, r.u / si, r.full[0] / si, r.full[1] / si, unit, r.p, *(100.0 * s for s in r.share),
+        share = [100.0 * s for s in r.share]
+        rows.append([r.name, r.slope / si, r.u / si, r.full[0] / si, r.full[1] / si, unit, r.p, *share,
                      "taken out" if r.kept else "not significant, left in"])  # fmt: skip
     names = harmonic_names(len(by))
     for n, (c, s) in enumerate(zip(names[::2], names[1::2], strict=True), 1):
@@ -169,8 +174,8 @@ def coarse_text(name: str, run: RunDocument) -> str:
     if column["kind"] in DIRECT:
         own = units_of(run.window_units.get(name, ""))
         return (
-            f"The values are rounded to {number(q / own.si)} {own.unit}, more than twice the noise of a sample: the error of "
-            "rounding is not white, and N is that of the rounding."
+            f"The values are rounded to {number(q / own.si)} {own.unit}, more than twice the noise of a sample: the "
+            "error of rounding is not white, and N is that of the rounding."
         )
     return (
         f"The angle is rounded to {number(q / ARCSEC)}″, more than 2.5 times its random change within a sample: errors "
@@ -226,8 +231,10 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
             f"{noise_tables.agreement_text(noise)} No coefficient is stated. See the figures; look for lines that "
             "wander, steps, or noise that changes with time.",
         )
-    for id, text in (("wild", noise_tables.wild_text(noise, p.time, p.units)), ("step", noise_tables.steps_text(noise, p.time, p.units)),
-                     ("level", noise_tables.levels_text(noise))):  # fmt: skip
+    found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
+             "step": noise_tables.steps_text(noise, p.time, p.units),
+             "level": noise_tables.levels_text(noise)}  # fmt: skip
+    for id, text in found.items():
         if text:
             say(id, text)
     if about and about["jitter"] > 0.01 and not about["rounded"]:
@@ -261,6 +268,8 @@ def in_short(p: Prepared, run: RunDocument) -> str:
     t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
     counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (t.wild.size, "wild"))
     said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
+    said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "
+             f"{noise_tables.number(g.tau.value)} s" for g in p.noise.processes if g.tau.determined]  # fmt: skip
     said += ["frozen"] if p.name in about.get("frozen", {}) else []
     said += ["at its range"] if saturated_text(p, run) else []
     said += ["coarse"] if coarse_text(p.name, run) else []
@@ -289,7 +298,7 @@ def of_rows(run: RunDocument) -> list[Reason]:
         Reason(
             "drift_record.repeated",
             f"{repeated} of {about['samples']} rows repeat the row before in every channel: the logger writes faster "
-            "than the instrument samples, or again what it missed. The noise between samples is too small and N is that "
+            "than the instrument samples, or again what it missed. The noise between samples is too small and N that "
             "of the log; keep one row of each sample.",
         )
     ]

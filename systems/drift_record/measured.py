@@ -94,7 +94,12 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     windows: dict[str, Any] = {"t_start": start, "t_end": start + length, **columns}
     run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
     si = {c.name: c.unit for c in reader.columns}
-    run.window_units = {"t_start": "s", "t_end": "s", **{n: si[n] for n in reader.others}, **{s.name: s.reduced for s in signals}}
+    run.window_units = {
+        "t_start": "s",
+        "t_end": "s",
+        **{n: si[n] for n in reader.others},
+        **{s.name: s.reduced for s in signals},
+    }
     run.series = {
         "columns": {
             s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name], reader.steps)}
@@ -123,7 +128,7 @@ def _opened(system: System, table: DriftTable) -> tuple[DriftTable, list[Signal]
 
 
 def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:
-    """Return the step to which rates (rad/s), forces or an angle (rad) are rounded, 0: none; whether it is a white error.
+    """Return the step to which rates, forces or an angle (SI) are rounded, 0: none; whether it is a white error.
 
     values: rates, or increments of the angle; angles: least and largest increment and largest value of those that are
     cumulative, whose rounding in the computer their increments have.

@@ -66,7 +66,14 @@ def models(m: DriftModel, units: ChannelUnits) -> list[Table]:
         rows = [[int(p), float(o.variance[k]) / units.si**2, *(float(v[k] - np.min(v)) for v in (o.aic, o.sbc)),
                  float(o.fpe[k] / np.min(o.fpe)), ", ".join(n.upper() for n, c in chosen.items() if c == p)]
                 for k, p in enumerate(o.order)]  # fmt: skip
-        head = ["order", f"innovation variance / ({units.unit})²", "AIC − least", "SBC − least", "FPE over least", "least"]
+        head = [
+            "order",
+            f"innovation variance / ({units.unit})²",
+            "AIC − least",
+            "SBC − least",
+            "FPE over least",
+            "least",
+        ]
         tables.append(
             Table("orders", "Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows)
         )

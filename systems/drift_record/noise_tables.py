@@ -82,7 +82,14 @@ def agreement(noise: NoiseModel, units: ChannelUnits) -> Table:
         )
         if shown
     ]
-    head = ["averaging time / s", f"record / ({units.unit})", "95 % from", "95 % to", f"model / ({units.unit})", "finding"]
+    head = [
+        "averaging time / s",
+        f"record / ({units.unit})",
+        "95 % from",
+        "95 % to",
+        f"model / ({units.unit})",
+        "finding",
+    ]
     caption = (
         "Allan deviation of the record as it was, nothing taken out but missing samples, and that of the whole model "
         f"with what was taken out; coefficients are stated where {_percent(ENOUGH)} agree"
@@ -100,7 +107,16 @@ def bias_instability(noise: NoiseModel, units: ChannelUnits) -> Table:
         ["B_min", *_range(least.deviation, units.si), *_range(least.tau, 1.0),
          "minimum" if least.reached else "no minimum: it falls to the end"],
     ]  # fmt: skip
-    head = ["sense", f"value / ({units.unit})", "95 % from", "95 % to", "averaging time / s", "from / s", "to / s", "finding"]
+    head = [
+        "sense",
+        f"value / ({units.unit})",
+        "95 % from",
+        "95 % to",
+        "averaging time / s",
+        "from / s",
+        "to / s",
+        "finding",
+    ]
     caption = (
         "Two figures are called bias instability: B, the coefficient of the flicker, and B_min, the least Allan "
         "deviation of all noise together, which data sheets mean"
@@ -120,8 +136,9 @@ def gauss_markov(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
         found = "determined" if g.tau.determined else f"in {_percent(g.present)} of the models"
         ends = [v / si for e, si in ((g.sigma, units.si), (g.tau, 1.0)) for v in (e.value, e.low, e.high)]
         rows.append([k, (g.sigma.value / units.si) ** 2, *ends, g.density / units.si, phi, w / units.si, found])
-    head = ["process", f"variance / ({units.unit})²", f"σ / ({units.unit})", "95 % from", "95 % to", "τ / s", "from / s", "to / s",
-            f"√q / ({units.unit}/√s)", "φ", f"σ(w) / ({units.unit})", "finding"]  # fmt: skip
+    head = ["process", f"variance / ({units.unit})²", f"σ / ({units.unit})", "95 % from", "95 % to",
+            "τ / s", "from / s", "to / s", f"√q / ({units.unit}/√s)", "φ", f"σ(w) / ({units.unit})",
+            "finding"]  # fmt: skip
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
         f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all"
@@ -175,8 +192,8 @@ def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     found = noise.steps
     if not found:
         return ""
-    said = ", ".join(f"{number(s.size / units.si, s.u / units.si)} {units.unit} at {number(time[min(s.at, time.size - 1)])} s"
-                     for s in sorted(found, key=lambda s: s.at))  # fmt: skip
+    sizes = [(time[min(s.at, time.size - 1)], s.size / units.si, s.u / units.si) for s in found]
+    said = ", ".join(f"{number(size, u)} {units.unit} at {number(t)} s" for t, size, u in sorted(sizes))
     return (
         f"The level steps by {said}: a step, which no noise of the rest makes, is taken out before the model; left in, "
         "K and B take it for theirs. Find its cause."

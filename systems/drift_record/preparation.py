@@ -30,8 +30,8 @@ OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "
 
 @dataclass(frozen=True)
 class Prepared:
-    """A rate (rad/s) or force (m/s²) on the grid, NaN in gaps, and its noise model; clean: without what columns, lines, steps explain,
-    and without its wild samples.
+    """A rate (rad/s) or force (m/s²) on the grid, NaN in gaps, and its noise model; clean: without what columns,
+    lines, steps explain, and without its wild samples.
 
     stretch: the longest part of ``clean`` without a long gap, for spectra and time-series models; what was missing or
     wild in it is drawn from the noise around.  step: s.
@@ -134,8 +134,8 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None
     return Prepared(
-        name, columns.units.get(name, RATE), columns.time, columns.step, rate, noise.cleaned, regressions, noise, model, stretch, first,
-        columns.inseparable, share,
+        name, columns.units.get(name, RATE), columns.time, columns.step, rate, noise.cleaned, regressions,
+        noise, model, stretch, first, columns.inseparable, share,
     )  # fmt: skip
 
 

@@ -109,7 +109,9 @@ def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
     names = tuple(_named(term, a, several) for term in (*TERMS, LEAST_DEVIATION))
     against = description.doubts(a.of, run).items()
-    return description.warnings(a.of, run) + [Reason(id, text, ("pass", "fail"), names, severity="doubt") for id, text in against]
+    return description.warnings(a.of, run) + [
+        Reason(id, text, ("pass", "fail"), names, severity="doubt") for id, text in against
+    ]
 
 
 def channel(name: str, columns: Columns, run: RunDocument, truth: Mapping[str, float], several: bool) -> Channel:
@@ -152,31 +154,35 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
 
 def _coefficients(a: Analysed, run: RunDocument, truth: Mapping[str, float], several: bool) -> list[Coefficient]:
     relative = float(run.options.get("u_scale_factor", 0.0))
-    out = [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+    out = [_coefficient(a, term, several, truth.get(term), relative) for term in TERMS]
     units = a.of.units
     least, when = a.noise.minimum.deviation, a.noise.minimum.tau
     meaning = f"bias instability as the least Allan deviation, at {noise_tables.range_text(when)} s"
     why = "" if least.determined else "not determined: the deviation still falls at the longest averaging time"
-    return [*out, _stated(a, _named(LEAST_DEVIATION, a, several), meaning, units.unit, least, units.si, why, None, relative)]
+    name = _named(LEAST_DEVIATION, a, several)
+    return [*out, _stated(a, name, meaning, units.unit, least, units.si, why, None, relative, not several)]
 
 
-def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
+def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, relative: float) -> Coefficient:
     unit, si, meaning = a.of.units.terms[term]
     e: Estimate = a.noise[term]
     why = "" if e.determined else noise_tables.absent(term, a.noise)
-    return _stated(a, name, meaning, unit, e, si, why, truth, relative)
+    return _stated(a, _named(term, a, several), meaning, unit, e, si, why, truth, relative, not several)
 
 
 def _stated(
     a: Analysed, name: str, meaning: str, unit: str, e: Estimate, si: float, why: str, truth: float | None,
-    relative: float,
+    relative: float, bound: bool,
 ) -> Coefficient:  # fmt: skip
-    """Return a coefficient with its interval; without a value where ``why`` says why, or the model is not right."""
+    """Return a coefficient with its interval; without a value where ``why`` says why, or the model is not right.
+
+    bound: the reason states the upper end; of many channels it stands in the table alone.
+    """
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not a.noise.agrees:
         why, low, high = noise_tables.contradicted(a.noise), math.nan, math.nan
-    elif why:
+    elif why and bound:
         why = f"{why}; below {max(abs(low), abs(high)):.2g} {unit} (95 %)"
     if why:
         return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
@@ -253,5 +259,7 @@ def _envelope(p: Prepared) -> RateRecord:
     parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
     there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
     middle = 0.5 * (p.time[edges[:-1]] + p.time[edges[1:] - 1] + p.step)
-    low, mean, high = ([float(f(parts[k])) / p.units.level_si for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
+    low, mean, high = (
+        [float(f(parts[k])) / p.units.level_si for k in there] for f in (np.nanmin, np.nanmean, np.nanmax)
+    )
     return RateRecord(middle[there].tolist(), low, mean, high, _smoothed(p))

@@ -8,7 +8,9 @@ that tell the same one stays, where both at once would look insignificant.  Sele
 small: the interval with all columns is stated beside them; it holds whatever is kept.
 [RED-STEPWISE, RED-ORTHO, RED-HARMONIC; Hu 1981, eq. 4-12..4-22, 4-92..4-101]
 
-Beside a temperature stands its rate of change.  Not modelled: lag of the rate behind a column; a slope that changes with time; columns with errors of their own.
+Beside a temperature stands its rate of change.
+
+Not modelled: lag of the rate behind a column; a slope that changes with time; columns with errors of their own.
 """
 
 from __future__ import annotations
@@ -122,8 +124,8 @@ def with_rates_of_change(
         likeness = float(np.corrcoef(means[there], slope)[0, 1])
         if abs(likeness) > ALIKE:
             left.append(
-                f"The rate of change of {name} follows {name} itself (correlation {likeness:.3f}): what each of them "
-                "does to the channel cannot be told apart."
+                f"The rate of change of {name} follows {name} itself (correlation "
+                f"{f'{likeness:.3f}'.replace('-', '−')}): what each of them does to the channel cannot be told apart."
             )
             continue
         grid = np.interp(np.arange(x.size), middle[there], slope)

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.series.channel_correlation import LEVEL, Correlated, correlate
 from gyrobench.reduction.series.channel_units import FORCE, RATE
@@ -29,8 +28,8 @@ def tables(channels: Sequence[Channel], step: float, run: RunDocument) -> tuple[
     common, lines_said = common_lines(channels)
     stated = sum(c.agrees for c in channels)
     said = [
-        f"{len(channels)} channels; coefficients are stated for {stated}: the deviation that the model implies is the "
-        f"record's own.{_lacking(channels)}",
+        f"Coefficients are stated for {stated} of {len(channels)} channels, those whose model implies the record's own "
+        f"deviation.{_lacking(channels)}",
         *checked, correlation_text(found), lines_said,
     ]  # fmt: skip
     out = [*summary(channels), *checks, *correlation_tables(found), *common]
@@ -64,7 +63,8 @@ def summary(channels: Sequence[Channel]) -> list[Table]:
             row.append(100.0 * c.inside)
             row += [None if c.explained is None else 100.0 * c.explained] if explained else []
             rows.append([*row, c.found])
-        head = ["channel", f"N / ({unit})", "from", "to", *([f"N / ({units.density})"] if units is FORCE else []),
+        density = [f"N / ({units.density})"] if units is FORCE else []
+        head = ["channel", f"N / ({unit})", "95 % from", "95 % to", *density,
                 f"B_min / ({units.unit})", "at / s", "model inside / %", *(["columns / %"] if explained else []),
                 "remarks"]  # fmt: skip
         caption = (
@@ -95,20 +95,21 @@ def correlations(channels: Sequence[Channel], step: float) -> Pairs:
 
 
 def correlation_tables(found: Pairs) -> list[Table]:
-    """Return the pairs that are correlated, each at the averaging time at which that is clearest, and all values."""
-    best = {pair: min(of, key=lambda c: c.p) for pair, of in found.items() if of}
-    clear = sorted((p for p, c in best.items() if c.p_all < LEVEL), key=lambda p: best[p].p)
+    """Return the pairs that are correlated, each at the averaging time at which most is certain, and all values."""
+    best = {pair: max(of, key=_certain) for pair, of in found.items() if any(c.p_all < LEVEL for c in of)}
+    clear = sorted(best, key=lambda p: -_certain(best[p]))
     rows: list[list[Any]] = []
     for pair in clear[:MOST]:
         c = best[pair]
         times = [o.tau for o in found[pair] if o.p_all < LEVEL]
-        rows.append([" – ".join(pair), c.tau, c.value, c.low, c.high, c.p_all, f"{number(min(times))} to "
-                     f"{number(max(times))} s" if len(times) > 1 else f"{number(times[0])} s"])  # fmt: skip
-    columns = ["channels", "averaging time / s", "correlation", "95 % from", "to", "p", "clear at"]
+        clear_at = f"{number(min(times))} to {number(max(times))} s" if len(times) > 1 else f"{number(times[0])} s"
+        rounded = [round(v, 4) for v in (c.value, c.low, c.high)]
+        rows.append([" – ".join(pair), c.tau, *rounded, c.p_all, clear_at])
+    columns = ["channels", "averaging time / s", "correlation", "95 % from", "95 % to", "p", "clear at"]
     text = (
         "Correlation of the noise without columns, lines, steps, wild samples and a straight line, at the averaging "
-        "time at which it is clearest; the interval holds for all averaging times of a pair together, p for all pairs "
-        "and times"
+        "time at which its interval is farthest from zero; the interval holds for all averaging times of a pair "
+        "together, p for all pairs and times"
     )
     if not rows:
         return []
@@ -121,13 +122,18 @@ def correlation_tables(found: Pairs) -> list[Table]:
             Table("correlation_by_time", "Correlation over averaging times", caption, head, every)]  # fmt: skip
 
 
+def _certain(c: Correlated) -> float:
+    """Return the least size of a correlation by its interval; below 0 where that holds 0."""
+    return max(c.low, -c.high)
+
+
 def correlation_text(found: Pairs) -> str:
     if not found:
         return ""
     clear = [p for p, of in found.items() if any(c.p_all < LEVEL for c in of)]
     if not clear:
         return f"No two of the channels are correlated (5 % for all {len(found)} pairs and averaging times together)."
-    pair, c = max(((p, c) for p in clear for c in found[p] if c.p_all < LEVEL), key=lambda x: abs(x[1].value))
+    pair, c = max(((p, c) for p in clear for c in found[p]), key=lambda x: _certain(x[1]))
     return (
         f"{len(clear)} of {len(found)} pairs of channels are correlated (5 % for all together), most of all "
         f"{pair[0]} and {pair[1]}, {number(c.value, (c.high - c.low) / 4.0)} at {number(c.tau)} s."
@@ -200,5 +206,3 @@ def merged(reasons: Mapping[str, Sequence[Reason]]) -> list[Reason]:
         blocked = tuple(dict.fromkeys(n for r in alike for n in r.names))
         out.append(Reason(key[0], of + key[1], alike[0].blocks, blocked, severity=key[2]))
     return out
-
-
