@@ -25,7 +25,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE
 from gyrobench.result import Reason, Table
 from gyrobench.units import DPH, EARTH_RATE, G0
 
-from .channels import Channel, mean_of, triads
+from .channels import RecordChannel, mean_of, triads
 from .noise_tables import number
 
 NEAR = 0.1  # of g, bias and scale factor of a triad that is at rest and in its unit
@@ -43,7 +43,7 @@ RATE_UNITS: Mapping[float, str] = {
 }  # fmt: skip
 
 
-def check(channels: Sequence[Channel], run: RunDocument) -> tuple[list[Table], list[Reason], list[str]]:
+def check(channels: Sequence[RecordChannel], run: RunDocument) -> tuple[list[Table], list[Reason], list[str]]:
     """Return the table of gravity and Earth's rate, warnings of units, and sentences for the summary."""
     rows: list[list[Any]] = []
     reasons, words = list[Reason](), list[str]()
@@ -70,12 +70,12 @@ def check(channels: Sequence[Channel], run: RunDocument) -> tuple[list[Table], l
     return ([Table("at_rest", "Gravity and Earth's rate", caption, head, rows)] if rows else []), reasons, words
 
 
-def _names(triad: Sequence[Channel]) -> str:
+def _names(triad: Sequence[RecordChannel]) -> str:
     return ", ".join(c.name for c in triad)
 
 
 def _gravity(
-    triad: Sequence[Channel], f: Array, u: Array, run: RunDocument, stated: Sequence[str]
+    triad: Sequence[RecordChannel], f: Array, u: Array, run: RunDocument, stated: Sequence[str]
 ) -> tuple[list[list[Any]], list[Reason], Array | None]:
     """Return the rows of a triad of accelerometers, warnings, and the direction of up in its axes."""
     size = float(np.linalg.norm(f))
@@ -91,7 +91,7 @@ def _gravity(
         finding = f"{number(1e3 * (size - g) / G0)} mg from {of}: bias and scale factor"
         up = f / size
         slope = ", ".join(f"{c.name} {number(math.degrees(math.asin(x)))}°" for c, x in zip(triad, up, strict=True))
-        rows = [[f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding],
+        rows: list[list[Any]] = [[f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding],
                 ["elevation of the axes", None, None, None, "°", f"{slope}; 1 mg of bias is 3.4′"]]  # fmt: skip
         return rows, [], up
     finding = _mistaken(ratio, FORCE_UNITS)
@@ -99,11 +99,11 @@ def _gravity(
         f"{finding}? Correct it in the file or the column map: the coefficients of these channels are off by as much."
         if finding else "not gravity. Check unit, scale and names of the axes; if they are right it was not at rest."
     )  # fmt: skip
-    rows = [[f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding or "not gravity"]]
-    return rows, [_reason("gravity", text, triad)], None
+    row = [f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding or "not gravity"]
+    return [row], [_reason("gravity", text, triad)], None
 
 
-def _single(channels: Sequence[Channel]) -> list[Reason]:
+def _single(channels: Sequence[RecordChannel]) -> list[Reason]:
     """Return that accelerometers that are no triad read more than gravity."""
     over = [c for c in channels if c.units is FORCE and abs(c.mean) > (1.0 + NEAR) * G0]
     return [
@@ -122,13 +122,13 @@ def _mistaken(ratio: float, of: Mapping[float, str]) -> str:
     return next((words for factor, words in of.items() if abs(ratio * factor - 1.0) < NEAR), "")
 
 
-def _reason(id: str, text: str, of: Sequence[Channel]) -> Reason:
+def _reason(id: str, text: str, of: Sequence[RecordChannel]) -> Reason:
     names = tuple(c.name for channel in of for c in channel.coefficients)
     return Reason(f"drift_record.{id}", text, ("pass", "fail"), names)
 
 
 def _earth(
-    triad: Sequence[Channel], up: Array | None, run: RunDocument, stated: Sequence[str]
+    triad: Sequence[RecordChannel], up: Array | None, run: RunDocument, stated: Sequence[str]
 ) -> tuple[list[list[Any]], list[str]]:
     """Return the rows of a triad of gyros, and what is to be said of them."""
     w, u = mean_of(triad)

@@ -27,7 +27,7 @@ _task: Callable[[int], Any]
 
 
 @dataclass(frozen=True)
-class Channel:
+class RecordChannel:
     """What a channel says, and its whitened ordinates (n - 1,) from the grid point ``first`` on; mean in SI."""
 
     name: str
@@ -88,13 +88,13 @@ def _done(k: int) -> tuple[Any, list[str]]:
         return None, error.problems
 
 
-def triads(channels: Sequence[Channel], words: str) -> list[list[Channel]]:
+def triads(channels: Sequence[RecordChannel], words: str) -> list[list[RecordChannel]]:
     """Return the channels that are axes x, y, z of one instrument, those without such names where they are three.
 
     words: what they read, rate or specific force.
     """
     mine = [c for c in channels if c.units.words == words]
-    by: dict[str, dict[str, Channel]] = {}
+    by: dict[str, dict[str, RecordChannel]] = {}
     for c in mine:
         stem, axis = c.axis
         if axis:
@@ -103,6 +103,6 @@ def triads(channels: Sequence[Channel], words: str) -> list[list[Channel]]:
     return found or ([mine] if len(mine) == 3 else [])
 
 
-def mean_of(triad: Sequence[Channel]) -> tuple[Array, Array]:
+def mean_of(triad: Sequence[RecordChannel]) -> tuple[Array, Array]:
     """Return means (3,) and their standard uncertainties by noise, SI."""
     return np.array([c.mean for c in triad]), np.array([c.u_mean for c in triad])

@@ -44,7 +44,7 @@ from gyrobench.result_entries import (
 )
 
 from . import description, model_tables, noise_tables, together
-from .channels import Channel, each
+from .channels import RecordChannel, each
 from .preparation import Columns, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
@@ -114,13 +114,13 @@ def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     ]
 
 
-def channel(name: str, columns: Columns, run: RunDocument, truth: Mapping[str, float], several: bool) -> Channel:
+def channel(name: str, columns: Columns, run: RunDocument, truth: Mapping[str, float], several: bool) -> RecordChannel:
     """Return what a column says, and what the findings of several need of it."""
     a = analyse(name, columns, run)
     p, noise, lines = a.of, a.noise, a.of.lines.lines
     length = p.rate.size * p.step
-    ordinates = whitened(p.stretch, p.step, noise.spectrum).astype(np.float32) if several else np.empty(0)
-    return Channel(
+    ordinates = whitened(p.stretch, p.step, noise.spectrum) if several else np.empty(0)
+    return RecordChannel(
         name=name, units=p.units, coefficients=_coefficients(a, run, truth, several), reasons=_reasons(a, run, several),
         summary=description.summary(name, noise, p.units, several), column=_column(a, run), first=p.first,
         ordinates=ordinates, lines=lines, resolution=1.0 / (p.stretch.size * p.step), N=noise["N"],

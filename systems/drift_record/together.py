@@ -14,14 +14,16 @@ from gyrobench.reduction.series.lines import CLUSTER, SpectralLine
 from gyrobench.result import Reason, Table
 
 from . import at_rest
-from .channels import Channel
+from .channels import RecordChannel
 from .noise_tables import number
 
 WIDTHS = 3.0  # standard uncertainties by which the frequencies of one line may differ in two channels
 MOST = 40  # pairs that are listed
 
 
-def tables(channels: Sequence[Channel], step: float, run: RunDocument) -> tuple[list[Table], list[Reason], list[str]]:
+def tables(
+    channels: Sequence[RecordChannel], step: float, run: RunDocument
+) -> tuple[list[Table], list[Reason], list[str]]:
     """Return the tables of all channels, the reasons that follow from them, and sentences for the summary."""
     checks, reasons, checked = at_rest.check(channels, run)
     found = correlations(channels, step)
@@ -36,12 +38,12 @@ def tables(channels: Sequence[Channel], step: float, run: RunDocument) -> tuple[
     return out, reasons, [s for s in said if s]
 
 
-def _lacking(channels: Sequence[Channel]) -> str:
+def _lacking(channels: Sequence[RecordChannel]) -> str:
     without = [c.name for c in channels if not c.agrees]
     return f" Not for {', '.join(without)}." if without else ""
 
 
-def summary(channels: Sequence[Channel]) -> list[Table]:
+def summary(channels: Sequence[RecordChannel]) -> list[Table]:
     """Return a table of the gyros and one of the accelerometers."""
     out = []
     for units, id, title in ((RATE, "gyros", "Gyros"), (FORCE, "accelerometers", "Accelerometers")):
@@ -81,10 +83,10 @@ def summary(channels: Sequence[Channel]) -> list[Table]:
 Pairs = dict[tuple[str, str], list[Correlated]]
 
 
-def correlations(channels: Sequence[Channel], step: float) -> Pairs:
+def correlations(channels: Sequence[RecordChannel], step: float) -> Pairs:
     """Return the correlations of all pairs whose longest stretch is the same."""
     out: Pairs = {}
-    groups: dict[tuple[int, int], list[Channel]] = {}
+    groups: dict[tuple[int, int], list[RecordChannel]] = {}
     for c in channels:
         groups.setdefault((c.first, c.ordinates.size), []).append(c)
     for mine in groups.values():
@@ -141,7 +143,7 @@ def correlation_text(found: Pairs) -> str:
 
 
 # ------------------------------------------------------------------ lines
-def common_lines(channels: Sequence[Channel]) -> tuple[list[Table], str]:
+def common_lines(channels: Sequence[RecordChannel]) -> tuple[list[Table], str]:
     """Return the lines that are in two channels or more, and a sentence on them."""
     groups = _grouped([(x, c) for c in channels for x in c.lines])
     rows: list[list[Any]] = []
@@ -170,9 +172,9 @@ def common_lines(channels: Sequence[Channel]) -> tuple[list[Table], str]:
     return [Table("common_lines", "Common lines", caption, head, sorted(rows))], f"Lines common to channels: {told}."
 
 
-def _grouped(lines: Sequence[tuple[SpectralLine, Channel]]) -> list[list[tuple[SpectralLine, Channel]]]:
+def _grouped(lines: Sequence[tuple[SpectralLine, RecordChannel]]) -> list[list[tuple[SpectralLine, RecordChannel]]]:
     """Return groups of lines of one frequency, those with two channels or more."""
-    groups: list[list[tuple[SpectralLine, Channel]]] = []
+    groups: list[list[tuple[SpectralLine, RecordChannel]]] = []
     for x, c in sorted(lines, key=lambda line: line[0].frequency):
         last = groups[-1][-1] if groups else None
         if last is not None and x.frequency - last[0].frequency <= _width(x, c, *last):
@@ -182,7 +184,7 @@ def _grouped(lines: Sequence[tuple[SpectralLine, Channel]]) -> list[list[tuple[S
     return [g for g in groups if len({c.name for _, c in g}) > 1]
 
 
-def _width(x: SpectralLine, a: Channel, y: SpectralLine, b: Channel) -> float:
+def _width(x: SpectralLine, a: RecordChannel, y: SpectralLine, b: RecordChannel) -> float:
     resolution = max(a.resolution, b.resolution)
     if not (x.steady and y.steady):
         return CLUSTER * resolution
@@ -202,7 +204,7 @@ def merged(reasons: Mapping[str, Sequence[Reason]]) -> list[Reason]:
     out = []
     for key, names in groups.items():
         alike = first[key]
-        of = "" if len(names) == len(reasons) else f"{', '.join(names)}: "
+        whose = "" if len(names) == len(reasons) else f"{', '.join(names)}: "
         blocked = tuple(dict.fromkeys(n for r in alike for n in r.names))
-        out.append(Reason(key[0], of + key[1], alike[0].blocks, blocked, severity=key[2]))
+        out.append(Reason(key[0], whose + key[1], alike[0].blocks, blocked, severity=key[2]))
     return out

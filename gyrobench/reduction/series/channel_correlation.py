@@ -71,7 +71,7 @@ def octaves(n: int) -> list[slice]:
 
 def averaging_time(octave: slice, n: int, step: float) -> float:
     """Return the averaging time, s, of which an octave of the ordinates of n samples tells."""
-    f = octave.stop / (2.0 * n * step)
+    f = float(octave.stop) / (2.0 * n * step)
     return PEAK * math.sqrt(2.0) / f
 
 
