@@ -180,7 +180,7 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, 2.0)}, "", "all its values are"),
         ({"time [s]": TIME, "rate [deg/h]": ["0.1", "fast"] * 500}, "", "column 'rate': 500 cells are not a number"),
         ({"time [s]": ["2026-05-01T00:00:00"] * N, "rate [deg/h]": RATE}, "", "00:00:00' (a date: write seconds from"),
-        ({"time [s]": TIME, "temperature [degC]": RATE}, "", "no rate, angle or specific force among the columns of the file"),
+        ({"time [s]": TIME, "temperature [degC]": RATE}, "", "no rate, angle or specific force among the columns of"),
     ],
 )  # fmt: skip
 def test_wrong_files(tmp_path: Path, columns: dict[str, Any], scale: str, words: str) -> None:
