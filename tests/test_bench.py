@@ -175,7 +175,7 @@ ROOMS: dict[str, set[str]] = {
     "system": COMMON | {"component", "packaging", "record", "reduction"},  # a test knows how it is reduced and judged
     "linear": COMMON | {"component", "packaging", "record", "system"},
     "engine": COMMON | {"component", "packaging", "record", "system", "linear"},
-    "exchange": COMMON | {"component", "packaging", "record", "system", "engine"},
+    "exchange": COMMON | {"component", "packaging", "record", "system", "linear", "engine"},
     "reduction": COMMON | {"component", "packaging", "record"},  # parts say what errors of a set-up they simulate
     "report": COMMON | {"record", "reduction"},
 }
