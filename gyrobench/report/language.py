@@ -41,7 +41,7 @@ NUMERIC = re.compile(r"n\d*")
 NUMBER = r"[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]+(?: UTC)?"
 #: English words: two lower-case letters or more that are not part of an identifier (table.angle, u_scale, --set, x.csv)
 WORD = re.compile(r"(?<![\w./\\@-])[A-Za-z]?[a-z]{2,}(?![\w\\@]|[./-]\w)")
-SENTENCE = re.compile(r"(?<=[.!?:])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=])")
+SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b)")
 DATE = re.compile(r"\b(\d{4})-(\d\d)-(\d\d)\b")
 
 
