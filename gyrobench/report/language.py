@@ -5,7 +5,7 @@
 
 Code writes English, and no logic reads it.  ``catalogue/zh.toml`` has the texts of the bench, ``systems/NAME/zh.toml``
 those of a test: English text = its translation, ``{placeholders}`` stand for any text, which is translated too, ``{n}``,
-``{n2}`` for numbers and dates.  What is in no line is taken apart at full stops, semicolons,
+``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  What is in no line is taken apart at full stops, semicolons,
 colons, commas, brackets and " and "; symbols, numbers, units and names stay.  ``catalogue`` says how the parts are joined.
 """
 
@@ -37,7 +37,7 @@ from gyrobench.report.page_model import (
 FOLDER = Path(__file__).parent / "catalogue"
 ENGLISH = "en"
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
-NUMERIC = re.compile(r"n\d*")
+NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
 NUMBER = r"[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]+(?: UTC)?"
 #: English words: two lower-case letters or more that are not part of an identifier (table.angle, u_scale, --set, x.csv)
 WORD = re.compile(r"(?<![\w./\\@-])[A-Za-z]?[a-z]{2,}(?![\w\\@]|[./-]\w)")
@@ -76,7 +76,8 @@ class Catalogue:
 def _pattern(template: str) -> re.Pattern[str]:
     parts = PLACEHOLDER.split(template)
     for k in range(1, len(parts), 2):
-        parts[k] = f"(?P<{parts[k]}>{NUMBER if NUMERIC.fullmatch(parts[k]) else '.+?'})"
+        last = "(?<![.])" if k == len(parts) - 2 and not parts[-1] else ""
+        parts[k] = f"(?P<{parts[k]}>{NUMBER if NUMERIC.fullmatch(parts[k]) else '.+?'}{last})"
     return re.compile("".join(p if k % 2 else re.escape(p) for k, p in enumerate(parts)), re.S)
 
 
@@ -155,7 +156,7 @@ class Language:
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
             if form in self.catalogue.texts:
                 return self.catalogue.texts[form]
-        if text in self.names or all(w in self.catalogue.names or w in self.names for w in WORD.findall(text)):
+        if text in self.names or self.catalogue.names.issuperset(WORD.findall(text)):
             return DATE.sub(self.catalogue.joints["date"], text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
@@ -164,7 +165,7 @@ class Language:
         return self._apart(text)
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
-        parts = {name: self.find(value) for name, value in match.groupdict().items()}
+        parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
         if None in parts.values():
             return None
         return PLACEHOLDER.sub(lambda m: str(parts[m[1]]), said)
@@ -172,8 +173,9 @@ class Language:
     def _apart(self, text: str) -> str | None:
         """Return a text that is made of others: sentences, clauses, name and text, a list, a remark in brackets."""
         joints = self.catalogue.joints
-        if (sentences := SENTENCE.split(text))[1:] and (made := self._all(sentences)) is not None:
-            return "".join(made)
+        for gap in SENTENCE.finditer(text):
+            if (made := self._all([text[: gap.start()], text[gap.end() :]])) is not None:
+                return "".join(made)
         for sign in ("\n", " / ", "; ", ": ", ", ", " and "):
             if sign in text and (made := self._all(text.split(sign))) is not None:
                 return joints[sign].join(made)

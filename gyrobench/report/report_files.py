@@ -77,6 +77,7 @@ def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
         run = report.run
         own |= set(run.notes)
         names |= {*run.parts, *(part.name for part in run.parts.values()), *run.options, *run.parameters, *run.versions}
+        names |= {f"{k} {slot}" for k, slot in enumerate(run.order, 1)}  # as they stand in the drawing of the system
         names |= {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}
         names |= {column.name for column in getattr(result, "columns", [])}
     return own - {""}, names - {""}

@@ -158,7 +158,7 @@ def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, signifi
 def _plain(doc: Any, path: tuple[str | int, ...]) -> Cell:
     """Return a parameter: all its digits that matter, not aligned, for magnitudes differ."""
     cell = _cell(doc, path, None, 8)
-    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=True)
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=not cell.text.endswith(" entries)"))
 
 
 def compact(value: Any, length: int = 72) -> str:
@@ -177,7 +177,8 @@ def how_tables(report: Report[Any]) -> list[Any]:
     if run.parts:
         rows = []
         for slot, part in run.parts.items():
-            names = [text_cell(x or None) for x in (part.name, part.version, part.target, part.fmi)]
+            names = [text_cell(part.name or None, own=True)]
+            names += [text_cell(x or None) for x in (part.version, part.target, part.fmi)]
             time = number_cell(doc, ("provenance", "timing", slot), significant=3)
             rows.append(Row([text_cell(slot, "strong", own=True), *names, time, Cell(part.sha256 or "–", mark="hash")]))
         heads = columns("slot", "component", "version", "target", "FMI", ("time", "s"), "SHA-256", wide=("SHA-256",))
