@@ -60,10 +60,10 @@ class Certified:
 
     @property
     def remarks(self) -> list[tuple[str, str]]:
-        """Return the id and the sentence of every warning, of why a verdict is withheld and of why there is no value."""
+        """Return id and sentence of every warning, of why a verdict is withheld, of why there is no value."""
         result = self.report.result
         reasons = [r for s in (("error", "warning"), ("doubt",)) for r in result.reasons if r.severity in s]
-        none = [(f"{c.name}: no value", f"No value of {c.name}: {c.no_value}.") for c in result.coefficients if c.no_value]
+        none = [(f"{c.name}.none", f"No value of {c.name}: {c.no_value}.") for c in result.coefficients if c.no_value]
         return [*((r.id, r.text) for r in reasons), *none]
 
 
@@ -108,7 +108,8 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
         Section("Reports", "reports", [_reports(of)]),
         Section("Statements and signatures", "signatures", [_signatures(of, laboratory)]),
     ]
-    title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {_said(first.result.title, known)}"
+    title = first.result.title if known(first.result.title) else first.result.system
+    title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {title}"
     return Page(title, number, _head(of, laboratory, number, known), sections, what="Certificate").finish()
 
 

@@ -4,9 +4,11 @@
         page = words.page(made())       # raises UntranslatedError with the sentences that the catalogue lacks
 
 Code writes English, and no logic reads it.  ``catalogue/zh.toml`` has the texts of the bench, ``systems/NAME/zh.toml``
-those of a test: English text = its translation, ``{placeholders}`` stand for any text, which is translated too, ``{n}``,
-``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  What is in no line is taken apart at full stops, semicolons,
-colons, commas, brackets and " and "; symbols, numbers, units and names stay.  ``catalogue`` says how the parts are joined.
+those of a test: English = translation.  In both, ``{placeholders}`` stand for a text, which is translated too, ``{n}``,
+``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  A text that is no line is taken apart at full
+stops, semicolons, colons, commas, brackets and " and "; ``[joints]`` are what the parts are joined by.  Symbols,
+numbers, units and names stay.  A test whose catalogue has ``report = true`` has all texts of its report, else those of
+its certificate.
 """
 
 from __future__ import annotations
@@ -38,9 +40,9 @@ FOLDER = Path(__file__).parent / "catalogue"
 ENGLISH = "en"
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
 NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
-NUMBER = r"[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]+(?: UTC)?"
-#: English words: two lower-case letters or more that are not part of an identifier (table.angle, u_scale, --set, x.csv)
-WORD = re.compile(r"(?<![\w./\\@-])[A-Za-z]?[a-z]{2,}(?![\w\\@]|[./-]\w)")
+NUMBER = r"(?:[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]|e(?=[+-]\d))+(?: UTC)?"
+#: English words: letters that are no symbol and no part of an identifier (table.angle, u_a, --set, x.csv)
+WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as)(?![\w\\@]|[./-]\w)")
 SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b)")
 DATE = re.compile(r"\b(\d{4})-(\d\d)-(\d\d)\b")
 
@@ -65,6 +67,7 @@ class Catalogue:
     names: frozenset[str]
     joints: Mapping[str, str]
     html: str = ENGLISH
+    reports: bool = True  # whether a test has all texts of its report, not of its certificate alone
 
     @functools.cached_property
     def templates(self) -> list[tuple[re.Pattern[str], str]]:
@@ -97,12 +100,12 @@ def check_code(code: str) -> str:
 def catalogue(code: str, folder: Path | None = None) -> Catalogue:
     """Return the catalogue of a language, with that of a system in its folder.  Raises UsageError for a wrong file."""
     own = _read(FOLDER / f"{check_code(code)}.toml")
-    texts, names = dict(own["texts"]), set(own["names"])
+    texts, names, more = dict(own["texts"]), set(own["names"]), {}
     if folder is not None and (file := folder / f"{code}.toml").is_file():
         more = _read(file)
         texts |= more["texts"]
         names |= set(more.get("names", ()))
-    return Catalogue(code, texts, frozenset(names), own["joints"], own["html"])
+    return Catalogue(code, texts, frozenset(names), own["joints"], own["html"], bool(more.get("report", False)))
 
 
 def system_folder(system: str, bench: Path | None = None) -> Path | None:
@@ -157,7 +160,7 @@ class Language:
             if form in self.catalogue.texts:
                 return self.catalogue.texts[form]
         if text in self.names or self.catalogue.names.issuperset(WORD.findall(text)):
-            return DATE.sub(self.catalogue.joints["date"], text)
+            return DATE.sub(lambda m: self.catalogue.joints["date"].format(*map(int, m.groups())), text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
                 if (match := pattern.fullmatch(form)) and (made := self._filled(said, match)) is not None:
@@ -240,10 +243,34 @@ class Language:
         for row in table.rows:
             row.group = self.text(row.group)
             for cell in row.cells:
-                if not cell.number and not cell.own:
+                if not (cell.number or cell.own or cell.mark == "hash"):
                     cell.text = self.text(cell.text)
 
 
+@contextmanager
+def reports_in(code: str, system: str, bench: Path | None = None) -> Iterator[None]:
+    """Make a language that of the reports written within.
+
+    Raises UsageError for one that there is not, and before anything is run where the test has no texts of its report.
+    """
+    if check_code(code) != ENGLISH and not catalogue(code, system_folder(system, bench)).reports:
+        raise UsageError(
+            f"--language {code}: the report of {system} has no translation, it would be half English; its certificate "
+            f"has (gyrobench certificate RUN --language {code})"
+        )
+    token = _chosen.set(code)
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
+
+
+def chosen() -> str:
+    """Return the language of the reports that are written."""
+    return _chosen.get()
+
+
+_chosen: ContextVar[str] = ContextVar("chosen", default=ENGLISH)
 _in_use: ContextVar[Language | None] = ContextVar("language", default=None)
 
 

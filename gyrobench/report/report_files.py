@@ -55,9 +55,7 @@ def write(
     return write_files(document, lambda: translated, folder, formats, NAMES, bench)
 
 
-def page_in(
-    code: str, report: Report[Any], record: Mapping[str, Any] | None = None, bench: Path | None = None
-) -> Page:
+def page_in(code: str, report: Report[Any], record: Mapping[str, Any] | None = None, bench: Path | None = None) -> Page:
     """Return the page of a report in another language.  Raises UntranslatedError where it would be half English."""
     system = report.result.system
     own, names = own_texts(report)
@@ -69,13 +67,13 @@ def page_in(
 def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
     """Return what is the same in every language: texts of the user, and names of parts, slots and options."""
     about, result = report.about, report.result
-    own = {result.provenance.get("title", ""), *(str(getattr(about, n, "")) for n in ("operator", *ABOUT))} - {result.title}
+    own = {str(getattr(about, n, "")) for n in ("operator", *ABOUT)}
     names = {result.system, *(c.name for c in result.coefficients), result.instrument.removesuffix(", simulated")}
     if not result.simulated:
         own |= {result.instrument}
     if not isinstance(result, SuiteResult):
         run = report.run
-        own |= set(run.notes)
+        own |= {run.data.file, run.data.sha256, run.data.columns, run.data.columns_sha256} if run.data else set()
         names |= {*run.parts, *(part.name for part in run.parts.values()), *run.options, *run.parameters, *run.versions}
         names |= {f"{k} {slot}" for k, slot in enumerate(run.order, 1)}  # as they stand in the drawing of the system
         names |= {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}

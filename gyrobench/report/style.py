@@ -162,6 +162,11 @@ def _in_language(fig: Any) -> None:
         text.set_text(language.text(text.get_text()))
 
 
+def _said(text: str) -> str:
+    language = in_use()
+    return language.text(text) if language else text
+
+
 def _in_any_script(fig: Any) -> None:
     """Give the texts of a figure the fonts of the machine where DejaVu Sans lacks a character (names of runs)."""
     from matplotlib.text import Text
@@ -253,9 +258,8 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
     for k, (start, end, label) in enumerate(spans):
         if k % 2 == 0:
             ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
-        language = in_use()
         text = ax.annotate(
-            language.text(label) if language else label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
+            _said(label), (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
         )
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size

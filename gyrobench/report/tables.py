@@ -158,7 +158,8 @@ def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, signifi
 def _plain(doc: Any, path: tuple[str | int, ...]) -> Cell:
     """Return a parameter: all its digits that matter, not aligned, for magnitudes differ."""
     cell = _cell(doc, path, None, 8)
-    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=not cell.text.endswith(" entries)"))
+    said = isinstance(value_at(doc, *path), bool) or cell.text.endswith(" entries)")
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=not said)
 
 
 def compact(value: Any, length: int = 72) -> str:
