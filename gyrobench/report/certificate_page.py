@@ -89,7 +89,8 @@ def _own(laboratory: Laboratory) -> set[str]:
 
 
 def _address(laboratory: Laboratory) -> str:
-    return ", ".join([laboratory.name, *laboratory.address])
+    lines = [laboratory.name, *laboratory.address]
+    return ("，" if any("一" <= c <= "鿿" for line in lines for c in line) else ", ").join(lines)
 
 
 def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known) -> Page:
