@@ -22,7 +22,7 @@ from gyrobench.result import Reason
 
 FILES = sorted([*language.FOLDER.glob("*.toml"), *standard_folder().glob("systems/*/zh.toml")])
 LABORATORY = Laboratory.model_validate({"name": "惯性实验室", "address": ["示例路 1 号"], "language": "zh"})
-OPTION = re.compile(r"\w+ = [\w.]+")  # as it is written: type_b = none
+OPTION = re.compile(r"\w+ = \"?[\w.]+\"?")  # as it is written: type_b = none
 TEXTS = {
     "Constant drift": "常值漂移",
     "{x} of {y} = {n} {unit}": "{y} 的{x} = {n} {unit}",
