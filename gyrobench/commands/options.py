@@ -128,3 +128,4 @@ class Form(StrEnum):
     container = "container"
     fmu = "fmu"
     html = "html"
+    mat = "mat"
