@@ -204,5 +204,5 @@ def by_source(
             add("noise of the gyro", gain * low_pass[:, None] * ways.test[:, :, k], np.full(f.size, 2.0 * white**2))
     for name, pair in ride.torques.items():
         for k in PAIR:
-            add(name, ways.torque[:, :, k], pair[k])
+            add(name, ways.torque[:, :, k], pair[k][-f.size :])  # the lines from the lowest on
     return made

@@ -12,7 +12,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
-from gyrobench.reduction.loops.jitter import Spectra, root, shortest
+from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction, Response, Table, margins, told
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.result import Curve
@@ -121,15 +121,15 @@ class Reduction(LoopReduction):
         f = ride.los[0].f
         use = f >= lowest * (1.0 - 1e-9)
         sources = self._sources(ride, f[use])
-        df = float(f[1] - f[0])
+        df = widths(f, lowest)[use]
         linear = [sum((pair[k] for pair in sources.values()), np.zeros(int(use.sum()))) for k in (0, 1)]
-        squares = [float(x.sum()) * df for x in (linear[0], linear[1], linear[0] + linear[1])]
+        squares = [float(x @ df) for x in (linear[0], linear[1], linear[0] + linear[1])]
         for name, of, square in zip(names, spectra, squares, strict=True):
             words = {"jitter": "of both axes, root of the sum of squares"}.get(name, f"about {name[7:]}")
             v = of.rms(lowest)
             meaning = f"line of sight from {lowest:g} Hz, rms {words}"
             found.add(name, meaning, "µrad", v, scale=MICRO, closed=math.sqrt(square) or None)
-        self._bands(spectra[:2], linear, f[use], df, lowest)
+        self._bands(spectra[:2], linear, f[use], lowest)
         self._figures(spectra[:2], linear, f, use, df)
         return self._budget(sources, squares[2], df, spectra[2].rms(lowest).value)
 
@@ -149,16 +149,15 @@ class Reduction(LoopReduction):
         except (LookupError, ValueError):
             return {}
 
-    def _bands(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, df: float, lowest: float) -> None:
+    def _bands(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, lowest: float) -> None:
         """Add the table of the jitter by band."""
         edges = [lowest, *(e for e in EDGES if lowest < e < f[-1]), math.inf]
         rows = []
         for a, b in pairwise(edges):
-            inside = (f >= a * (1.0 - 1e-9)) & (f < b * (1.0 - 1e-9))
             row: list[object] = [f"{a:g} to {b:g}" if math.isfinite(b) else f"above {a:g}"]
             for of, lines in zip(spectra, linear, strict=True):
                 v = root(of.mean_square(a, b))
-                row += [v.value / MICRO, v.u / MICRO, math.sqrt(float(lines[inside].sum()) * df) / MICRO]
+                row += [v.value / MICRO, v.u / MICRO, math.sqrt(float(lines @ widths(f, a, b))) / MICRO]
             rows.append(row)
         heads = [f"{axis}{what} / µrad" for axis in AXES for what in ("", ", u", ", linear")]
         caption = (
@@ -167,11 +166,11 @@ class Reduction(LoopReduction):
         )
         self.found.tables.append(Table("jitter.bands", "Jitter by frequency", caption, ["band / Hz", *heads], rows))
 
-    def _budget(self, sources: Sources, square: float, df: float, measured: float) -> str:
+    def _budget(self, sources: Sources, square: float, df: Array, measured: float) -> str:
         """Add the table of sources, warn where it does not explain the ride; return the largest as words."""
         if not square:
             return ""
-        entries = {n: [float(x.sum()) * df for x in pair] for n, pair in sources.items()}
+        entries = {n: [float(x @ df) for x in pair] for n, pair in sources.items()}
         rows: list[list[object]] = []
         small = 0.0
         for name, pair in sorted(entries.items(), key=lambda e: -sum(e[1])):
@@ -216,7 +215,7 @@ class Reduction(LoopReduction):
     def _stuck(self) -> bool:
         return any(np.any(np.asarray(self.run.parameters.get(f"platform.{n}", 0.0))) for n in ("friction", "stiction"))
 
-    def _figures(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, use: Array, df: float) -> None:
+    def _figures(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, use: Array, df: Array) -> None:
         """Add the density and the jitter that has accumulated up to each frequency."""
         density, rising = [], []
         for axis, of, lines in zip(AXES, spectra, linear, strict=True):
@@ -224,7 +223,7 @@ class Reduction(LoopReduction):
                 if np.any(values):
                     x, y = _averaged(f[use], values / MICRO**2)
                     density.append(Curve(label, x, y))
-                    x, y = _averaged(f[use], np.sqrt(np.cumsum(values) * df) / MICRO)
+                    x, y = _averaged(f[use], np.sqrt(np.cumsum(values * df)) / MICRO)
                     rising.append(Curve(label, x, y))
         for name, unit, curves, caption in (
             ("density of the line of sight", "µrad²/Hz", density,

@@ -105,7 +105,7 @@ class GimbalStabilization(LoopTest):
         for axis, (_, k) in AXES.items() if self["load_step"] else ():
             found.append(LoopPhase(f"load {axis}", "torque", "step", k, self["load_step"], settle=1.0, dwell=1.0))
         for axis, (_, k) in AXES.items() if self["sweeps"] else ():
-            tones = [fc * x for x in TONES]
+            tones = sorted([fc * x for x in TONES] + [x for x in (0.96 * self["bending"],) if fc < x < 4.0 * fc])
             found += sweep(f"loop {axis}", "test", tones, TEST, axis=k, settle=1.0, periods=40)
         for name, k in (("x", 1), ("z", 3)) if self["base"] else ():
             found += sweep(f"base {name}", "motion", [1.0, 3.0, 8.0], self.swing, axis=k, settle=1.0, dwell=4.0)

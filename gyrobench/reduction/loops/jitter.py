@@ -40,8 +40,7 @@ class Spectra:
 
     def mean_square(self, low: float, high: float = math.inf) -> UncertainValue:
         """Return the mean square from low to below high, Hz."""
-        inside = (self.f >= low * (1.0 - 1e-9)) & (self.f < high * (1.0 - 1e-9))
-        powers = self.segments[:, inside].sum(axis=1) * (self.f[1] - self.f[0])
+        powers = self.segments @ widths(self.f, low, high)
         n = powers.size
         u = float(np.std(powers, ddof=1)) * math.sqrt((1.0 + 2.0 * OVERLAP) / n)
         return UncertainValue(float(powers.mean()), u, n - 1)
@@ -53,6 +52,15 @@ class Spectra:
     def together(self, other: Spectra) -> Spectra:
         """Return the spectra of two axes together."""
         return Spectra(self.f, self.segments + other.segments)
+
+
+def widths(f: Array, low: float, high: float = math.inf) -> Array:
+    """Return what each of equidistant lines has of a band, Hz: the part of its interval that is inside.
+
+    A line at the edge counts half: of a spectrum that falls, the lines from the lowest on would be too much otherwise.
+    """
+    half = 0.5 * float(f[1] - f[0])
+    return np.asarray(np.clip(np.minimum(high, f + half) - np.maximum(low, f - half), 0.0, 2.0 * half))
 
 
 def root(square: UncertainValue) -> UncertainValue:
