@@ -17,11 +17,12 @@ from gyrobench.report.page_model import (
     pictures,
     text_cell,
 )
-from gyrobench.report.plots import finite, short
+from gyrobench.report.plots import finite, plain_log, short
 from gyrobench.report.result_json import Report
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 from gyrobench.result import Curve, LoopResult, Response, Result
 
+DECADES = 1e-7  # of the largest value: what a spectrum is drawn down to
 LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their order
 Named = Sequence[tuple[str, Response]]
 
@@ -76,7 +77,9 @@ def draw(named: Named, key: str, curves: Sequence[Curve] = ()) -> str:
         lines = [(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named]
         return _over_time(lines, first, key, ())
     if first.kind == "spectrum":
-        return _over_frequency([(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named], first, key)
+        return _over_frequency(
+            [(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named], first, key
+        )
     if first.kind == "step":
         return _over_time([(label, r.x, r.y) for label, r in named], first, key, curves)
     phases = first.kind == "loop"
@@ -168,10 +171,12 @@ def _over_frequency(lines: Sequence[tuple[str, Sequence[float], Sequence[float]]
                 linewidth=1.2 if modelled else 0.8, label=label)  # fmt: skip
     ax.set_xscale("log")
     ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(max(low, DECADES * high), high)
     ax.set_xlabel(axis_label(first.x_name, first.x_unit))
     ax.set_ylabel(axis_label(first.y_name, first.y_unit))
     ax.margins(x=0.01)
-    _frequency_axis(ax)
+    plain_log(ax, ax.get_ylim()[1] / ax.get_ylim()[0])
     fig.legend(loc="outside upper left", ncols=2, handlelength=2.2)
     return svg(fig, key)
 

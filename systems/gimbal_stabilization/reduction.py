@@ -5,22 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import DataError
-from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction, Response, Table, margins, told
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.result import Curve
 
-from .budget import LOS, Ride, by_source, read_ride
-from .spectra import SPECTRA
+from .budget import LOS, Ride, Source, by_source, read_ride
 
-Sources = Mapping[str, tuple[Array, Array]]
+Sources = Mapping[str, Source]
 AXES = {"pitch": 1, "yaw": 3}
 MICRO = 1e-6
 EDGES = (3.0, 10.0, 30.0, 100.0)  # Hz, of the bands
@@ -28,7 +25,7 @@ POINTS = 250  # of a figure
 WRONG = 0.2  # relative: a jitter that differs more from the linear prediction is explained
 NOISY = 0.25  # relative u of a ratio beyond which its dB say nothing
 DECIBEL = 20.0 / math.log(10.0)
-SMALL = 1e-3  # share of the variance below which a source has no row
+SMALL = 0.1  # %, share of the variance below which a source has no row
 LIMITS = {
     "platform.saturated": "a motor",
     "pitch.saturated": "the pitch controller",
@@ -101,9 +98,7 @@ class Reduction(LoopReduction):
                     level = 20.0 * math.log10(size * (1.0 + 2.0 * u)) if size else -math.inf
                     none = f"not above the noise: below {level:.0f} dB".replace("-", "−")
                 value = 20.0 * math.log10(size) if size else None
-                found.measure(
-                    f"isolation {name} {p.f:g} Hz", meaning, "dB", value, DECIBEL * u, no_value=none
-                )
+                found.measure(f"isolation {name} {p.f:g} Hz", meaning, "dB", value, DECIBEL * u, no_value=none)
 
     # ------------------------------------------------------------------ jitter
     def _jitter(self, gate: Gate) -> str:
@@ -120,10 +115,10 @@ class Reduction(LoopReduction):
         spectra = (*ride.los, ride.los[0].together(ride.los[1]))
         f = ride.los[0].f
         use = f >= lowest * (1.0 - 1e-9)
-        sources = self._sources(ride, f[use])
+        sources = self._sources(ride, use)
         df = widths(f, lowest)[use]
-        linear = [sum((pair[k] for pair in sources.values()), np.zeros(int(use.sum()))) for k in (0, 1)]
-        squares = [float(x @ df) for x in (linear[0], linear[1], linear[0] + linear[1])]
+        linear = [sum((x.part[k] for x in sources.values()), np.zeros(int(use.sum()))) for k in (0, 1)]
+        squares = [max(0.0, float(x @ df)) for x in (linear[0], linear[1], linear[0] + linear[1])]
         for name, of, square in zip(names, spectra, squares, strict=True):
             words = {"jitter": "of both axes, root of the sum of squares"}.get(name, f"about {name[7:]}")
             v = of.rms(lowest)
@@ -131,22 +126,12 @@ class Reduction(LoopReduction):
             found.add(name, meaning, "µrad", v, scale=MICRO, closed=math.sqrt(square) or None)
         self._bands(spectra[:2], linear, f[use], lowest)
         self._figures(spectra[:2], linear, f, use, df)
-        return self._budget(sources, squares[2], df, spectra[2].rms(lowest).value)
+        return self._budget(sources, squares, df, spectra[2].rms(lowest).value)
 
-    def _spectrum(self) -> VibrationSpectrum | None:
-        """Return the vibration that was asked for; None where there is none, or its file is gone."""
-        name = str(self.run.options["psd"])
-        if name in SPECTRA or name == "none":
-            return SPECTRA.get(name)
+    def _sources(self, ride: Ride, use: NDArray[np.bool_]) -> Sources:
         try:
-            return read_spectrum(Path(name))
-        except (OSError, DataError):
-            return None
-
-    def _sources(self, ride: Ride, f: Array) -> Sources:
-        try:
-            return by_source(self.found, ride, f, self._spectrum())
-        except (LookupError, ValueError):
+            return by_source(self.found, ride, use)
+        except (LookupError, ValueError):  # parts of another kind
             return {}
 
     def _bands(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, lowest: float) -> None:
@@ -157,7 +142,7 @@ class Reduction(LoopReduction):
             row: list[object] = [f"{a:g} to {b:g}" if math.isfinite(b) else f"above {a:g}"]
             for of, lines in zip(spectra, linear, strict=True):
                 v = root(of.mean_square(a, b))
-                row += [v.value / MICRO, v.u / MICRO, math.sqrt(float(lines @ widths(f, a, b))) / MICRO]
+                row += [v.value / MICRO, v.u / MICRO, math.sqrt(max(0.0, float(lines @ widths(f, a, b)))) / MICRO]
             rows.append(row)
         heads = [f"{axis}{what} / µrad" for axis in AXES for what in ("", ", u", ", linear")]
         caption = (
@@ -166,32 +151,28 @@ class Reduction(LoopReduction):
         )
         self.found.tables.append(Table("jitter.bands", "Jitter by frequency", caption, ["band / Hz", *heads], rows))
 
-    def _budget(self, sources: Sources, square: float, df: Array, measured: float) -> str:
+    def _budget(self, sources: Sources, squares: Sequence[float], df: Array, measured: float) -> str:
         """Add the table of sources, warn where it does not explain the ride; return the largest as words."""
-        if not square:
+        square = squares[2]
+        if not square > 0.0:
             return ""
-        entries = {n: [float(x @ df) for x in pair] for n, pair in sources.items()}
+        alone = {n: [math.sqrt(float(y @ df)) / MICRO for y in x.alone] for n, x in sources.items()}
+        share = {n: 100.0 * float(np.sum(x.part @ df)) / square for n, x in sources.items()}
         rows: list[list[object]] = []
-        small = 0.0
-        for name, pair in sorted(entries.items(), key=lambda e: -sum(e[1])):
-            if sum(pair) < SMALL * square:
-                small += sum(pair)
-                continue
-            rows.append([name, *(math.sqrt(x) / MICRO for x in pair), 100.0 * sum(pair) / square])
+        small = [n for n in sources if abs(share[n]) < SMALL]
+        for name in sorted((n for n in sources if n not in small), key=lambda n: -share[n]):
+            rows.append([name, *alone[name], share[name]])
         if small:
-            rows.append(["others", None, None, 100.0 * small / square])
-        together = [math.sqrt(sum(p[k] for p in entries.values())) / MICRO for k in (0, 1)]
-        rows.append(["together", *together, None])
+            rows.append(["others", None, None, sum(share[n] for n in small)])
+        rows.append(["together", *(math.sqrt(x) / MICRO for x in squares[:2]), None])
         rows.append(["co-simulated", *(self.found.estimates[f"jitter {axis}"] for axis in AXES), None])
         caption = (
             "Angle of the line of sight that each source makes by the linear model, rms of each axis, and its share of "
-            "the variance of both. "
+            "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part of the "
+            "others. "
         )
-        caption += (
-            "The joints slip: their dry friction is the torque that the joint angles of the ride make, not a spring."
-            if "dry friction" in entries
-            else "Independent sources add by squares."
-        )
+        if "dry friction" in sources:
+            caption += "The joints slip: their dry friction is the torque that their angles make, not a spring."
         title = "Jitter budget, by source"
         self.found.tables.append(
             Table("budget.sources", title, caption, ["source", "pitch / µrad", "yaw / µrad", "share / %"], rows)
@@ -200,17 +181,15 @@ class Reduction(LoopReduction):
         if abs(measured / whole - 1.0) > WRONG:
             causes = [text for name, text in LIMITS.items() if self._hit(name)]
             why = f"at their limit were {', '.join(causes)}" if causes else ""
-            if not why and "dry friction" in entries:
-                why = "dry friction moves with the vibration, so the two do not add by squares"
-            elif not why and self._stuck():
+            if not why and self._stuck():
                 why = "dry friction sticks for a part of the ride and slips in another"
             text = (
                 f"The jitter budget gives {whole / MICRO:.3g} µrad, the co-simulation {measured / MICRO:.3g} µrad"
                 f"{': ' + why if why else ''}. Believe the co-simulation."
             )
             self.found.warn("budget.not_linear", text)
-        largest = max(entries, key=lambda n: sum(entries[n]))
-        return f", {100.0 * sum(entries[largest]) / square:.0f} % of its variance by {largest}"
+        largest = max(share, key=lambda n: share[n])
+        return f", {share[largest]:.0f} % of its variance by {largest}"
 
     def _stuck(self) -> bool:
         return any(np.any(np.asarray(self.run.parameters.get(f"platform.{n}", 0.0))) for n in ("friction", "stiction"))
@@ -223,7 +202,7 @@ class Reduction(LoopReduction):
                 if np.any(values):
                     x, y = _averaged(f[use], values / MICRO**2)
                     density.append(Curve(label, x, y))
-                    x, y = _averaged(f[use], np.sqrt(np.cumsum(values * df)) / MICRO)
+                    x, y = _averaged(f[use], np.sqrt(np.maximum(0.0, np.cumsum(values * df))) / MICRO)
                     rising.append(Curve(label, x, y))
         for name, unit, curves, caption in (
             ("density of the line of sight", "µrad²/Hz", density,

@@ -91,7 +91,7 @@ class GimbalStabilization(LoopTest):
     step = 2e-4
     channels = (
         "exciter.phase", "exciter.gate", "exciter.motion_angle[1]", "exciter.motion_angle[3]", "exciter.torque[1]",
-        "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]", *loop.three("motion.angle", "vibration.omega"),
+        "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]", *loop.three("motion.angle", "vibration.omega", "vibration.f"),
         *(f"{n}[{k}]" for n in ("platform.los", "platform.theta") for k in (1, 2)),
         "platform.keyhole", "platform.saturated", "gyro.saturated", "decoupler.saturated",
         *(f"{axis}.{n}" for axis in AXES for n in ("e", "v", "saturated")),

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 
+Complex = np.ndarray[Any, np.dtype[np.complex128]]
 PERIODS = 8.0  # of the lowest frequency in a segment
 FEWEST = 8  # segments
 OVERLAP = 1.0 / 36.0  # correlation of the powers of two neighbours
@@ -79,8 +81,11 @@ def shortest(lowest: float) -> float:
     return 0.5 * (FEWEST + 1) * PERIODS / lowest
 
 
-def spectra(dt: float, y: Array, lowest: float) -> Spectra | None:
-    """Return the spectra of a record sampled every dt s, down to a lowest frequency, Hz; None for too short a record."""
+def segments(dt: float, y: Array, lowest: float) -> Complex | None:
+    """Return the transforms of the windowed segments of a record, (segments, frequencies); None for too few of them.
+
+    Scaled so that the mean of |segment|^2 is the one-sided density from the second line on.
+    """
     n = samples_of(dt, lowest)
     starts = range(0, y.size - n + 1, max(1, n // 2))
     if len(starts) < FEWEST:
@@ -90,9 +95,13 @@ def spectra(dt: float, y: Array, lowest: float) -> Spectra | None:
     rows = []
     for k in starts:
         part = y[k : k + n]
-        part = part - line @ np.linalg.lstsq(line, part, rcond=None)[0]
-        rows.append(np.abs(np.fft.rfft(window * part)) ** 2)
-    scale = 2.0 * dt / float(np.sum(window**2))
-    found = np.array(rows) * scale
-    found[:, 0] *= 0.5
-    return Spectra(np.asarray(np.fft.rfftfreq(n, dt)), found)
+        rows.append(np.fft.rfft(window * (part - line @ np.linalg.lstsq(line, part, rcond=None)[0])))
+    return np.asarray(np.array(rows) * math.sqrt(2.0 * dt / float(np.sum(window**2))))
+
+
+def spectra(dt: float, y: Array, lowest: float) -> Spectra | None:
+    """Return the spectra of a record sampled every dt s, down to a lowest frequency, Hz; None for too short a record."""
+    found = segments(dt, y, lowest)
+    if found is None:
+        return None
+    return Spectra(np.asarray(np.fft.rfftfreq(samples_of(dt, lowest), dt)), np.abs(found) ** 2)
