@@ -11,9 +11,9 @@ NONE = [0.0, 0.0, 0.0]
 
 
 class BaseVibration(Component):
-    """Vibration of a base by power spectral densities, added to its motion: angular rate and acceleration.  [BASE-PSD]
+    """Vibration of a base by power spectral densities, added to it: angular rate and acceleration.  [BASE-PSD]
 
-    omega = omega_b + w n(t),  alpha = alpha_b + d/dt w n(t),  f = f_b + w a(t)          w rises from 0 to 1 over onset s
+    omega = omega_b + w n(t),  alpha = alpha_b + d/dt w n(t),  f = f_b + w a(t)          w rises from 0 to 1 in onset
 
     Each of the three components of n and of a is a sum of 48 sines.  The band from the first to the last frequency is
     cut into 48 of equal ratio; each has one sine of the power of its band, int S df, at a place within it that does not

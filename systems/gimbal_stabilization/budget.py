@@ -46,7 +46,7 @@ GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
 class Ride:
     """What was recorded in the ride: spectra of the line of sight, transforms of what moves it, whether joints slide.
 
-    base, force: (axis x, y, z) of (segments, frequencies), rates and accelerations; torques: source -> joint pitch, yaw.
+    base, force: (axis x, y, z) of (segments, frequencies), rates and accelerations; torques: source -> of pitch, yaw.
     """
 
     los: tuple[Spectra, Spectra]

@@ -57,8 +57,7 @@ class Reduction(LoopReduction):
             equation="S_(l o s) = sum_i abs(T_i (j omega))^2 S_i, quad "
             "sigma^2 = integral_(f_1)^oo S_(l o s) dif f, quad u_O = omega_(l o s) \\/ cos theta_I",
             conventions=[
-                "The line of sight is y of the inner gimbal; pitch turns it about x, yaw about z, positive by the right "
-                "hand.",
+                "The line of sight is y of the inner gimbal; pitch turns it about x, yaw about z, by the right hand.",
                 "Jitter is the root mean square of its angle from the stated frequency on; slower motion is drift.",
                 "L is the loop opened at the input of a stabilizer: what comes back over what is put in, with minus.",
             ],
@@ -146,8 +145,8 @@ class Reduction(LoopReduction):
             rows.append(row)
         heads = [f"{axis}{what} / µrad" for axis in AXES for what in ("", ", u", ", linear")]
         caption = (
-            "Root mean square of the angle in each band, its standard uncertainty from the scatter of the segments, and "
-            "what the linear model with the sources of the budget makes of it."
+            "Root mean square of the angle in each band, its standard uncertainty from the scatter of the segments, "
+            "and what the linear model with the sources of the budget makes of it."
         )
         self.found.tables.append(Table("jitter.bands", "Jitter by frequency", caption, ["band / Hz", *heads], rows))
 
@@ -168,8 +167,8 @@ class Reduction(LoopReduction):
         rows.append(["co-simulated", *(self.found.estimates[f"jitter {axis}"] for axis in AXES), None])
         caption = (
             "Angle of the line of sight that each source makes by the linear model, rms of each axis, and its share of "
-            "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part of the "
-            "others. "
+            "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part "
+            "of the others. "
         )
         if "dry friction" in sources:
             caption += "The joints slip: their dry friction is the torque that their angles make, not a spring."
@@ -194,7 +193,9 @@ class Reduction(LoopReduction):
     def _stuck(self) -> bool:
         return any(np.any(np.asarray(self.run.parameters.get(f"platform.{n}", 0.0))) for n in ("friction", "stiction"))
 
-    def _figures(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, use: Array, df: Array) -> None:
+    def _figures(
+        self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, use: NDArray[np.bool_], df: Array
+    ) -> None:
         """Add the density and the jitter that has accumulated up to each frequency."""
         density, rising = [], []
         for axis, of, lines in zip(AXES, spectra, linear, strict=True):

@@ -91,7 +91,8 @@ class GimbalStabilization(LoopTest):
     step = 2e-4
     channels = (
         "exciter.phase", "exciter.gate", "exciter.motion_angle[1]", "exciter.motion_angle[3]", "exciter.torque[1]",
-        "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]", *loop.three("motion.angle", "vibration.omega", "vibration.f"),
+        "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]",
+        *loop.three("motion.angle", "vibration.omega", "vibration.f"),
         *(f"{n}[{k}]" for n in ("platform.los", "platform.theta") for k in (1, 2)),
         "platform.keyhole", "platform.saturated", "gyro.saturated", "decoupler.saturated",
         *(f"{axis}.{n}" for axis in AXES for n in ("e", "v", "saturated")),
@@ -195,8 +196,8 @@ class GimbalStabilization(LoopTest):
         problems = self.no_choice(form=FORMS)
         if self["bending"] and self["bending"] < self["crossover"]:
             problems.append(
-                f"crossover = {self['crossover']:g} Hz: above the mode at {self['bending']:g} Hz, which turns the phase "
-                "by 180 degrees; take a lower one"
+                f"crossover = {self['crossover']:g} Hz: above the mode at {self['bending']:g} Hz, which turns the "
+                "phase by 180 degrees; take a lower one"
             )
         if self["ride"] < shortest(self["jitter_from"]):
             problems.append(

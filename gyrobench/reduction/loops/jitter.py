@@ -100,7 +100,7 @@ def segments(dt: float, y: Array, lowest: float) -> Complex | None:
 
 
 def spectra(dt: float, y: Array, lowest: float) -> Spectra | None:
-    """Return the spectra of a record sampled every dt s, down to a lowest frequency, Hz; None for too short a record."""
+    """Return the spectra of a record sampled every dt s, down to a lowest frequency, Hz; None for too few segments."""
     found = segments(dt, y, lowest)
     if found is None:
         return None
