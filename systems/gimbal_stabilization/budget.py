@@ -188,14 +188,14 @@ def by_unbalance(p: Mapping[str, Any], angles: tuple[float, float]) -> Array:
 
 
 @dataclass(frozen=True)
-class Source:
+class JitterSource:
     """Of a source, for pitch and yaw: the density alone, and its part of the whole, rad2/Hz; (2, frequencies)."""
 
     alone: Array
     part: Array
 
 
-def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[str, Source]:
+def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[str, JitterSource]:
     """Return the sources of the line of sight at the frequencies of its spectra that are used.
 
     Raises LookupError without a linear model of the parts that is needed.
@@ -219,14 +219,14 @@ def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[s
             add(name, ways.torque[:, :, k], pair[k])
     whole = sum(moved.values(), np.zeros((), complex))
     sources = {
-        name: Source(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))
+        name: JitterSource(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))
         for name, y in moved.items()
         if np.any(y)
     }
     white = float(p.get("gyro.white") or 0.0)
     if white and "gyro.bandwidth" in p:
         density = _gyro(p, ride, ways, 2.0 * white**2)
-        sources["noise of the gyro"] = Source(density, density)
+        sources["noise of the gyro"] = JitterSource(density, density)
     return sources
 
 

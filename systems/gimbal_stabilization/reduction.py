@@ -15,9 +15,9 @@ from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction,
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.result import Curve
 
-from .budget import LOS, Ride, Source, by_source, read_ride
+from .budget import LOS, Ride, JitterSource, by_source, read_ride
 
-Sources = Mapping[str, Source]
+Sources = Mapping[str, JitterSource]
 AXES = {"pitch": 1, "yaw": 3}
 MICRO = 1e-6
 EDGES = (3.0, 10.0, 30.0, 100.0)  # Hz, of the bands
