@@ -127,3 +127,4 @@ class Form(StrEnum):
     container = "container"
     fmu = "fmu"
     html = "html"
+    mat = "mat"

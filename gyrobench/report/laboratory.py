@@ -12,13 +12,16 @@ name = "N. N."
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.boundary import faults_of
+from gyrobench.files import write_whole
 
 FILE = "laboratory.toml"
 
@@ -55,3 +58,16 @@ def read_laboratory(file: Path) -> Laboratory:
     except ValidationError as error:
         problems = faults_of(error, lambda place: Signatory if place[0] == "signatories" and place[1:] else Laboratory)
     raise UsageError("\n".join([f"{file}: not a profile of a laboratory:", *(f"  - {p}" for p in problems)]))
+
+
+def write_laboratory(profile: Laboratory, file: Path) -> None:
+    """Write a profile as TOML; what it leaves at its default is left out."""
+    given = profile.model_dump(exclude_defaults=True)
+    tables = given.pop("signatories", [])
+    text = "".join(f"{k} = {_toml(v)}\n" for k, v in given.items())
+    text += "".join("\n[[signatories]]\n" + "".join(f"{k} = {_toml(v)}\n" for k, v in t.items()) for t in tables)
+    write_whole(file, text.encode())
+
+
+def _toml(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # strings and lists are written as in JSON
