@@ -15,7 +15,7 @@ from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction,
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.result import Curve
 
-from .budget import LOS, Ride, JitterSource, by_source, read_ride
+from .budget import LOS, JitterSource, Ride, by_source, read_ride
 
 Sources = Mapping[str, JitterSource]
 AXES = {"pitch": 1, "yaw": 3}
