@@ -7,6 +7,7 @@ LINES = 48  # sines of each axis
 POINTS = 24  # of a spectrum
 PARTS = 8  # of a line's band, over which its power is summed
 GOLDEN = 0.6180339887498949
+REST = [0.0] * (POINTS - 2)
 NONE = [0.0, 0.0, 0.0]
 
 
@@ -30,10 +31,10 @@ class BaseVibration(Component):
     version = "1.0.0"
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
-    points = Parameter(0, int, "points of the spectra; 0: no vibration", min=0, max=POINTS)
-    frequency = Parameter([0.0] * POINTS, "Hz", "their frequencies, rising", min=0.0)
+    points = Parameter(2, int, "points of the spectra; 0: no vibration", min=0, max=POINTS)
+    frequency = Parameter([1.0, 100.0, *REST], "Hz", "their frequencies, rising", min=0.0)
     rate_psd = Parameter(
-        [[0.0] * POINTS] * 3, "rad2/s2/Hz", "one-sided density of the angular rate about x, y, z", min=0.0
+        [[1e-6, 1e-6, *REST]] * 3, "rad2/s2/Hz", "one-sided density of the angular rate about x, y, z", min=0.0
     )
     acceleration_psd = Parameter(
         [[0.0] * POINTS] * 3, "m2/s4/Hz", "one-sided density of the acceleration along x, y, z", min=0.0
