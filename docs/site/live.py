@@ -19,7 +19,7 @@ LIVE = {
         "The servo turns the table against the Earth; the drift is what is left.",
     ),
     "rebalance_loop_test": (("gyro.C",), "Damping of the float and the step response of the rebalance loop."),
-    "stabilizer_sdf": (("platform.J", "gyro.D_F"), "A heavier platform rings; the drift of the gyro turns it."),
+    "stabilizer_sdf": (("gyro.D_F", "gyro.C"), "The platform turns at the drift rate of its gyro."),
     "platform_single_axis": (
         ("platform.J", "platform.friction"),
         "Friction carries the base's motion onto the platform.",
