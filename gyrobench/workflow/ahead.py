@@ -1,4 +1,4 @@
-"""What a report needs, imported while the run goes on in a process of its own: a second less to wait for after it."""
+"""Modules that a report needs, imported while the run goes on in a process of its own: a second less to wait for."""
 
 from __future__ import annotations
 
