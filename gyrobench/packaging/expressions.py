@@ -22,7 +22,7 @@ COMPARISONS: dict[type[ast.AST], str] = {
     ast.Eq: "==",
     ast.NotEq: "!=",
 }
-OWN_C = {"fabs", "minimum", "maximum", "clip", "sign"}  # written in core.h, the others are libm's
+LIBRARY_C = {"sqrt", "floor"}  # exact in every library of C; the others are written in functions.h and elementary.h
 ARGUMENTS = {"atan2": 2, "minimum": 2, "maximum": 2, "clip": 3, "where": 3, "dot": 2, "cross": 2}  # the others take one
 WRITE = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
@@ -187,7 +187,7 @@ class Expressions(Places):
         args = ", ".join(self.expression(a) for a in e.args)
         if self.dual:
             return self.number(f"d_{name}({args})")
-        return self.number(f"f_{name}({args})" if name in OWN_C else f"{name}({args})")
+        return self.number(f"{name}({args})" if name in LIBRARY_C else f"f_{name}({args})")
 
     def callee(self, e: ast.Call) -> Code | None:
         """Return the procedure or function that is called; None where it is one of the language."""
