@@ -86,11 +86,12 @@ def sine(n: int, r: float, error: float) -> tuple[float, float]:
     """Return sin(n pi / 128 + r + error) as a double and a small rest."""
     high, low, near, more = table.TURN[n & 127]
     z = r * r
-    odd = (r * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)))
-    even = z * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)))
+    cosine = near + more
     straight = near * r
     s = high + straight
-    rest = (straight - (s - high)) + (low + (more * r + ((near + more) * (odd + error) + high * even)))
+    odd = (cosine * (r * z)) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)))
+    even = (high * z) * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)))
+    rest = ((straight - (s - high)) + (low + (more * r + cosine * error))) + (odd + even)
     return (-s, -rest) if n & 128 else (s, rest)
 
 

@@ -14,8 +14,12 @@
 #define EF_SPLITTER 134217729.0 /* 2^27 + 1 */
 #ifdef __GNUC__
 #define EF_RARE(x) __builtin_expect(!!(x), 0)
+#define EF_ALWAYS inline __attribute__((always_inline))
+#define EF_VALUE __attribute__((noinline, const)) /* it follows from its arguments: asked once for the same ones */
 #else
 #define EF_RARE(x) (x)
+#define EF_ALWAYS inline
+#define EF_VALUE
 #endif
 
 typedef struct { double v, rest; } doubled; /* a number as a sum; the second is small */
@@ -90,7 +94,7 @@ static COLD turned far_turn(double x) {
     return of;
 }
 
-static inline turned turn(double x) {
+static EF_ALWAYS turned turn(double x) {
     const double k = (x * EF_STEPS + EF_TO_WHOLE) - EF_TO_WHOLE, first = x - k * EF_STEP_1, second = k * EF_STEP_2;
     const double r = first - second, b = r - first, error = (first - (r - b)) - (second + b);
     const double third = k * EF_STEP_3, rest = r - third;
@@ -102,18 +106,18 @@ static inline turned turn(double x) {
     return of;
 }
 
-static inline doubled sine(int n, double r, double error) {
+static EF_ALWAYS doubled sine(int n, double r, double error) {
     const double *row = turn_table[n & 127], high = row[0], low = row[1], near = row[2], more = row[3];
-    const double z = r * r, odd = (r * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)));
-    const double even = z * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)));
-    const double straight = near * r, s = high + straight;
-    const double rest = (straight - (s - high)) + (low + (more * r + ((near + more) * (odd + error) + high * even)));
+    const double z = r * r, cosine = near + more, straight = near * r, s = high + straight;
+    const double odd = (cosine * (r * z)) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)));
+    const double even = (high * z) * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)));
+    const double rest = ((straight - (s - high)) + (low + (more * r + cosine * error))) + (odd + even);
     doubled of = {s, rest};
     if (n & 128) { of.v = -s; of.rest = -rest; }
     return of;
 }
 
-static double f_sin(double x) {
+static EF_VALUE double f_sin(double x) {
     turned t;
     doubled s;
     if (EF_RARE(fabs(x) < 0x1p-27)) return x;
@@ -122,11 +126,28 @@ static double f_sin(double x) {
     return s.v + s.rest;
 }
 
-static double f_cos(double x) {
+static EF_VALUE double f_cos(double x) {
     const turned t = turn(x);
     const doubled s = sine(t.n + 64, t.r, t.error);
     return s.v + s.rest;
 }
+
+/* Sine and cosine of one reduction, as a complex number, which is a value to the compiler: it asks once for both. */
+#ifdef __GNUC__
+static EF_VALUE double _Complex pair_of(double x) {
+    const turned t = turn(x);
+    const doubled s = sine(t.n, t.r, t.error), c = sine(t.n + 64, t.r, t.error);
+    double _Complex of;
+    __real__ of = EF_RARE(fabs(x) < 0x1p-27) ? x : s.v + s.rest;
+    __imag__ of = c.v + c.rest;
+    return of;
+}
+static inline double f_paired_sin(double x) { return __real__ pair_of(x); }
+static inline double f_paired_cos(double x) { return __imag__ pair_of(x); }
+#else
+static double f_paired_sin(double x) { return f_sin(x); }
+static double f_paired_cos(double x) { return f_cos(x); }
+#endif
 
 static inline doubled quotient(doubled a, doubled b) {
     const double q = a.v / b.v, p = q * b.v;
@@ -140,7 +161,7 @@ static inline doubled normalized(double s, double rest) {
     return of;
 }
 
-static double f_tan(double x) {
+static EF_VALUE double f_tan(double x) {
     turned t;
     doubled s, c;
     if (fabs(x) < 0.0625) {
@@ -187,7 +208,7 @@ static NEVER_INLINE double angle(double y, double y_rest, double x, double x_res
 
 static inline int is_infinite(double x) { return fabs(x) > 1.7976931348623157e308; }
 
-static double f_atan2(double y, double x) {
+static EF_VALUE double f_atan2(double y, double x) {
     double a, b, large, small, f;
     int left;
     if (x != x || y != y) return x + y;
@@ -217,13 +238,13 @@ static double f_atan2(double y, double x) {
     return signed_as(f, y);
 }
 
-static double f_atan(double x) {
+static EF_VALUE double f_atan(double x) {
     const double z = x * x;
     if (fabs(x) < 0x1p-27) return x;
     return fabs(x) < 0.0625 ? x + (x * z) * arctan_series(z) : f_atan2(x, 1.0);
 }
 
-static double f_asin(double x) {
+static EF_VALUE double f_asin(double x) {
     const double a = fabs(x);
     double p, h, rest, s, f;
     if (a < 0.0625 || x != x) {
@@ -243,7 +264,7 @@ static double f_asin(double x) {
     return signed_as(f, x);
 }
 
-static double f_exp(double x) {
+static EF_VALUE double f_exp(double x) {
     double n, r, p, high, rest, y, scale, a, s;
     int j, k;
     if (EF_RARE(!(fabs(x) < 745.5))) return x != x ? x : x < 0.0 ? 0.0 : (double)INFINITY;
@@ -269,7 +290,7 @@ static double f_exp(double x) {
     return y * power_of_two(k);
 }
 
-static double f_log(double x) {
+static EF_VALUE double f_log(double x) {
     double m, c, mh, a, b, r, error, whole, s, inner, rest;
     const double *row;
     int e, k = 0;
@@ -302,7 +323,7 @@ static inline doubled beside(double high, double r, double rest, double one) { /
     return normalized(s, ((a - (s - t)) + (r - t)) + (b + rest));
 }
 
-static double f_tanh(double x) {
+static EF_VALUE double f_tanh(double x) {
     const double a = fabs(x);
     double z, n, first, second, r, error, scale, high, low, p, rest;
     doubled q;

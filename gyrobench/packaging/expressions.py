@@ -187,7 +187,14 @@ class Expressions(Places):
         args = ", ".join(self.expression(a) for a in e.args)
         if self.dual:
             return self.number(f"d_{name}({args})")
+        if name in ("sin", "cos") and self.is_paired(e, name):
+            name = f"paired_{name}"
         return self.number(f"{name}({args})" if name in LIBRARY_C else f"f_{name}({args})")
+
+    def is_paired(self, e: ast.Call, name: str) -> bool:
+        """Return whether this piece of code asks for the other one of sine and cosine of the same text, too."""
+        other = f"{'cos' if name == 'sin' else 'sin'}({ast.unparse(e.args[0])})"
+        return any(isinstance(n, ast.Call) and ast.unparse(n) == other for n in ast.walk(self.code.node))
 
     def callee(self, e: ast.Call) -> Code | None:
         """Return the procedure or function that is called; None where it is one of the language."""

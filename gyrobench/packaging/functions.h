@@ -71,8 +71,8 @@ static inline dual d_sub(dual a, dual b) { return d_of(a.v - b.v, a.d - b.d); }
 static inline dual d_mul(dual a, dual b) { return d_of(a.v * b.v, a.d * b.v + a.v * b.d); }
 static inline dual d_div(dual a, dual b) { double q = a.v / b.v; return d_of(q, (a.d - q * b.d) / b.v); }
 static inline dual d_neg(dual a) { return d_of(-a.v, -a.d); }
-static inline dual d_sin(dual x) { return d_of(f_sin(x.v), f_cos(x.v) * x.d); }
-static inline dual d_cos(dual x) { return d_of(f_cos(x.v), -f_sin(x.v) * x.d); }
+static inline dual d_sin(dual x) { return d_of(f_paired_sin(x.v), f_paired_cos(x.v) * x.d); }
+static inline dual d_cos(dual x) { return d_of(f_paired_cos(x.v), -f_paired_sin(x.v) * x.d); }
 static inline dual d_tan(dual x) { double y = f_tan(x.v); return d_of(y, (1.0 + y * y) * x.d); }
 static inline dual d_asin(dual x) { return d_of(f_asin(x.v), x.d / sqrt(1.0 - x.v * x.v)); }
 static inline dual d_atan(dual x) { return d_of(f_atan(x.v), x.d / (1.0 + x.v * x.v)); }

@@ -1,0 +1,42 @@
+"""The records of all systems against the table of digests: here and, where node is installed, in WebAssembly.
+
+Run by hand: ``python tests/benchmarks/same_bits.py [--write] [system ...]``; two minutes.  --write: the table anew,
+from the native target.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+
+from bits import TABLE, digest, expected, in_node, recorded, systems, table
+
+
+def main() -> int:
+    write = "--write" in sys.argv
+    names = [n for n in sys.argv[1:] if n != "--write"] or systems()
+    node, found, wrong = shutil.which("node"), {}, 0
+    for name in names:
+        with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as folder:
+            channels = recorded(name, patch)
+            found[name] = digest(channels)
+            places = {"native": found[name]}
+            if node:
+                places["node"] = digest(in_node(name, node, list(channels), Path(folder)))
+        truth = found[name] if write else expected().get(name)
+        off = [place for place, value in places.items() if value != truth]
+        wrong += bool(off)
+        print(f"{name}: {'differs: ' + ', '.join(off) if off else 'the same in ' + ' and '.join(places)}", flush=True)
+    if write:
+        TABLE.write_text(table({**(expected() if TABLE.exists() and len(names) < len(systems()) else {}), **found}))
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(main())
