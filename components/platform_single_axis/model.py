@@ -176,4 +176,4 @@ class PlatformSingleAxis(Component):
         amps = self.i if self.L > 0.0 else self.flowed  # not of the present v: a current loop could not be ordered
         self.i_motor = amps
         self.M_motor = self.ratio * self.k_t * amps
-        self.saturated = 1.0 if fabs(self.v) > self.v_max or fabs(amps) >= self.i_max else 0.0
+        self.saturated = 1.0 if fabs(self.v) >= self.v_max or fabs(amps) >= self.i_max else 0.0

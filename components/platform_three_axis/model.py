@@ -259,7 +259,7 @@ class PlatformThreeAxis(Component):
             emf = self.k_e[k] * self.dq[k]
             amps = motor_current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
             self.i_motor[k] = amps
-            if fabs(self.v[k]) > self.v_max[k] or fabs(amps) >= self.i_max[k]:
+            if fabs(self.v[k]) >= self.v_max[k] or fabs(amps) >= self.i_max[k]:
                 self.saturated = 1.0
         self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0
         self.at_stop = 1.0 if fabs(self.q[PITCH]) > self.pitch_stop else 0.0

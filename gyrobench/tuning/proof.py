@@ -27,7 +27,6 @@ from gyrobench.tuning.robustness import bandwidth_limit, crossovers, gain_limits
 from gyrobench.tuning.wishes import Wish
 
 INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
-LIMITED = "stabilizer.saturated"
 SINES = 14  # beside those at the limits
 DRIVEN = 0.3  # of the largest voltage, at most, is taken by a test sine
 PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
@@ -161,7 +160,7 @@ def _read(
     sines = [g for g in phases if g.kind == "test"]
     judged = [open_loop_point(g, INSIDE, TEST) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
-    friction, limits = friction_of(record.run), limits_hit(sines)
+    friction, limits = friction_of(record.run), ", ".join(limits_hit(sines))
     step = next((_step(g) for g in phases if g.kind == "torque" and ANGLE in g.channels), None)
     if len(points) < FEW:
         why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"

@@ -21,7 +21,7 @@ from gyrobench.packaging import load_part
 from gyrobench.system.system import System
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
-from gyrobench.tuning.proof import INSIDE, LIMITED, TEST, Proof, proof_of
+from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.spread import Range, parse_spread, points
@@ -94,7 +94,6 @@ def tune(
     worst = sorted(results, key=lambda r: r.ratio)[0].at
     runs = [{}, worst] if worst else [{}]
     proofs = []
-    system.channels = tuple(dict.fromkeys((*system.channels, LIMITED)))  # type: ignore[misc]
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))

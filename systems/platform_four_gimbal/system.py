@@ -45,7 +45,7 @@ class PlatformFourGimbalSystem(TwoGyroTest):
     channels = (
         *three("platform.attitude"), "platform.theta_4", *three("platform.theta"), "exciter.phase", "exciter.gate",
         *three("exciter.torque", "exciter.test", "motion.omega", "platform.theta_dot"), "platform.theta_4_dot",
-        "platform.lock", "pitch.e", "roll.e", "azimuth.e", "gyro_a.saturated", "gyro_b.saturated",
+        "platform.lock", "pitch.e", "roll.e", "azimuth.e",
     )  # fmt: skip
     shown = (
         "platform.attitude", "platform.theta platform.theta_4", "platform.theta_dot platform.theta_4_dot",

@@ -59,10 +59,8 @@ def effort(found: LoopFindings, ride: Gate) -> None:
     fast = size(jitter(v, max(2, round(1.0 / (crossover * period(ride))))))
     meaning = "the same about the running mean over one period of the crossover asked for"
     found.measure("voltage ripple", meaning, "V", *fast.pair)
-    limited = ride["platform.saturated"] > 0.5
-    v_max = found.record.run.parameters.get("stabilizer.v_max")
-    if v_max is not None:
-        limited |= np.abs(v) >= float(v_max) * (1.0 - 1e-12)
+    flags = [ride[n] for n in ("platform.saturated", "stabilizer.saturated") if n in ride.channels]
+    limited = np.any(np.array([np.zeros(v.size), *flags]) > 0.5, axis=0)
     shares = [float(part.mean()) for part in np.array_split(limited, 10)]
     found.measure("time at a limit", "share of the ride in which motor or stabilizer is at a limit", "%",
                   100.0 * float(limited.mean()), 100.0 * float(np.std(shares, ddof=1)) / math.sqrt(10.0))  # fmt: skip

@@ -25,7 +25,6 @@ from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, 
 SLOW = 0.1  # Hz: a ride by a recorded profile has no frequency of its own
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 SETTLING = "settling", "time until the rate stays within 5 %"
-LIMITS = {"platform.saturated": "the motor", "rebalance.saturated": "the torquer of the gyro"}
 
 
 class Reduction(LoopReduction):
@@ -57,10 +56,6 @@ class Reduction(LoopReduction):
             )  # fmt: skip
         if holds := [g for g in found.of("hold") if g.label == "drift"]:
             found.drift(holds[-1], ANGLE, truth=level_drift(self.run.parameters))
-        for name, text in LIMITS.items():
-            labels = [g.label for g in found.gates if name in g.channels and np.any(g[name] > 0.5)]
-            said = f"At its limit was {text} in: {', '.join(labels)}. What was measured there is not linear."
-            found.warn(f"limit:{name}", said if labels else "")
         known = {c.name for c in found.coefficients}
         found.facts["purposes"] = {name: purpose for name, purpose in PURPOSES.items() if name in known}
         return Account(

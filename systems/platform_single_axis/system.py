@@ -88,8 +88,8 @@ class PlatformSingleAxisLoop(OneAxisTest):
     noises = (*noises(), "rebalance.meter", "channel.white", "reference.reading")
     step = 5e-4
     channels = (
-        *OneAxisTest.channels, "platform.saturated", "rebalance.i_read", "rebalance.saturated", "estimator.estimate",
-        "estimator.latency", "stabilizer.e", "stabilizer.v",
+        *OneAxisTest.channels, "rebalance.i_read", "estimator.estimate", "estimator.latency", "stabilizer.e",
+        "stabilizer.v",
     )  # fmt: skip
     shown = (
         "platform.attitude", "platform.omega", "rebalance.i_read estimator.estimate", "stabilizer.v",

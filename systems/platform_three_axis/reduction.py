@@ -21,11 +21,6 @@ from .budget import budget
 AXES = ("pitch", "roll", "azimuth")
 XYZ = "xyz"
 ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
-LIMITS = {
-    "platform.saturated": "A motor was at its limit",
-    "decoupler.saturated": "The secant of the decoupler was at its limit",
-    "platform.lock": "The gimbals were near their lock",
-}
 
 
 class Reduction(LoopReduction):
@@ -47,7 +42,7 @@ class Reduction(LoopReduction):
             found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
         if found.at_rest is not None:
             self._drift(found.at_rest)
-        self._limits()
+        self._lock()
         return Account(
             method="Load steps, commanded sines, sines of the base, test sines of each axis and drift of a platform of "
             "three gimbals",
@@ -188,15 +183,15 @@ class Reduction(LoopReduction):
             lags[axis] = {"gyro": J / C, "motor": L / R, "corner of the stabilizer": corner}
         return lags
 
-    def _limits(self) -> None:
+    def _lock(self) -> None:
         channels = self.record.channels
-        for name, text in LIMITS.items():
-            hit = channels[name] > 0.5 if name in channels else np.zeros(1)
-            if np.any(hit):
-                first = int(np.argmax(hit))
-                pitch = math.degrees(channels["platform.theta[1]"][first])
-                said = f"{text}, first at t = {channels['time'][first]:.4g} s, pitch {pitch:.3g}°."
-                self.found.warn(f"limit:{name}", said)
+        if np.any(hit := channels["platform.lock"] > 0.5):
+            first = int(np.argmax(hit))
+            pitch = math.degrees(channels["platform.theta[1]"][first])
+            text = (
+                f"The gimbals were near their lock, first at t = {channels['time'][first]:.4g} s, pitch {pitch:.3g}°."
+            )
+            self.found.warn("platform.lock", text)
 
 
 def _norm(points: list[Point]) -> tuple[float, float]:

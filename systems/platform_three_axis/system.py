@@ -77,8 +77,8 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     step = 1e-4
     channels = (
         "exciter.phase", "exciter.gate", *three("exciter.command", "exciter.test"), "exciter.motion_angle[1]",
-        *three("motion.angle", "platform.attitude", "platform.theta"), "platform.lock", "platform.saturated",
-        "platform.at_stop", "decoupler.saturated", *(f"{slot}.saturated" for slot in (*GYROS, *AXES)),
+        *three("motion.angle", "platform.attitude", "platform.theta"), "platform.lock", "platform.at_stop",
+        "decoupler.saturated",
         *(f"{axis}.e" for axis in AXES), *(f"{axis}.v" for axis in AXES),
     )  # fmt: skip
     shown = (

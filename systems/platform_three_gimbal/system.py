@@ -64,7 +64,6 @@ class PlatformThreeGimbal(TwoGyroTest):
         *three("exciter.torque", "exciter.test"), "exciter.command[3]",
         *three("motion.omega", "platform.theta_dot"), "platform.lock", "pitch.e", "roll.e", "azimuth.e",
         "gyro_a.u_y", "gyro_b.u_x", "gyro_a.drift_x", "gyro_a.drift_y", "gyro_b.drift_x", "gyro_b.drift_y",
-        "gyro_a.saturated", "gyro_b.saturated",
     )  # fmt: skip
     shown = (
         "platform.attitude", "platform.theta", "platform.theta_dot", "motion.omega", "pitch.e roll.e azimuth.e",

@@ -79,7 +79,7 @@ class TableServoLoop(LoopTest):
     channel_period = 5e-4
     channels = (
         "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "table.angle", "table.omega[1]",
-        "gyro.u", "gyro.b", "rings.M", "table.saturated", "gyro.saturated",
+        "gyro.u", "gyro.b", "rings.M",
     )  # fmt: skip
     shown = ("table.angle", "gyro.u", "exciter.torque", "exciter.command", "rings.M", "table.saturated gyro.saturated")
 

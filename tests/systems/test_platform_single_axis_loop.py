@@ -164,6 +164,26 @@ def test_measured_and_computed_margins_that_differ_are_named_with_the_cause():
     assert "friction" in said and f"{found['PM'].closed:.3g}°" in said
 
 
+def test_margins_read_at_a_limit_do_not_pass():
+    """A sine of 1.2 V clipped at 0.3 V comes back with a smaller gain: the crossover falls although no gain changed."""
+    small = {"base": 0.0, "load_step": 0.05, "command": 1e-6, "hold": 10.0, "stabilizer.v_max": 0.3}
+    record = run(load_system(NAME), values=small)
+    limits = {"f_c": (5.0, None), "PM": (10.0, None), "load/peak": (0.0, None)}
+    result = load_system(NAME).reduce(record, limits)
+    found = {c.name: c for c in result.coefficients}
+    assert found["f_c"].estimate < 0.95 * found["f_c"].closed
+    assert {n: found[n].verdict for n in limits} == {"f_c": "inconclusive", "PM": "inconclusive", "load/peak": "pass"}
+    assert any("A limit was active in stabilizer, in: " in w and "loop 10 Hz" in w for w in result.warnings)
+    assert any("Use smaller test signals" in w for w in result.warnings)
+
+
+def test_a_voltage_that_was_clipped_at_the_limit_of_the_motor_is_at_it():
+    """What the stabilizer clips at the largest voltage of the motor reaches it as that voltage, not above it."""
+    record = run(load_system(NAME), values={**QUIET, **SHORT, "load_step": "30N.m", "platform.v_max": 27.0})
+    at = record.channels["stabilizer.saturated"] > 0.5
+    assert at.any() and (record.channels["platform.saturated"][1:][at[:-1] & at[1:]] > 0.5).all()
+
+
 def test_an_estimator_need_not_state_its_latency(quiet):
     """Without the channel everything is as before but the row of the latency."""
     record, _, found = quiet

@@ -151,6 +151,7 @@ class LoopFindings(MeasureFindings):
         widened = dict(values)
         if twin is not None:
             widened["crossover"], widened["phase"] = twin.widened(values["crossover"], values["phase"])
+        before = len(self.coefficients)
         none = "" if "phase" in values or self.unstable else why_no_crossover(sure, len(points), self.record.run)
         for name, what, unit, value, closed in (
             (f"f_c{key}", "gain crossover frequency", "Hz", widened.get("crossover", (None,)), closest[1]),
@@ -162,6 +163,7 @@ class LoopFindings(MeasureFindings):
             self.modelled(f"f_c{key}", loop, lambda limits: limits.near(crosses)[0])
             self.modelled(f"PM{key}", loop, lambda limits: limits.near(crosses)[1])
         self._gain_margins(loop, key, values, sure, models.discrete)
+        self._limited(title, sines, [c.name for c in self.coefficients[before:]])
         noisy = "" if self.unstable else excluded_words(title, points, counts)
         self.warn("loop.noisy", noisy)
         if "phase" in values:
@@ -201,10 +203,26 @@ class LoopFindings(MeasureFindings):
             models = float(pair[0] or 0.0), float(pair[1] or 0.0)
             self.coefficients = [replace(c, models=models) if c.name == name else c for c in self.coefficients]
 
+    def limits_reached(self) -> None:
+        """Say in which phases a part was at a limit."""
+        for slot in limits_hit(self.gates):
+            labels = ", ".join(g.label for g in self.gates if max(g[f"{slot}.saturated"]) > 0.5)
+            text = f"A limit was active in {slot}, in: {labels}. What was measured there is not linear."
+            self.warn(f"limit:{slot}", text)
+
+    def _limited(self, title: str, sines: Sequence[Gate], names: Sequence[str]) -> None:
+        """Take the verdicts from margins that were measured at a limit: others hold for smaller signals."""
+        if names and (slots := limits_hit(sines)):
+            text = (
+                f"Margins of the {title} were measured with a limit active in {', '.join(slots)}: they belong to this "
+                "amplitude, not to the loop. Use smaller test signals."
+            )
+            self.reasons.append(Reason("loop.limited", text, ("pass", "fail"), tuple(names)))
+
     def _causes(self, sines: Sequence[Gate], noisy: str) -> list[str]:
         """Return what may set measured and computed margins apart."""
         limited, friction = limits_hit(sines), friction_of(self.record.run)
-        causes = [f"a limit was active in {limited}"] if limited else []
+        causes = [f"a limit was active in {', '.join(limited)}"] if limited else []
         causes += (
             [f"dry friction ({friction}), which the linear model takes for an elastic contact"] if friction else []
         )

@@ -87,12 +87,10 @@ def friction_of(run: RunDocument) -> str:
     return ", ".join(known)
 
 
-def limits_hit(gates: Sequence[Gate]) -> str:
-    """Return which parts were at a limit in phases, "" for none."""
-    if not gates:
-        return ""
-    names = [n for n in gates[0].channels if n.endswith(".saturated")]
-    return ", ".join(n.partition(".")[0] for n in names if any(np.any(g[n] > 0.5) for g in gates))
+def limits_hit(gates: Sequence[Gate]) -> list[str]:
+    """Return the slots whose parts were at a limit in phases."""
+    names = [n for n in gates[0].channels if n.endswith(".saturated")] if gates else []
+    return [n.partition(".")[0] for n in names if any(np.any(g[n] > 0.5) for g in gates)]
 
 
 def why_no_crossover(points: Sequence[Point], measured: int, run: RunDocument) -> str:

@@ -24,6 +24,7 @@ from gyrobench.system.families.option_groups import GYRO_NOISES
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import LIMIT
+from gyrobench.system.sockets import socket
 from gyrobench.system.system import Option, Slot, System
 
 AXES = ("pitch", "roll", "azimuth")  # motor axes in A order
@@ -83,6 +84,11 @@ def stabilizer(part: str = "", signal: str = "angle") -> Slot:
     return Slot("Stabilizer", part, {"u": signal})
 
 
+def _has_limit(slot: Slot) -> bool:
+    """Return whether a part there says that a signal is at a limit; the gain of a decoupler at its limit is a gain."""
+    return slot.socket != "Decoupler" and socket(slot.socket).connector("saturated") is not None
+
+
 class LoopTest(System):
     """Exciter and motion of the base; the plan of a system is its ``phases``, its parameters are its ``design``."""
 
@@ -93,6 +99,12 @@ class LoopTest(System):
     }
     wires = "exciter -> load: torque\n"
     done = "exciter.done"
+
+    def __init__(self) -> None:
+        """Record what says that a part is at a limit, of every part: what was measured then is not the linear loop."""
+        super().__init__()
+        flags = [f"{name}.saturated" for name, slot in self.slots.items() if _has_limit(slot)]
+        vars(self)["channels"] = tuple(dict.fromkeys((*self.channels, *flags)))
 
     def phases(self) -> list[LoopPhase]:
         """Return what the test does, one after the other."""
