@@ -1,7 +1,7 @@
 """The records of all systems against the table of digests: here and, where node is installed, in WebAssembly.
 
-Run by hand: ``python tests/benchmarks/same_bits.py [--write] [system ...]``; two minutes.  --write: the table anew,
-from the native target.
+Run by hand: ``python tests/benchmarks/same_bits.py [--write] [system ...]``; some minutes.  --write: the table
+anew, from the native target alone, for some seconds.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from bits import TABLE, digest, expected, in_node, recorded, systems, table
+from bits import TABLE, digest, expected, first_steps, in_node, recorded, systems, table
 
 
 def main() -> int:
     write = "--write" in sys.argv
     names = [n for n in sys.argv[1:] if n != "--write"] or systems()
-    node, found, wrong = shutil.which("node"), {}, 0
+    node, found, wrong = None if write else shutil.which("node"), {}, 0
     for name in names:
         with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as folder:
-            channels = recorded(name, patch)
+            system = first_steps(name, patch)
+            channels = recorded(system)
             found[name] = digest(channels)
             places = {"native": found[name]}
             if node:
-                places["node"] = digest(in_node(name, node, list(channels), Path(folder)))
+                places["node"] = digest(in_node(system, node, list(channels), Path(folder)))
         truth = found[name] if write else expected().get(name)
         off = [place for place, value in places.items() if value != truth]
         wrong += bool(off)

@@ -10,13 +10,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from bits import SEED, STEPS, digest, expected, in_node, recorded, systems
+from bits import SEED, STEPS, digest, expected, first_steps, in_node, recorded, systems
 from fmpy import read_model_description
 from hosted import host, run
 
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.packaging.compiler import this_platform
-from gyrobench.system.system import load_system
 
 #: tables that turn, angles of gimbals, a platform at sea, a gyro in a tumble with noise of all kinds, filters
 IN_NODE = ("accelerometer_four", "gyrocompass", "platform_three_axis", "tumble_two_axis", "servo_polar")
@@ -29,32 +28,32 @@ def test_the_table_has_all_systems() -> None:
 
 @pytest.mark.parametrize("name", systems())
 def test_the_record_has_the_bits_of_the_table(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert digest(recorded(name, monkeypatch)) == expected()[name]
+    assert digest(recorded(first_steps(name, monkeypatch))) == expected()[name]
 
 
 @pytest.mark.parametrize("name", IN_PYTHON)
 def test_the_python_target_gives_them(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert digest(recorded(name, monkeypatch, "reference", "python")) == expected()[name]
+    assert digest(recorded(first_steps(name, monkeypatch), "reference", "python")) == expected()[name]
 
 
 @pytest.mark.parametrize("name", IN_NODE)
-def test_webassembly_gives_them(name: str, tmp_path: Path) -> None:
+def test_webassembly_gives_them(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     node = shutil.which("node")
     if node is None or importlib.util.find_spec("ziglang") is None:
         pytest.skip("node or ziglang is not installed: WebAssembly is not run")
-    channels = [n for n in load_system(name).channels if n != "time"]
-    assert digest(in_node(name, node, channels, tmp_path)) == expected()[name]
+    system = first_steps(name, monkeypatch)
+    assert digest(in_node(system, node, list(recorded(system)), tmp_path)) == expected()[name]
 
 
 @pytest.mark.parametrize("platform", [this_platform(), "win64"])
 @pytest.mark.parametrize("name", ["gyrocompass", "tumble_two_axis"])
-def test_the_one_fmu_gives_them(name: str, platform: str, tmp_path: Path) -> None:
+def test_the_one_fmu_gives_them(name: str, platform: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a host in C: here, and the library of Windows under wine."""
     command = host(platform, tmp_path)
-    system = load_system(name)
+    system = first_steps(name, monkeypatch)
+    channels = list(recorded(system))
     export_fmu(system, tmp_path / "one.fmu", seed=SEED, platforms=(platform,))
     outputs = {v.name: v.valueReference for v in read_model_description(str(tmp_path / "one.fmu")).modelVariables}
-    channels = [n for n in system.channels if n != "time"]
     rows = run(
         command, tmp_path / "one.fmu", platform, [outputs[n] for n in channels], STEPS, system.step, tmp_path / "there"
     )

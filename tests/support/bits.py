@@ -24,6 +24,7 @@ from gyrobench.exchange.system_fmu import linked_source
 from gyrobench.exchange.system_source import source_files
 from gyrobench.packaging.compiler import compile_wasm
 from gyrobench.system.suite import Suite, load_test
+from gyrobench.system.system import System, load_system
 
 STEPS, SEED = 200, 7
 TABLE = Path(__file__).parents[1] / "engine" / "record_digests.toml"
@@ -47,21 +48,24 @@ def digest(channels: Mapping[str, Any]) -> str:
     return sha.hexdigest()
 
 
-def recorded(name: str, patch: pytest.MonkeyPatch, engine: str = "linked", target: str = "native") -> dict[str, Any]:
-    """Return the channels of a run of this bench: of the first steps, each a row."""
-    with Session(name, engine=engine, target=target, bench=standard_folder()) as session:
-        system, step = type(session.system), session.system.step
-        for attribute, value in {"stop": STEPS * step, "channel_period": step, "loops": ()}.items():
-            patch.setattr(system, attribute, value)
+def first_steps(name: str, patch: pytest.MonkeyPatch) -> System:
+    """Return a system that ends after its first steps and records each of them."""
+    system = load_system(name, standard_folder())
+    for attribute, value in {"stop": STEPS * system.step, "channel_period": system.step, "loops": ()}.items():
+        patch.setattr(type(system), attribute, value)
+    return system
+
+
+def recorded(system: System, engine: str = "linked", target: str = "native") -> dict[str, Any]:
+    """Return the channels of a run of this bench."""
+    with Session(system, engine=engine, target=target, bench=standard_folder()) as session:
         channels = session.run(seed=SEED).channels
     return {n: x[1:] for n, x in channels.items() if n != "time"}
 
 
-def in_node(name: str, node: str, channels: list[str], folder: Path) -> dict[str, Any]:
+def in_node(system: System, node: str, channels: list[str], folder: Path) -> dict[str, Any]:
     """Return the same from the WebAssembly of the system's page."""
-    source = linked_source(
-        load_test(name), None, None, None, SEED, None, (), "html", "no page can be made of it"
-    ).source
+    source = linked_source(system, None, None, None, SEED, None, (), "html", "no page can be made of it").source
     files = {**source_files(source, "", 2), "page.c": (html_page.HERE / "page.c").read_text(encoding="utf-8")}
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
