@@ -15,7 +15,7 @@
 #ifdef __GNUC__
 #define EF_RARE(x) __builtin_expect(!!(x), 0)
 #define EF_ALWAYS inline __attribute__((always_inline))
-#define EF_VALUE __attribute__((noinline, const)) /* it follows from its arguments: asked once for the same ones */
+#define EF_VALUE __attribute__((noinline, const, unused)) /* const: asked once for the same arguments */
 #else
 #define EF_RARE(x) (x)
 #define EF_ALWAYS inline
