@@ -264,6 +264,7 @@ class Response:
     """A measured response of a loop, with the curves of its linear models laid over it.
 
     kind: "loop" (open loop gain: Bode plot with margins), "ratio" (a gain against frequency), "step" (against time),
+    "spectrum" (several quantities against frequency, both logarithmic: all of them in curves),
     "time" (several quantities against time: all of them in curves, y is the one that runs are compared by).
     x: Hz or s, rising.  y: gain (positive) or value.  phase: degrees, [] for a step.  u: standard uncertainty, relative
     of a gain (u rad of its phase too), in y_unit of a step; None: not known.  counts: false for a point too noisy to be
@@ -354,7 +355,7 @@ class DriftColumn:
     """
 
     name: str
-    unit: str  # of the rate
+    unit: str  # of deviations
     record: RateRecord
     deviations: list[DeviationCurve]
     model: NoiseModelCurves | None = field(default=None, metadata=EMPTY)
@@ -362,3 +363,5 @@ class DriftColumn:
     correlation: SampleCorrelation | None = field(default=None, metadata=EMPTY)
     tables: dict[str, list[Table]] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
+    quantity: str = "rate"
+    level_unit: str = "°/h"  # of the record

@@ -20,6 +20,7 @@ FIGURE = re.compile(r'<figure class="picture.*?(<svg.*?</svg>).*?<figcaption>(.*
 SHOWN = {
     "angle_system_test": "first minus second reading",
     "drift_record": "Allan deviation",
+    "gimbal_stabilization": "density of the line of sight",
     "gyro_magnetic_compass": "low-pass",
     "platform_four_gimbal": "Angles",
     "platform_single_axis": "Isolation",

@@ -175,7 +175,7 @@ ROOMS: dict[str, set[str]] = {
     "system": COMMON | {"component", "packaging", "record", "reduction"},  # a test knows how it is reduced and judged
     "linear": COMMON | {"component", "packaging", "record", "system"},
     "engine": COMMON | {"component", "packaging", "record", "system", "linear"},
-    "exchange": COMMON | {"component", "packaging", "record", "system", "engine"},
+    "exchange": COMMON | {"component", "packaging", "record", "system", "linear", "engine"},
     "reduction": COMMON | {"component", "packaging", "record"},  # parts say what errors of a set-up they simulate
     "report": COMMON | {"record", "reduction"},
 }
@@ -187,7 +187,7 @@ ROOMS["tuning"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
 ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
 #: the face in the browser; that of the shell is in FACES, and neither imports the other
-ROOMS["studio"] = BELOW | {"workflow", "library"}
+ROOMS["studio"] = BELOW | {"workflow", "library", "tuning"}
 #: rooms inside a room -> rooms beside them that they may import
 INNER: dict[str, set[str]] = {
     "campaign.execution": set(),

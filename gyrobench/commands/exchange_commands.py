@@ -28,7 +28,7 @@ def export(
         typer.Option(
             "--to",
             help="ssp: FMUs and wiring in one archive; fmu: one native FMU; container: one FMU of the FMUs; "
-            "html: a web page that runs it.",
+            "html: a web page that runs it; mat: the state space of it, or of a part, for MATLAB.",
         ),
     ],
     values: Set = None,
@@ -59,6 +59,7 @@ def export(
       gyrobench export tumble_single_axis --to ssp --set windows=36
       gyrobench export tumble_single_axis --to fmu --expose gyro.D_I --expose gyro.temperature
       gyrobench export stabilizer_sdf --to html --expose platform.J
+      gyrobench export stabilizer_sdf --to mat
     """
     from gyrobench.commands import export_system
     from gyrobench.commands.arguments import parse_settings, parse_swaps

@@ -60,6 +60,7 @@ from gyrobench.component.integration import advance
 from gyrobench.component.math import value
 from gyrobench.component.numerics import ROUNDING, normal
 from gyrobench.component.tangents import Tangent, dig, tangents
+from gyrobench.component.tuned import check_bounds, tune
 from gyrobench.component.vectors import Vector, copied, is_finite
 
 PER = ("start", "step", "second")  # when noise is drawn
@@ -130,6 +131,8 @@ class Component:
             s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory
         )
 
+    _tunable: ClassVar[frozenset[int]] = frozenset()  # parameters that may be set between steps, by value reference
+    _derived: ClassVar[tuple[int, ...]] = ()  # what `start` makes of parameters alone: see packaging/tuning.py
     _own: ClassVar[dict[str, Any]] = {}
     _functions: ClassVar[dict[str, Any]] = {}
     _by_name: ClassVar[dict[str, Scalar]] = {}
@@ -223,13 +226,11 @@ class Component:
         return [self._at(s) for s in scalars]
 
     def write(self, references: Iterable[int], values: Iterable[float]) -> None:
-        """Set values by value reference.  A parameter is fixed once initialization has ended."""
-        for r, x in zip(references, values, strict=True):
-            s = self._referenced(r)
-            if self._running and s.section == "parameter":
-                raise ComponentError(
-                    f"{self.instance}: parameter {s.name} is fixed once initialization has ended: reset first"
-                )
+        """Set values by value reference; of parameters, once initialization has ended, those that are tunable."""
+        given = [(self._referenced(r), float(x)) for r, x in zip(references, values, strict=True)]
+        if self._running and any(s.section == "parameter" for s, _ in given):
+            tune(self, given)
+        for s, x in given:
             self._put(s, x)
 
     def _referenced(self, reference: int) -> Scalar:
@@ -292,12 +293,7 @@ class Component:
     def initialize(self, t0: float = 0.0) -> None:
         """Check parameters and inputs, run ``start`` and ``outputs``.  Raises ComponentError."""
         self.t = self.step_start = self.step_end = t0
-        for s in self.layout:
-            if s.section in ("parameter", "input", "state"):
-                x = self._at(s)
-                bound = s.decl.bound_broken(x)
-                if bound:
-                    raise ComponentError(f"{self.instance}: {s.section} {s.name} = {x:g} {s.decl.unit} must be {bound}")
+        check_bounds(self, "parameter", "input", "state")
         self._evaluate_start()
         self._require_finite(self._watched, self.t)
         self._running = True

@@ -81,7 +81,7 @@ class Declaration:
 
 
 class Parameter(Declaration):
-    """Fixed from initialization on.  ``min``/``max`` are inclusive bounds, ``above``/``below`` exclusive."""
+    """Not changed by the part.  ``min``/``max`` are inclusive bounds, ``above``/``below`` exclusive."""
 
 
 class Input(Declaration):

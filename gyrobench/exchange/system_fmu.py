@@ -26,11 +26,12 @@ from gyrobench.exchange.ssp_export import ExportError, experiment, prepare, reco
 from gyrobench.exchange.system_source import Exposed, SystemSource, source_files
 from gyrobench.packaging import load_part
 from gyrobench.packaging.compiler import this_platform
-from gyrobench.packaging.description import add_variable, units
+from gyrobench.packaging.description import EMPTY, add_variable, units
 from gyrobench.packaging.description3 import add_time, build_description, reference, xml_text
 from gyrobench.packaging.description3 import add_variable as add_variable3
 from gyrobench.packaging.documentation import LICENCE, index_page, is_standard, licences
 from gyrobench.packaging.fmu import content_hash, guid_of, native_entries, write_archive
+from gyrobench.packaging.icon import icon
 from gyrobench.packaging.loading import sources
 from gyrobench.system.parameters import Starts
 from gyrobench.system.system import System
@@ -67,7 +68,7 @@ def export_fmu(
         entries["sources/buildDescription.xml"] = build_description(chosen.name).encode()
     entries["modelDescription.xml"] = (_description3 if fmi == 3 else _description2)(chosen, source, guid).encode()
     entries |= index_page(chosen.name, chosen.title, _text(source), [e.scalar for e in source.exposed], whole=False)
-    entries |= licences()
+    entries |= licences() | icon("system", fmi)
     readme = chosen.folder / "README.md" if chosen.folder else None
     if readme is not None and readme.is_file():
         entries["documentation/README.md"] = readme.read_bytes()
@@ -186,8 +187,9 @@ def _description2(system: System, source: SystemSource, guid: str) -> str:
     co = ET.SubElement(root, "CoSimulation", {"modelIdentifier": system.name, **abilities})
     ET.SubElement(ET.SubElement(co, "SourceFiles"), "File", {"name": "fmi2.c"})
     variables = _common(root, system, face, ())
+    tunable = source.tunable()
     for s in face.layout:
-        add_variable(variables, face, s)
+        add_variable(variables, face, s, tunable, EMPTY)
     structure = ET.SubElement(root, "ModelStructure")
     known = " ".join(str(e.scalar.reference + 1) for e in source.exposed if e.scalar.section != "output")
     for what, on in (("Outputs", ""), ("InitialUnknowns", known)):
@@ -206,8 +208,9 @@ def _description3(system: System, source: SystemSource, guid: str) -> str:
     ET.SubElement(root, "CoSimulation", {**own, **dict.fromkeys(abilities, "true")})
     variables = _common(root, system, face, ("s",))
     add_time(variables, face)
+    tunable = source.tunable()
     for s in face.layout:
-        add_variable3(variables, face, s)
+        add_variable3(variables, face, s, tunable, EMPTY)
     structure = ET.SubElement(root, "ModelStructure")
     known = " ".join(reference(e.scalar) for e in source.exposed if e.scalar.section != "output")
     for what, on in (("Output", ""), ("InitialUnknown", known)):

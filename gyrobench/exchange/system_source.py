@@ -13,6 +13,7 @@ from gyrobench.engine.linked_system import HELPER, READ, assignments, checks_inp
 from gyrobench.engine.program import Program
 from gyrobench.packaging.linked_parts import c_name, linked_files
 from gyrobench.packaging.native_target import face_files
+from gyrobench.packaging.tuning import tuning
 
 HERE = Path(packaging.__file__).parent
 KINDS = {float: "Real", int: "Integer", bool: "Boolean"}
@@ -47,6 +48,12 @@ class SystemSource:
     def section(self, name: str) -> list[Exposed]:
         return [e for e in self.exposed if e.scalar.section == name]
 
+    def tunable(self) -> frozenset[int]:
+        """Return the value references of the parameters that may be set between steps, in all parts they belong to."""
+        of = {slot: tuning(cls).tunable for slot, (_, cls) in self.parts.items()}
+        named = self.section("parameter")
+        return frozenset(e.scalar.reference for e in named if all(r in of[slot] for slot, r in e.ends))
+
 
 def _function(head: str, lines: Sequence[str], count: int, used: bool = True) -> str:
     pointers = [f"    double *const v{i} = (double *)&parts->p{i};" for i in range(count)] if used else []
@@ -80,6 +87,9 @@ def model_text(s: SystemSource, guid: str) -> str:
     def setting(section: str) -> list[str]:
         return [f"v{at[slot]}[{r}] = x[{e.scalar.reference}];" for e in sections[section] for slot, r in e.ends]
 
+    tunable = s.tunable()
+    tunes = [line for slot in slots for line in _tuning(s, slot, at[slot], part[slot], tunable)]
+    flags = ", ".join(str(int(e.scalar.reference in tunable)) for e in sections["parameter"]) or "0"
     getting = [
         f"x[{e.scalar.reference}] = {READ[KINDS[e.scalar.decl.type]].format(f'v{at[slot]}[{r}]')};"
         for e in sections["output"]
@@ -115,12 +125,16 @@ def model_text(s: SystemSource, guid: str) -> str:
         ),
         f"static const double starts[] = {{{starts}}};",
         f"static const char *const names[] = {{{names}}};",
+        f"static const unsigned char tunable[] = {{{flags}}}; /* which parameters may be set between steps */",
         "static const struct { int slot, reference; double value; } settings[] = {\n    "
         + ",\n    ".join(settings or ["{-1, 0, 0.0}"])
         + "\n};",
         HELPER,
         _function("void begin_parts(Parts *parts, double t0)", [*begins, *pick], count),
         _function("void set_parameters(Parts *parts, const double *x)", ["(void)x;", *setting("parameter")], count),
+        _function(
+            "COLD void tune_parts(Parts *parts, Parts *room, const double *x)", ["(void)room; (void)x;", *tunes], count
+        ),
         _function("void set_inputs(Parts *parts, const double *x)", ["(void)x;", *setting("input")], count),
         _function("void get_outputs(Parts *parts, double *x)", ["(void)x;", *getting], count),
         _function("void take_wired(Parts *parts, double *out)", taking, count),
@@ -133,6 +147,17 @@ def model_text(s: SystemSource, guid: str) -> str:
         '#include "system_core.h"',
     ]
     return "\n\n".join(text) + "\n"
+
+
+def _tuning(s: SystemSource, slot: str, i: int, part: str, tunable: frozenset[int]) -> list[str]:
+    """Return the lines that set the tunable parameters of a part, where one has changed."""
+    sets = [(f"v{i}[{r}]", f"x[{e.scalar.reference}]") for e in s.section("parameter")
+            if e.scalar.reference in tunable for of, r in e.ends if of == slot]  # fmt: skip
+    if not sets:
+        return []
+    changed = " || ".join(f"{a} != {b}" for a, b in sets)
+    inner = [*(f"{a} = {b};" for a, b in sets), f"tune_{part}(&parts->p{i}, &room->p{i}.n);"]
+    return [f"if ({changed}) {{ /* {slot} */", *(f"    {x}" for x in inner), "}", f"if (parts->p{i}.failed) return;"]
 
 
 def source_files(s: SystemSource, guid: str, fmi: int) -> dict[str, str]:

@@ -319,12 +319,11 @@ static NEVER_INLINE void refresh(Part *p) {
     }
 }
 
-static COLD void initialize(Part *p, double t0) {
+static COLD void check_bounds(Part *p, int end) { /* of parameters, inputs, states before a place */
     static const char *const words[] = {">=", "<=", ">", "<"};
     const double *a = value(p);
     int i, k = 0;
-    p->n.v.t = p->n.v.step_start = p->n.v.step_end = t0;
-    for (i = 0; i < DX0; i++) { /* parameters, inputs, (outputs), states */
+    for (i = 0; i < end; i++) {
         const char *what = i < U0 ? "parameter" : i < Y0 ? "input" : "state";
         if (i < Y0 || i >= X0) {
             if (!isfinite(a[i])) {
@@ -343,8 +342,30 @@ static COLD void initialize(Part *p, double t0) {
             }
         }
     }
+}
+
+static COLD void initialize(Part *p, double t0) {
+    p->n.v.t = p->n.v.step_start = p->n.v.step_end = t0;
+    check_bounds(p, DX0);
+    if (p->failed) return;
     evaluate_start(p);
     if (!p->failed && tell_finite(p)) p->n.running = 1.0;
+}
+
+/* Parameters have been set between steps: makes anew what the start makes of them alone.  room: for the numbers as they
+   are.  Where it fails, the numbers are to be given up. */
+static COLD void tune(Part *p, Numbers *room) {
+    double *const a = value(p);
+    int i;
+    check_bounds(p, U0);
+    *room = p->n;
+    for (i = X0; i < N_REFERENCES; i++) a[i] = starts[i];
+    if (!p->failed) start(p);
+    for (i = 0; i < N_DERIVED; i++) ((double *)&room->v)[derived[i]] = a[derived[i]];
+    p->n = *room;
+    p->n.phi_h = 0.0;
+    p->n.dirty = 1.0;
+    p->kept.settled = 0;
 }
 
 static inline int can_step(Part *p, double t, double step) {

@@ -12,6 +12,7 @@ from gyrobench.component.math import ARRAY_FUNCTIONS, FUNCTIONS
 from gyrobench.packaging.source import Code, PartCode, dotted
 
 Reach: TypeAlias = dict[str, set[str]]  # variable -> the known variables it follows
+REFUSAL = "refuse"  # of a reach: whether the part refuses
 
 
 def called(e: ast.AST, code: Code, source: PartCode) -> Code | None:
@@ -84,7 +85,9 @@ class Dependencies:
                 where = self.reach if name is not None else locals_
                 where.setdefault(name if name is not None else ast.unparse(base), set()).update(follows)
             elif isinstance(s, ast.Expr):
-                self.read(s.value, code, locals_)  # a procedure: what it writes
+                follows = self.read(s.value, code, locals_)  # of a procedure: what it writes
+                if isinstance(s.value, ast.Call) and dotted(s.value.func) == "self.refuse":
+                    self.reach.setdefault(REFUSAL, set()).update(follows | under)
                 callee = called(s.value, code, self.source)
                 if callee is not None and under:
                     for name in written_names(callee, self.source):
@@ -107,6 +110,8 @@ def flat_name(e: ast.AST, code: Code) -> str | None:
     if not isinstance(e, ast.Attribute):
         return None
     of = dotted(e.value)
+    if e.attr in TIMES and of == "self":
+        return e.attr
     if of == "self":
         return code.flat(e.attr)
     if of in ("self.der", "self.noise"):

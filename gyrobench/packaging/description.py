@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
 from gyrobench.packaging.source import PartCode
+from gyrobench.packaging.tuning import tuning
 from gyrobench.units import OFFERED, base_unit, shown_in, unit
 
 #: section -> causality, variability, initial
@@ -22,6 +23,7 @@ ATTRIBUTES = {
     "derivative": ("local", "continuous", "calculated"),
     "discrete": ("local", "discrete", "calculated"),
 }
+EMPTY: Mapping[str, float] = {}
 LONGEST = 1.0  # s; a longer "largest internal step" stands for any
 TYPES = {float: "Real", int: "Integer", bool: "Boolean"}
 
@@ -48,8 +50,22 @@ def unit_attributes(name: str, start: float | None = None) -> dict[str, str]:
     return {"unit": name} if shown == name else {"unit": name, "displayUnit": shown}
 
 
-def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
+def nominal(elements: Sequence[Scalar], sizes: Mapping[str, float]) -> dict[str, str]:
+    """Return the nominal value of a variable, a power of ten; nothing where its size is not known.
+
+    sizes: the largest of each scalar in the reference run of the part.  Of others it is that of the start value.
+    """
+    known = [abs(sizes.get(s.name) or (0.0 if s.section == "output" else s.start)) for s in elements]
+    largest = max(known, default=0.0)
+    return {"nominal": f"{10.0 ** round(math.log10(largest)):g}"} if 0.0 < largest < math.inf else {}
+
+
+def add_variable(
+    parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int], sizes: Mapping[str, float]
+) -> None:
+    """Add a variable.  tunable: value references of the parameters that may be set between steps."""
     causality, variability, initial = ATTRIBUTES[s.section]
+    variability = "tunable" if s.reference in tunable else variability
     d = s.decl
     kind = TYPES[d.type]
     if kind != "Real" and variability == "continuous":
@@ -70,7 +86,7 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar) -> None:
     if kind == "Real":
         if d.quantity:
             of_type["quantity"] = d.quantity
-        of_type |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
+        of_type |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None) | nominal([s], sizes)
     if s.section in ("parameter", "input", "state"):
         lo = d.min if d.min is not None else d.above
         hi = d.max if d.max is not None else d.below
@@ -123,8 +139,13 @@ def licence(cls: type[Component]) -> dict[str, str]:
     return {"license": LICENCE} if is_standard(sources(cls).values()) else {}
 
 
-def model_description(cls: type[Component], guid: str, identifier: str, target: str) -> str:
-    """Return the XML text.  ``target`` is "native" or "python": what each can do differs."""
+def model_description(
+    cls: type[Component], guid: str, identifier: str, target: str, sizes: Mapping[str, float] = EMPTY
+) -> str:
+    """Return the XML text.
+
+    target: "native" or "python", what each can do differs.  sizes: see :func:`nominal`.
+    """
     source = PartCode(cls)
     root = ET.Element(
         "fmiModelDescription",
@@ -162,8 +183,9 @@ def model_description(cls: type[Component], guid: str, identifier: str, target: 
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     variables = ET.SubElement(root, "ModelVariables")
+    tunable = tuning(cls).tunable
     for s in cls.layout:
-        add_variable(variables, cls, s)
+        add_variable(variables, cls, s, tunable, sizes)
     _structure(ET.SubElement(root, "ModelStructure"), cls, source)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

@@ -8,15 +8,17 @@ description; an array has that of its first element.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
 from gyrobench.packaging.description import (
     ATTRIBUTES,
+    EMPTY,
     default_experiment,
     initial_references,
     licence,
+    nominal,
     number,
     summary,
     unit_attributes,
@@ -25,6 +27,7 @@ from gyrobench.packaging.description import (
 )
 from gyrobench.packaging.native_target import variables
 from gyrobench.packaging.source import PartCode
+from gyrobench.packaging.tuning import tuning
 
 TYPES = {float: "Float64", int: "Int32", bool: "Boolean"}
 
@@ -59,9 +62,13 @@ def array_name(s: Scalar) -> str:
     return f"der({s.decl.name})" if s.section == "derivative" else s.decl.name
 
 
-def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, array: Sequence[Scalar] = ()) -> None:
+def add_variable(
+    parent: ET.Element, cls: type[Component], s: Scalar, tunable: Collection[int], sizes: Mapping[str, float],
+    array: Sequence[Scalar] = (),
+) -> None:  # fmt: skip
     """Add a variable: the scalar, or the array of these elements, of which it is the first."""
     causality, variability, initial = ATTRIBUTES[s.section]
+    variability = "tunable" if s.reference in tunable else variability
     kind = TYPES[s.decl.type]
     if kind != "Float64" and variability == "continuous":
         variability = "discrete"
@@ -79,6 +86,7 @@ def add_variable(parent: ET.Element, cls: type[Component], s: Scalar, array: Seq
         if s.decl.quantity:
             attributes["quantity"] = s.decl.quantity
         attributes |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
+        attributes |= nominal(array or (s,), sizes)
     if s.section == "derivative":
         attributes["derivative"] = reference(next(x for x in cls.states if x.name == s.name[4:-1]))
     if s.section in ("parameter", "input", "state"):
@@ -100,8 +108,8 @@ def add_time(parent: ET.Element, cls: type[Component]) -> None:
     ET.SubElement(parent, "Float64", {"name": time_name(cls), **time, "unit": "s"})
 
 
-def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
-    """Return the XML text of the native FMI 3.0 FMU."""
+def model_description3(cls: type[Component], guid: str, identifier: str, sizes: Mapping[str, float] = EMPTY) -> str:
+    """Return the XML text of the native FMI 3.0 FMU; sizes: see :func:`nominal`."""
     root = ET.Element(
         "fmiModelDescription",
         {
@@ -132,9 +140,9 @@ def model_description3(cls: type[Component], guid: str, identifier: str) -> str:
     ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
     declared = ET.SubElement(root, "ModelVariables")
     add_time(declared, cls)
-    every = variables(cls)
+    every, tunable = variables(cls), tuning(cls).tunable
     for v in every:
-        add_variable(declared, cls, v[0], v if v[0].decl.shape else ())
+        add_variable(declared, cls, v[0], tunable, sizes, v if v[0].decl.shape else ())
 
     structure = ET.SubElement(root, "ModelStructure")
     source = PartCode(cls)

@@ -74,13 +74,13 @@ fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
         }                                                                                                         \
         return told((Instance *)c);                                                                               \
     }
-#define SETTER(Name, Type)                                                                                        \
+#define SETTER(Name, Type, refuse)                                                                                \
     fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference vr[], size_t n, const Type in[]) {         \
         double *const values = (double *)c;                                                                       \
         const unsigned first = first_settable(face_of(c)), count = model.n_references - first;                    \
         size_t i;                                                                                                 \
         for (i = 0; i < n; i++) {                                                                                 \
-            if (!in_range(vr[i], first, count)) return unsettable((Instance *)c, vr[i]);                          \
+            if (!in_range(vr[i], first, count)) return refuse;                                                    \
             values[vr[i]] = (double)in[i];                                                                        \
         }                                                                                                         \
         *face_of(c)->dirty = 1.0;                                                                                 \
@@ -90,9 +90,9 @@ fmi2Status fmi2Reset(fmi2Component c) { reset((Instance *)c); return fmi2OK; }
 GETTER(Real, fmi2Real, x)
 GETTER(Integer, fmi2Integer, (fmi2Integer)floor(x + 0.5))
 GETTER(Boolean, fmi2Boolean, x != 0.0)
-SETTER(Real, fmi2Real)
-SETTER(Integer, fmi2Integer)
-SETTER(Boolean, fmi2Boolean)
+SETTER(Real, fmi2Real, tune_values((Instance *)c, vr, n, in))
+SETTER(Integer, fmi2Integer, unsettable((Instance *)c, vr[i]))
+SETTER(Boolean, fmi2Boolean, unsettable((Instance *)c, vr[i]))
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String out[]) {
     (void)vr; (void)out;

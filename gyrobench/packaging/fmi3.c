@@ -103,7 +103,7 @@ static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size
         }                                                                                                            \
         return told(m);                                                                                              \
     }
-#define SETTER(Name, Type)                                                                                           \
+#define SETTER(Name, Type, refuse)                                                                                   \
     fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const Type in[], size_t n_in) {\
         Instance *m = (Instance *)c;                                                                                 \
         const unsigned first = first_settable(face_of(m)), count = model.n_references - first;                       \
@@ -112,7 +112,7 @@ static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size
         if (miscounted(m, vr, n, n_in)) return fmi3Error;                                                            \
         for (i = 0; i < n; i++) {                                                                                    \
             const unsigned at = place(face_of(m), vr[i]);                                                            \
-            if (!in_range(at, first, count)) return unsettable(m, vr[i]);                                            \
+            if (!in_range(at, first, count)) return refuse;                                                          \
             for (k = 0; k < extent(face_of(m), vr[i]); k++) ((double *)c)[at + k] = (double)in[j++];                 \
         }                                                                                                            \
         *face_of(m)->dirty = 1.0;                                                                                    \
@@ -127,9 +127,9 @@ static int miscounted(Instance *m, const fmi3ValueReference vr[], size_t n, size
 GETTER(Float64, fmi3Float64, x)
 GETTER(Int32, fmi3Int32, (fmi3Int32)floor(x + 0.5))
 GETTER(Boolean, fmi3Boolean, x != 0.0)
-SETTER(Float64, fmi3Float64)
-SETTER(Int32, fmi3Int32)
-SETTER(Boolean, fmi3Boolean)
+SETTER(Float64, fmi3Float64, tune_values(m, vr, n, in))
+SETTER(Int32, fmi3Int32, unsettable(m, vr[i]))
+SETTER(Boolean, fmi3Boolean, unsettable(m, vr[i]))
 NO_TYPE(Float32)
 NO_TYPE(Int8)
 NO_TYPE(UInt8)

@@ -17,6 +17,7 @@ from gyrobench.packaging import compiler, native_target, python_target
 from gyrobench.packaging.description import model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
 from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
+from gyrobench.packaging.icon import icon, kind_of
 from gyrobench.packaging.loading import BuildError, load_part, sources
 from gyrobench.packaging.native_library import make_library
 from gyrobench.user_code import blamed
@@ -107,6 +108,15 @@ def _python_entries(cls: type[Component], guid: str, name: str) -> dict[str, byt
     return entries
 
 
+def largest(file: Path) -> dict[str, float]:
+    """Return the largest magnitude of each column of a reference run; nothing where there is no such file."""
+    if not file.is_file():
+        return {}
+    lines = [line.split(",") for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    columns = zip(*lines, strict=False)
+    return {name: max((abs(float(x)) for x in values), default=0.0) for name, *values in columns if name != "time"}
+
+
 def build(
     part: str | type[Component],
     target: str = "native",
@@ -132,6 +142,7 @@ def build(
         what = _content(cls, name, target, fmi)
     readme = sources(cls)["model"].parent / "README.md"
     documentation = readme.read_text(encoding="utf-8") if readme.exists() else ""
+    sizes = largest(readme.with_name("reference.csv"))
     if target == "native":
         how = "".join(p + compiler.identity(p) for p in platforms)
     else:
@@ -139,7 +150,9 @@ def build(
     guid = guid_of(what)
     home = Bench.find(bench)
     suffix = ("-python" if target == "python" else "") + ("-fmi3" if fmi == 3 else "")
-    cached = home.cache / f"{name}{suffix}-{content_hash(what, how, documentation, licence_text())[:20]}.fmu"
+    cached = (
+        home.cache / f"{name}{suffix}-{content_hash(what, how, documentation, licence_text(), repr(sizes))[:20]}.fmu"
+    )
 
     def write(path: Path) -> None:
         if target == "native":
@@ -149,11 +162,12 @@ def build(
             entries = _python_entries(cls, guid, identifier)
         if fmi == 3:
             entries["sources/buildDescription.xml"] = build_description(identifier).encode()
-            entries["modelDescription.xml"] = model_description3(cls, guid, identifier).encode()
+            entries["modelDescription.xml"] = model_description3(cls, guid, identifier, sizes).encode()
             entries |= terminals(cls)
         else:
-            entries["modelDescription.xml"] = model_description(cls, guid, identifier, target).encode()
+            entries["modelDescription.xml"] = model_description(cls, guid, identifier, target, sizes).encode()
         entries |= index_page(name, summary(cls), cls.__doc__ or "", cls.layout) | licences(target == "python")
+        entries |= icon(kind_of(cls), fmi)
         if documentation:
             entries["documentation/README.md"] = documentation.encode()
         write_archive(path, entries, durable=False)

@@ -89,6 +89,40 @@ static COLD int has_all(Instance *m, const unsigned references[], size_t n) {
     return 1;
 }
 
+/* Sets values while it runs, parameters among them; refused, nothing has changed. */
+COLD int tune_values(Instance *m, const unsigned references[], size_t n, const double in[]) {
+    const Face *const f = face_of(m);
+    Part *const p = &m->part;
+    const int before = p->failed;
+    Numbers *room;
+    int k, status = 0, changed = 0;
+    size_t i, j = 0;
+    for (i = 0; i < n; i++)
+        if (!extent(f, references[i]) || (in_range(place(f, references[i]), 0, U0) && !tunable[place(f, references[i])]))
+            return unsettable(m, references[i]);
+    room = (Numbers *)malloc(2 * sizeof *room);
+    if (!room) return wrong(m, "out of memory");
+    room[0] = p->n;
+    for (i = 0; i < n; i++)
+        for (k = 0; k < extent(f, references[i]); k++, j++) {
+            double *const v = value(p) + place(f, references[i]) + k;
+            changed |= in_range(place(f, references[i]), 0, U0) && *v != in[j];
+            *v = in[j];
+        }
+    p->n.dirty = 1.0;
+    if (changed) {
+        p->failed = 0;
+        tune(p, &room[1]);
+        if (p->failed) {
+            p->n = room[0];
+            status = tell(m);
+        }
+        p->failed = before;
+    }
+    free(room);
+    return status;
+}
+
 /* ------------------------------------------------------------------------------ values and steps */
 /* To be called before values are read: outputs follow inputs that were set since the last step. */
 NEVER_INLINE void freshen(Instance *m, const unsigned references[], size_t n) {

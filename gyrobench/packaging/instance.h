@@ -51,6 +51,7 @@ SHARED int tell(Instance *m);
 SHARED int wrong(Instance *m, const char *format, ...);
 SHARED int missing(Instance *m, unsigned reference);
 SHARED int unsettable(Instance *m, unsigned reference);
+SHARED int tune_values(Instance *m, const unsigned references[], size_t n, const double in[]);
 SHARED void freshen(Instance *m, const unsigned references[], size_t n);
 SHARED int run(Instance *m);
 SHARED int step(Instance *m, double t, double h);
@@ -74,7 +75,7 @@ static inline int extent(const Face *f, unsigned reference) {
     return f->extents ? f->extents[place(f, reference)] : 1;
 }
 
-/* The first value that may be set now: no parameter once the instance runs. */
+/* The first value that may be set now without more ado: no parameter once the instance runs. */
 static inline unsigned first_settable(const Face *f) { return *f->running != 0.0 ? model.u0 : 0u; }
 
 /* The status of a call: 0 OK, 3 error, the same in both versions; the reason of a failure goes to the log. */

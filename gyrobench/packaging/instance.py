@@ -22,6 +22,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.files import check_size, temporary_folder, unzip_fmu
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.loading import load_part
+from gyrobench.packaging.tuning import tuning
 
 
 class InstanceError(GyrobenchError):
@@ -63,6 +64,9 @@ class Plain:
 
     def set(self, values: dict[str, float]) -> None:
         references = [self.part._find(n).reference for n in values]
+        if self.part._running:
+            allowed = tuning(type(self.part))
+            self.part._tunable, self.part._derived = allowed.tunable, allowed.derived  # type: ignore[misc]
         self._call("set", self.part.write, references, list(values.values()))
 
     def get(self, names: Sequence[str]) -> list[float]:

@@ -14,6 +14,7 @@ from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
 from gyrobench.packaging.source import PartCode, member
 from gyrobench.packaging.translate import Translation
+from gyrobench.packaging.tuning import tuning
 
 HERE = Path(__file__).parent
 PER = {"start": 0, "step": 1, "second": 2}
@@ -79,7 +80,7 @@ def c_source(cls: type[Component], guid: str) -> str:
     counts = {s: sum(1 for x in layout if x.section == s) for s in {x.section for x in layout}}
     checked = [s for s in layout if s.section in ("parameter", "input", "state")]
     bounds = [b for s in checked for b in _bounds(s)]
-    samples = len(layout)
+    samples, tuned = len(layout), tuning(cls)
     param = {s.name: s.reference for s in layout if s.section == "parameter"}
     changing = written(source)
     names_followed = followed(source)
@@ -111,12 +112,14 @@ def c_source(cls: type[Component], guid: str) -> str:
         "N_WATCHED": len(watched),
         "N_STEPPED": len(stepped),
         "N_FOLLOWED": -1 if follow is None else len(follow),
+        "N_DERIVED": len(tuned.derived),
         "NONLINEAR": f"(p->n.v.{cls.nonlinear} != 0.0)" if isinstance(cls.nonlinear, str) else int(cls.nonlinear),
         "OF_MATRIX": "NEVER_INLINE" if cls.nonlinear else "COLD",  # of a linear part it is made once for each step
         "MIDPOINT": int(cls.integrator == "midpoint"),
         "RK4_SUBSTEPS": cls.rk4_substeps if cls.integrator == "rk4" else 0,
         "LARGEST_STEP(p, step)": "((p)->n.v.step)" if "step" in cls.declarations else "(step)",
     }
+    may_be_set = [str(int(s.reference in tuned.tunable)) for s in layout if s.section == "parameter"]
     names = [f'"{s.name}"' for s in layout]
     units = [f'"{s.decl.unit}"' for s in layout]
     parts = [
@@ -134,6 +137,9 @@ def c_source(cls: type[Component], guid: str) -> str:
         _table("static const struct { int from, n; } stepped[]", [f"{{{a}, {n}}}" for a, n in stepped], "{0, 0}"),
         "/* what the outputs follow from, where that is inputs and discretes alone */",
         _table("static const int followed[]", follow or [], "0"),
+        "/* which parameters may be set between steps; what the start makes of parameters alone */",
+        _table("static const unsigned char tunable[]", [", ".join(may_be_set) or "0"], ""),
+        _table("static const int derived[]", [", ".join(map(str, tuned.derived)) or "0"], ""),
         '#include "core.h"',
         Translation(source).text,
     ]

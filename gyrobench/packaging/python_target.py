@@ -16,6 +16,7 @@ from pathlib import Path
 
 from gyrobench.component import Component
 from gyrobench.packaging.loading import ROOM, BuildError, sources
+from gyrobench.packaging.tuning import tuning
 
 TOOL = Path(__file__).parent.parent
 RUNTIME = (*sorted((TOOL / "component").rglob("*.py")), TOOL / "errors.py")  # what a Python FMU may carry of gyrobench
@@ -33,6 +34,8 @@ from pythonfmu.enums import Fmi2Status
 
 from {unique}.component import ComponentError
 from {unique}.model import {cls} as Part
+
+Part._tunable, Part._derived = frozenset({tunable}), {derived}
 
 
 def logged(call):
@@ -148,5 +151,8 @@ def resources(cls: type[Component], guid: str) -> tuple[str, dict[str, str]]:
     files = {f"{unique}/{n}": renamed(t, unique) for n, t in texts.items()}
     files[f"{unique}/__init__.py"] = ""
     module = f"{unique}_slave"
-    files[f"{module}.py"] = SLAVE.format(cls=cls.__name__, version=cls.version, unique=unique)
+    tuned = tuning(cls)
+    files[f"{module}.py"] = SLAVE.format(
+        cls=cls.__name__, version=cls.version, unique=unique, tunable=sorted(tuned.tunable), derived=tuned.derived
+    )
     return module, files

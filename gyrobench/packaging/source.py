@@ -24,7 +24,8 @@ KEYWORDS = {
     "NAN", "INFINITY", "HUGE_VAL", "NULL", "EOF", "BUFSIZ", "errno", "stdin", "stdout", "stderr", "GAMMA", "AHEAD",
     "PATIENCE", "NEVER_INLINE", "COLD", "OF_MATRIX", "BY_PROCESSOR", "CAN_BE_LINKED", "APART", "SHARED", "LINKED_FORM",
     "MODEL_GUID", "N_REFERENCES", "U0", "Y0", "X0", "DX0", "N_U", "N_Y", "N_X", "N_PORTS", "N_STREAMS",
-    "N_BOUNDS", "N_WATCHED", "N_STEPPED", "N_FOLLOWED", "NONLINEAR", "MIDPOINT", "RK4_SUBSTEPS", "LARGEST_STEP",
+    "N_BOUNDS", "N_WATCHED", "N_STEPPED", "N_FOLLOWED", "N_DERIVED", "NONLINEAR", "MIDPOINT", "RK4_SUBSTEPS",
+    "LARGEST_STEP",
 }  # fmt: skip
 MEMBERS = KEYWORDS | {"tick"}  # of struct Vars
 LOCALS = KEYWORDS | {"part", "self", "seed", "dual", "Vars", "Part", "plain", "fail", "at", "whole"}

@@ -94,6 +94,12 @@ static COLD void initialize(Part *p, double t0) {
     p->n.running = 1.0;
 }
 
+/* Parameters have been set between steps, see core.h: each part takes its own. */
+static COLD void tune(Part *p, Numbers *room) {
+    tune_parts(&p->n.parts, &room->parts, value(p));
+    (void)broken(p);
+}
+
 static void proceed(Part *p, double t, double step) {
     const double expected = p->n.t0 + p->n.steps * STEP, n = floor(step / STEP + 0.5);
     double k;

@@ -17,11 +17,12 @@ from gyrobench.report.page_model import (
     pictures,
     text_cell,
 )
-from gyrobench.report.plots import finite, short
+from gyrobench.report.plots import finite, plain_log, short
 from gyrobench.report.result_json import Report
 from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
 from gyrobench.result import Curve, LoopResult, Response, Result
 
+DECADES = 1e-7  # of the largest value: what a spectrum is drawn down to
 LINES = ((VERMILION, "-"), (GREEN, "--"))  # of the linear models, in their order
 Named = Sequence[tuple[str, Response]]
 
@@ -34,10 +35,11 @@ def blocks(report: Report[Result]) -> list[Any]:
     order = {"time": 0, "loop": 1}
     for k, r in sorted(enumerate(report.result.responses), key=lambda item: order.get(item[1].kind, 2)):
         key = f"response-{k + 1}"
-        alt = f"{r.name}: " + ("lines over time" if r.kind == "time" else "measured points and linear curves")
+        lines = {"time": "lines over time", "spectrum": "lines over frequency"}
+        alt = f"{r.name}: {lines.get(r.kind, 'measured points and linear curves')}"
         label = r.name if r.kind == "step" and r.name == r.y_name else "measured"
         figures += pictures(Picture(key, draw([(label, r)], key, r.curves), r.caption, alt))
-        if r.kind not in ("step", "time") and r.x:
+        if r.kind in ("loop", "ratio") and r.x:
             figures.append(CollapsedBlocks(f"Points of the {r.name}", [_points(report, k, r)]))
     return figures
 
@@ -62,7 +64,7 @@ def of_all_runs(key: str, named: Named) -> list[Any]:
     alike = [n for n in named if (n[1].kind, n[1].y_unit) == (first.kind, first.y_unit)]
     if len(alike) < 2:
         return []
-    several = first.kind == "time" and len(first.curves) > 1
+    several = first.kind in ("time", "spectrum") and len(first.curves) > 1
     name = f"{first.name}, {first.curves[0].label}" if several else first.name
     text = f"{name[:1].upper()}{name[1:]} of all runs."
     return pictures(Picture(key, draw(alike, key), text, f"{name} of all runs in one figure"))
@@ -74,6 +76,10 @@ def draw(named: Named, key: str, curves: Sequence[Curve] = ()) -> str:
     if first.kind == "time":
         lines = [(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named]
         return _over_time(lines, first, key, ())
+    if first.kind == "spectrum":
+        return _over_frequency(
+            [(c.label, c.x, c.y) for c in curves] or [(label, r.x, r.y) for label, r in named], first, key
+        )
     if first.kind == "step":
         return _over_time([(label, r.x, r.y) for label, r in named], first, key, curves)
     phases = first.kind == "loop"
@@ -151,6 +157,27 @@ def _over_time(
     ax.margins(x=0.01)
     if len(lines) + len(curves) > 1:
         fig.legend(loc="outside upper left", ncols=3, handlelength=2.2)
+    return svg(fig, key)
+
+
+def _over_frequency(lines: Sequence[tuple[str, Sequence[float], Sequence[float]]], first: Response, key: str) -> str:
+    """Return lines (label, x, y) in one figure, both axes logarithmic; pairs of a measured line and its model alike."""
+    fig, axes = figure(WIDE * 0.8, 72)
+    ax = axes[0, 0]
+    for i, (label, *values) in enumerate(lines):
+        x, y = finite(*values)
+        modelled = label.endswith("linear")
+        ax.plot(x, y, "--" if modelled else "-", color=CYCLE[(i // 2 if len(lines) == 4 else i) % len(CYCLE)],
+                linewidth=1.2 if modelled else 0.8, label=label)  # fmt: skip
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(max(low, DECADES * high), high)
+    ax.set_xlabel(axis_label(first.x_name, first.x_unit))
+    ax.set_ylabel(axis_label(first.y_name, first.y_unit))
+    ax.margins(x=0.01)
+    plain_log(ax, ax.get_ylim()[1] / ax.get_ylim()[0])
+    fig.legend(loc="outside upper left", ncols=2, handlelength=2.2)
     return svg(fig, key)
 
 

@@ -16,7 +16,10 @@ from gyrobench.studio.jobs import StudioJobs
 from gyrobench.workflow.user_errors import user_message
 
 STYLE = Path(__file__).with_name("studio.css")
-PAGES = (("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"))
+PAGES = (
+    ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
+    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"),
+)  # fmt: skip
 DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
     None: (True, "Colours: as the system"),
     True: (False, "Colours: dark"),
@@ -110,9 +113,10 @@ class CopyLines:
     def __init__(self) -> None:
         self.text = {"In the shell": "", "In Python": ""}
         self.shown: dict[str, ui.label] = {}
+        self.boxes: dict[str, ui.element] = {}
         with ui.element("section").classes("lines").props('aria-label="The same as a command and in Python"'):
             for name in self.text:
-                with ui.element("div").classes("line"):
+                with ui.element("div").classes("line") as self.boxes[name]:
                     with ui.element("div").classes("line-head"):
                         ui.label(name).classes("small-head")
                         copy = ui.button(icon="content_copy", on_click=lambda n=name: self._copy(n))
@@ -128,3 +132,4 @@ class CopyLines:
         for name, text in zip(self.text, (command, python), strict=True):
             self.text[name] = text
             self.shown[name].set_text(text)
+            self.boxes[name].set_visibility(bool(text))

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
-from gyrobench.studio.request import JobRequest, first_shown, read_request
+from gyrobench.studio.request import CommandRequest, JobRequest, first_shown, read_request
 
 if TYPE_CHECKING:
     from gyrobench.arrays import Array
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
 LIVE_SIGNALS = 4
+PRINTED, LONG = 400, 500  # lines of a command that are kept, characters of one
 WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
 
 
@@ -143,11 +144,37 @@ def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     return execute_run(run, test, feedback)
 
 
-def _finish(report: JobReport, request: JobRequest, resume: bool, writer: _Writer) -> None:
+def _command(report: JobReport, request: CommandRequest, writer: _Writer) -> None:
+    """Execute a command and keep the lines that it prints as notes; exit code 1 is an answer, too."""
+    import subprocess
+
+    from gyrobench.bench import Bench
+
+    command = [sys.executable, "-m", "gyrobench", *request.words]
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8",
+        errors="replace",
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                report.notes = [*report.notes, line.rstrip("\n")[:LONG]][-PRINTED:]
+                writer.write()
+        except KeyboardInterrupt:
+            process.send_signal(signal.SIGINT)
+            raise
+    pages = Bench.find().out / request.folder
+    report.folder = str(pages) if request.folder and pages.is_dir() else ""
+    report.state = "done" if process.returncode in (0, 1) else "failed"
+
+
+def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: bool, writer: _Writer) -> None:
     """Execute the request and put its end into the report."""
     from gyrobench.workflow.user_errors import CommandInterrupted, user_message
 
     try:
+        if isinstance(request, CommandRequest):
+            return _command(report, request, writer)
         outcome = _execute(request, resume, writer)
         report.folder = str(outcome.folder or "")
         report.verdict = getattr(outcome, "verdict", "") or getattr(outcome.result, "verdict", "") or ""

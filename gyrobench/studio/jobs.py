@@ -21,7 +21,7 @@ from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import LOCK, FolderLock, cores
 from gyrobench.studio.job_process import REQUEST, STARTED, STATE, JobReport, read_report, store, stored
-from gyrobench.studio.request import JobRequest, read_request
+from gyrobench.studio.request import CommandRequest, JobRequest, read_request
 
 FOLDER = Path("studio", "jobs")  # below reports/out
 ENDED = ("done", "stopped", "failed", "lost")
@@ -36,7 +36,7 @@ class StudioJob:
     """
 
     key: str
-    request: JobRequest
+    request: JobRequest | CommandRequest
     resume: bool
     created: float
     state: str
@@ -49,8 +49,8 @@ class StudioJob:
 
     @property
     def resumable(self) -> bool:
-        """True for a run that goes on where it was stopped."""
-        return self.state in ("stopped", "lost") and not self.request.data
+        """True for what goes on where it was stopped."""
+        return self.state in ("stopped", "lost") and self.request.resumable
 
 
 class StudioJobs:
@@ -66,7 +66,7 @@ class StudioJobs:
         self.read_only = read_only
         self._started: dict[str, subprocess.Popen[bytes]] = {}  # by this studio
 
-    def submit(self, request: JobRequest, resume: bool = False) -> str:
+    def submit(self, request: JobRequest | CommandRequest, resume: bool = False) -> str:
         """Queue a request and return the key of its job.  Raises UsageError where nothing may be started."""
         self._require_writable()
         key = f"{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 FIRST = 4  # signals shown at first
 
@@ -26,6 +26,11 @@ class JobRequest:
     spec: str = ""
     data: str = ""
     columns: str = ""
+
+    @property
+    def resumable(self) -> bool:
+        """True for a run, which goes on where it was stopped."""
+        return not self.data
 
     def as_dict(self) -> dict[str, Any]:
         """Return the request, JSON-able."""
@@ -65,9 +70,45 @@ class JobRequest:
         return "\n".join(lines)
 
 
-def read_request(content: dict[str, Any]) -> JobRequest:
-    """Return the request that :meth:`Request.as_dict` wrote."""
-    return JobRequest(**content)
+@dataclass(frozen=True)
+class CommandRequest:
+    """Another command of the bench, with what it prints and the pages that it writes.
+
+    words: of its line, without "gyrobench".  lines: of Python that do the same, "" for none.  folder: with its pages,
+    below reports/out, "" for none.
+    """
+
+    words: list[str]
+    lines: str = ""
+    folder: str = ""
+    data: ClassVar[str] = ""
+
+    @property
+    def system(self) -> str:
+        """Return the name of it in a list."""
+        return " ".join(self.words[:2])
+
+    @property
+    def resumable(self) -> bool:
+        """True for a command that goes on where it was stopped."""
+        return self.words[0] == "sweep"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the request, JSON-able."""
+        return asdict(self)
+
+    def command(self, resume: bool = False) -> str:
+        """Return the command line."""
+        return shlex.join(["gyrobench", *self.words])
+
+    def python(self, suite: bool = False) -> str:
+        """Return lines of Python that do the same."""
+        return self.lines
+
+
+def read_request(content: dict[str, Any]) -> JobRequest | CommandRequest:
+    """Return the request that its ``as_dict`` wrote."""
+    return CommandRequest(**content) if "words" in content else JobRequest(**content)
 
 
 def comparison_command(runs: list[str]) -> str:

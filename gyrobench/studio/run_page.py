@@ -18,7 +18,7 @@ from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, to
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
-from gyrobench.studio.request import comparison_command, comparison_python, first_shown
+from gyrobench.studio.request import CommandRequest, comparison_command, comparison_python, first_shown
 from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
@@ -58,18 +58,20 @@ def _add_job_page(studio: Studio) -> None:
     def job_page(key: str) -> None:
         with frame(studio, "Run"):
             job = studio.jobs.find(key)
+            command = isinstance(job.request, CommandRequest)
             ui.html(f"<h1>{escape(job.request.system)}</h1>", sanitize=False)
             with ui.element("div").classes("bar"):
                 state = ui.label().classes("tag").props("role=status").mark("state")
                 words = ui.label().classes("soft")
             bar = ui.linear_progress(0.0, show_value=False).props('aria-label="progress"')
-            message, notes = ui.label().classes("problem"), ui.label().classes("notes")
+            bar.set_visibility(not command)
+            message, notes = ui.label().classes("problem"), ui.label().classes("printed" if command else "notes")
             with ui.element("div").classes("bar"):
                 stop = ui.button("Stop", icon="stop", on_click=told(lambda: studio.jobs.stop(key))).mark("stop")
                 again = ui.button("Resume", icon="play_arrow", on_click=told(lambda: _resume(studio, key))).mark(
                     "resume"
                 )
-                done = ui.link("Report and signals", "#").mark("result")
+                done = ui.link("Its pages" if command else "Report and signals", "#").mark("result")
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
@@ -88,8 +90,8 @@ def _add_job_page(studio: Studio) -> None:
                 place = _place(studio, now.report.folder)
                 done.set_visibility(bool(place))
                 if place:
-                    done.props(f'href="{address("run", place)}"')
-                if now.state == "done" and place and not message.text and not gone["there"]:
+                    done.props(f'href="{address("pages" if command else "run", place)}"')
+                if now.state == "done" and place and not message.text and not gone["there"] and not command:
                     gone["there"] = True
                     ui.navigate.to(address("run", place))
                 chart.look()
@@ -129,7 +131,7 @@ def _add_run_page(studio: Studio) -> None:
             )
             if isinstance(document, SuiteDocument):
                 _tests(document, place)
-                _report(folder, place)
+                report_frame(folder, place)
                 CopyLines().show(*lines_of)
                 return
             with ui.tabs().props("no-caps align=left dense") as tabs:
@@ -137,7 +139,7 @@ def _add_run_page(studio: Studio) -> None:
                 made = {n: ui.tab(n) for n in names}
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
-                    _report(folder, place)
+                    report_frame(folder, place)
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
                 with ui.tab_panel(made["Moving picture"]):
@@ -173,7 +175,7 @@ def _head(document: RunDocument | SuiteDocument, place: str, entry: RunEntry | N
             ui.link(text, f"/files/{quote(place)}/{name}", new_tab=True)
 
 
-def _report(folder: Path, place: str, name: str = "report.html") -> None:
+def report_frame(folder: Path, place: str, name: str = "report.html") -> None:
     """Add the report as it is; its scripts run without a way to the studio."""
     if not (folder / name).is_file():
         ui.label("There is no report: the run has no reduction, or it did not come to its end.").classes("soft")
@@ -199,7 +201,7 @@ async def _signals(folder: Path, document: RunDocument) -> None:
     if not signals.names or not len(signals.time):
         ui.label("The record holds no signals over time.").classes("soft")
         return
-    first = first_shown(signals.names, _shown_by_report(document.system))
+    first = first_shown(signals.names, _shown_byreport_frame(document.system))
     await _chosen({folder.name: signals}, signals.names, first)
 
 
@@ -214,7 +216,7 @@ async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
         ui.label("The record holds no angle of a body that moves.").classes("soft")
 
 
-def _shown_by_report(name: str) -> list[Any]:
+def _shown_byreport_frame(name: str) -> list[Any]:
     try:
         return list(getattr(load_test(name), "shown", ()))
     except Exception:  # a run of a system that is not there any more
@@ -331,7 +333,7 @@ def _add_comparison_page(studio: Studio) -> None:
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
                     if target.is_dir():
-                        _report(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
+                        report_frame(target, target.relative_to(studio.bench.out).as_posix(), "comparison.html")
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
                 with ui.tab_panel(made["As a command"]):
@@ -356,7 +358,7 @@ async def _overlay(folders: list[Path]) -> None:
         ui.label("The runs have no signal in common.").classes("soft")
         return
     document = await asyncio.to_thread(read_run, folders[0])
-    await _chosen(records, common, first_shown(common, _shown_by_report(document.system))[:2])
+    await _chosen(records, common, first_shown(common, _shown_byreport_frame(document.system))[:2])
 
 
 async def _chosen(records: dict[str, RecordSignals], names: list[str], first: list[str]) -> None:

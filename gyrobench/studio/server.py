@@ -16,6 +16,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock
+from gyrobench.studio.command_pages import add_command_pages, served
 from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
 from gyrobench.studio.gate import TOKEN, StudioGate, is_loopback, refuse_remote
@@ -83,7 +84,8 @@ def build(studio: Studio) -> FastAPI:
             file = studio.run_folder(place)
         except UsageError as error:
             return PlainTextResponse(str(error), 404)
-        if file.name not in SERVED or not file.is_file() or file.is_relative_to(studio.jobs.folder.parent.resolve()):
+        named = file.name in SERVED or served(studio.bench.out, file)
+        if not named or not file.is_file() or file.is_relative_to(studio.jobs.folder.parent.resolve()):
             return PlainTextResponse("not a file of a run", 404)
         return FileResponse(file, headers={"cache-control": "no-store"})
 
@@ -108,6 +110,7 @@ def build(studio: Studio) -> FastAPI:
     add_system_page(studio)
     add_run_pages(studio)
     add_data_page(studio)
+    add_command_pages(studio)
     ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=20)
     return app
 

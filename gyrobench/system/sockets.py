@@ -13,6 +13,7 @@ from __future__ import annotations
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.component.declarations import element_names
 from gyrobench.system.connectors import EXPOSED, Connector, Shape, Socket, inp, limit_flag, out
+from gyrobench.system.gimbal_sockets import GIMBALS
 from gyrobench.system.loop_sockets import LOOPS
 from gyrobench.system.north_sockets import NORTH
 from gyrobench.system.table_sockets import TABLES
@@ -256,6 +257,7 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         *LOOPS,
+        *GIMBALS,
         *TABLES,
         *NORTH,
     )

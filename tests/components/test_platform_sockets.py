@@ -19,6 +19,9 @@ from gyrobench.system.sockets import SOCKETS
         ("platform_four_gimbal", "Platform"),
         ("decoupler_t2", "Decoupler"),
         ("decoupler_none", "Decoupler"),
+        ("gimbal_two_axis", "TwoAxisGimbal"),
+        ("decoupler_los", "LosDecoupler"),
+        ("base_vibration", "Vibration"),
     ],
 )
 def test_fits(part, socket, tmp_path):

@@ -86,7 +86,7 @@ def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Pa
     times = read_model_description(str(file)).defaultExperiment
     assert float(times.stopTime).is_integer() and float(times.stepSize) == 10.0  # a row of the channels
     names = zipfile.ZipFile(file).namelist()
-    assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md"} <= set(names)
+    assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md", "model.png"} <= set(names)
 
 
 def test_an_option_that_is_the_time_of_the_run_is_built_in(tmp_path: Path) -> None:
@@ -188,3 +188,30 @@ def test_what_cannot_be_exposed(small: System, tmp_path: Path, foreign: Callable
     with pytest.raises(ExportError, match="gyro: not a native part of this bench; one library"):
         export_fmu(small, tmp_path / "x.fmu", **setup)
     assert not list(tmp_path.glob("*.fmu"))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_parameter_is_set_between_steps(small: System, write: Write, fmi: int) -> None:
+    """From 0.5 s on a drift D of 1e-5 rad/s more; set to what it is, nothing changes; nan is refused.
+
+    J b'' + C b' = -H D with J / C = 1 ms = h, H / C = 1: one step later b is less by D h / e, before the loop answers;
+    u = K_sg b, K_sg = 10 V/rad.
+    """
+    file = write(small, fmi)
+    variables = {v.name: v for v in read_model_description(str(file)).modelVariables}
+    assert variables["gyro.D_F"].variability == "tunable"
+    before = float(variables["gyro.D_F"].start)
+    plain = simulated(file, 1.5)
+
+    def changed(to: float) -> Any:
+        series = np.array([(0.0, before), (0.5, before), (0.5, to), (9.0, to)], [("time", float), ("gyro.D_F", float)])
+        return simulate_fmu(str(file), stop_time=1.5, output_interval=1e-3, input=series)
+
+    np.testing.assert_array_equal(changed(before)["gyro.u"], plain["gyro.u"])
+    apart = changed(before + 1e-5)["gyro.u"][:502] - plain["gyro.u"][:502]
+    assert not apart[:501].any()
+    assert apart[501] == pytest.approx(
+        -10.0 * 1e-5 * 1e-3 / np.e, rel=1e-3
+    )  # the coefficients of its step are made anew, too
+    with pytest.raises(Exception, match=r"fmi[23]Set"):
+        changed(np.nan)

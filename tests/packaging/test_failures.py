@@ -223,11 +223,12 @@ def test_a_step_before_initialization(instance: Callable) -> None:
 
 @pytest.mark.parametrize("kind", STATUS)
 def test_parameters_are_fixed(instance: Callable, kind: str) -> None:
-    one = instance("lag", kind, toy=True)
+    """Those that act at the start alone; which others are, and which are not: test_tuning.py."""
+    one = instance("estimator_lti", kind)
     one.initialize()
-    for name, value in (("mix[1,2]", 0.5), ("limit", 50.0)):
+    for name, value in (("x0[1]", 0.0), ("Ts", one.get(["Ts"])[0])):
         told = refused(kind, one.set, {name: 2.0})
-        shown = "mix" if kind == "native-fmi3" and name != "limit" else name  # an array is set as a whole
+        shown = "x0" if kind == "native-fmi3" and name != "Ts" else name  # an array is set as a whole
         assert told == f"slot: parameter {shown} is fixed once initialization has ended: reset first"
         assert one.get([name]) == [value]
     one.step(0.0, 1e-3)  # a wrong call changes nothing

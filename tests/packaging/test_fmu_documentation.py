@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Callable
@@ -12,8 +13,52 @@ import pytest
 from fmpy import read_model_description
 
 from gyrobench.bench import Bench, standard_folder
+from gyrobench.component import Component
 from gyrobench.packaging import build, load_part
 from gyrobench.packaging.description import default_experiment
+from gyrobench.packaging.icon import PICTURES, SIZE, kind_of, picture
+
+
+@pytest.mark.parametrize(("kind", "fmi"), [("native", 2), ("native", 3), ("python", 2)])
+def test_the_icon_stands_where_the_standard_has_it(kind: str, fmi: int, tmp_path: Path) -> None:
+    """A PNG that other readers take: strokes on a transparent ground, those of a table."""
+    from matplotlib.image import imread
+
+    with zipfile.ZipFile(build("table_rate", kind, fmi=fmi, out=tmp_path)) as archive:
+        content = archive.read("model.png" if fmi == 2 else "terminalsAndIcons/icon.png")
+    assert content == picture("table") and len(content) < 4000
+    image = imread(io.BytesIO(content))
+    assert image.shape == (SIZE, SIZE, 4)
+    alpha = image[..., 3]
+    assert alpha[0].max() == 0.0 and alpha.max() == 1.0 and 0.03 < alpha.mean() < 0.3
+    assert alpha[SIZE - 21, SIZE // 2] == 1.0  # the foot: y = 16 % from below
+
+
+def test_kinds_of_icons() -> None:
+    """Of each kind there is a picture, all are different, and a class of the user's is found by its base."""
+    assert len({picture(k) for k in PICTURES}) == len(PICTURES)
+    assert {kind_of(load_part(p)) for p in Bench.find().parts()} == set(PICTURES) - {"part", "system"}
+    parts = ("table_servo", "gyrocompass", "stabilizer_lti", "gyro_error_compensator")
+    assert [kind_of(load_part(p)) for p in parts] == ["table", "compass", "controller", "estimator"]
+
+    class Mine(load_part("floated_gyro")):  # type: ignore[misc]
+        """Derived."""
+
+    class Other(Component):
+        """Of no kind."""
+
+    assert (kind_of(Mine), kind_of(Other)) == ("gyro", "part")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_nominal_values_are_those_of_the_reference_run(fmi: int, tmp_path: Path) -> None:
+    """Powers of ten: specific force up to 12 m/s2, J = 2e-4 kg.m2; none for what is 0 and not in the run."""
+    description = read_model_description(str(build("floated_gyro", fmi=fmi, out=tmp_path)))
+    found = {v.name: v.nominal for v in description.modelVariables}
+    assert float(found["f[1]" if fmi == 2 else "f"]) == 10.0
+    assert (float(found["J"]), found["turn_on"], found["float_angle"]) == (1e-4, None, None)
+    assert float(found["omega[1]" if fmi == 2 else "omega"]) in (1e-4, 1e-3)
+    assert float(found["mount[1,1]" if fmi == 2 else "mount"]) == 1.0
 
 
 @pytest.mark.parametrize(("kind", "fmi"), [("native", 2), ("native", 3), ("python", 2)])

@@ -48,6 +48,10 @@ def test_one_row_is_named_with_what_it_changes(noise: str) -> None:
     assert text.startswith("Row 41 (+0.") and "without it" in text and "u = " in text
     (table,) = [t for t in r.tables if t.title == "Estimates without outliers"]
     assert table.rows[0][4] < 0.2 * table.rows[0][2]
+    # 6.4 u of the mean without it, 0.01/sqrt(88) deg/h: nothing passes; 5.5 sigma move it by 0.6 u
+    blocks = [[x.blocks for x in judged(record({40: size}, noise=noise)).reasons if x.id == "outliers"]
+              for size in (60.0, 5.5)]  # fmt: skip
+    assert blocks == [[("pass", "fail")], [()]]
 
 
 def test_a_mount_of_outliers() -> None:

@@ -25,6 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Reason, Table
 
@@ -123,7 +124,7 @@ def _against(found: Findings, rest: Findings, rows: NDArray[np.intp]) -> tuple[A
 
 
 def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
-    """Return which rows, and what changes most without them, as a warning."""
+    """Return which rows, and what changes most without them; where that leaves its interval, no verdict stands."""
     if outliers is None:
         return []
     rows, rest = outliers.rows, outliers.without
@@ -143,7 +144,8 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
         f"{what} {listed}{more} {verb} outside the noise of the others. They are in the estimates; without {them} "
         f"{q.title} = {values} in place of {plain}. Look for the cause, and leave {them} out only if it is one."
     )
-    return [Reason("outliers", text)]
+    moved = abs(rest.value[b] - found.value[a]) > NORMAL * rest.u[b]
+    return [Reason("outliers", text, ("pass", "fail") if moved else ())]
 
 
 def _common(found: Findings, rest: Findings) -> list[tuple[int, int]]:

@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, sampled
+from gyrobench.component.math import Number, Vector, atan2, cos, exp, floor, index, log, pi, sin, sqrt, vector
+
+LINES = 48  # sines of each axis
+POINTS = 24  # of a spectrum
+PARTS = 8  # of a line's band, over which its power is summed
+GOLDEN = 0.6180339887498949
+REST = [0.0] * (POINTS - 2)
+NONE = [0.0, 0.0, 0.0]
+
+
+class BaseVibration(Component):
+    """Vibration of a base by power spectral densities, added to it: angular rate and acceleration.  [BASE-PSD]
+
+    omega = omega_b + w n(t),  alpha = alpha_b + d/dt w n(t),  f = f_b + w a(t)          w rises from 0 to 1 in onset
+
+    Each of the three components of n and of a is a sum of 48 sines.  The band from the first to the last frequency is
+    cut into 48 of equal ratio; each has one sine of the power of its band, int S df, at a place within it that does not
+    repeat, with a phase by the seed of the run.  Between its points S goes straight in logarithms.  So the mean square
+    is the spectrum's in every band, and over a long time the same for every seed.
+
+    It begins where the number of the running phase is `first`, and lasts to the end.
+
+    Not modelled: correlation between axes, peaks other than a Gaussian process has, lines of a rotor (give a narrow
+    band), the small angle of the vibration in f.
+    Source: Shinozuka 1991 (sum of cosines with random phases).
+    """
+
+    version = "1.0.0"
+
+    step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
+    points = Parameter(2, int, "points of the spectra; 0: no vibration", min=0, max=POINTS)
+    frequency = Parameter([1.0, 100.0, *REST], "Hz", "their frequencies, rising", min=0.0)
+    rate_psd = Parameter(
+        [[1e-6, 1e-6, *REST]] * 3, "rad2/s2/Hz", "one-sided density of the angular rate about x, y, z", min=0.0
+    )
+    acceleration_psd = Parameter(
+        [[0.0] * POINTS] * 3, "m2/s4/Hz", "one-sided density of the acceleration along x, y, z", min=0.0
+    )
+    scale = Parameter(1.0, "1", "factor on rates and accelerations", min=0.0)
+    first = Parameter(0, int, "number of the phase in which it begins; 0: at the start", min=0)
+    onset = Parameter(1.0, "s", "time in which it fades in", min=0.0)
+    phases = Noise(1.0, "1", "1: phases by the seed", per="start", samples=12 * LINES)
+
+    phase = Input(0, int, "number of the running phase")
+    omega_b = Input(NONE, "rad/s", "inertial rate of the base without vibration, base axes")
+    alpha_b = Input(NONE, "rad/s2", "its derivative")
+    f_b = Input([0.0, 0.0, 9.80665], "m/s2", "specific force without vibration, base axes")
+
+    omega = Output("rad/s", "inertial rate of the base, base axes", shape=(3,))
+    alpha = Output("rad/s2", "its derivative", shape=(3,))
+    f = Output("m/s2", "specific force of the base, base axes", shape=(3,))
+
+    x = Discrete([[0.0] * LINES] * 6, "1", "sines: their values, rates of x, y, z, then accelerations")
+    y = Discrete([[0.0] * LINES] * 6, "1", "sines: a quarter of a period ahead")
+    w = Discrete([[0.0] * LINES] * 6, "rad/s", "sines: frequencies")
+    turn_c = Discrete([[0.0] * LINES] * 6, "1", "sines: cosine of what they turn in a step")
+    turn_s = Discrete([[0.0] * LINES] * 6, "1", "sines: sine of it")
+    active = Discrete([0.0] * 6, "1", "1: the spectrum is not 0")
+    h_turned = Discrete(0.0, "s", "step of turn_c and turn_s")
+    since = Discrete(-1.0, "s", "time at which it began; -1: not yet")
+    sums = Discrete([0.0] * 6, "1", "sums of the sines")
+    slopes = Discrete([0.0] * 6, "1/s", "their derivatives")
+    bad_point = Discrete(0.0, "1", "point under check")
+
+    def start(self) -> None:
+        self.refuse(self.points == 1.0, "a spectrum needs 2 points or more, points = {points}")
+        for k in range(index(self.points)):
+            self.bad_point = k + 1.0
+            low = self.frequency[index(k - 1.0)] if k > 0 else 0.0
+            self.refuse(
+                self.frequency[k] <= low, "frequency of point {bad_point} must be above that of the one before, and 0"
+            )
+        if self.points > 0.0:
+            for n in range(6):
+                self.draw(n)
+        if self.first == 0.0:
+            self.since = self.t
+        self.add()
+
+    def draw(self, n: Number) -> None:
+        """Choose the sines of one spectrum: 0 to 2 rates, 3 to 5 accelerations."""
+        top = log(self.frequency[index(self.points - 1.0)] / self.frequency[0])
+        for k in range(LINES):
+            power = 0.0
+            for j in range(PARTS):
+                f = self.frequency[0] * exp(top * (k + (j + 0.5) / PARTS) / LINES)
+                power = power + self.density(n, f) * f * top / (LINES * PARTS)
+            place = GOLDEN * (LINES * n + k + 1.0)
+            f = self.frequency[0] * exp(top * (k + place - floor(place)) / LINES)
+            size = self.scale * sqrt(2.0 * power)
+            number = 2.0 * (LINES * n + k)
+            angle = atan2(self.noise.phases[index(number)], self.noise.phases[index(number + 1.0)])
+            self.w[index(n)][k] = 2.0 * pi * f
+            self.x[index(n)][k] = size * cos(angle)
+            self.y[index(n)][k] = size * sin(angle)
+            if power > 0.0:
+                self.active[index(n)] = 1.0
+
+    def density(self, n: Number, f: Number) -> Number:
+        """Return the spectrum at f: straight in logarithms, in the density itself next to a 0."""
+        found = 0.0
+        for k in range(POINTS - 1):
+            if k + 1 < self.points and f >= self.frequency[k] and f <= self.frequency[k + 1]:
+                a = self.rate_psd[index(n)][k] if n < 3.0 else self.acceleration_psd[index(n - 3.0)][k]
+                b = self.rate_psd[index(n)][k + 1] if n < 3.0 else self.acceleration_psd[index(n - 3.0)][k + 1]
+                share = log(f / self.frequency[k]) / log(self.frequency[k + 1] / self.frequency[k])
+                if a > 0.0 and b > 0.0:
+                    found = exp((1.0 - share) * log(a) + share * log(b))
+                else:
+                    found = (1.0 - share) * a + share * b
+        return found
+
+    def add(self) -> None:
+        """Sum the sines at the present instant."""
+        for n in range(6):
+            total = 0.0
+            slope = 0.0
+            if self.active[n] > 0.0:
+                for k in range(LINES):
+                    total = total + self.x[n][k]
+                    slope = slope - self.w[n][k] * self.y[n][k]
+            self.sums[n] = total
+            self.slopes[n] = slope
+
+    @sampled(every=1)
+    def tick(self) -> None:
+        if self.since < 0.0:
+            if self.phase >= self.first:
+                self.since = self.t
+        elif self.points > 0.0:
+            if self.h != self.h_turned:
+                self.h_turned = self.h
+                for n in range(6):
+                    for k in range(LINES):
+                        self.turn_c[n][k] = cos(self.w[n][k] * self.h)
+                        self.turn_s[n][k] = sin(self.w[n][k] * self.h)
+            for n in range(6):
+                if self.active[n] > 0.0:
+                    for k in range(LINES):
+                        x = self.x[n][k]
+                        self.x[n][k] = x * self.turn_c[n][k] - self.y[n][k] * self.turn_s[n][k]
+                        self.y[n][k] = self.y[n][k] * self.turn_c[n][k] + x * self.turn_s[n][k]
+            self.add()
+
+    def weight(self) -> Vector:
+        """Return how far the vibration has faded in, and the derivative of it."""
+        if self.since < 0.0:
+            return vector([0.0, 0.0])
+        if self.t - self.since >= self.onset:
+            return vector([1.0, 0.0])
+        turn = pi / self.onset
+        at = turn * (self.t - self.since)
+        return vector([0.5 - 0.5 * cos(at), 0.5 * turn * sin(at)])
+
+    def outputs(self) -> None:
+        w = self.weight()
+        for n in range(3):
+            self.omega[n] = self.omega_b[n] + w[0] * self.sums[n]
+            self.alpha[n] = self.alpha_b[n] + w[0] * self.slopes[n] + w[1] * self.sums[n]
+            self.f[n] = self.f_b[n] + w[0] * self.sums[index(n + 3.0)]

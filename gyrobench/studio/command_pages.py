@@ -1,0 +1,312 @@
+"""The pages of commands that a form asks for: tune a loop, find the shortest plan, sweep values, certify."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import ui
+
+from gyrobench.bench import UsageError, display_path
+from gyrobench.report.laboratory import FILE, Laboratory, read_laboratory, write_laboratory
+from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem, told
+from gyrobench.studio.request import CommandRequest
+from gyrobench.studio.run_page import report_frame
+from gyrobench.system.system import System
+from gyrobench.tuning.tune_loop import tunable
+from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.run_list import list_runs
+
+PAGES = ("tuning.html", "tuning.pdf", "site/index.html")  # that a command writes; certificates have names of their own
+LISTED = 100  # runs to choose from
+STRUCTURES = ("lead-lag", "pi", "pi+lead-lag", "pi+lead", "lead", "lag", "lead-lag+notch", "pi+lead-lag+notch")
+
+
+@dataclass(frozen=True)
+class FormField:
+    """A field of a form.
+
+    option: of the command.  argument: of the function in Python, "" for the first one behind the system.  kind: "list"
+    or "dict" (an entry a line, the second as NAME=VALUE), "text", "number", "choice".
+    """
+
+    option: str
+    argument: str
+    label: str
+    kind: str
+    example: str = ""
+    choices: tuple[str, ...] = ()
+
+    def entries(self, value: Any) -> list[str]:
+        """Return what was given: the lines of a list, one text of any other kind, nothing where it was left out."""
+        lines = [line.strip() for line in str("" if value is None else value).splitlines()]
+        return [line.removesuffix(".0") if self.kind == "number" else line for line in lines if line]
+
+    def literal(self, entries: list[str]) -> str:
+        """Return the value in Python."""
+        if self.kind == "dict":
+            return repr({n.strip(): v.strip() for n, _, v in (e.partition("=") for e in entries)})
+        return repr(entries) if self.kind == "list" else entries[0] if self.kind == "number" else repr(entries[0])
+
+
+@dataclass(frozen=True)
+class CommandForm:
+    """A page with a form.  fixed: words that every command of it has.  under: folder of its pages, "" for none."""
+
+    name: str
+    command: str
+    text: str
+    fields: tuple[FormField, ...]
+    fixed: tuple[str, ...] = ()
+    under: str = ""
+
+    def request(self, studio: Studio, system: str, given: dict[str, Any]) -> CommandRequest:
+        """Return the command that the fields ask for.  given: option -> value of its field."""
+        words, arguments = [self.command, system], [repr(system)]
+        for f in self.fields:
+            if entries := f.entries(given.get(f.option)):
+                words += [f"{f.option}={e}" for e in entries]
+                arguments.append(f"{f.argument}={f.literal(entries)}" if f.argument else f.literal(entries))
+        folder = ""
+        if self.under:
+            folder = f"{self.under}/{hashlib.sha256(repr(words).encode()).hexdigest()[:8]}"
+            words.append(f"--out={display_path(studio.bench.out / folder)}")
+        lines = f"import gyrobench as gb\n\nprint(gb.{self.command}({', '.join(arguments)}))"
+        return CommandRequest([*words, *self.fixed], lines, folder)
+
+
+SET = FormField("--set", "values", "Other values", "dict", "platform.J=0.7")
+TUNE = CommandForm(
+    "Tune", "tune",
+    "The controller of a stabilizer loop for wanted margins, in the worst case over a spread of the parts, proven in "
+    "co-simulation; or why it cannot be had.",
+    (
+        FormField("--want", "", "Wanted", "list", "phase margin=40deg\nbandwidth>10Hz\ndisk margin=0.5"),
+        FormField("--over", "over", "Spread of the parts", "list", "platform.J=±30%"),
+        FormField("--structure", "structure", "Structure of the controller", "choice", choices=STRUCTURES),
+        SET,
+    ), under="tuning",
+)  # fmt: skip
+DESIGN = CommandForm(
+    "Design", "design",
+    "The shortest plan of a test for wanted standard uncertainties, judged by runs; what no plan of it can show.",
+    (
+        FormField("--want", "", "Standard uncertainties wanted", "dict", "D_I=0.001deg/h/g\nD_F=0.002deg/h"),
+        FormField("--time", "time", "Or the best in this time", "text", "4h"),
+        FormField("--count", "count", "Runs that count the prediction", "number", "0"),
+        SET,
+    ),
+)  # fmt: skip
+SWEEP = CommandForm(
+    "Campaign", "sweep",
+    "Many runs of a system, a row each, on all cores: over values, parts, seeds; its site shows them. The same command "
+    "goes on where it was stopped.",
+    (
+        FormField("--over", "", "Varied, all combinations", "dict",
+              "latitude=0deg..80deg:9\ngyro.D_I=0.1,0.3 deg/h/g\ngyro.D_F=uniform(-1, 1) deg/h"),
+        FormField("--seeds", "seeds", "Seeds at each point", "number", "1"),
+        FormField("--runs", "runs", "Points that are drawn from distributions", "number", ""),
+        FormField("--spec", "spec", "Acceptance specification", "choice"),
+        replace(SET, argument="set"),
+    ), fixed=("--site",), under="campaigns",
+)  # fmt: skip
+
+
+def systems_of(studio: Studio, form: CommandForm) -> dict[str, str]:
+    """Return name -> title of the systems that a form is for."""
+    able = set(tunable()) if form is TUNE else None
+    found = {}
+    for name in studio.bench.systems():
+        try:
+            test = load_test(name)
+        except Exception:  # it says what is wrong with it in the gallery
+            continue
+        runs = not isinstance(test, System) or bool(test.slots)
+        designs = form is not DESIGN or not isinstance(test, System) or bool(test.protocol)
+        if runs and designs and (able is None or name in able):
+            found[name] = f"{test.title} ({name})"
+    return found
+
+
+def _field(f: FormField, studio: Studio) -> Any:
+    if f.kind == "choice":
+        choices = f.choices or ("", *studio.bench.specifications())
+        return ui.select(list(choices), value=choices[0], label=f.label).props("dense outlined").classes("full")
+    if f.kind == "number":
+        return ui.number(f.label, min=0, precision=0, placeholder=f.example).props("dense outlined").classes("full")
+    if f.kind == "text":
+        return ui.input(f.label, placeholder=f.example).props("dense outlined").classes("full")
+    made = (
+        ui.textarea(f"{f.label}, one a line", placeholder=f.example)
+        .props("dense outlined autogrow stack-label")
+        .classes("full")
+    )
+    return made.props("debounce=250")
+
+
+def _add_form(studio: Studio, form: CommandForm) -> None:
+    @ui.page(f"/{form.name.lower()}", response_timeout=60)
+    async def form_page(system: str = "") -> None:
+        systems = await asyncio.to_thread(systems_of, studio, form)
+        with frame(studio, form.name):
+            ui.html(f"<h1>{escape(form.name)}</h1>", sanitize=False)
+            ui.label(form.text)
+            with ui.element("div").classes("two"):
+                with ui.element("div").classes("form"):
+                    first = system if system in systems else next(iter(systems), None)
+                    chosen = ui.select(systems, value=first, label="System", with_input=True)
+                    chosen.props("dense outlined").classes("full")
+                    fields = {f.option: _field(f, studio) for f in form.fields}
+                with ui.element("div").classes("aside"):
+                    lines = CopyLines()
+                    go = ui.button("Start", icon="play_arrow").mark("start")
+                    go.set_visibility(not studio.read_only)
+
+            def asked() -> CommandRequest:
+                if not chosen.value:
+                    raise UsageError("choose a system")
+                return form.request(studio, chosen.value, {o: f.value for o, f in fields.items()})
+
+            def show() -> None:
+                if chosen.value:
+                    lines.show(asked().command(), asked().python())
+
+            go.on_click(told(lambda: ui.navigate.to(f"/job/{studio.jobs.submit(asked())}")))
+            for f in (chosen, *fields.values()):
+                f.on_value_change(show)
+            show()
+
+
+# ---------------------------------------------------------------------------------------------- laboratory
+def _profile_fields(there: Laboratory | None) -> dict[str, Any]:
+    """Add the fields of a profile; return them by the name of the key."""
+    shown = [
+        ("name", "Name", there.name if there else ""),
+        ("address", "Address, one line each", "\n".join(there.address) if there else ""),
+        ("accreditation", "Accreditation number", there.accreditation if there else ""),
+        ("statements", "Statements of the certificate, one a line", "\n".join(there.statements) if there else ""),
+        ("coefficients", "Coefficients shown, one a line; none: all", "\n".join(there.coefficients) if there else ""),
+        ("signatories", "Signatories, ROLE: NAME, one a line",
+         "\n".join(f"{s.role}: {s.name}" for s in there.signatories) if there else ""),
+    ]  # fmt: skip
+    made = {}
+    for key, label, value in shown:
+        field = ui.input(label, value=value) if key in ("name", "accreditation") else ui.textarea(label, value=value)
+        made[key] = field.props("dense outlined autogrow stack-label").classes("full")
+    return made
+
+
+def _profile(fields: dict[str, Any], there: Laboratory | None) -> Laboratory:
+    """Return the profile that the fields make, with what else the one before says.  Raises UsageError."""
+    lines = {k: [s.strip() for s in (f.value or "").splitlines() if s.strip()] for k, f in fields.items()}
+    content: dict[str, Any] = there.model_dump() if there else {}
+    content |= {k: lines[k] for k in ("address", "statements", "coefficients")}
+    content |= {k: (fields[k].value or "").strip() for k in ("name", "accreditation")}
+    if lines["signatories"]:
+        pairs = (line.partition(":") for line in lines["signatories"])
+        content["signatories"] = [{"role": role.strip(), "name": name.strip()} for role, _, name in pairs]
+    for key in ("name", "address"):
+        if not content[key]:
+            raise UsageError(f"{key}: a certificate needs it")
+    return Laboratory.model_validate(content)
+
+
+def certificate_request(studio: Studio, runs: list[str], number: str) -> CommandRequest:
+    """Return the command that certifies runs, given by their places below reports/out."""
+    if not runs:
+        raise UsageError("choose the run of the instrument, or the runs of a lot")
+    folder = f"certificates/{hashlib.sha256(repr((runs, number)).encode()).hexdigest()[:8]}"
+    folders = [display_path(studio.run_folder(r)) for r in runs]
+    numbered = [f"--number={number.strip()}"] if number.strip() else []
+    return CommandRequest(
+        ["certificate", *folders, *numbered, f"--out={display_path(studio.bench.out / folder)}"], folder=folder
+    )
+
+
+def _add_laboratory_page(studio: Studio) -> None:
+    @ui.page("/laboratory", response_timeout=60)
+    async def laboratory_page() -> None:
+        file = studio.bench.home / FILE
+        entries = await asyncio.to_thread(list_runs, studio.bench.out)
+        with frame(studio, "Laboratory"):
+            ui.html("<h1>Laboratory</h1>", sanitize=False)
+            there = None
+            try:
+                there = read_laboratory(file) if file.is_file() else None
+            except UsageError as error:
+                show_problem(error)
+            with ui.element("div").classes("two"):
+                with ui.element("div").classes("form"):
+                    ui.html("<h2>Profile</h2>", sanitize=False)
+                    ui.label("Certificates say this of the laboratory; it is kept in laboratory.toml.").classes("soft")
+                    fields = _profile_fields(there)
+                    save = ui.button("Save", icon="save").mark("save")
+                with ui.element("div").classes("form"):
+                    ui.html("<h2>Certificate</h2>", sanitize=False)
+                    names = {
+                        r.place: f"{r.title or r.system}, {r.instrument or r.place}"
+                        for r in entries[:LISTED]
+                        if r.report
+                    }
+                    runs = ui.select(names, multiple=True, label="Run of an instrument, runs of a lot", with_input=True)
+                    runs.props("dense outlined use-chips").classes("full")
+                    number = ui.input("Number of the certificate").props("dense outlined").classes("full")
+                    make = ui.button("Make the certificate", icon="workspace_premium").mark("certify")
+                    lines = CopyLines()
+            for button in (save, make):
+                button.set_visibility(not studio.read_only)
+
+            def show() -> None:
+                if runs.value:
+                    lines.show(certificate_request(studio, runs.value, number.value or "").command(), "")
+
+            def keep() -> None:
+                write_laboratory(_profile(fields, there), file)
+                ui.notify(f"Saved: {display_path(file)}")
+
+            def certify() -> None:
+                asked = certificate_request(studio, runs.value or [], number.value or "")
+                ui.navigate.to(f"/job/{studio.jobs.submit(asked)}")
+
+            save.on_click(told(keep))
+            make.on_click(told(certify))
+            runs.on_value_change(show)
+            number.on_value_change(show)
+
+
+# ---------------------------------------------------------------------------------------------- results
+def pages_of(folder: Path) -> list[str]:
+    """Return the pages that a command wrote into its folder, as they are named there."""
+    certificates = [f.name for f in sorted(folder.glob("certificate-*")) if f.suffix in (".html", ".pdf")]
+    return [*(name for name in PAGES if (folder / name).is_file()), *certificates]
+
+
+def served(out: Path, file: Path) -> bool:
+    """Return whether a file below the folder of results is a page of a command, or belongs to a campaign's site."""
+    parts = file.relative_to(out.resolve()).parts
+    named = file.name in ("tuning.html", "tuning.pdf") or file.match("certificates/*/certificate-*.*")
+    return named or (parts[0] == "campaigns" and len(parts) > 3 and parts[2] == "site")
+
+
+def add_command_pages(studio: Studio) -> None:
+    """Register the pages."""
+    for form in (TUNE, DESIGN, SWEEP):
+        _add_form(studio, form)
+    _add_laboratory_page(studio)
+
+    @ui.page("/pages/{place:path}", response_timeout=60)
+    def result_page(place: str) -> None:
+        with frame(studio, "Result"):
+            folder = studio.run_folder(place)
+            ui.html(f"<h1>{escape(place)}</h1>", sanitize=False)
+            found = pages_of(folder)
+            with ui.element("div").classes("bar"):
+                for name in found:
+                    ui.link(name, f"/files/{quote(place)}/{quote(name)}", new_tab=True)
+            for name in [n for n in found if n.endswith(".html") and "/" not in n][:1]:
+                report_frame(folder, place, name)

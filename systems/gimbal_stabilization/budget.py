@@ -1,0 +1,243 @@
+"""Jitter of the line of sight by source, from the linear model of the run and what was recorded in the ride.
+
+Every way to the line of sight is a response of the closed linear model: of the base's angle, of a torque at a motor, of
+a test signal where a loop is opened.
+
+    vibration of the base     T_base / s       on the rates of the base that were recorded
+    acceleration              T_torque u x     on its acceleration; unbalance u, at the mean joint angles
+    dry friction, cogging     T_torque         on the torques that the recorded joint angles make
+    noise of the gyro         T_test F / cos   F its filter; 1/cos of the outer axis alone; by its density
+
+The linear model takes a contact for a spring and cogging for its slope.  Where the joints move by more than
+presliding, these stiffnesses K are taken out, T (1 - K Theta)^-1 with the joints' response Theta, and the torques
+come from the joint angles; where they do not, friction is part of the way of the base.  What a ride moves at once is
+not independent: sources add segment by segment with their phases, and each has its share of the sum; a negative share
+cancels part of the others.  The noise of the gyro adds by squares.
+
+Not modelled: limits; a roll of the base times a joint angle (second order).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.loops.jitter import Complex, Spectra, segments, spectra
+from gyrobench.reduction.loops.loop_measures import Gate
+from gyrobench.reduction.loops.loop_result import LoopFindings
+from gyrobench.reduction.loops.margins import excitation_response
+
+PAIR = (0, 1)  # pitch, yaw
+EXCITED = (1, 3)  # their elements of the exciter
+LOS = ("platform.los[1]", "platform.los[2]")
+THETA = ("platform.theta[1]", "platform.theta[2]")
+TORQUES = ("cogging", "cogging_order", "friction", "stiction")
+GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
+
+
+@dataclass(frozen=True)
+class Ride:
+    """What was recorded in the ride: spectra of the line of sight, transforms of what moves it, whether joints slide.
+
+    base, force: (axis x, y, z) of (segments, frequencies), rates and accelerations; torques: source -> of pitch, yaw.
+    """
+
+    los: tuple[Spectra, Spectra]
+    base: list[Complex]
+    force: list[Complex]
+    torques: Mapping[str, list[Complex]]
+    slides: bool
+    angles: tuple[float, float]  # mean joint angles, rad
+
+
+def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float) -> Ride | None:
+    """Return what the ride shows; None where it is too short for its lowest frequency, Hz."""
+    dt = float(gate.t[1] - gate.t[0])
+    los = [spectra(dt, gate[name], lowest) for name in LOS]
+    if los[0] is None or los[1] is None:
+        return None
+
+    def cut(y: Array) -> Complex:
+        found = segments(dt, y, lowest)
+        assert found is not None
+        return found
+
+    theta = [gate[name] for name in THETA]
+    slides = any(float(np.ptp(x)) > 2.0 * float(p["platform.presliding"]) for x in theta)
+    none: Array = np.zeros(gate.t.size)
+    made: dict[str, list[Array]] = {}
+    for k in PAIR:
+        of = {n: float(np.asarray(p[f"platform.{n}"], float)[k]) for n in TORQUES}
+        if max(of["friction"], of["stiction"]) and slides:
+            made.setdefault("dry friction", [none, none])[k] = contact(theta[k], of, float(p["platform.presliding"]))
+        if of["cogging"]:
+            wave = -of["cogging"] * np.sin(of["cogging_order"] * theta[k])
+            made.setdefault("cogging", [none, none])[k] = wave
+    return Ride(
+        (los[0], los[1]),
+        [cut(gate[f"vibration.omega[{k}]"]) for k in (1, 2, 3)],
+        [cut(gate[f"vibration.f[{k}]"]) for k in (1, 2, 3)],
+        {name: [cut(m) for m in pair] for name, pair in made.items()},
+        slides,
+        (float(theta[0].mean()), float(theta[1].mean())),
+    )
+
+
+def contact(theta: Array, of: Mapping[str, float], presliding: float) -> Array:
+    """Return the torque of a contact that sticks up to its stiction and slips with its friction, without damping."""
+    most = max(of["friction"], of["stiction"])
+    reach = presliding * of["friction"] / most
+    spring, anchor, sense = most / presliding, float(theta[0]), 0.0
+    found = np.zeros(theta.size)
+    for k, x in enumerate(theta.tolist()):
+        if sense == 0.0 and abs(x - anchor) > presliding:
+            sense = math.copysign(1.0, x - anchor)
+        if sense:
+            if (x - anchor) * sense >= reach:
+                anchor = x - sense * reach
+            else:
+                sense = 0.0
+        found[k] = -spring * (x - anchor)
+    return found
+
+
+class Ways:
+    """Responses of the line of sight (rows pitch, yaw) in the closed linear model.
+
+    Raises LookupError where the model lacks one.
+    """
+
+    def __init__(self, found: LoopFindings, f: Array, slides: bool) -> None:
+        model = found.linear.closed.discrete
+        if model is None:
+            raise LookupError("no linear model")
+        p = found.record.run.parameters
+
+        def to(names: tuple[str, ...], kind: str, axes: tuple[int, ...]) -> Complex:
+            rows = [[excitation_response(model, kind, k, name, f) for k in axes] for name in names]
+            return np.asarray(np.moveaxis(np.array(rows), 2, 0))
+
+        self.f = f
+        self.torque = to(LOS, "torque", EXCITED)
+        self.test = to(LOS, "test", EXCITED)
+        self.base = to(LOS, "motion", (1, 2, 3))
+        stiff = stiffness(p, f, slides)
+        if not np.any(stiff):
+            return
+        joints = to(THETA, "torque", EXCITED)
+        back = self.torque @ stiff @ np.linalg.inv(np.eye(2) - joints @ stiff)
+        self.test = self.test + back @ to(THETA, "test", EXCITED)
+        self.base = self.base + back @ to(THETA, "motion", (1, 2, 3))
+        self.torque = self.torque + back @ joints
+
+
+def stiffness(p: Mapping[str, Any], f: Array, slides: bool) -> Complex:
+    """Return (frequency, 2, 2): what the linear model has of cogging and, where they slide, of the contacts."""
+    q = {n: np.asarray(p[f"platform.{n}"], float) for n in (*GEOMETRY, "bending", "theta_0")}
+    least = np.where(q["bending"] > 0.0, q["J_motor"], bodies(p) + q["J_motor"])
+    found = np.zeros((f.size, 2, 2), complex)
+    spring = np.maximum(q["friction"], q["stiction"]) / float(p["platform.presliding"])
+    for k in PAIR:
+        still = q["cogging"][k] * q["cogging_order"][k] * math.cos(q["cogging_order"][k] * q["theta_0"][k])
+        slips = spring[k] + 2j * np.pi * f * math.sqrt(spring[k] * least[k]) if slides else 0.0
+        found[:, k, k] = still + slips
+    return found
+
+
+def bodies(p: Mapping[str, Any]) -> Array:
+    """Return what the gimbals have about pitch and yaw at joint angles 0, without the motors: kg.m2."""
+    inner, outer = (np.asarray(p[f"platform.{n}"], float).diagonal()[[0, 2]] for n in ("I_inner", "I_outer"))
+    return np.asarray(inner + np.where(np.arange(2) == int(p["platform.form"]), 0.0, outer))
+
+
+def at_the_body(p: Mapping[str, Any], f: Array) -> Complex:
+    """Return (frequency, joint): response to a torque on the gimbal over that to one at its motor.
+
+    1 + J s2/(c s + k) of the motor behind the spring, whatever the loop: both act before the same plant and sensor.
+    """
+    s = 2j * np.pi * f[:, None]
+    w = 2.0 * np.pi * np.asarray(p["platform.bending"], float)
+    motor, zeta = (np.asarray(p[f"platform.{n}"], float) for n in ("J_motor", "bending_damping"))
+    springs = np.where(w > 0.0, w * w + 2.0 * zeta * w * s, np.inf)
+    return np.asarray(1.0 + s * s * (1.0 + motor / bodies(p)) / springs)
+
+
+def by_unbalance(p: Mapping[str, Any], angles: tuple[float, float]) -> Array:
+    """Return the torques about pitch and yaw (rows) for an acceleration along x, y, z of the base: kg.m."""
+    u = np.asarray(p["platform.unbalance"], float)
+    turns = [
+        Rotation.from_euler("x", angles[0]).inv().as_matrix(),
+        Rotation.from_euler("z", angles[1]).inv().as_matrix(),
+    ]
+    inner = int(p["platform.form"])
+    first, second = turns[1 - inner], turns[inner]
+    axes = np.eye(3)[[0, 2]]
+    found = np.zeros((2, 3))
+    for j, a in enumerate(np.eye(3)):
+        of_inner = np.cross(u[1], second @ first @ a)
+        found[inner, j] = -axes[inner] @ of_inner
+        found[1 - inner, j] = -axes[1 - inner] @ (np.cross(u[0], first @ a) + second.T @ of_inner)
+    return found
+
+
+@dataclass(frozen=True)
+class JitterSource:
+    """Of a source, for pitch and yaw: the density alone, and its part of the whole, rad2/Hz; (2, frequencies)."""
+
+    alone: Array
+    part: Array
+
+
+def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[str, JitterSource]:
+    """Return the sources of the line of sight at the frequencies of its spectra that are used.
+
+    Raises LookupError without a linear model of the parts that is needed.
+    """
+    p = found.record.run.parameters
+    f = ride.los[0].f[use]
+    ways = Ways(found, f, ride.slides)
+    moved: dict[str, Complex] = {}  # source -> (line of sight, segments, frequencies)
+
+    def add(name: str, way: Complex, signal: Complex) -> None:
+        """way: (frequency, line of sight)."""
+        moved[name] = moved.get(name, np.zeros((), complex)) + way.T[:, None, :] * signal[None, :, use]
+
+    for k, axis in enumerate("xyz"):
+        add(f"vibration about {axis}", ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
+    lever = by_unbalance(p, ride.angles)
+    for k in range(3) if np.any(lever) else ():
+        add("acceleration by unbalance", (ways.torque * at_the_body(p, f)[:, None, :]) @ lever[:, k], ride.force[k])
+    for name, pair in ride.torques.items():
+        for k in PAIR:
+            add(name, ways.torque[:, :, k], pair[k])
+    whole = sum(moved.values(), np.zeros((), complex))
+    sources = {
+        name: JitterSource(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))
+        for name, y in moved.items()
+        if np.any(y)
+    }
+    white = float(p.get("gyro.white") or 0.0)
+    if white and "gyro.bandwidth" in p:
+        density = _gyro(p, ride, ways, 2.0 * white**2)
+        sources["noise of the gyro"] = JitterSource(density, density)
+    return sources
+
+
+def _gyro(p: Mapping[str, Any], ride: Ride, ways: Ways, density: float) -> Array:
+    """Return the density of the line of sight by white noise of both axes of the gyro: (2, frequencies)."""
+    ratio = 1j * ways.f / float(p["gyro.bandwidth"])
+    low_pass = 1.0 / (1.0 + math.sqrt(2.0) * ratio + ratio**2)
+    inner = int(p["platform.form"])
+    total: Array = np.zeros((2, ways.f.size))
+    for k in PAIR:
+        secant = 1.0 / math.cos(ride.angles[inner]) if k != inner else 1.0
+        gain = float(p.get("decoupler.K", 1.0)) * secant
+        total = total + density * np.abs(gain * low_pass[:, None] * ways.test[:, :, k]).T ** 2
+    return total

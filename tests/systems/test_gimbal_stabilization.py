@@ -1,0 +1,142 @@
+"""The stabilized line of sight: jitter against its linear budget, margins, both forms, friction, keyhole, refusals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gyrobench.engine.session import Session
+from gyrobench.record.record import Record
+from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.system import load_system
+
+RIDE = {"sweeps": False, "base": 0.0, "load_step": 0.0}
+
+
+def ridden(parameters: dict[str, Any] | None = None, **options: Any) -> tuple[Any, Record]:
+    """Return result and record of a ride alone, or of what the options ask for."""
+    system: Any = load_system("gimbal_stabilization")
+    for name, value in (RIDE | options).items():
+        system.set(name, value)
+    with Session(system) as session:
+        record = session.run(parameters or {}, seed=3)
+    return system.reduce(record), record
+
+
+def rows(result: Any) -> dict[str, list[Any]]:
+    """Return the budget: source -> pitch, yaw (µrad), share (%)."""
+    return {row[0]: list(row[1:]) for t in result.tables if t.id == "budget.sources" for row in t.rows}
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Any:
+    return ridden(ride=60.0)[0]
+
+
+def test_jitter_is_that_of_the_linear_model(quiet: Any) -> None:
+    """Without dry friction the budget is in the interval of the co-simulation, widened by 5 % for what is of second
+    order (a roll of the base times a joint angle); the gyro rules.
+    """
+    for name in ("jitter pitch", "jitter yaw", "jitter"):
+        c = quiet[name]
+        assert abs(c.estimate - c.closed) < c.k * c.u + 0.05 * c.closed
+    found = rows(quiet)
+    assert 80.0 < found["noise of the gyro"][2] < 95.0
+    assert sum(r[2] for n, r in found.items() if r[2] is not None) == pytest.approx(100.0)
+    assert quiet.reasons == [r for r in quiet.reasons if r.id != "budget.not_linear"]
+
+
+def test_noise_of_the_gyro_by_hand() -> None:
+    """No vibration: with |T| about 1 below the crossover, rms of n/(2 pi f) from 1 Hz on, peaked by the loop.
+
+    0.005 deg/s/sqrt(Hz) over w from 1 to 3 Hz: 8.727e-5 / (2 pi) sqrt(1 - 1/3) = 11.34 µrad, times T between 1 and
+    1.25 there.
+    """
+    result, _ = ridden(psd="none")
+    table = next(t for t in result.tables if t.id == "jitter.bands")
+    low = math.radians(0.005) / (2 * math.pi) * math.sqrt(1 - 1 / 3) * 1e6
+    assert low < table.rows[0][3] < 1.25 * low
+    assert list(rows(result)) == ["noise of the gyro", "together", "co-simulated"]
+    assert result["jitter"].estimate == pytest.approx(result["jitter"].closed, rel=0.08)
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [{"stiction": 0.05}, {"stiction": 0.02, "pitch": 0.6}, {"stiction": 0.02, "form": "pitch-yaw", "yaw": -0.5}],
+)
+def test_slipping_joints_have_a_budget(friction: dict[str, Any]) -> None:
+    """Dry friction rules the jitter; the torque that the joint angles make explains it within 6 %."""
+    result, _ = ridden(**friction)
+    assert result["jitter"].estimate == pytest.approx(result["jitter"].closed, rel=0.06)
+    assert rows(result)["dry friction"][2] > 30.0
+
+
+def test_cogging_and_cables_have_a_budget() -> None:
+    given = {f"platform.cogging[{k}]": 0.02 for k in (1, 2)} | {f"platform.cable[{k}]": 0.3 for k in (1, 2)}
+    result, _ = ridden(given, gyro_noise=0.0)
+    assert result["jitter"].estimate == pytest.approx(result["jitter"].closed, rel=0.06)
+    found = rows(result)
+    assert found["cogging"][2] > 30.0
+
+
+def test_unbalance_and_acceleration_have_a_budget() -> None:
+    """The truck's acceleration on 2e-3 kg.m of the inner gimbal along z."""
+    result, _ = ridden({"platform.unbalance[2,3]": 2e-3}, psd="truck", gyro_noise=0.0, jitter_from=10.0, ride=30.0)
+    assert result["jitter"].estimate == pytest.approx(result["jitter"].closed, rel=0.1)
+    assert rows(result)["acceleration by unbalance"][2] == pytest.approx(100.0)
+
+
+def test_both_forms_are_one_gimbal() -> None:
+    """Pitch-yaw with the inertias in its own axes, turned by 0.4: the jitters change places (other phases: 15 %)."""
+    turned = {
+        "platform.I_inner[1,1]": 0.045, "platform.I_inner[3,3]": 0.045,
+        "vibration.rate_psd[1,1]": 0.0, "vibration.rate_psd[3,1]": 0.0,
+    }  # fmt: skip
+    first, _ = ridden(turned, psd="none", gyro_noise=0.0, form="yaw-pitch", pitch=0.4, load_step=0.05)
+    second, _ = ridden(turned, psd="none", gyro_noise=0.0, form="pitch-yaw", yaw=0.4, load_step=0.05)
+    assert first["peak pitch"].estimate == pytest.approx(second["peak yaw"].estimate, rel=1e-6)
+    assert first["peak yaw"].estimate == pytest.approx(second["peak pitch"].estimate, rel=1e-6)
+
+
+def test_margins_are_those_of_the_linear_model() -> None:
+    """At 50 degrees of pitch the secant keeps the crossover of the outer loop where it was asked for."""
+    result, _ = ridden(sweeps=True, psd="none", pitch=math.radians(50.0), gyro_noise=1e-6, ride=36.0)
+    for axis in ("pitch", "yaw"):
+        assert result[f"f_c {axis}"].estimate == pytest.approx(12.0, rel=0.01)
+        assert result[f"PM {axis}"].estimate == pytest.approx(result[f"PM {axis}"].closed, abs=0.3)
+
+
+def test_the_keyhole_is_said() -> None:
+    result, _ = ridden(pitch=math.radians(80.0), psd="none", ride=36.0)
+    text = " ".join(result.warnings)
+    assert "in the keyhole" in text and "secant of the outer axis" in text
+    system: Any = load_system("gimbal_stabilization")
+    system.set("pitch", math.radians(80.0))
+    assert "keyhole" in system.warnings()[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"form": "roll-yaw"}, "must be one of yaw-pitch, pitch-yaw"),
+        ({"crossover": 45.0}, "above the mode at 42 Hz"),
+        ({"ride": 30.0}, "takes 36 s or more"),
+        ({"psd": "tank"}, "psd = tank: none of vehicle"),
+    ],
+)
+def test_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidConfigurationError, match=message):
+        ridden(**options)
+
+
+def test_a_file_with_spectra(tmp_path: Path) -> None:
+    """Rates about x alone, 0.01 (deg/s)2/Hz from 2 to 8 Hz: no vibration about z in the budget."""
+    file = tmp_path / "mast.csv"
+    file.write_text("frequency [Hz],rate_x [deg2/s2/Hz]\n2,0.01\n8,0.01\n")
+    result, record = ridden(psd=str(file), gyro_noise=0.0, ride=36.0)
+    assert next(iter(rows(result))) == "vibration about x" and "vibration about z" not in rows(result)
+    omega = record.channels["vibration.omega[1]"][-30000:]
+    assert float((omega**2).mean()) == pytest.approx(math.radians(1.0) ** 2 * 0.06, rel=0.05)
