@@ -56,7 +56,7 @@ def first_steps(name: str, patch: pytest.MonkeyPatch) -> System:
     return system
 
 
-def recorded(system: System, engine: str = "linked", target: str = "native") -> dict[str, Any]:
+def recorded(system: System, engine: str = "native", target: str = "native") -> dict[str, Any]:
     """Return the channels of a run of this bench."""
     with Session(system, engine=engine, target=target, bench=standard_folder()) as session:
         channels = session.run(seed=SEED).channels
