@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
-from gyrobench.packaging import elementary
+from gyrobench.packaging import elementary_tables
 from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
 from gyrobench.packaging.source import PartCode, member
@@ -161,7 +161,7 @@ def header_folder() -> Path:
 def runtime_files() -> dict[str, str]:
     """Return what model.c includes, by name."""
     files = {n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "functions.h", "noise.h", "elementary.h")}
-    return files | {"elementary_tables.h": elementary.tables()}
+    return files | {"elementary_tables.h": elementary_tables.tables()}
 
 
 def face_files(extents: Iterable[int], fmi: int) -> dict[str, str]:
