@@ -1,8 +1,8 @@
 """Constants and tables of the elementary functions, made from whole numbers alone: nobody's library decides a digit.
 
 A real number x is held as a whole number near x 2^BITS, with an error of some units of 2^-BITS.  The series are the
-definitions: Machin's formula for pi, Taylor's series of sin, exp, arctan and artanh.  ``packaging/elementary_tables.py``
-writes the same numbers for C; ``tests/packaging/test_elementary.py`` compares them with mpmath.
+definitions: Machin's formula for pi, Taylor's series of sin, exp, arctan and artanh.  C has the same numbers, by
+``packaging/elementary_tables.py``; ``tests/packaging/test_elementary.py`` compares them with mpmath.
 """
 
 from __future__ import annotations
