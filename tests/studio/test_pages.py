@@ -146,6 +146,8 @@ def test_a_part_shows_its_equations(page: Any, studio: tuple[str, Path]) -> None
     page.get_by_role("heading", name="Equations").wait_for()
     assert "i = K_p u" in page.locator("pre").first.text_content()
     assert page.get_by_role("cell", name="torquer current").count() >= 1, "the table of ports"
+    page.goto(base_of(studio) + "/part/floated_gyro")
+    page.get_by_text("omega_IA - omega_d", exact=False).first.wait_for()  # low lines are no emphasis
     page.goto(base_of(studio) + "/part/cag")
     page.get_by_role("alert").get_by_text("cage").wait_for()
 
