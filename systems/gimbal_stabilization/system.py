@@ -25,6 +25,7 @@ ON_INNER = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # gyro axes x, y along x (pitch) 
 INTEGRAL = 8.0  # crossover over the corner of the integral
 NOTCH = (0.1, 0.7)  # damping of its zeros and of its poles
 TONES = (0.3, 0.6, 0.85, 1.0, 1.2, 1.6, 2.2, 2.6, 3.0, 3.6)  # of the crossover
+NEVER = 100  # number of a phase that no plan has
 TEST = 0.3  # V (rad/s), of the test sines
 
 
@@ -146,7 +147,7 @@ class GimbalStabilization(LoopTest):
             "gyro.mount": ON_INNER,
             "gyro.white?": self["gyro_noise"] / math.sqrt(2.0),
             **(spectrum.parameters() if spectrum else {"vibration.points?": 0}),
-            "vibration.first?": len(self.plan().phases),
+            "vibration.first?": next((k for k, p in enumerate(self.plan().phases, 1) if p.label == "ride"), NEVER),
         }
         for k, axis in enumerate(AXES):
             found |= self.controller(axis, k, parts)
