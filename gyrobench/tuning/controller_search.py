@@ -18,8 +18,9 @@ from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.robustness import grid, measured
+from gyrobench.tuning.sight_jitter import SightModel, SightWays
 from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.wishes import Wish
+from gyrobench.tuning.wishes import JITTER, Wish
 
 LOOK = 512  # controllers of the coarse look
 STARTS = 4  # of the simplex
@@ -40,11 +41,13 @@ class TuningProblem:
     f: Array
     corners: int = 1  # plants at nominal values and at the corners, which come first
     evaluations: int = 0
+    sights: list[SightModel] = field(default_factory=list)  # of the plants, for a jitter that is wanted
     _responses: list[Complex] = field(default_factory=list)
+    _ways: list[SightWays] = field(default_factory=list)
 
     def of(self, count: int) -> TuningProblem:
         """Return the problem with the first plants alone."""
-        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[])
+        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[], _ways=[])
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -68,14 +71,27 @@ class TuningProblem:
         growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
         if np.any(growth >= ROUNDING):
             return np.full(shape, UNSTABLE - 1e3 * float(np.maximum(growth, 0.0).sum()))
-        loops = np.array(self._responses) * held.response(np.exp(2j * np.pi * self.f * step))
-        got = measured(self.wishes, self.f, loops)
+        while len(self._ways) < min(len(self.sights), len(self.plants)):
+            self._ways.append(self.sights[len(self._ways)].at(self.f))
+        response = held.response(np.exp(2j * np.pi * self.f * step))
+        loops = np.array(self._responses) * response
+        got = with_jitter(self.wishes, measured(self.wishes, self.f, loops), self._ways, response, loops)
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
         return np.asarray(np.clip(ratio, -9.0, CAP))
 
     def worst(self, x: Array) -> float:
         return float(self.ratios(x).min())
+
+
+def with_jitter(
+    wishes: Sequence[Wish], got: Array, ways: Sequence[SightWays], response: Complex, loops: Complex
+) -> Array:
+    """Return the measures (plants, wishes) with the jitter in its place.  response, loops: G, L over frequency."""
+    for i, wish in enumerate(wishes):
+        if wish.name == JITTER:
+            got[:, i] = [way.rms(response, L) for way, L in zip(ways, loops, strict=True)]
+    return got
 
 
 def search(problem: TuningProblem) -> Array:

@@ -6,6 +6,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +19,20 @@ from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
+from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
-from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.plant import HeldController, Plant, plants
-from gyrobench.tuning.proof import Proof, proof_of
+from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
+from gyrobench.tuning.sight_jitter import SightModel, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.tuned_loop import WishResult
-from gyrobench.tuning.wishes import Wish, parse_wishes
+from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
 from gyrobench.tuning.written_loop import TunedLoop
 
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
@@ -74,7 +77,9 @@ def tune(
             if w.f >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
                                  f"{HIGHEST / now.step:g} Hz")  # fmt: skip
-        models = _Loop(session, now, nominal, ranges, ports)
+        sources = _line_of_sight(now, nominal, wishes)
+        wishes = [replace(w, f=sources.lowest) if w.name == JITTER and sources else w for w in wishes]
+        models = _Loop(session, now, nominal, ranges, ports, sources)
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
@@ -89,7 +94,9 @@ def tune(
             f"{system.name}: no {structure} was found that holds the loop stable over the whole spread; take another "
             "structure, or a smaller spread"
         )
-    results = _results(wishes, f, loops, problem.plants)
+    ways = [s.at(f) for s in problem.sights]
+    got = with_jitter(wishes, measured(wishes, f, loops), ways, responses, loops)
+    results = _results(wishes, got, problem.plants)
     part, settings = _settings(shape, controller, nominal, system, ports.slot)
     settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
@@ -101,8 +108,10 @@ def tune(
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
+            jitter = ways[k].rms(responses, loops[k]) if ways else 0.0
+            sight = ExpectedJitter(sources.ride, sources.lowest, jitter) if sources else None
             try:
-                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports))
+                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
             except RunError as error:
                 proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
@@ -119,32 +128,40 @@ class _Loop:
     """The loop of a system at its nominal parameters, and elsewhere in the spread."""
 
     def __init__(
-        self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range], ports: LoopPorts
+        self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range], ports: LoopPorts,
+        sources: LineOfSight | None = None,
     ) -> None:  # fmt: skip
         self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
         self.system, self.nominal, self.ranges = system, nominal, ranges
-        self.step, self.ports = system.step, ports
+        self.step, self.ports, self.sources = system.step, ports, sources
+
+    def part_of(self, slot: str) -> type[Component]:
+        if slot not in self.names:
+            raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
+        return load_part(self.names[slot], self.bench)
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
-
-        def part_of(slot: str) -> type[Component]:
-            if slot not in self.names:
-                raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
-            return load_part(self.names[slot], self.bench)
-
         try:
-            return plants(self.assembly, self.nominal, part_of, step or self.step, at, self.ports)
+            return plants(self.assembly, self.nominal, self.part_of, step or self.step, at, self.ports)
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
 
+    def sights(self, at: Sequence[Mapping[str, float]]) -> list[SightModel]:
+        """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
+        if self.sources is None:
+            return []
+        return sight_models(self.assembly, self.nominal, self.part_of, self.step, at, self.ports, self.sources)
+
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
-        models = self.plants(points(self.ranges))
+        at = points(self.ranges)
+        models = self.plants(at)
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
-            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges)
-        )
+            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges),
+            sights=self.sights(at),
+        )  # fmt: skip
 
 
 @contextlib.contextmanager
@@ -173,6 +190,17 @@ def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:
     if ports.slot in parts:
         raise UsageError(f"--part {ports.slot}={parts[ports.slot]}: tune chooses the stabilizer")
     return ports
+
+
+def _line_of_sight(system: System, nominal: Mapping[str, Any], wishes: Sequence[Wish]) -> LineOfSight | None:
+    """Return what makes the line of sight of a system jitter, where that is wanted.  Raises UsageError."""
+    if not any(w.name == JITTER for w in wishes):
+        return None
+    stated = getattr(system, "line_of_sight", None)
+    if stated is None:
+        raise UsageError(f"--want jitter: {system.name} does not state what moves a line of sight")
+    found: LineOfSight = stated(nominal)
+    return found
 
 
 def tunable() -> list[str]:
@@ -222,7 +250,8 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
             return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
-            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f)
+            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f,
+                                sights=loop.sights([at(share)]))  # fmt: skip
             return float(one.judged(controller).min())
 
         found = minimize(
@@ -232,12 +261,13 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
         if found.fun > ratios.min() - 2e-3:
             break
         problem.plants.append(loop.plants([at(found.x)])[0])
+        problem.sights.extend(loop.sights([at(found.x)]))
         x = polished(problem, x)
     return x
 
 
-def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]) -> list[WishResult]:
-    got = measured(wishes, f, loops)
+def _results(wishes: Sequence[Wish], got: Any, models: Sequence[Plant]) -> list[WishResult]:
+    """Return the wishes with nominal and worst values; got: (plants, wishes)."""
     found = []
     for k, wish in enumerate(wishes):
         worst = int(np.argmin([wish.ratio(g) for g in got[:, k]]))

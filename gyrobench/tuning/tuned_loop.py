@@ -16,7 +16,7 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.wishes import Wish
+from gyrobench.tuning.wishes import JITTER, Wish
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,8 @@ def margin_text(w: ProvenWish) -> str:
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""
     match w.wish.unit:
+        case "rad" if w.wish.name == JITTER:
+            return f" ± {1e6 * w.U:.2g} µrad"
         case "rad":
             return f" ± {math.degrees(w.U):.2g}°"
         case "":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import shortest
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import LoopTest
+from gyrobench.system.line_of_sight import Density, LineOfSight
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -134,6 +136,27 @@ class GimbalStabilization(LoopTest):
             return None
         return SPECTRA[name] if name in SPECTRA else read_spectrum(Path(name))
 
+    def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
+        """Return what makes the line of sight jitter, for a jitter that is wanted of a loop."""
+        spectrum, scale = self.spectrum(), float(parameters.get("vibration.scale", 1.0)) ** 2
+
+        def rate(axis: int) -> Density:
+            return lambda f: scale * spectrum.density("rate", axis, f) if spectrum else np.zeros(f.size)
+
+        white = 2.0 * float(parameters.get("gyro.white", 0.0)) ** 2
+        band, K = float(parameters.get("gyro.bandwidth", np.inf)), float(parameters.get("decoupler.K", 1.0))
+
+        def noise(axis: str) -> Density:
+            gain = K if axis == self.inner else K / math.cos(self[self.inner])
+            return lambda f: white * gain**2 / (1.0 + (f / band) ** 4)
+
+        return LineOfSight(self["jitter_from"], (rate(0), rate(1), rate(2)), {a: noise(a) for a in AXES})
+
+    @property
+    def inner(self) -> str:
+        """Return the name of the inner joint."""
+        return "pitch" if self["form"] == FORMS[0] else "yaw"
+
     def design(self, parts: PartValues) -> dict[str, Any]:
         form = FORMS.index(self["form"])
         spectrum = self.spectrum()
@@ -210,7 +233,7 @@ class GimbalStabilization(LoopTest):
         return problems
 
     def warnings(self) -> list[str]:
-        inner = self["pitch" if self["form"] == FORMS[0] else "yaw"]
+        inner = self[self.inner]
         if abs(inner) > 75 * DEG:
             return [
                 f"the inner joint begins at {math.degrees(inner):.3g}°, in the keyhole: the gain of the outer loop is "

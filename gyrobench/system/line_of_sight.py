@@ -1,0 +1,25 @@
+"""What makes a stabilized line of sight jitter, as a system states it for a jitter that is wanted of a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from gyrobench.arrays import Array
+
+#: one-sided power spectral density over frequencies in Hz
+Density = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class LineOfSight:
+    """Sources of the jitter of a line of sight, from ``lowest`` Hz on.
+
+    rates: densities of the angular rate of the base about x, y, z, rad2/s2/Hz.  noise: loop -> density of the sensor's
+    noise in the signal at which the loop is opened.  ride: label of the phase of the plan in which the base vibrates.
+    """
+
+    lowest: float
+    rates: tuple[Density, Density, Density]
+    noise: Mapping[str, Density]
+    ride: str = "ride"
