@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from gyrobench.arrays import Array
 
@@ -17,9 +18,13 @@ class LineOfSight:
 
     rates: densities of the angular rate of the base about x, y, z, rad2/s2/Hz.  noise: loop -> density of the sensor's
     noise in the signal at which the loop is opened.  ride: label of the phase of the plan in which the base vibrates.
+    free: parameters of parts without the dry friction that slips in the ride, for margins; slipping: with the viscous
+    friction that makes torques as large, for the jitter.  {}: as they are.
     """
 
     lowest: float
     rates: tuple[Density, Density, Density]
     noise: Mapping[str, Density]
     ride: str = "ride"
+    free: Mapping[str, Any] = field(default_factory=dict)
+    slipping: Mapping[str, Any] = field(default_factory=dict)

@@ -65,7 +65,7 @@ def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResul
         return []
     step = problem.plants[k].step
     response = HeldController(problem.controller(x), step).response(np.exp(2j * np.pi * problem.f * step))
-    sources = problem.sights[k].at(problem.f).sources(response, problem.plants[k].response(problem.f) * response)
+    sources = problem.sights[k].at(problem.f).sources(response)
     parts = sorted(((v, n) for n, v in sources.items() if v > 0.0), reverse=True)
     return [f"the jitter is of {', '.join(f'{n} {1e6 * v:.3g} µrad' for v, n in parts[:3])}"]
 

@@ -52,31 +52,33 @@ class SightModel:
         angles = [density(g) / (2.0 * np.pi * g) ** 2 for density in self.sources.rates]
         return SightWays(
             use, g, tuple((w, u, s) for (w, u), s in zip(moved, angles, strict=True)),
-            way("test", self.ports.axis, self.ports.angle), self.sources.noise[self.ports.loop](g),
+            way("test", self.ports.axis, self.ports.angle),
+            way("test", self.ports.axis, self.ports.inside), self.sources.noise[self.ports.loop](g),
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class SightWays:
-    """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of the angle), of y, density of n."""
+    """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of the angle), R and Q of y, density of n."""
 
     use: Array
     f: Array
     base: tuple[tuple[Complex, Complex, Array], ...]
     driven: Complex
+    back: Complex
     noise: Array
 
-    def sources(self, G: Complex, L: Complex) -> dict[str, float]:
-        """Return source -> rms of the line of sight, rad; G, L: controller and loop over all frequencies."""
-        answer = self.driven * G[self.use] / (1.0 + L[self.use])
+    def sources(self, G: Complex) -> dict[str, float]:
+        """Return source -> rms of the line of sight, rad; G: the controller over all frequencies."""
+        answer = self.driven * G[self.use] / (1.0 - G[self.use] * self.back)
         density = {f"vibration about {axis}": np.abs(w + answer * u) ** 2 * s
                    for axis, (w, u, s) in zip("xyz", self.base, strict=True)}  # fmt: skip
         density["noise of the sensor"] = np.abs(answer) ** 2 * self.noise
         return {name: math.sqrt(float(np.trapezoid(s, self.f))) for name, s in density.items()}
 
-    def rms(self, G: Complex, L: Complex) -> float:
+    def rms(self, G: Complex) -> float:
         """Return the jitter, rad rms."""
-        return math.sqrt(sum(x * x for x in self.sources(G, L).values()))
+        return math.sqrt(sum(x * x for x in self.sources(G).values()))
 
 
 def sight_models(

@@ -95,7 +95,7 @@ def tune(
             "structure, or a smaller spread"
         )
     ways = [s.at(f) for s in problem.sights]
-    got = with_jitter(wishes, measured(wishes, f, loops), ways, responses, loops)
+    got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
     results = _results(wishes, got, problem.plants)
     part, settings = _settings(shape, controller, nominal, system, ports.slot)
     settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
@@ -108,7 +108,7 @@ def tune(
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
-            jitter = ways[k].rms(responses, loops[k]) if ways else 0.0
+            jitter = ways[k].rms(responses) if ways else 0.0
             sight = ExpectedJitter(sources.ride, sources.lowest, jitter) if sources else None
             try:
                 proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
@@ -119,7 +119,7 @@ def tune(
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
-        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=tuple(_notes(proofs)),
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=(*_slips(sources), *_notes(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "",
     )  # fmt: skip
 
@@ -134,6 +134,7 @@ class _Loop:
         self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
         self.system, self.nominal, self.ranges = system, nominal, ranges
         self.step, self.ports, self.sources = system.step, ports, sources
+        self.free = {**nominal, **(sources.free if sources else {})}
 
     def part_of(self, slot: str) -> type[Component]:
         if slot not in self.names:
@@ -143,7 +144,7 @@ class _Loop:
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
         try:
-            return plants(self.assembly, self.nominal, self.part_of, step or self.step, at, self.ports)
+            return plants(self.assembly, self.free, self.part_of, step or self.step, at, self.ports)
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
 
@@ -151,7 +152,8 @@ class _Loop:
         """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
         if self.sources is None:
             return []
-        return sight_models(self.assembly, self.nominal, self.part_of, self.step, at, self.ports, self.sources)
+        slipping = {**self.nominal, **self.sources.slipping}
+        return sight_models(self.assembly, slipping, self.part_of, self.step, at, self.ports, self.sources)
 
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
         at = points(self.ranges)
@@ -201,6 +203,16 @@ def _line_of_sight(system: System, nominal: Mapping[str, Any], wishes: Sequence[
         raise UsageError(f"--want jitter: {system.name} does not state what moves a line of sight")
     found: LineOfSight = stated(nominal)
     return found
+
+
+def _slips(sources: LineOfSight | None) -> list[str]:
+    """Return how dry friction is in the search, where it slips in the ride."""
+    if sources is None or not sources.slipping:
+        return []
+    return [
+        "dry friction slips in the ride: margins are searched without it, the jitter with viscous friction that makes "
+        "torques as large there; its reversals are in the co-simulation alone"
+    ]
 
 
 def tunable() -> list[str]:
