@@ -59,7 +59,7 @@ class SightModel:
 
 @dataclass(frozen=True)
 class SightWays:
-    """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of the angle), R and Q of y, density of n."""
+    """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of its angle); R, Q; density of n."""
 
     use: Array
     f: Array
