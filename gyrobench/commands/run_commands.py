@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gyrobench.bench import UsageError, display_path
+from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.app import app, echo, exit_on_fail
 from gyrobench.commands.options import (
     Columns,
@@ -17,6 +17,7 @@ from gyrobench.commands.options import (
     Force,
     From,
     Json,
+    Language,
     Map,
     NoReport,
     Order,
@@ -69,6 +70,7 @@ def run(
     ] = None,
     force: Force = False,
     resume: Resume = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Run a system: record, reduction, report.
@@ -84,6 +86,7 @@ def run(
     from gyrobench.commands import print_runs
     from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time
     from gyrobench.report import FORMATS
+    from gyrobench.report.language import reports_in
     from gyrobench.workflow.instruments import with_instrument
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
@@ -107,7 +110,8 @@ def run(
         resume=resume,
         formats=("json",) if no_report else FORMATS,
     )
-    exit_on_fail(print_runs.run(request, test, as_json), strict)
+    with reports_in(language, test.name, Bench.find().folder):
+        exit_on_fail(print_runs.run(request, test, as_json), strict)
 
 
 @app.command()
@@ -136,6 +140,7 @@ def reduce(
     ] = None,
     out: Out = None,
     force: Force = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Reduce measured data, or a run of another tool, and report.
@@ -152,6 +157,7 @@ def reduce(
     from gyrobench.commands import print_runs
     from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.report import FORMATS
+    from gyrobench.report.language import reports_in
     from gyrobench.workflow.inputs import load_test
     from gyrobench.workflow.run_execution import RunRequest
 
@@ -169,12 +175,14 @@ def reduce(
                 "--from: a run of another tool; --data, --columns and --fit-to are of measured data, name one of them"
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
-        exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
+        with reports_in(language, test.name, Bench.find().folder):
+            exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
         return
     if parts or maps:
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
     given = parse_settings(values)
-    verdict = print_runs.reduce(test, data or [], given, spec, out, force, as_json, formats, fit_to, columns)
+    with reports_in(language, test.name, Bench.find().folder):
+        verdict = print_runs.reduce(test, data or [], given, spec, out, force, as_json, formats, fit_to, columns)
     exit_on_fail(verdict, strict)
 
 
@@ -183,6 +191,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     spec: Spec = None,
     strict: Strict = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Reduce the record of a run again and rewrite its report.
@@ -191,9 +200,12 @@ def report(
     Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
     """
     from gyrobench.commands import print_runs
+    from gyrobench.report.language import reports_in
     from gyrobench.workflow.inputs import load_saved_test
 
-    exit_on_fail(print_runs.report(folder, load_saved_test(folder), spec, as_json), strict)
+    test = load_saved_test(folder)
+    with reports_in(language, test.name, Bench.find().folder):
+        exit_on_fail(print_runs.report(folder, test, spec, as_json), strict)
 
 
 @app.command()
@@ -275,6 +287,7 @@ def certificate(
     ] = None,
     number: Annotated[str, typer.Option(help="Number of the certificate; default: that of the report.")] = "",
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: the working folder.")] = None,
+    language: Annotated[str, typer.Option(metavar="en|zh", help="Default: that of the profile.")] = "",
 ) -> None:
     """Write the certificate of an instrument, or of a lot.
 
@@ -285,7 +298,7 @@ def certificate(
     """
     from gyrobench.workflow.certificate import write_certificate
 
-    for path in write_certificate(runs, laboratory, number, out):
+    for path in write_certificate(runs, laboratory, number, out, language):
         echo(display_path(path))
 
 

@@ -6,11 +6,13 @@ Its figures are those of the reports, whose ids and digests it names.  Nothing t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from gyrobench.bench import UsageError
-from gyrobench.report.laboratory import Laboratory
+from gyrobench.report.laboratory import SIGNATORIES, Laboratory
+from gyrobench.report.language import system_folder, used
 from gyrobench.report.numbers import FormattedNumber, write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -24,10 +26,13 @@ from gyrobench.report.page_model import (
     columns,
     text_cell,
 )
+from gyrobench.report.report_files import own_texts
 from gyrobench.report.result_json import Report
 from gyrobench.report.result_page import date, place, what_u_is
 from gyrobench.report.tables import limit_text
 from gyrobench.result import NO_VERDICT, Coefficient, Result
+
+Known = Callable[[str], bool]  # whether a text can be said in the language of the certificate
 
 NOT_PASSED = ("fail", "inconclusive", "void")
 ACROSS = 5  # coefficients side by side in the table of a lot
@@ -37,6 +42,7 @@ STATEMENTS = (
     "about 95 % [GUM].",
     "This certificate shall not be reproduced except in full without approval of the laboratory.",
 )
+IN_REPORT = "see the report"  # of what has no translation: never half of a sentence, never left out
 ESTIMATES = "Estimates with their expanded uncertainty U = k u"
 SIMULATED = "All data are simulated: no item was tested, and no traceability is claimed."
 
@@ -52,28 +58,64 @@ class Certified:
     def instrument(self) -> str:
         return self.report.result.instrument or "not named"
 
+    @property
+    def remarks(self) -> list[tuple[str, str]]:
+        """Return id and sentence of every warning, of why a verdict is withheld, of why there is no value."""
+        result = self.report.result
+        reasons = [r for s in (("error", "warning"), ("doubt",)) for r in result.reasons if r.severity in s]
+        none = [(f"{c.name}.none", f"No value of {c.name}: {c.no_value}.") for c in result.coefficients if c.no_value]
+        return [*((r.id, r.text) for r in reasons), *none]
 
-def page(of: Sequence[Certified], laboratory: Laboratory, number: str = "") -> Page:
+
+def page(
+    of: Sequence[Certified], laboratory: Laboratory, number: str = "", language: str = "", bench: Path | None = None
+) -> Page:
     """Return the certificate of one report, or of a lot of the same test.  number: its own; "": that of the report.
 
-    Raises UsageError for reports of different tests, and for a coefficient of the profile that the test has not.
+    language: default that of the profile.  bench: whose systems have catalogues.  Raises UsageError for reports of
+    different tests, and for a coefficient of the profile that the test has not.
     """
+    own = {t for c in of for t in own_texts(c.report)[0]} | _own(laboratory) | {number}
+    names = {t for c in of for t in own_texts(c.report)[1]}
+    folder = system_folder(of[0].report.result.system, bench)
+    with used(language or laboratory.language, folder, own - {""}, names) as words:
+        made = _page(of, laboratory, number, words.has if words else lambda text: True)
+        return words.page(made, "the certificate") if words else made
+
+
+def _own(laboratory: Laboratory) -> set[str]:
+    roles = {text for s in laboratory.signatories for text in (s.role, s.name)} - {s.role for s in SIGNATORIES}
+    return {_address(laboratory), laboratory.accreditation, *laboratory.statements, *roles}
+
+
+def _address(laboratory: Laboratory) -> str:
+    lines = [laboratory.name, *laboratory.address]
+    return ("，" if any("一" <= c <= "鿿" for line in lines for c in line) else ", ").join(lines)
+
+
+def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known) -> Page:
+    """Return the certificate in English, without what is not known in its language: that is in the reports."""
     first = of[0].report
     systems = sorted({c.report.result.system for c in of})
     if len(systems) > 1:
         raise UsageError(f"a certificate is of one test, the runs are of {', '.join(systems)}")
     names = _names(first.result, laboratory)
     number = number or (first.report_id if len(of) == 1 else f"{first.report_id}-{len(of)}")
-    results = _one(of[0], names) if len(of) == 1 else _lot(of, names)
+    results = _one(of[0], names, known) if len(of) == 1 else _lot(of, names)
     sections = [
         Section("Results", "results", results),
         Section("Conformity", "conformity", _conformity(of)),
-        Section("Remarks", "remarks", _remarks(of)),
+        Section("Remarks", "remarks", _remarks(of, known)),
         Section("Reports", "reports", [_reports(of)]),
         Section("Statements and signatures", "signatures", [_signatures(of, laboratory)]),
     ]
-    title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {first.result.title}"
-    return Page(title, number, _head(of, laboratory, number), sections, what="Certificate").finish()
+    title = first.result.title if known(first.result.title) else first.result.system
+    title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {title}"
+    return Page(title, number, _head(of, laboratory, number, known), sections, what="Certificate").finish()
+
+
+def _said(text: str, known: Known) -> str:
+    return text if known(text) else IN_REPORT
 
 
 def _names(result: Result, laboratory: Laboratory) -> list[str]:
@@ -83,22 +125,22 @@ def _names(result: Result, laboratory: Laboratory) -> list[str]:
     return laboratory.coefficients or there
 
 
-def _head(of: Sequence[Certified], laboratory: Laboratory, number: str) -> list[tuple[str, str]]:
+def _head(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known) -> list[tuple[str, str]]:
     result = of[0].report.result
     same = {n: {getattr(c.report.about, n) for c in of} for n in ("customer", "conditions", "equipment", "operator")}
     stated = [(n.capitalize(), values.pop() if len(values) == 1 else "see the reports") for n, values in same.items()]
     items = [("Instrument", of[0].instrument)] if len(of) == 1 else [("Items", f"{len(of)}, see the first table")]
     dates = sorted({date(c.report.about.date or "not recorded") for c in of})
     return [
-        ("Laboratory", ", ".join([laboratory.name, *laboratory.address])),
+        ("Laboratory", _address(laboratory)),
         *([("Accreditation", laboratory.accreditation)] if laboratory.accreditation and not _simulated(of) else []),
         ("Certificate", number),
         *items,
         *((name, text or "not stated") for name, text in stated),
         ("Date of test", dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"),
         ("Site", place(result.site) or "not stated"),
-        ("Method", result.method),
-        ("Sources", "; ".join(result.sources)),
+        ("Method", _said(result.method, known)),
+        ("Sources", _said("; ".join(result.sources), known)),
     ]
 
 
@@ -107,7 +149,7 @@ def _number(value: float | None, u: float | None) -> Cell:
     return Cell(written.text, written.whole, written.rest, written.full, "", "", True)
 
 
-def _one(certified: Certified, names: Sequence[str]) -> list[PageTable]:
+def _one(certified: Certified, names: Sequence[str], known: Known) -> list[PageTable]:
     """Return the table of one instrument: a row for each coefficient."""
     rows = []
     limits = any(c.limit is not None for c in certified.report.result.coefficients)
@@ -115,7 +157,7 @@ def _one(certified: Certified, names: Sequence[str]) -> list[PageTable]:
         u = None if c.no_value else c.k * c.u
         cells = [
             text_cell(c.name, "strong"),
-            text_cell(c.meaning),
+            text_cell(_said(c.meaning, known)),
             text_cell("no value", "warn") if c.no_value else _number(c.estimate, c.u),
             _number(u, c.u),
             _number(None if c.no_value else c.k, 0.05),
@@ -181,13 +223,12 @@ def _conformity(of: Sequence[Certified]) -> list[Text]:
     return [Text(said), *(Text(f"Decision rule: {rule}") for rule in rules if rule)]
 
 
-def _remarks(of: Sequence[Certified]) -> list[BulletList]:
+def _remarks(of: Sequence[Certified], known: Known) -> list[BulletList]:
     """Return every warning of the reports and why a verdict is withheld, with the instruments that it is about."""
     said: dict[str, list[str]] = {}
     for c in of:
-        reasons = [f"No value of {x.name}: {x.no_value}." for x in c.report.result.coefficients if x.no_value]
-        for text in [*c.report.result.warnings, *c.report.result.withheld, *reasons]:
-            said.setdefault(text, []).append(c.instrument)
+        for id, text in dict.fromkeys(c.remarks):
+            said.setdefault(text if known(text) else f"Remark {id}: {IN_REPORT}.", []).append(c.instrument)
     items = [t if len(who) == len(of) else f"{', '.join(who)}: {t}" for t, who in said.items()]
     return [BulletList(items, warn=True)] if items else []
 

@@ -17,6 +17,7 @@ from gyrobench.errors import GyrobenchError
 OWN = "DejaVu Sans"
 FOLDER = "fonts"  # in reports/ of a bench
 KINDS = (".ttf", ".otf", ".ttc", ".otc")
+FACES = {"zh": " SC"}  # of a collection the face whose characters have the form of a language: 直 and 骨 differ
 
 
 class MissingFontError(GyrobenchError):
@@ -30,11 +31,27 @@ class Font:
     path: Path
     family: str
 
+    def of(self, language: str) -> Font:
+        """Return the face of a collection for a language, itself where it has none."""
+        from matplotlib.ft2font import FT2Font
 
-def fonts_for(texts: Iterable[str], bench: Path | None = None) -> list[Font]:
+        if not (ending := FACES.get(language)):
+            return self
+        faces = (FT2Font(str(self.path), face_index=k) for k in range(FT2Font(str(self.path)).num_faces))
+        return next((Font(self.path, f.family_name) for f in faces if f.family_name.endswith(ending)), self)
+
+    @property
+    def files(self) -> list[Path]:
+        """The file, and that of the bold font beside it where there is one."""
+        bold = self.path.with_name(self.path.name.replace("Regular", "Bold"))
+        return [self.path, bold] if bold != self.path and bold.is_file() else [self.path]
+
+
+def fonts_for(texts: Iterable[str], bench: Path | None = None, language: str = "") -> list[Font]:
     """Return the fonts that are needed for texts beyond DejaVu Sans, few and plain ones first; mostly none.
 
-    Raises MissingFontError with the characters that no font has.
+    language: in whose form characters are drawn that several share.  Raises MissingFontError with the characters that
+    no font has.
     """
     left = {c for c in set("".join(texts)) if c.isprintable() and ord(c) not in _own()}
     found: list[Font] = []
@@ -45,7 +62,7 @@ def fonts_for(texts: Iterable[str], bench: Path | None = None) -> list[Font]:
         font, has = max(candidates, key=lambda c: len(c[1] & left), default=(None, frozenset[str]()))
         if font is None or not has & left:
             raise MissingFontError(_missing(left))
-        found.append(font)
+        found.append(font.of(language))
         left -= has
     return found
 

@@ -5,6 +5,7 @@ address = ["Example street 1", "12345 Example town"]
 accreditation = "D-K-00000-00-00"                        # what follows is optional
 statements = ["The measurements are traceable to the national standards."]
 coefficients = ["D_F", "D_I", "D_S"]                     # shown, in this order; default all
+language = "zh"                                          # of the certificate; default en
 [[signatories]]
 role = "Head of the laboratory"
 name = "N. N."
@@ -16,12 +17,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.boundary import faults_of
 from gyrobench.files import write_whole
+from gyrobench.report.language import ENGLISH, codes
 
 FILE = "laboratory.toml"
 
@@ -35,6 +37,9 @@ class Signatory(BaseModel):
     name: str = ""
 
 
+SIGNATORIES = (Signatory(role="Tested by"), Signatory(role="Approved by"))
+
+
 class Laboratory(BaseModel):
     """The keys of a profile; see the module."""
 
@@ -45,7 +50,15 @@ class Laboratory(BaseModel):
     accreditation: str = ""
     statements: list[str] = []
     coefficients: list[str] = []
-    signatories: list[Signatory] = [Signatory(role="Tested by"), Signatory(role="Approved by")]
+    language: str = ENGLISH
+    signatories: list[Signatory] = list(SIGNATORIES)
+
+    @field_validator("language")
+    @classmethod
+    def _there_is(cls, code: str) -> str:
+        if code not in codes():
+            raise ValueError(f"no such language; there are: {', '.join(codes())}")
+        return code
 
 
 def read_laboratory(file: Path) -> Laboratory:

@@ -16,6 +16,24 @@ from gyrobench.report.result_json import pointer, value_at
 
 Path = Sequence[str | int]
 
+#: what the templates of HTML and PDF print beside the texts of a page
+WORDS = {
+    "table": "Table",
+    "figure": "Figure",
+    "page": "Page {n} of {n2}",
+    "name": "Name",
+    "signature": "Signature",
+    "date": "Date",
+    "verdict": "Verdict",
+    "rule": "Decision rule",
+    "warnings": "Warnings",
+    "none": "No warnings.",
+    "contents": "Contents",
+    "skip": "Skip to the report",
+    "zoom": "Drag over the figure to zoom|Zoom in|Zoom out|Earlier|Later|whole|Whole record",
+    **{verdict: verdict for verdict in ("pass", "fail", "inconclusive", "void")},
+}
+
 
 @dataclass
 class Cell:
@@ -29,6 +47,7 @@ class Cell:
     mark: str = ""  # pass | fail | inconclusive | void | warn | strong | ""
     number: bool = False
     link: str = ""  # what the text leads to, on the page
+    own: bool = False  # a name or a value: the same in every language
 
 
 @dataclass
@@ -127,6 +146,7 @@ class ResultSummary:
     summary: list[str]
     warnings: list[str]
     requirements: PageTable | None
+    said: str = ""  # the verdict as it is printed; "": as it is
     kind: str = "answer"
 
 
@@ -167,9 +187,13 @@ class Page:
     sections: list[Section]
     pictures: list[Picture] = field(default_factory=list)
     what: str = "Report"
+    language: str = "en"
+    html_language: str = "en"
+    words: dict[str, str] = field(default_factory=lambda: dict(WORDS))
 
     def finish(self) -> Page:
         """Number sections, tables and figures in reading order; drop sections without content."""
+        self.words["end"] = f"— end of {self.what.lower()} —"
         kept = []
         for k, section in enumerate(self.sections):
             following = self.sections[k + 1 :]
@@ -209,8 +233,8 @@ def pictures(*items: Picture) -> list[Any]:
     return [Pictures(shown)] if shown else []
 
 
-def text_cell(value: Any, mark: str = "", link: str = "") -> Cell:
-    return Cell(text="" if value is None else str(value), mark=mark, link=link)
+def text_cell(value: Any, mark: str = "", link: str = "", own: bool = False) -> Cell:
+    return Cell(text="" if value is None else str(value), mark=mark, link=link, own=own)
 
 
 def number_cell(

@@ -92,10 +92,10 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
     for section in data["sections"]:
         for block in section["blocks"]:
             _strip(block)
-    others = fonts_for(_texts(data), bench)
+    others = fonts_for(_texts(data), bench, page.language)
     data["fonts"] = [font.family for font in others]
     files["data.json"] = json.dumps(data, ensure_ascii=False).encode()
-    folder = _font_folder(tuple(font.path for font in others))
+    folder = _font_folder(tuple(path for font in others for path in font.files))
     made: bytes = _typst(files, font_paths=[str(folder)])
     return made
 

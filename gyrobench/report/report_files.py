@@ -9,6 +9,8 @@ from typing import Any
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
+from gyrobench.record.run_document import ABOUT
+from gyrobench.report.language import ENGLISH, system_folder, used
 from gyrobench.report.page_model import Page
 from gyrobench.report.result_json import Report
 from gyrobench.result import DriftRecordResult, Result, SuiteResult
@@ -36,16 +38,47 @@ def write(
     formats: Sequence[str] = FORMATS,
     record: Mapping[str, Any] | None = None,
     bench: Path | None = None,
+    language: str = ENGLISH,
 ) -> dict[str, Path]:
     """Write the report of a result into a folder; return the path of each format.
 
     ``record`` may hold decimated channels to draw ("time" in s and "slot.variable" columns, equally long).
-    ``bench`` is the bench whose ``reports/`` templates come first.  Files are replaced whole or not at all.
-    Raises ValueError for an unknown format and :class:`ReportError`, after all others were written, when a
-    format fails.
+    ``bench`` is the bench whose ``reports/`` templates and catalogues of systems come first.  Files are replaced whole
+    or not at all.  Raises ValueError for an unknown format and :class:`ReportError`, after all others were written,
+    when a format fails; UntranslatedError, before any page is written, where the page would be half English.
     """
     report = Report.of(result)
-    return write_files(dict(report.document), lambda: page(report, record), Path(folder), formats, NAMES, bench)
+    folder, document = Path(folder), dict(report.document)
+    if language == ENGLISH or set(formats) == {"json"}:
+        return write_files(document, lambda: page(report, record), folder, formats, NAMES, bench)
+    translated = page_in(language, report, record, bench)
+    return write_files(document, lambda: translated, folder, formats, NAMES, bench)
+
+
+def page_in(code: str, report: Report[Any], record: Mapping[str, Any] | None = None, bench: Path | None = None) -> Page:
+    """Return the page of a report in another language.  Raises UntranslatedError where it would be half English."""
+    system = report.result.system
+    own, names = own_texts(report)
+    with used(code, system_folder(system, bench), own, names) as language:
+        made = page(report, record)
+        return language.page(made, f"the report of {system}") if language else made
+
+
+def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
+    """Return what is the same in every language: texts of the user, and names of parts, slots and options."""
+    about, result = report.about, report.result
+    own = {str(getattr(about, n, "")) for n in ("operator", *ABOUT)}
+    names = {result.system, *(c.name for c in result.coefficients), result.instrument.removesuffix(", simulated")}
+    if not result.simulated:
+        own |= {result.instrument}
+    if not isinstance(result, SuiteResult):
+        run = report.run
+        own |= {run.data.file, run.data.sha256, run.data.columns, run.data.columns_sha256} if run.data else set()
+        names |= {*run.parts, *(part.name for part in run.parts.values()), *run.options, *run.parameters, *run.versions}
+        names |= {f"{k} {slot}" for k, slot in enumerate(run.order, 1)}  # as they stand in the drawing of the system
+        names |= {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}
+        names |= {column.name for column in getattr(result, "columns", [])}
+    return own - {""}, names - {""}
 
 
 def page(report: Report[Any], record: Mapping[str, Any] | None = None) -> Page:

@@ -13,6 +13,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from gyrobench.report.fonts import Font, MissingFontError, fonts_for
+from gyrobench.report.language import in_use
+
 MM = 1.0 / 25.4
 WIDE = 170 * MM  # the text width of A4, inch
 HALF = 82 * MM
@@ -91,8 +94,24 @@ def styled() -> Iterator[None]:
     """Matplotlib with the report's style; the caller's settings come back afterwards."""
     import matplotlib
 
-    with matplotlib.rc_context(_RC):
+    with matplotlib.rc_context({**_RC, "font.family": ["DejaVu Sans", *_fonts()]}):
         yield
+
+
+def _fonts() -> list[str]:
+    """Return the families for the language of the page, so that texts have their size when they are placed."""
+    language = in_use()
+    if language is None:
+        return []
+    return _added(fonts_for(language.catalogue.texts.values(), None, language.catalogue.code))
+
+
+def _added(fonts: Sequence[Font]) -> list[str]:
+    from matplotlib.font_manager import fontManager
+
+    for font in fonts:
+        fontManager.addfont(str(font.path))
+    return [font.family for font in fonts]
 
 
 def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
@@ -115,6 +134,7 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+    _in_language(fig)
     _in_any_script(fig)
     buffer = io.StringIO()  # not by savefig, which draws everything twice
     canvas: Any = FigureCanvasSVG(fig)
@@ -126,20 +146,37 @@ def svg(fig: Any, key: str, zoom: Any = None) -> str:
     return text
 
 
+def _in_language(fig: Any) -> None:
+    """Say the texts of a figure, its named ticks too, in the language of the page."""
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter, FuncFormatter
+
+    language = in_use()
+    if language is None:
+        return
+    for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis)):
+        named = axis.get_major_formatter()
+        if isinstance(named, FixedFormatter | FuncFormatter):
+            axis.set_major_formatter(FuncFormatter(lambda x, pos, named=named: language.text(named(x, pos))))
+    for text in fig.findobj(Text):
+        text.set_text(language.text(text.get_text()))
+
+
+def _said(text: str) -> str:
+    language = in_use()
+    return language.text(text) if language else text
+
+
 def _in_any_script(fig: Any) -> None:
     """Give the texts of a figure the fonts of the machine where DejaVu Sans lacks a character (names of runs)."""
-    from matplotlib.font_manager import fontManager
     from matplotlib.text import Text
 
-    from gyrobench.report.fonts import MissingFontError, fonts_for
-
+    language = in_use()
     texts = [t for t in fig.findobj(Text) if not t.get_text().isascii()]
     with contextlib.suppress(MissingFontError):  # the PDF says which, a page shows the name beside the figure
-        others = fonts_for(t.get_text() for t in texts)
-        for font in others:
-            fontManager.addfont(str(font.path))
+        others = _added(fonts_for((t.get_text() for t in texts), None, language.catalogue.code if language else ""))
         for text in texts if others else []:
-            text.set_fontfamily([*text.get_fontfamily(), *(font.family for font in others)])
+            text.set_fontfamily(list(dict.fromkeys([*text.get_fontfamily(), *others])))
 
 
 def clean_svg(text: str, key: str) -> str:
@@ -222,7 +259,7 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
         if k % 2 == 0:
             ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
         text = ax.annotate(
-            label, (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
+            _said(label), (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
         )
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size

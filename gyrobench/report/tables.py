@@ -158,7 +158,8 @@ def _cell(doc: Any, path: tuple[str | int, ...], u: float | None = None, signifi
 def _plain(doc: Any, path: tuple[str | int, ...]) -> Cell:
     """Return a parameter: all its digits that matter, not aligned, for magnitudes differ."""
     cell = _cell(doc, path, None, 8)
-    return Cell(cell.text, full=cell.full, pointer=cell.pointer)
+    said = isinstance(value_at(doc, *path), bool) or cell.text.endswith(" entries)")
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=not said)
 
 
 def compact(value: Any, length: int = 72) -> str:
@@ -177,9 +178,10 @@ def how_tables(report: Report[Any]) -> list[Any]:
     if run.parts:
         rows = []
         for slot, part in run.parts.items():
-            names = [text_cell(x or None) for x in (part.name, part.version, part.target, part.fmi)]
+            names = [text_cell(part.name or None, own=True)]
+            names += [text_cell(x or None) for x in (part.version, part.target, part.fmi)]
             time = number_cell(doc, ("provenance", "timing", slot), significant=3)
-            rows.append(Row([text_cell(slot, "strong"), *names, time, Cell(part.sha256 or "–", mark="hash")]))
+            rows.append(Row([text_cell(slot, "strong", own=True), *names, time, Cell(part.sha256 or "–", mark="hash")]))
         heads = columns("slot", "component", "version", "target", "FMI", ("time", "s"), "SHA-256", wide=("SHA-256",))
         blocks.append(PageTable(heads, rows, "Components in their slots, with the computing time of each.", small=True))
     blocks += _changed(report) + _defaults(report)
@@ -196,7 +198,7 @@ def how_tables(report: Report[Any]) -> list[Any]:
     if run.notes:
         blocks.append(BulletList(run.notes))
     if run.versions:
-        rows = [Row([text_cell(k), text_cell(v)]) for k, v in run.versions.items()]
+        rows = [Row([text_cell(k, own=True), text_cell(v, own=True)]) for k, v in run.versions.items()]
         table = PageTable(columns("package", "version"), rows, "Package versions.", small=True)
         blocks.append(CollapsedBlocks("Package versions", [table]))
     return blocks
@@ -212,7 +214,7 @@ def _changed(report: Report[Any]) -> list[Any]:
     for name in run.changed:
         where = "parameters" if name in run.parameters else "options" if name in run.options else ""
         value = _plain(report.document, ("provenance", where, name)) if where else text_cell("changed")
-        rows.append(Row([text_cell(name, "strong"), value]))
+        rows.append(Row([text_cell(name, "strong", own=True), value]))
     caption = "Options, parameters and components that differ from their defaults, in SI units."
     return [PageTable(columns("changed", "value (SI)"), rows, caption, small=True)]
 
@@ -227,7 +229,7 @@ def _defaults(report: Report[Any]) -> list[Any]:
     ):
         names = [n for n in values if n not in run.changed]
         if names:
-            rows = [Row([text_cell(n), _plain(report.document, ("provenance", key, n))]) for n in names]
+            rows = [Row([text_cell(n, own=True), _plain(report.document, ("provenance", key, n))]) for n in names]
             caption = f"{what.capitalize()} at their default values, in SI units."
             table = PageTable(columns("name", "value (SI)"), rows, caption, small=True)
             blocks.append(CollapsedBlocks(f"Defaults: {len(names)} {what}", [table]))

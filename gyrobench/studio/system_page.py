@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from html import escape
 from typing import Any
 
@@ -16,6 +17,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.report import wiring_figure
 from gyrobench.studio.frame import CopyLines, Studio, frame, told
 from gyrobench.studio.request import JobRequest
+from gyrobench.studio.slot_fmu import drop_fmu
 from gyrobench.system.configurable import Option
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -79,14 +81,17 @@ class _Choice:
         self._now(replace(self.request, values=values))
         return self.wrong.get(name)
 
-    def put(self, slot: str, part: str, own: str) -> None:
+    def put(self, slot: str, part: str, own: str, mapping: str = "") -> None:
         """Put a part into a slot; its own one takes the choice back.  Values of the part before are dropped."""
         parts = {k: v for k, v in self.request.parts.items() if k != slot}
+        maps = {k: v for k, v in self.request.maps.items() if k != slot}
         if part != own:
             parts[slot] = part
+        if mapping:
+            maps[slot] = mapping
         values = {k: v for k, v in self.request.values.items() if not k.startswith(f"{slot}.")}
         self.wrong = {k: v for k, v in self.wrong.items() if not k.startswith(f"{slot}.")}
-        self._now(replace(self.request, parts=parts, values=values))
+        self._now(replace(self.request, parts=parts, maps=maps, values=values))
 
     def about(self, seed: float | None, spec: str | None) -> None:
         """Take seed and specification."""
@@ -208,6 +213,12 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 draw(slot)
         narrow()
 
+    dropped: dict[str, str] = {}  # FMU -> its mapping
+
+    def foreign(slot: str, menu: ui.select, file: str, mapping: str) -> None:
+        dropped[file] = mapping
+        menu.set_options([*fitting[slot], file], value=file)
+
     for slot, declared in system.all_slots().items():
         with ui.element("div").classes("setting"):
             with ui.element("div").classes("about"):
@@ -219,10 +230,12 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
             menu.mark(f"slot {slot}")
         with ui.expansion(f"Parameters of {slot}").props("dense").classes("full") as expansion:
             bodies[slot] = ui.element("div").classes("rows")
+            if not studio.read_only:
+                drop_fmu(studio, system.name, slot, partial(foreign, slot, menu))
         opened[slot] = expansion
 
         def chosen(e: Any, slot: str = slot, own: str = declared.part) -> None:
-            choice.put(slot, e.value, own)
+            choice.put(slot, e.value, own, dropped.get(e.value, ""))
             if slot in drawn:
                 draw(slot)
 

@@ -11,6 +11,7 @@ from gyrobench.files import sha256, write_whole
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import certificate_page, load, render
 from gyrobench.report.laboratory import FILE, read_laboratory
+from gyrobench.report.language import check_code
 from gyrobench.report.result_json import Report
 from gyrobench.workflow.inputs import require_run
 from gyrobench.workflow.manifest import verify
@@ -18,11 +19,12 @@ from gyrobench.workflow.run_folders import MANIFEST
 
 
 def write_certificate(
-    runs: Sequence[Path], profile: Path | None = None, number: str = "", out: Path | None = None
+    runs: Sequence[Path], profile: Path | None = None, number: str = "", out: Path | None = None, language: str = ""
 ) -> list[Path]:
     """Write ``certificate-NUMBER.html`` and ``.pdf`` of runs of one test; return their paths.
 
     profile: of the laboratory, default ``laboratory.toml`` here or in the bench; out: default the working folder.
+    language: default that of the profile.
     Raises VerificationError for a report that was changed, UsageError for runs of different tests and a wrong profile.
     """
     bench = Bench.find().folder
@@ -33,7 +35,7 @@ def write_certificate(
         verify(require_run(folder))
         result = load(reading.read_text(folder / "result.json", RecordError))
         of.append(certificate_page.Certified(Report.of(result), sha256(folder / MANIFEST)))
-    page = certificate_page.page(of, laboratory, number)
+    page = certificate_page.page(of, laboratory, number, language and check_code(language), bench)
     target = out or Path()
     target.mkdir(parents=True, exist_ok=True)
     paths = []

@@ -12,6 +12,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import FORMATS, NAMES
+from gyrobench.report.language import chosen
 from gyrobench.report.result_json import read_document
 from gyrobench.result import Result, StepCheck
 from gyrobench.result_content import typed
@@ -50,7 +51,7 @@ def write_report(
         return {}
     for kind in set(FORMATS) - set(formats):
         (folder / NAMES[kind]).unlink(missing_ok=True)
-    paths = write(result, folder, formats, (record and record.channels) or None, Bench.find().folder)
+    paths = write(result, folder, formats, (record and record.channels) or None, Bench.find().folder, chosen())
     write_manifest(folder)
     return paths
 

@@ -89,13 +89,14 @@
     }
 
     function middle() { return (view[0] + view[1]) / 2; }
+    var words = document.body.dataset.zoom.split("|");
     var bar = document.createElement("div");
     bar.className = "zoombar";
-    if (window.matchMedia("(pointer: fine)").matches) { bar.append("Drag over the figure to zoom"); }
-    [["+", "Zoom in", function () { by(middle(), 0.5); }], ["−", "Zoom out", function () { by(middle(), 2); }],
-      ["◀", "Earlier", function () { var s = (view[1] - view[0]) / 2; set(view[0] - s, view[1] - s); }],
-      ["▶", "Later", function () { var s = (view[1] - view[0]) / 2; set(view[0] + s, view[1] + s); }],
-      ["whole", "Whole record", function () { set(whole[0], whole[1]); }]].forEach(function (b) {
+    if (window.matchMedia("(pointer: fine)").matches) { bar.append(words[0]); }
+    [["+", words[1], function () { by(middle(), 0.5); }], ["−", words[2], function () { by(middle(), 2); }],
+      ["◀", words[3], function () { var s = (view[1] - view[0]) / 2; set(view[0] - s, view[1] - s); }],
+      ["▶", words[4], function () { var s = (view[1] - view[0]) / 2; set(view[0] + s, view[1] + s); }],
+      [words[5], words[6], function () { set(whole[0], whole[1]); }]].forEach(function (b) {
       var button = document.createElement("button");
       button.type = "button";
       button.textContent = b[0];

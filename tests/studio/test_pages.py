@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import foreign_fmus
 import numpy as np
 import pytest
 from messy_file import messy
@@ -27,6 +28,7 @@ from gyrobench.system.moving_bodies import attitudes, parse_bodies
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: the studio is not looked at")
 LIMIT = 60_000  # ms, for one thing to come
+TESTS = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
@@ -394,3 +396,20 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     page.get_by_role("button", name="Make the certificate").click()
     page.get_by_role("link", name="Its pages").click()
     page.frame_locator("iframe.report").get_by_text("2026-7").first.wait_for()
+
+
+def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
+    """The proposed mapping is shown, what the vendor's data sheet says is written into it, and the run has the gyro."""
+    fmu = foreign_fmus.make("vendor_gyro", tmp_path)
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("dwell", exact=True).fill("60s")
+    page.get_by_role("button", name="Parameters of gyro").click()
+    page.locator('[aria-label="FMU for gyro"] input[type=file]').set_input_files(fmu)
+    mapping = page.get_by_label("Mapping")
+    assert "into the socket SdfGyro" in mapping.input_value()
+    page.wait_for_function("document.querySelector('.code').textContent.includes('--map gyro=')")
+    mapping.fill((TESTS / "foreign" / "vendor_gyro.toml").read_text(encoding="utf-8"))
+    page.wait_for_timeout(500)
+    page.get_by_role("button", name="Run").click()
+    run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
+    assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]

@@ -1,0 +1,164 @@
+"""Pages in Chinese: every text of the catalogue, no English sentence, no box in place of a character."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from certified import certified
+from reading import pdf_text
+
+from gyrobench.bench import UsageError, standard_folder
+from gyrobench.report import fonts, language, write
+from gyrobench.report.certificate_page import page
+from gyrobench.report.laboratory import Laboratory, read_laboratory
+from gyrobench.report.language import ENGLISH, PLACEHOLDER, WORD, Language, UntranslatedError, catalogue
+from gyrobench.report.page_model import BulletList, PageTable
+from gyrobench.report.render import html, pdf
+from gyrobench.result import Reason
+
+FILES = sorted([*language.FOLDER.glob("*.toml"), *standard_folder().glob("systems/*/zh.toml")])
+LABORATORY = Laboratory.model_validate({"name": "惯性实验室", "address": ["示例路 1 号"], "language": "zh"})
+OPTION = re.compile(r"\w+ = \"?[\w.]+\"?")  # as it is written: type_b = none
+TEXTS = {
+    "Constant drift": "常值漂移",
+    "{x} of {y} = {n} {unit}": "{y} 的{x} = {n} {unit}",
+    "no value": "无值",
+    "time": "时间",
+    "Record longer.": "延长记录。",
+    "Use {v}.": "请用 {v}。",
+}
+
+
+@pytest.fixture(autouse=True)
+def needs_a_font() -> None:
+    try:
+        fonts.fonts_for(["测"])
+    except fonts.MissingFontError:
+        pytest.skip("no font of this machine has Chinese characters")
+
+
+def small(**more: object) -> Language:
+    chinese = catalogue("zh")
+    return Language(language.Catalogue("zh", TEXTS, chinese.names, chinese.joints), **more)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: f"{f.parent.name}-{f.stem}")
+def test_both_languages_of_a_line_have_the_same_placeholders_and_no_word_is_left(file: Path) -> None:
+    content = language._read(file)
+    names = {*catalogue("zh").names, *content.get("names", ())}
+    for english, said in content["texts"].items():
+        assert sorted(PLACEHOLDER.findall(english)) == sorted(PLACEHOLDER.findall(said)), english
+        rest = set(WORD.findall(OPTION.sub("", PLACEHOLDER.sub("1", said)))) - names
+        assert said.strip() and not rest, f"{said}: {rest}"
+
+
+@pytest.mark.parametrize(
+    ("english", "said"),
+    [
+        ("constant drift", "常值漂移"),
+        ("Constant drift: no value", "常值漂移：无值"),
+        ("Constant drift of D_F = −0.30 ± 0.01 °/h", "D_F 的常值漂移 = −0.30 ± 0.01 °/h"),
+        ("Record longer. No value.", "延长记录。无值。"),
+        ("time / h", "时间 / h"),
+        ("no value (D_F, D_I)", "无值（D_F, D_I）"),
+        ("2026-03-14 09:30 UTC", "2026年3月14日 09:30 UTC"),
+        ("Use --step 0.1ms.", "请用 --step 0.1ms。"),
+        ("gyro.D_I and u_scale of floated.toml", None),
+        ("the drift wanders", None),
+        ("Constant drift of the drift = 1 m", None),
+    ],
+)
+def test_a_text_is_said_whole_or_not_at_all(english: str, said: str | None) -> None:
+    words = small()
+    assert words.find(english) == said
+    words.text(english)
+    assert list(words.missing) == ([] if said else [english])
+
+
+def test_texts_of_the_user_stay_names_stay_where_they_are_no_text() -> None:
+    words = small(own=frozenset({"no value"}), names=frozenset({"time", "table"}))
+    assert (words.text("no value"), words.text("table"), words.text("time")) == ("no value", "table", "时间")
+
+
+def english_words(text: str, allowed: set[str]) -> set[str]:
+    """Return the words of a text in PDF that are neither names of the catalogue nor allowed."""
+    return set(WORD.findall(OPTION.sub("", text))) - catalogue("zh").names - allowed
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_no_english_sentence_and_no_box_in_a_chinese_certificate(count: int, tmp_path: Path) -> None:
+    made = page([certified(k) for k in range(count)], LABORATORY, "2026-1")
+    file = tmp_path / "c.pdf"
+    file.write_bytes(pdf(made))
+    text = pdf_text(file)
+    assert "证书结束" in text and "固定位置测试" in text and "2026年3月12日" in text.replace(" ", "")
+    assert not english_words(text, {"ab" * 32, "last"})
+    assert '<html lang="zh-CN">' in html(made)
+    every_character_has_a_font(file, text)
+
+
+def every_character_has_a_font(file: Path, text: str) -> None:
+    """Check that of the fonts that a PDF names one has each of its characters."""
+    named = {n.decode() for n in re.findall(rb"/BaseFont\s*/(?:[A-Z]{6}\+)?([\w-]+)", file.read_bytes())}
+    assert any("CJK" in n or "SC" in n for n in named), named
+    has = set(map(chr, fonts._own()))
+    for font, characters in fonts._machine(None):
+        chosen = font.of("zh")
+        if any(n.lower().startswith(chosen.family.replace(" ", "").lower()) for n in named):
+            has |= characters
+    assert not {c for c in unicodedata.normalize("NFKC", text) if c.isprintable() and c not in has}
+
+
+def test_what_has_no_translation_is_named_by_its_id_never_left_out() -> None:
+    odd = Reason("odd.reason", "The moon was full.")
+    made = page([certified(0, reasons=[odd], method="By the moon.")], LABORATORY, "1")
+    (remarks,) = (b for s in made.sections if s.slug == "remarks" for b in s.blocks if isinstance(b, BulletList))
+    assert remarks.items == ["备注 odd.reason：内容见报告。"] and dict(made.head)["测试方法"] == "见报告"
+
+
+def test_verdicts_keep_their_sign_and_colour(tmp_path: Path) -> None:
+    judged = [replace(c, limit=(-9.0, 9.0), verdict="pass") for c in certified(0).report.result.coefficients]
+    made = page([certified(0, coefficients=judged)], LABORATORY, "1")
+    (values, *_) = (b for s in made.sections for b in s.blocks if isinstance(b, PageTable))
+    assert (values.rows[0].cells[-1].mark, values.rows[0].cells[-1].text) == ("pass", "合格")
+    (tmp_path / "c.pdf").write_bytes(pdf(made))
+    assert "✓ 合格" in pdf_text(tmp_path / "c.pdf")
+
+
+def test_a_report_in_chinese_and_what_it_lacks(tmp_path: Path) -> None:
+    found = certified(0).report.result
+    written = write(found, tmp_path, language="zh")
+    text = pdf_text(written["pdf"])
+    run = found.provenance
+    names = {*run["options"], *run.get("parameters", {}), *run.get("versions", {}), "result", "json", "docs", "methods"}
+    assert not english_words(text, names | {"errata", "auto", "current", "last"})
+    every_character_has_a_font(written["pdf"], text)
+    with pytest.raises(UntranslatedError, match=r"the report of fixed_position has 1 sentence without a translation"):
+        write(certified(0, reasons=[Reason("odd", "The moon was full.")]).report.result, tmp_path / "b", language="zh")
+    assert not (tmp_path / "b" / "report.html").exists()
+
+
+def test_a_test_without_its_texts_is_refused_before_it_runs() -> None:
+    with (
+        pytest.raises(UsageError, match="the report of servo_polar has no translation, it would be half English"),
+        language.reports_in("zh", "servo_polar"),
+    ):
+        pass
+    with pytest.raises(UsageError, match="xx: no such language; there are: en, zh"), language.reports_in("xx", "a"):
+        pass
+    with language.reports_in("zh", "fixed_position"):
+        assert language.chosen() == "zh"
+    assert language.chosen() == ENGLISH
+
+
+def test_a_profile_says_the_language(tmp_path: Path) -> None:
+    file = tmp_path / "laboratory.toml"
+    file.write_text('name = "A"\naddress = ["b"]\nlanguage = "zh"\n')
+    assert read_laboratory(file).language == "zh"
+    file.write_text('name = "A"\naddress = ["b"]\nlanguage = "klingon"\n')
+    with pytest.raises(UsageError, match="no such language; there are: en, zh"):
+        read_laboratory(file)
