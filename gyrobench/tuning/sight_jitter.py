@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component
@@ -61,7 +62,7 @@ class SightModel:
 class SightWays:
     """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of its angle); R, Q; density of n."""
 
-    use: Array
+    use: NDArray[np.bool_]
     f: Array
     base: tuple[tuple[Complex, Complex, Array], ...]
     driven: Complex

@@ -105,10 +105,8 @@ def test_wanted_jitter_is_had_and_measured() -> None:
 
 def test_a_jitter_that_friction_forbids_says_so() -> None:
     """Much less than the loop can do: the sources are named, the note says how friction was taken."""
-    found = tune(
-        gimbal(stiction=0.05, jitter_from=2.0, ride=20.0), ["phase margin=40deg", "jitter=20urad"], structure="pi+notch",
-        loop="yaw",
-    )  # fmt: skip
+    wishes = ["phase margin=40deg", "jitter=20urad"]
+    found = tune(gimbal(stiction=0.05, jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="yaw")
     assert not found.had and not found.proven
     text = str(found)
     assert "cannot be had" in text and "the jitter is of vibration about z" in text
