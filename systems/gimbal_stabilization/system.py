@@ -166,7 +166,7 @@ class GimbalStabilization(LoopTest):
         most = np.maximum(parameters["platform.friction"], parameters["platform.stiction"])
         f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
         density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale**2
-        squares = [np.trapezoid(density / x**2, f, axis=1) for x in (1.0, 2.0 * np.pi * f)]
+        squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
         k_in, k_out = (0, 2) if self.inner == "pitch" else (2, 0)
         c, s = (fun(self["yaw" if self.inner == "pitch" else "pitch"]) ** 2 for fun in (math.cos, math.sin))
         rate, angle = (np.sqrt([
@@ -189,6 +189,7 @@ class GimbalStabilization(LoopTest):
         spectrum = self.spectrum()
         found: dict[str, Any] = {
             "platform.form?": form,
+            "platform.step?": self.step,  # a mode of 60 Hz wants less than the millisecond of the part
             "decoupler.form?": form,
             "platform.theta_0": [self["pitch"], self["yaw"]],
             "platform.bending": [self["bending"]] * 2,
