@@ -65,6 +65,11 @@ class LoopTuning:
     loop: str = ""  # name of the loop, of a system with several
 
     @property
+    def name(self) -> str:
+        """Return the system, and the loop where it has several."""
+        return f"{self.system}, loop {self.loop}" if self.loop else self.system
+
+    @property
     def had(self) -> bool:
         """True where every wish is fulfilled over the whole spread, by the linear model."""
         return all(w.ratio >= 1.0 for w in self.wishes)
@@ -154,9 +159,8 @@ def range_text(r: Range) -> str:
 def _lines(t: LoopTuning) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
     over = ", ".join(range_text(r) for r in t.spread)
-    name = f"{t.system}, loop {t.loop}" if t.loop else t.system
     lines = [
-        f"{name}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
+        f"{t.name}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
         f"over {over}: {len(t.points)} points" if over else "at nominal values",
         "",
     ]
