@@ -1,4 +1,4 @@
-"""What makes a stabilized line of sight jitter, as a system states it for a jitter that is wanted of a loop."""
+"""Sources of the jitter of a line of sight, as a system states them for a jitter that is wanted of a loop."""
 
 from __future__ import annotations
 
