@@ -163,6 +163,7 @@ def _earth(
     rows.append(["latitude φ, sin φ = ω·f/(|ω| |f|)", latitude, spread,
                  None if there is None else math.degrees(there), "°", "as far as the gyros have no bias"])  # fmt: skip
     words[0] += (
-        f" With the direction of gravity that is the latitude {number(latitude, spread)}°, if the bias is small."
+        f" With the direction of gravity that is the latitude {number(latitude, spread)}°, "
+    words[0] += f"u = {number(spread, spread)}° by the noise alone, as far as the gyros have no bias."
     )
     return rows, words

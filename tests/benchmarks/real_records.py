@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -80,16 +81,17 @@ def rows_of(file: Path) -> dict[str, dict[str, str]]:
     return out
 
 
-def put(page: str) -> str:
-    """Return the page with a table of all rows in docs/figures.toml, a record after the other, between its marks."""
-    lines = [f"| record, channel | {' | '.join(HEAD)} |", "|---" * (len(HEAD) + 1) + "|"]
+def put(group: str, head: Sequence[str]) -> None:
+    """Write the rows of a group of docs/figures.toml into the page, between its marks."""
+    lines = [f"| record, channel | {' | '.join(head)} |", "|---" * (len(head) + 1) + "|"]
     for key, entry in sorted(figures.load().items()):
-        if key.startswith("real."):
-            record, _, channel = key.removeprefix("real.").partition("-")
-            cells = " | ".join(entry["value"][h] for h in HEAD)
-            lines.append(f"| {record} {channel} <!--row {key}--> | {cells} |")
-    table = "\n".join(lines)
-    return re.sub(r"(<!--records-->\n\n).*?(\n\n<!--/records-->)", lambda m: m[1] + table + m[2], page, flags=re.S)
+        if key.startswith(f"{group}."):
+            record, _, channel = key.removeprefix(f"{group}.").partition("-")
+            cells = " | ".join(entry["value"][h] for h in head)
+            lines.append(f"| {record} {channel.replace('-', ' ')} <!--row {key}--> | {cells} |")
+    marks = re.compile(rf"(<!--{group}-->\n\n).*?(\n\n<!--/{group}-->)", re.S)
+    page = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(marks.sub(lambda m: m[1] + "\n".join(lines) + m[2], page), encoding="utf-8")
 
 
 def main(folder: Path, parts: list[str], write: bool) -> None:
@@ -103,7 +105,7 @@ def main(folder: Path, parts: list[str], write: bool) -> None:
             if write:
                 quoted.record(f"real.{file.stem}-{channel}", values, "", "tests/benchmarks/real_records.py FOLDER")
     if write:
-        PAGE.write_text(put(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+        put("real", HEAD)
     stated = sum(v["stated"] == "yes" for v in every.values())
     print(f"stated for {stated} of {len(every)} channels, {time.process_time() - began:.0f} s of CPU")
 
