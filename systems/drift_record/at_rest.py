@@ -164,6 +164,6 @@ def _earth(
                  None if there is None else math.degrees(there), "°", "as far as the gyros have no bias"])  # fmt: skip
     words[0] += (
         f" With the direction of gravity that is the latitude {number(latitude, spread)}°, "
-    words[0] += f"u = {number(spread, spread)}° by the noise alone, as far as the gyros have no bias."
+        f"u = {number(spread, spread)}° by the noise alone, as far as the gyros have no bias."
     )
     return rows, words

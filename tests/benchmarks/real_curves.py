@@ -35,7 +35,7 @@ UNITS = {"adis": (math.radians(1.0), G0)}
 
 
 def markov(tau: Array, tc: float) -> Array:
-    """Allan variance of a Gauss-Markov process of unit variance: 2/x (1 - (3 - 4e + e^2)/(2x)), x = tau/tc, e = exp -x."""
+    """Allan variance of a Gauss-Markov process of variance 1: 2/x (1 - (3 - 4e + e^2)/(2x)), x = tau/tc, e = exp -x."""
     x = tau / tc
     e = np.exp(-x)
     exact = 2.0 / x * (1.0 - (3.0 - 4.0 * e + e * e) / (2.0 * x))
