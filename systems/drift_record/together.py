@@ -75,7 +75,9 @@ def summary(channels: Sequence[RecordChannel]) -> list[Table]:
         )
         if explained:
             caption += "; columns: share of the variance of the samples that temperature and other columns explain"
-        out.append(Table(id, title, caption, head, rows))
+        shown = [k for k in range(len(head)) if k < 4 or any(row[k] not in (None, "") for row in rows)]
+        rows = [[row[k] for k in shown] for row in rows]
+        out.append(Table(id, title, caption, [head[k] for k in shown], rows))
     return out
 
 
