@@ -67,6 +67,7 @@ def test_units_walks_gravity_and_the_latitude(tmp_path: Path) -> None:
     assert rate[1] == pytest.approx(EARTH, abs=4.0 / 64.0) and "the Earth's rate" in rate[-1]
     assert vertical[3] == pytest.approx(EARTH * math.sin(PHI)) and abs(vertical[1] - vertical[3]) < 4.0 * vertical[2]
     assert latitude[2] == pytest.approx(0.0595, rel=0.15) and abs(latitude[1] - 51.0) < 4.0 * latitude[2]
+    assert result.site["latitude / °"] == pytest.approx(51.0)
     assert not result.warnings and "columns / %" not in gyros.columns
 
 
