@@ -85,6 +85,20 @@ def test_a_mistaken_unit_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+def test_a_single_accelerometer_above_gravity_is_named_from_a_forked_process_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1 g under a head of 10 g; what comes back from a process is a copy, equal but not the same."""
+    columns = unit_at_rest(2048)
+    few = {"time [s]": columns["time [s]"], "gyro_x [deg/h]": columns["gyro_x [deg/h]"],
+           "acc_z [g]": 9.8 * columns["acc_z [g]"]}  # fmt: skip
+    for long in (CHANNELS.LONG, 1):
+        monkeypatch.setattr(CHANNELS, "LONG", long)
+        (said,) = [r for r in reduce(tmp_path, few).reasons if r.id == "drift_record.gravity"]
+        assert said.text.startswith("acc_z reads 96.1 m/s² at rest, 9.8 times gravity")
+
+
+@pytest.mark.usefixtures("no_arma")
 def test_correlation_and_line_of_several_channels(tmp_path: Path) -> None:
     """gyro_x and gyro_y share half of their white power, gyro_z and acc_x a line of 1.7 Hz; no other pair has any."""
     n = 8192
