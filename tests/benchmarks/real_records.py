@@ -89,7 +89,7 @@ def put(group: str, head: Sequence[str]) -> None:
             record, _, channel = key.removeprefix(f"{group}.").partition("-")
             cells = " | ".join(entry["value"][h] for h in head)
             lines.append(f"| {record} {channel.replace('-', ' ')} <!--row {key}--> | {cells} |")
-    marks = re.compile(rf"(<!--{group}-->\n\n).*?(\n\n<!--/{group}-->)", re.S)
+    marks = re.compile(rf"(<!--{group}-->\n\n).*?(\n\n<!--end of {group}-->)", re.S)
     page = PAGE.read_text(encoding="utf-8")
     PAGE.write_text(marks.sub(lambda m: m[1] + "\n".join(lines) + m[2], page), encoding="utf-8")
 
