@@ -288,6 +288,9 @@ def certificate(
     number: Annotated[str, typer.Option(help="Number of the certificate; default: that of the report.")] = "",
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: the working folder.")] = None,
     language: Annotated[str, typer.Option(metavar="en|zh", help="Default: that of the profile.")] = "",
+    dcc: Annotated[
+        bool, typer.Option("--dcc", help="Also as XML, a Digital Calibration Certificate by the schema of PTB.")
+    ] = False,
 ) -> None:
     """Write the certificate of an instrument, or of a lot.
 
@@ -298,7 +301,7 @@ def certificate(
     """
     from gyrobench.workflow.certificate import write_certificate
 
-    for path in write_certificate(runs, laboratory, number, out, language):
+    for path in write_certificate(runs, laboratory, number, out, language, dcc):
         echo(display_path(path))
 
 

@@ -7,12 +7,13 @@ Its figures are those of the reports, whose ids and digests it names.  Nothing t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench.bench import UsageError
 from gyrobench.report.laboratory import SIGNATORIES, Laboratory
-from gyrobench.report.language import system_folder, used
+from gyrobench.report.language import Language, system_folder, used
 from gyrobench.report.numbers import FormattedNumber, write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -75,12 +76,30 @@ def page(
     language: default that of the profile.  bench: whose systems have catalogues.  Raises UsageError for reports of
     different tests, and for a coefficient of the profile that the test has not.
     """
+    with spoken(of, laboratory, number, language, bench) as words:
+        made = _page(of, laboratory, number, words.has if words else lambda text: True)
+        return words.page(made, "the certificate") if words else made
+
+
+def spoken(
+    of: Sequence[Certified], laboratory: Laboratory, number: str, language: str, bench: Path | None
+) -> AbstractContextManager[Language | None]:
+    """Return the language of a certificate, to be used, that knows the texts of laboratory and user."""
     own = {t for c in of for t in own_texts(c.report)[0]} | _own(laboratory) | {number}
     names = {t for c in of for t in own_texts(c.report)[1]}
     folder = system_folder(of[0].report.result.system, bench)
-    with used(language or laboratory.language, folder, own - {""}, names) as words:
-        made = _page(of, laboratory, number, words.has if words else lambda text: True)
-        return words.page(made, "the certificate") if words else made
+    return used(language or laboratory.language, folder, own - {""}, names)
+
+
+def number_of(of: Sequence[Certified]) -> str:
+    """Return the number of a certificate that was given none: the id of the report, of a lot with its count."""
+    first = of[0].report.report_id
+    return first if len(of) == 1 else f"{first}-{len(of)}"
+
+
+def chosen(certified: Certified, laboratory: Laboratory) -> list[Coefficient]:
+    """Return the coefficients of a report that the profile shows, in its order.  Raises UsageError."""
+    return _chosen(certified, _names(certified.report.result, laboratory))
 
 
 def _own(laboratory: Laboratory) -> set[str]:
@@ -100,7 +119,7 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
     if len(systems) > 1:
         raise UsageError(f"a certificate is of one test, the runs are of {', '.join(systems)}")
     names = _names(first.result, laboratory)
-    number = number or (first.report_id if len(of) == 1 else f"{first.report_id}-{len(of)}")
+    number = number or number_of(of)
     results = _one(of[0], names, known) if len(of) == 1 else _lot(of, names)
     sections = [
         Section("Results", "results", results),

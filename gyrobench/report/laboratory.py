@@ -3,6 +3,7 @@
 name = "Inertial laboratory"
 address = ["Example street 1", "12345 Example town"]
 accreditation = "D-K-00000-00-00"                        # what follows is optional
+country = "DE"                                           # needed for a digital calibration certificate
 statements = ["The measurements are traceable to the national standards."]
 coefficients = ["D_F", "D_I", "D_S"]                     # shown, in this order; default all
 language = "zh"                                          # of the certificate; default en
@@ -48,6 +49,7 @@ class Laboratory(BaseModel):
     name: str = Field(min_length=1)
     address: list[str] = Field(min_length=1)
     accreditation: str = ""
+    country: str = Field(default="", pattern="^([A-Z]{2})?$")
     statements: list[str] = []
     coefficients: list[str] = []
     language: str = ENGLISH
