@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gyrobench.bench import UsageError
 from gyrobench.report.laboratory import SIGNATORIES, Laboratory
@@ -35,6 +36,8 @@ from gyrobench.result import NO_VERDICT, Coefficient, Result
 
 Known = Callable[[str], bool]  # whether a text can be said in the language of the certificate
 
+Charts = Callable[[Sequence["Certified"], Laboratory], list[Any]]  # blocks of a lot
+
 NOT_PASSED = ("fail", "inconclusive", "void")
 ACROSS = 5  # coefficients side by side in the table of a lot
 STATEMENTS = (
@@ -57,7 +60,9 @@ class Certified:
 
     @property
     def instrument(self) -> str:
-        return self.report.result.instrument or "not named"
+        """The instrument; of a record that does not name it the file of its data, so that those of a lot differ."""
+        data = getattr(self.report.about, "data", None)
+        return self.report.result.instrument or (data.file if data else "") or "not named"
 
     @property
     def remarks(self) -> list[tuple[str, str]]:
@@ -69,15 +74,21 @@ class Certified:
 
 
 def page(
-    of: Sequence[Certified], laboratory: Laboratory, number: str = "", language: str = "", bench: Path | None = None
+    of: Sequence[Certified],
+    laboratory: Laboratory,
+    number: str = "",
+    language: str = "",
+    bench: Path | None = None,
+    charts: Charts | None = None,
 ) -> Page:
     """Return the certificate of one report, or of a lot of the same test.  number: its own; "": that of the report.
 
-    language: default that of the profile.  bench: whose systems have catalogues.  Raises UsageError for reports of
-    different tests, and for a coefficient of the profile that the test has not.
+    language: default that of the profile.  bench: whose systems have catalogues.  charts: drawn of a lot.  Raises
+    UsageError for reports of different tests, and for a coefficient of the profile that the test has not.
     """
     with spoken(of, laboratory, number, language, bench) as words:
-        made = _page(of, laboratory, number, words.has if words else lambda text: True)
+        drawn = charts(of, laboratory) if charts and len(of) > 1 else []
+        made = _page(of, laboratory, number, words.has if words else lambda text: True, drawn)
         return words.page(made, "the certificate") if words else made
 
 
@@ -112,7 +123,7 @@ def _address(laboratory: Laboratory) -> str:
     return ("，" if any("一" <= c <= "鿿" for line in lines for c in line) else ", ").join(lines)
 
 
-def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known) -> Page:
+def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known, charts: list[Any]) -> Page:
     """Return the certificate in English, without what is not known in its language: that is in the reports."""
     first = of[0].report
     systems = sorted({c.report.result.system for c in of})
@@ -123,6 +134,7 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
     results = _one(of[0], names, known) if len(of) == 1 else _lot(of, names)
     sections = [
         Section("Results", "results", results),
+        Section("Control charts", "control", charts),
         Section("Conformity", "conformity", _conformity(of)),
         Section("Remarks", "remarks", _remarks(of, known)),
         Section("Reports", "reports", [_reports(of)]),
