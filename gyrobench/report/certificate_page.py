@@ -31,6 +31,7 @@ from gyrobench.report.page_model import (
 from gyrobench.report.report_files import own_texts
 from gyrobench.report.result_json import Report
 from gyrobench.report.result_page import date, place, what_u_is
+from gyrobench.report.standard_names import names_table
 from gyrobench.report.tables import limit_text
 from gyrobench.result import NO_VERDICT, Coefficient, Result
 
@@ -133,7 +134,7 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
     number = number or number_of(of)
     results = _one(of[0], names, known) if len(of) == 1 else _lot(of, names)
     sections = [
-        Section("Results", "results", results),
+        Section("Results", "results", [*results, *names_table(_chosen(of[0], names))]),
         Section("Control charts", "control", charts),
         Section("Conformity", "conformity", _conformity(of)),
         Section("Remarks", "remarks", _remarks(of, known)),
@@ -142,7 +143,9 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
     ]
     title = first.result.title if known(first.result.title) else first.result.system
     title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {title}"
-    return Page(title, number, _head(of, laboratory, number, known), sections, what="Certificate").finish()
+    return Page(
+        title, number, _head(of, laboratory, number, known), sections, what="Certificate", logo=laboratory.picture
+    ).finish()
 
 
 def _said(text: str, known: Known) -> str:
