@@ -355,7 +355,7 @@ class DriftColumn:
     """
 
     name: str
-    unit: str  # of the rate
+    unit: str  # of deviations
     record: RateRecord
     deviations: list[DeviationCurve]
     model: NoiseModelCurves | None = field(default=None, metadata=EMPTY)
@@ -363,3 +363,5 @@ class DriftColumn:
     correlation: SampleCorrelation | None = field(default=None, metadata=EMPTY)
     tables: dict[str, list[Table]] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
+    quantity: str = "rate"
+    level_unit: str = "°/h"  # of the record

@@ -1,10 +1,11 @@
-"""Tables of drift records: which columns are a rate, an angle or counts, and their rows in blocks of bounded size.
+"""Tables of drift records: which columns are a rate, an angle, a force or counts, and their rows in blocks.
 
     # scale = 0.5arcsec
     time [s],counts x [1],counts y [1],temperature [degC]
 
 CSV, Parquet (columns named "name [unit]", or the unit in the field's metadata; comments in the file's), or the folder
-of a run.  A column is a rate or an angle by its unit, or by ``scale``, the rate or angle of one of its units.
+of a run.  A column is a rate, an angle or a specific force by its unit, or by ``scale``, what one of its
+units is.
 """
 
 from __future__ import annotations
@@ -28,19 +29,28 @@ Blocks = Iterator[dict[str, Array]]
 TIME, FLAG = "time", "flag"
 ROWS = 1 << 18  # of a block of a Parquet file
 BUFFER = 1 << 20  # bytes of a column read at a time
-RATE, ANGLE, INCREMENT = "rate", "angle", "increment"
-KINDS = {RATE: "rad/s", ANGLE: "rad"}
-SIGNALS = "a drift record holds a rate [deg/h], an angle [arcsec], or another quantity with '# scale = 17.2deg/h/mA'"
+RATE, ANGLE, INCREMENT, FORCE = "rate", "angle", "increment", "force"
+KINDS = {RATE: "rad/s", ANGLE: "rad", FORCE: "m/s2"}
+DIRECT = (RATE, FORCE)  # what a sample reads is analysed, not its differences
+SIGNALS = (
+    "a drift record holds a rate [deg/h], an angle [arcsec], a specific force [g], or another quantity with "
+    "'# scale = 17.2deg/h/mA'"
+)
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A column that becomes a rate: SI value * factor is rad/s (rate) or rad (angle, cumulative; increment)."""
+    """A column to reduce: SI value * factor is rad/s (rate), rad (angle, cumulative; increment) or m/s2 (force)."""
 
     name: str
     unit: str  # as in the file
     kind: str
     factor: float
+
+    @property
+    def reduced(self) -> str:
+        """The SI unit of what is analysed."""
+        return KINDS[FORCE if self.kind == FORCE else RATE]
 
 
 @dataclass(frozen=True)
@@ -193,7 +203,7 @@ def named(head: Head) -> dict[str, str | None]:
 
 
 def find_signals(table: DriftTable, channel: str, scale: str, increments: bool) -> list[Signal]:
-    """Return the columns that become rates: those that ``channel`` names, or all whose unit (times scale) says so.
+    """Return the columns to reduce: those that ``channel`` names, or all whose unit (times scale) says so.
 
     scale: "0.5arcsec", "17.2deg/h/mA": one unit (of a column without one: 1) as rate or angle; "" for none.
     increments: an angle is the one of a sample, not cumulative.  Raises DataError.
@@ -216,7 +226,7 @@ def find_signals(table: DriftTable, channel: str, scale: str, increments: bool) 
             problems.append(found)
     if not signals and not problems:
         whys = [_signal(n, there[n], scale, increments) for n in wanted]
-        none = f"no rate and no angle among the columns of the file ({', '.join(there)}); {SIGNALS}"
+        none = f"no rate, angle or specific force among the columns of the file ({', '.join(there)}); {SIGNALS}"
         problems = [w for w in whys if isinstance(w, str)][:4] or [none]
     if problems:
         raise DataError(table.source, problems)
@@ -234,12 +244,12 @@ def _signal(name: str, unit: str | None, scale: str, increments: bool) -> Signal
         if own.exponents == units.unit(si).exponents:
             return Signal(name, unit or "", angle if kind == ANGLE else kind, 1.0)
     if own.offset:
-        return f"column '{name}': [{unit}] is neither a rate nor an angle; {SIGNALS}"
+        return f"column '{name}': [{unit}] is no rate, angle or specific force; {SIGNALS}"
     if not scale:
-        what = f"[{unit}] is neither a rate nor an angle" if unit else "no unit"
+        what = f"[{unit}] is no rate, angle or specific force" if unit else "no unit"
         return f"column '{name}': {what}; {SIGNALS}, counts '# scale = 0.5arcsec'"
     if re.fullmatch(r"[-+.\deE\s]+", scale):
-        return f"scale = {scale}: no unit; write what one unit of '{name}' is, '0.5arcsec' or '17.2deg/h/mA'"
+        return f"scale = {scale}: no unit; write what one unit of '{name}' is, '0.5arcsec', '0.1mg' or '17.2deg/h/mA'"
     for kind, si in KINDS.items():
         try:
             factor = units.parse_quantity(scale, _per(si, unit))
@@ -248,7 +258,7 @@ def _signal(name: str, unit: str | None, scale: str, increments: bool) -> Signal
         if not factor:
             return f"scale = {scale}: must not be 0"
         return Signal(name, unit or "", angle if kind == ANGLE else kind, factor)
-    return f"column '{name}': scale = {scale} times [{unit or '1'}] is neither a rate nor an angle; {SIGNALS}"
+    return f"column '{name}': scale = {scale} times [{unit or '1'}] is no rate, angle or specific force; {SIGNALS}"
 
 
 def _per(si: str, unit: str | None) -> str:

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.record.block_means import BlockMeans
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import FLAG, RATE, TIME, DriftTable, Signal, columns_of
+from gyrobench.record.drift_columns import DIRECT, FLAG, TIME, DriftTable, Signal, columns_of
 from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
+from gyrobench.record.frozen import EqualSamples
 
 GAP = 1.5  # steps
 CHUNK = 200  # samples whose median step is held against the usual one
@@ -82,6 +83,8 @@ class Acquisition:
     resets: dict[str, int] = field(default_factory=dict)
     wraps: dict[str, int] = field(default_factory=dict)
     stuck: dict[str, int] = field(default_factory=dict)  # samples at the largest or smallest value of the file
+    frozen: dict[str, tuple[int, float]] = field(default_factory=dict)  # samples of a run of one value, its time
+    repeated: int = 0  # rows that are those before
 
 
 @dataclass
@@ -141,7 +144,8 @@ class DriftReader:
         self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
         self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
         self.held = BlockMeans([TIME, *(s.name for s in signals), *self.others])
-        self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (RATE, PER_SAMPLE)}
+        self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (*DIRECT, PER_SAMPLE)}
+        self.equal = EqualSamples([s.name for s in signals])
         self.position = 0  # on the grid, of the next sample
         self.cut = 0  # samples of long gaps that are left out of it
         self.before = math.nan  # time of the last sample
@@ -194,6 +198,7 @@ class DriftReader:
         values = {s.name: self._rate(s, block[s.name][good], follows, dt) for s in self.signals}
         others = {n: block[n][good] for n in self.others}
         values[TIME] = t if self.timed else about.step * number.astype(float)
+        self.equal.add(values[TIME] - about.first, {s.name: block[s.name][good] for s in self.signals})
         about.samples += place.size
         self._put(place, values, others, observers)
 
@@ -280,9 +285,9 @@ class DriftReader:
     def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
         self._extreme(s, value)
         value = value * s.factor if s.factor != 1.0 else value
-        if s.kind in (RATE, PER_SAMPLE):
+        if s.kind in (*DIRECT, PER_SAMPLE):
             self._begin(s, value)
-            return value if s.kind == RATE else value / self.about.step
+            return value if s.kind in DIRECT else value / self.about.step
         d = self.angles[s.name].increments(value, follows)
         self._begin(s, d)
         if (there := d[np.isfinite(d)]).size:
@@ -399,6 +404,7 @@ class DriftReader:
                     [f"column '{name}': every step of it is {high:.6g} rad: the noise is below its resolution, there "
                      "is nothing to estimate; read a finer angle, or more seldom"],
                 )  # fmt: skip
+        about.frozen, about.repeated = self.equal.frozen(), self.equal.rows_repeated()
         about.resets = {n: a.resets for n, a in self.angles.items() if a.resets}
         about.wraps = {n: a.wraps for n, a in self.angles.items() if a.wraps}
 

@@ -47,7 +47,7 @@ def record(column: DriftColumn, key: str) -> str:
         zero_line(ax)
     ax.margins(x=0.01)
     ax.set_xlabel(axis_label("time", unit))
-    ax.set_ylabel(axis_label("rate", column.unit))
+    ax.set_ylabel(axis_label(column.quantity, column.level_unit))
     return svg(fig, key, zoom=ax)
 
 

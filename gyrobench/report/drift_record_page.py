@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from gyrobench.report import channels_section, result_page
 from gyrobench.report import drift_record_figures as figures
-from gyrobench.report import result_page
 from gyrobench.report.page_model import (
     BulletList,
     CollapsedBlocks,
@@ -34,7 +34,8 @@ WIDE = ("finding", "meaning", "use")
 def page(report: Report[DriftRecordResult]) -> Page:
     """Return the page of the report of a drift record."""
     with styled():
-        sections = result_page.opening(report, "Noise coefficients")
+        first, *rest = result_page.opening(report, "Noise coefficients")
+        sections = [first, *channels_section.sections(report), *rest]
         for k in range(len(report.result.columns)):
             sections += _sections(report, k)
         sections += result_page.closing(report)
@@ -67,10 +68,11 @@ def _sections(report: Report[DriftRecordResult], k: int) -> list[Section]:
 def _figures(report: Report[DriftRecordResult], k: int, key: str) -> tuple[Picture, Picture, Picture, list[Picture]]:
     """Return the figures of a column: record, deviations, spectrum, correlations."""
     c = report.result.columns[k]
+    what = c.quantity.capitalize()
     record = Picture(
         f"{key}-record", figures.record(c, f"{key}-record"),
-        "Rate of the record: band from the smallest to the largest value of each interval, line through the means. "
-        f"White: no samples.{SMOOTHED if c.record.smoothed else ''}", "Rate against time with gaps", zoom=True,
+        f"{what} of the record: band from the smallest to the largest value of each interval, line through the means. "
+        f"White: no samples.{SMOOTHED if c.record.smoothed else ''}", f"{what} against time with gaps", zoom=True,
     )  # fmt: skip
     allan = Picture(
         f"{key}-deviations", figures.deviations(c, f"{key}-deviations"),

@@ -29,9 +29,9 @@ from gyrobench.workflow.measured_run import empty_record
 
 MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
-KINDS = ("rad/s", "rad", "K")  # of the columns of a drift record, which has any names
+KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
-LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"temp.*": "degC"}
+LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"acc.*|beschl.*|[af]_?[xyz]": "m/s2", r"temp.*": "degC"}
 
 
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:

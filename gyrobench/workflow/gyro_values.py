@@ -44,7 +44,7 @@ def columns_of(result: Result) -> Mapping[str, Mapping[str, Coefficient]]:
     columns: dict[str, dict[str, Coefficient]] = {}
     for c in result.coefficients:
         term, _, column = c.name.partition(" ")
-        if term in TERMS:
+        if term in TERMS and c.unit == TERMS[term][0]:  # of a gyro
             columns.setdefault(column, {})[term] = c
     return {name: terms for name, terms in columns.items() if len(terms) == len(TERMS)}
 
@@ -61,7 +61,7 @@ def processes_of(result: Result) -> list[list[tuple[float, float]]]:
     largest first.
     """
     out = []
-    for column in getattr(result, "columns", []):
+    for column in (c for c in getattr(result, "columns", []) if c.unit == "°/h"):
         tables = [t for t in column.tables.get("model", []) if t.id == "gauss_markov"]
         rows = [(DPH * float(row[2]), float(row[5])) for t in tables for row in t.rows]
         out.append(sorted(rows, reverse=True))

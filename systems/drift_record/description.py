@@ -11,16 +11,16 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.record import sampling
-from gyrobench.record.drift_columns import ANGLE, harmonic_names
+from gyrobench.record.drift_columns import ANGLE, DIRECT, harmonic_names
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
-from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.reduction.setup.run_metadata import reads_rate
 from gyrobench.result import Reason, Table
-from gyrobench.units import ARCSEC, DPH
+from gyrobench.units import ARCSEC
 
 from . import noise_tables
 from .noise_tables import number
@@ -38,11 +38,15 @@ def acquisition(p: Prepared, run: RunDocument) -> Table:
         ["sampling interval", step, "s"],
         ["samples", about.get("samples", int(np.count_nonzero(np.isfinite(p.rate)))), "1"],
         ["length", (p.time[-1] - p.time[0] + p.step) / 3600.0, "h"],
-        ["mean rate", float(np.nanmean(p.rate)) / DPH, "°/h"],
-        [f"standard deviation of a {'sample' if p.step == step else 'mean'}", float(np.nanstd(p.rate)) / DPH, "°/h"],
+        [f"mean {p.units.words}", float(np.nanmean(p.rate)) / p.units.level_si, p.units.level],
+        [
+            f"standard deviation of a {'sample' if p.step == step else 'mean'}",
+            float(np.nanstd(p.rate)) / p.units.si,
+            p.units.unit,
+        ],
     ]
     if run.series:
-        rows[:0], more = _column_rows(p.name, run.series)
+        rows[:0], more = _column_rows(p.name, p.units, run.series)
         rows += more
     if filled := p.noise.treatment.filled:
         rows.append(["missing samples completed by what the noise around says of them", filled, "1"])
@@ -52,20 +56,20 @@ def acquisition(p: Prepared, run: RunDocument) -> Table:
     )
 
 
-def _column_rows(name: str, series: Mapping[str, Any]) -> tuple[list[list[Any]], list[list[Any]]]:
+def _column_rows(name: str, units: ChannelUnits, series: Mapping[str, Any]) -> tuple[list[list[Any]], list[list[Any]]]:
     about, column = series["acquisition"], series["columns"][name]
     kind = column["kind"]
     rows = [["gaps", about["gaps"], "1"], ["samples missing in gaps", about["missing"], "1"]]
     rows += [["longest gap", about["longest"][1], "s"]] if about["longest"][1] else []
     rows += [["rows without a value", about["incomplete"], "1"]] if about["incomplete"] else []
     rows += [["samples flagged", about["flagged"], "1"]] if about["flagged"] else []
-    if kind != "rate":
+    if kind not in DIRECT:
         rows.append(["resets of the angle or counter", about["resets"].get(name, 0), "1"])
         rows.append(["turns or overflows unwrapped", about["wraps"].get(name, 0), "1"])
     if series["factor"] > 1:
         rows.append(["samples in a mean that is analysed", series["factor"], "1"])
     if q := column["resolution"]:
-        si, unit = (DPH, "°/h") if kind == "rate" else (ARCSEC, "″")
+        si, unit = (units.si, units.unit) if kind in DIRECT else (ARCSEC, "″")
         rows.append(["resolution of the values", q / si, unit])
     rows.append(["jitter of time stamps, rms, of a step", 0.0 if about["rounded"] else round(about["jitter"], 9), "1"])
     return [["column", f"{name}: {kind} [{column['unit'] or '1'}]", ""]], rows
@@ -81,7 +85,7 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
         f"Columns of the file that were not used: {shorten(', '.join(unused), 200)}. One that the rate may follow is "
         "taken out by '# regressors = NAME'."
     ] if unused else []  # fmt: skip
-    if run.series["columns"][p.name]["kind"] != "rate":
+    if run.series["columns"][p.name]["kind"] not in DIRECT:
         out.append(
             "The rate is the difference of two angles over the step, which is its mean over the step: a sine of "
             "frequency f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise "
@@ -100,8 +104,10 @@ def regression(p: Prepared) -> list[Table]:
     rows, turns = [], list[list[Any]]()
     by = {r.name: r for r in p.regressions}
     for r in p.regressions:
-        unit = f"°/h per {units.display(r.unit)}" if r.unit != "1" else "°/h"
-        rows.append([r.name, r.slope / DPH, r.u / DPH, r.full[0] / DPH, r.full[1] / DPH, unit, r.p, 100.0 * r.share,
+        unit = f"{p.units.unit} per {units.display(r.unit)}" if r.unit != "1" else p.units.unit
+        si = p.units.si
+        share = [100.0 * s for s in r.share]
+        rows.append([r.name, r.slope / si, r.u / si, r.full[0] / si, r.full[1] / si, unit, r.p, *share,
                      "taken out" if r.kept else "not significant, left in"])  # fmt: skip
     names = harmonic_names(len(by))
     for n, (c, s) in enumerate(zip(names[::2], names[1::2], strict=True), 1):
@@ -109,25 +115,25 @@ def regression(p: Prepared) -> list[Table]:
             a, b = by[c], by[s]
             size = math.hypot(a.slope, b.slope)
             u = math.hypot(a.slope * a.u, b.slope * b.u) / size if size else math.hypot(a.u, b.u)
-            turns.append([n, size / DPH, u / DPH, math.degrees(math.atan2(a.slope, b.slope)), a.p])
-    head = ["column", "slope", "u", "all: from", "all: to", "unit", "p", "share / %", "use"]
+            turns.append([n, size / p.units.si, u / p.units.si, math.degrees(math.atan2(a.slope, b.slope)), a.p])
+    head = ["column", "slope", "u", "all: from", "all: to", "unit", "p", "share / %", "share from", "share to", "use"]
     caption = (
         "Slope of the rate over other columns, under noise estimated from the residuals. The least significant column "
         "left, again and again, until all of the rest were significant (5 % for all together); p is that of its last "
         "test. Selection makes p and u of what stays too small; 'all' is the 95 % interval with every column. Share: "
-        "of the sum of squares of the rate, after the columns above it"
+        "of the variance of the samples, slope² times the variance of the column, with its 95 % interval"
     )
     out = [Table("regression", "Regression", caption, head, rows)] if rows else []
     caption = "C sin(n θ + φ), θ the angle of the table; u of C from those of its cosine and sine"
-    head = ["harmonic n", "C / (°/h)", "u(C) / (°/h)", "φ / °", "p"]
+    head = ["harmonic n", f"C / ({p.units.unit})", f"u(C) / ({p.units.unit})", "φ / °", "p"]
     return out + ([Table("harmonics", "Harmonics over the angle", caption, head, turns)] if turns else [])
 
 
-def slope_readings(noise: NoiseModel, allan: Deviation) -> Table:
+def slope_readings(noise: NoiseModel, allan: Deviation, units: ChannelUnits) -> Table:
     """Return the coefficients beside those read from the slopes of the Allan deviation."""
     read = slopes(allan)
     rows = []
-    for term, (unit, si, _) in TERMS.items():
+    for term, (unit, si, _) in units.terms.items():
         row: list[Any] = [term, unit]
         for e in (noise[term], getattr(read, term)):
             row += [e.value / si if e.determined else None, e.low / si if e.determined else None, abs(e.high) / si]
@@ -143,10 +149,10 @@ def slope_readings(noise: NoiseModel, allan: Deviation) -> Table:
 
 def lines(p: Prepared) -> list[Table]:
     rows = [
-        [k, x.frequency, x.u_frequency, x.amplitude / DPH, x.u_amplitude / DPH, x.false_alarm]
+        [k, x.frequency, x.u_frequency, x.amplitude / p.units.si, x.u_amplitude / p.units.si, x.false_alarm]
         for k, x in enumerate(p.lines.lines, 1)
     ]
-    head = ["line", "frequency / Hz", "u(f) / Hz", "amplitude / (°/h)", "u(A) / (°/h)", "p"]
+    head = ["line", "frequency / Hz", "u(f) / Hz", f"amplitude / ({p.units.unit})", f"u(A) / ({p.units.unit})", "p"]
     use = "taken out before the noise model" if p.noise.treatment.lines else "left in (remove_lines = false)"
     caption = f"Sines, {use}; p: probability of a line as clear in a record without any"
     return [Table("lines", "Lines", caption, head, rows)] if rows else []
@@ -165,10 +171,11 @@ def coarse_text(name: str, run: RunDocument) -> str:
     if not column or column["white"]:
         return ""
     q = column["resolution"]
-    if column["kind"] == "rate":
+    if column["kind"] in DIRECT:
+        own = units_of(run.window_units.get(name, ""))
         return (
-            f"The values are rounded to {number(q / DPH)} °/h, more than twice the noise of a sample: the error of "
-            "rounding is not white, and N is that of the rounding."
+            f"The values are rounded to {number(q / own.si)} {own.unit}, more than twice the noise of a sample: the "
+            "error of rounding is not white, and N is that of the rounding."
         )
     return (
         f"The angle is rounded to {number(q / ARCSEC)}″, more than 2.5 times its random change within a sample: errors "
@@ -204,7 +211,7 @@ def doubts(p: Prepared, run: RunDocument) -> dict[str, str]:
     """Return why no limit can be judged by the coefficients: the model or the readings are not as assumed."""
     noise = p.noise
     found = {"misfit": "" if noise.agrees else noise_tables.agreement_text(noise), "coarse": coarse_text(p.name, run),
-             "explained": explained_text(p), "saturated": saturated_text(p, run),
+             "explained": explained_text(p), "saturated": saturated_text(p, run), "frozen": frozen_text(p, run),
              "level": noise_tables.levels_text(noise)}  # fmt: skip
     return {f"drift_record.{id}": text for id, text in found.items() if text}
 
@@ -224,8 +231,10 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
             f"{noise_tables.agreement_text(noise)} No coefficient is stated. See the figures; look for lines that "
             "wander, steps, or noise that changes with time.",
         )
-    for id, text in (("wild", noise_tables.wild_text(noise, p.time)), ("step", noise_tables.steps_text(noise, p.time)),
-                     ("level", noise_tables.levels_text(noise))):  # fmt: skip
+    found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
+             "step": noise_tables.steps_text(noise, p.time, p.units),
+             "level": noise_tables.levels_text(noise)}  # fmt: skip
+    for id, text in found.items():
         if text:
             say(id, text)
     if about and about["jitter"] > 0.01 and not about["rounded"]:
@@ -236,8 +245,10 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
         )
     if saturated := saturated_text(p, run):
         say("saturated", saturated)
+    if frozen := frozen_text(p, run):
+        say("frozen", frozen)
     if rounding := coarse_text(p.name, run):
-        say("coarse", f"{rounding} {MORE_DIGITS if column['kind'] == 'rate' else FINER_ANGLE}")
+        say("coarse", f"{rounding} {MORE_DIGITS if column['kind'] in DIRECT else FINER_ANGLE}")
     if explained := explained_text(p):
         remedy = " Leave out what was computed from the rate." if any(r.kept for r in p.regressions) else ""
         say("explained", explained + remedy)
@@ -252,8 +263,49 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     return out
 
 
+def in_short(p: Prepared, run: RunDocument) -> str:
+    """Return lines, steps, wild and frozen samples of a channel in a few words."""
+    t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
+    counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (t.wild.size, "wild"))
+    said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
+    said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "
+             f"{noise_tables.number(g.tau.value)} s" for g in p.noise.processes if g.tau.determined]  # fmt: skip
+    said += ["frozen"] if p.name in about.get("frozen", {}) else []
+    said += ["at its range"] if saturated_text(p, run) else []
+    said += ["coarse"] if coarse_text(p.name, run) else []
+    said += ["level changes"] if noise_tables.levels_text(p.noise) else []
+    return ", ".join(said)
+
+
+def frozen_text(p: Prepared, run: RunDocument) -> str:
+    """Return that the channel stays at one value; "" where it does not, or its coarse steps make that."""
+    about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    if p.name not in about.get("frozen", {}) or coarse_text(p.name, run):
+        return ""
+    length, when = about["frozen"][p.name]
+    return (
+        f"{length} samples from {number(when)} s on are the same value, which the noise does not make: the channel was "
+        "frozen. They count as samples of the noise: the coefficients are too small. Leave them out by a column flag."
+    )
+
+
+def of_rows(run: RunDocument) -> list[Reason]:
+    """Return that rows were written twice."""
+    about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
+    if not (repeated := about.get("repeated", 0)):
+        return []
+    return [
+        Reason(
+            "drift_record.repeated",
+            f"{repeated} of {about['samples']} rows repeat the row before in every channel: the logger writes faster "
+            "than the instrument samples, or again what it missed. The noise between samples is too small and N that "
+            "of the log; keep one row of each sample.",
+        )
+    ]
+
+
 def _flat(p: Prepared, run: RunDocument) -> bool:
-    if not run.series or run.series["factor"] > 1 or run.series["columns"][p.name]["kind"] != "rate":
+    if not run.series or run.series["factor"] > 1 or run.series["columns"][p.name]["kind"] not in DIRECT:
         return False
     seen = sampling.Successive()
     seen.add(p.stretch)
@@ -273,12 +325,12 @@ def conventions(run: RunDocument) -> list[str]:
     ]
 
 
-def summary(name: str, noise: NoiseModel, several: bool) -> list[str]:
+def summary(name: str, noise: NoiseModel, units: ChannelUnits, several: bool) -> list[str]:
     of = f"{name}: " if several else ""
     if not noise.agrees:
         return [f"{of}{noise_tables.agreement_text(noise)} No coefficient is stated."]
     known, lacking = [], []
-    for term, (unit, si, _) in TERMS.items():
+    for term, (unit, si, _) in units.terms.items():
         e = noise[term]
         if e.determined:
             known.append(f"{term} = {noise_tables.range_text(e, si)} {unit}")
@@ -286,9 +338,9 @@ def summary(name: str, noise: NoiseModel, several: bool) -> list[str]:
             lacking.append(f"{term} (below {number(max(abs(e.low), abs(e.high)) / si)} {unit})")
     least = noise.minimum
     if least.reached:
-        known.append(f"least Allan deviation {noise_tables.range_text(least.deviation, DPH)} °/h at "
+        known.append(f"least Allan deviation {noise_tables.range_text(least.deviation, units.si)} {units.unit} at "
                      f"{noise_tables.range_text(least.tau)} s")  # fmt: skip
-    known += [f"Gauss-Markov drift of {noise_tables.range_text(g.sigma, DPH)} °/h rms, correlation time "
+    known += [f"Gauss-Markov drift of {noise_tables.range_text(g.sigma, units.si)} {units.unit} rms, correlation time "
               f"{noise_tables.range_text(g.tau)} s" for g in noise.processes if g.tau.determined]  # fmt: skip
     out = [f"{of}{'; '.join(known)}; 95 % intervals."] if known else []
     return out + ([f"{of}The record does not determine {', '.join(lacking)}."] if lacking else [])

@@ -1,4 +1,4 @@
-"""A laboratory's drift record of any length: rate, angle or counts, CSV or Parquet, or a channel of a run."""
+"""A laboratory's drift record of any length: rates, angles, specific forces, counts; CSV, Parquet, a run's channel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gyrobench.record import sampling
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import (
-    RATE,
+    DIRECT,
     TIME,
     DriftTable,
     Signal,
@@ -42,7 +42,8 @@ TEMPLATE = """\
 # operator = who took the record
 #
 # time: of the sample; or no such column, and a line '# sampling = 100Hz'.  Rows may be missing: gaps are found.
-# Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], or another quantity and a line
+# Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], a specific force [g] (all of an IMU
+#   together: names gyro_x ... acc_z make triads), or another quantity and a line
 #   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (resets are found), or
 #   those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
 # temperature [degC], and columns named by '# regressors = pressure', are taken out by regression, and harmonics over
@@ -54,7 +55,7 @@ time [s],rate [deg/h]
 
 
 def read(system: System, data: Path, values: Mapping[str, str], progress: Progress | None = None) -> Record:
-    """Return the record of a file or a run's folder: windows with the rates in rad/s, gaps as NaN.
+    """Return the record of a file or a run's folder: windows with rates in rad/s, forces in m/s², gaps as NaN.
 
     run.series: acquisition, and how many samples a window is the mean of.  Raises DataError and InvalidValueError.
     """
@@ -93,8 +94,12 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     windows: dict[str, Any] = {"t_start": start, "t_end": start + length, **columns}
     run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
     si = {c.name: c.unit for c in reader.columns}
-    run.window_units = {"t_start": "s", "t_end": "s", **{n: si[n] for n in reader.others}, **dict.fromkeys(
-        (s.name for s in signals), "rad/s")}  # fmt: skip
+    run.window_units = {
+        "t_start": "s",
+        "t_end": "s",
+        **{n: si[n] for n in reader.others},
+        **{s.name: s.reduced for s in signals},
+    }
     run.series = {
         "columns": {
             s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name], reader.steps)}
@@ -102,6 +107,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
         },
         "others": reader.others,
         "unused": [n for n in named(table.head) if n not in si] if data.is_file() else [],
+        "stated": [n for n in ("latitude", "gravity") if n in system.given],
         "factor": reader.held.factor,
         "samples": kind,
         "acquisition": as_dict(about),
@@ -122,18 +128,18 @@ def _opened(system: System, table: DriftTable) -> tuple[DriftTable, list[Signal]
 
 
 def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:
-    """Return the step to which rates (rad/s) or an angle (rad) are rounded, 0: none, and whether that is a white error.
+    """Return the step to which rates, forces or an angle (SI) are rounded, 0: none; whether it is a white error.
 
     values: rates, or increments of the angle; angles: least and largest increment and largest value of those that are
     cumulative, whose rounding in the computer their increments have.
     """
     counts, step, largest = values / s.factor, 0.0, angles[s.name][2] if s.name in angles else 0.0
-    if s.unit in ("", "1") and s.kind != RATE and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
+    if s.unit in ("", "1") and s.kind not in DIRECT and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
         step = abs(s.factor)
     if largest and not step:
         values = np.rint(values / (EXACT * largest)) * (EXACT * largest)
     try:
-        q = quantization(values) if s.kind == RATE else angle_quantization(values, step)
+        q = quantization(values) if s.kind in DIRECT else angle_quantization(values, step)
     except SeriesError:
         return {"resolution": step, "white": not step}  # all the same number of counts
     return {"resolution": q.step, "white": q.white}

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.series.autoregression import Autoregression
+from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.drift_model import DriftModel
 from gyrobench.reduction.series.stationarity import RunsTest
 from gyrobench.result import Table
-from gyrobench.units import DPH
 
 from .noise_tables import number
 
@@ -20,16 +20,17 @@ RAN = {"runs": "runs of block statistics", "up_down": "runs up and down", "trend
        "normality": "normality"}  # fmt: skip
 
 
-def stationarity(m: DriftModel) -> Table:
+def stationarity(m: DriftModel, units: ChannelUnits) -> Table:
     """Return the tests of stationarity and of the distribution; those that cannot be made say why."""
     rows: list[list[Any]] = [[f"runs of {t.statistic}", t.z, t.p, _runs_word(t)] for t in m.runs or ()]
     if m.up_down:
         rows.append(["runs up and down of block means", m.up_down.z, m.up_down.p, _runs_word(m.up_down)])
     if (t := m.trend) is not None:
-        size, u = t.slope / DPH * 3600.0, t.u / DPH * 3600.0
+        unit, si, _ = units.terms["R"]
+        size, u = t.slope / si, t.u / si
         word = "differs from zero" if t.significant else "not distinguishable from zero"
         rows.append(["trend", t.slope / t.u if t.u else None, t.p,
-                     f"{number(size, u)} °/h², u = {number(u, u)} °/h²: {word}"])  # fmt: skip
+                     f"{number(size, u)} {unit}, u = {number(u, u)} {unit}: {word}"])  # fmt: skip
     if (r := m.unit_root) is not None:
         rows += [["augmented Dickey-Fuller", r.adf, r.p_adf, r.reading], ["KPSS", r.kpss, r.p_kpss, r.reading]]
     if (n := m.normality) is not None:
@@ -57,15 +58,22 @@ def _runs_word(t: RunsTest) -> str:
     return f"{t.runs} runs, {'too few: slow variation' if t.z < 0.0 else 'too many: alternation'}"
 
 
-def models(m: DriftModel) -> list[Table]:
+def models(m: DriftModel, units: ChannelUnits) -> list[Table]:
     """Return orders, coefficients and whiteness of the models of the block means."""
     tables = []
     if m.orders is not None:
         o, chosen = m.orders, m.orders.chosen
-        rows = [[int(p), float(o.variance[k]) / DPH**2, *(float(v[k] - np.min(v)) for v in (o.aic, o.sbc)),
+        rows = [[int(p), float(o.variance[k]) / units.si**2, *(float(v[k] - np.min(v)) for v in (o.aic, o.sbc)),
                  float(o.fpe[k] / np.min(o.fpe)), ", ".join(n.upper() for n, c in chosen.items() if c == p)]
                 for k, p in enumerate(o.order)]  # fmt: skip
-        head = ["order", "innovation variance / (°/h)²", "AIC − least", "SBC − least", "FPE over least", "least"]
+        head = [
+            "order",
+            f"innovation variance / ({units.unit})²",
+            "AIC − least",
+            "SBC − least",
+            "FPE over least",
+            "least",
+        ]
         tables.append(
             Table("orders", "Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows)
         )
@@ -117,13 +125,13 @@ def _coefficients(ar: Autoregression) -> list[list[Any]]:
             for k in range(ar.phi.size)]  # fmt: skip
 
 
-def model_texts(m: DriftModel) -> list[str]:
+def model_texts(m: DriftModel, units: ChannelUnits) -> list[str]:
     """Return what to use, and what the record cannot show."""
     out = [f"Recommended: {m.recommended}.", *m.sentences]
     if (g := m.gauss_markov) is not None and g.determined:
         high = "not bounded" if math.isinf(g.high) else f"{number(g.high)} s"
         out.append(f"As a Gauss-Markov drift: correlation time {number(g.tau)} s (95 %: {number(g.low)} s to {high}), "
-                   f"rms {number(g.sigma / DPH)} °/h.")  # fmt: skip
+                   f"rms {number(g.sigma / units.si)} {units.unit}.")  # fmt: skip
     if (a := m.arima) is not None and a.over.flagged:
         out.append(
             f"ARIMA(3,1,0): the first difference is over-differenced (correlation of neighbours {a.over.lag_one:.2f}); "
@@ -132,7 +140,7 @@ def model_texts(m: DriftModel) -> list[str]:
     if (a := m.arima) is not None and a.level.determined:
         level = a.level
         out.append(
-            f"Local level: N = {number(level.white_density / DPH)} °/h/√Hz, K = "
-            f"{number(level.walk_density / DPH * 60.0)} °/h/√h."
+            f"Local level: N = {number(level.white_density / units.density_si)} {units.density}, K = "
+            f"{number(level.walk_density / units.terms['K'][1])} {units.terms['K'][0]}."
         )
     return out + [f"{what}: {why}" for what, why in m.refused.items() if what not in RAN]

@@ -8,11 +8,10 @@ from typing import Any
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import ENOUGH
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.noise_coefficients import Estimate
-from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.result import Table
-from gyrobench.units import DPH
 
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
 SHOWN = 6  # wild samples or steps that are listed
@@ -73,17 +72,24 @@ def agreement_text(noise: NoiseModel) -> str:
     )
 
 
-def agreement(noise: NoiseModel) -> Table:
+def agreement(noise: NoiseModel, units: ChannelUnits) -> Table:
     """Return the deviation of the record as it was beside that of the model, an octave apart."""
     a = noise.agreement
     rows: list[list[Any]] = [
-        [float(t), *(float(v) / DPH for v in values), "inside" if inside else "outside"]
+        [float(t), *(float(v) / units.si for v in values), "inside" if inside else "outside"]
         for t, *values, inside, shown in zip(
             a.tau, a.deviation, a.low, a.high, a.implied, a.inside, a.octave, strict=True
         )
         if shown
     ]
-    head = ["averaging time / s", "record / (°/h)", "95 % from", "95 % to", "model / (°/h)", "finding"]
+    head = [
+        "averaging time / s",
+        f"record / ({units.unit})",
+        "95 % from",
+        "95 % to",
+        f"model / ({units.unit})",
+        "finding",
+    ]
     caption = (
         "Allan deviation of the record as it was, nothing taken out but missing samples, and that of the whole model "
         f"with what was taken out; coefficients are stated where {_percent(ENOUGH)} agree"
@@ -91,17 +97,26 @@ def agreement(noise: NoiseModel) -> Table:
     return Table("agreement", "Record and model", caption, head, rows)
 
 
-def bias_instability(noise: NoiseModel) -> Table:
+def bias_instability(noise: NoiseModel, units: ChannelUnits) -> Table:
     """Return the bias instability in its two senses."""
     least, floor = noise.minimum, math.sqrt(2.0 * math.log(2.0) / math.pi)
     b = noise["B"]
     rows: list[list[Any]] = [
-        ["B", *_range(b, DPH), None, None, None,
-         f"floor {number(floor * b.value / DPH)}" if b.determined else "not determined"],
-        ["B_min", *_range(least.deviation, DPH), *_range(least.tau, 1.0),
+        ["B", *_range(b, units.si), None, None, None,
+         f"floor {number(floor * b.value / units.si)}" if b.determined else "not determined"],
+        ["B_min", *_range(least.deviation, units.si), *_range(least.tau, 1.0),
          "minimum" if least.reached else "no minimum: it falls to the end"],
     ]  # fmt: skip
-    head = ["sense", "value / (°/h)", "95 % from", "95 % to", "averaging time / s", "from / s", "to / s", "finding"]
+    head = [
+        "sense",
+        f"value / ({units.unit})",
+        "95 % from",
+        "95 % to",
+        "averaging time / s",
+        "from / s",
+        "to / s",
+        "finding",
+    ]
     caption = (
         "Two figures are called bias instability: B, the coefficient of the flicker, and B_min, the least Allan "
         "deviation of all noise together, which data sheets mean"
@@ -113,16 +128,17 @@ def _range(e: Estimate, si: float) -> list[float | None]:
     return [e.value / si if e.determined else None, e.low / si if e.determined else None, e.high / si]
 
 
-def gauss_markov(noise: NoiseModel) -> list[Table]:
+def gauss_markov(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
     """Return the Gauss-Markov processes as a Kalman filter takes them."""
     rows: list[list[Any]] = []
     for k, g in enumerate(noise.processes, 1):
         phi, w = g.discrete(noise.scale.tau0)
         found = "determined" if g.tau.determined else f"in {_percent(g.present)} of the models"
-        ends = [v / si for e, si in ((g.sigma, DPH), (g.tau, 1.0)) for v in (e.value, e.low, e.high)]
-        rows.append([k, (g.sigma.value / DPH) ** 2, *ends, g.density / DPH, phi, w / DPH, found])
-    head = ["process", "variance / (°/h)²", "σ / (°/h)", "95 % from", "95 % to", "τ / s", "from / s", "to / s",
-            "√q / (°/h/√s)", "φ", "σ(w) / (°/h)", "finding"]  # fmt: skip
+        ends = [v / si for e, si in ((g.sigma, units.si), (g.tau, 1.0)) for v in (e.value, e.low, e.high)]
+        rows.append([k, (g.sigma.value / units.si) ** 2, *ends, g.density / units.si, phi, w / units.si, found])
+    head = ["process", f"variance / ({units.unit})²", f"σ / ({units.unit})", "95 % from", "95 % to",
+            "τ / s", "from / s", "to / s", f"√q / ({units.unit}/√s)", "φ", f"σ(w) / ({units.unit})",
+            "finding"]  # fmt: skip
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
         f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all"
@@ -130,10 +146,10 @@ def gauss_markov(noise: NoiseModel) -> list[Table]:
     return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
 
 
-def resonances(noise: NoiseModel) -> list[Table]:
+def resonances(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
     """Return the narrow bands of noise that are no lines."""
-    rows = [[k, f, width, rms / DPH] for k, (f, width, rms) in enumerate(noise.peaks(), 1)]
-    head = ["band", "frequency / Hz", "bandwidth / Hz", "rms / (°/h)"]
+    rows = [[k, f, width, rms / units.si] for k, (f, width, rms) in enumerate(noise.peaks(), 1)]
+    head = ["band", "frequency / Hz", "bandwidth / Hz", f"rms / ({units.unit})"]
     caption = "Noise about a frequency: a resonance, a dither that wanders; bandwidth at half the power"
     return [Table("resonances", "Bands of noise", caption, head, rows)] if rows else []
 
@@ -152,7 +168,7 @@ def terms_text(noise: NoiseModel) -> str:
     return f"Terms of the model: {', '.join(words)}; {noise.models} models were compared.{passed}"
 
 
-def wild_text(noise: NoiseModel, time: Array) -> str:
+def wild_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     """Return how many samples are none of the noise, and the coefficients with and without them."""
     at = noise.treatment.wild
     if not at.size:
@@ -161,7 +177,7 @@ def wild_text(noise: NoiseModel, time: Array) -> str:
     first = ", ".join(f"{number(time[k])} s" for k in at[:SHOWN])
     both = [
         f"{term} {number(noise[term].value / si)} {unit} without them, {number(with_them / si)} with them"
-        for term, (unit, si, _) in TERMS.items()
+        for term, (unit, si, _) in units.terms.items()
         if (with_them := noise.with_wild.get(term, 0.0)) and noise[term].determined
     ]
     told = f" {'; '.join(both)}." if both else ""
@@ -171,13 +187,13 @@ def wild_text(noise: NoiseModel, time: Array) -> str:
     )
 
 
-def steps_text(noise: NoiseModel, time: Array) -> str:
+def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     """Return the steps of the level that were taken out."""
     found = noise.steps
     if not found:
         return ""
-    said = ", ".join(f"{number(s.size / DPH, s.u / DPH)} °/h at {number(time[min(s.at, time.size - 1)])} s"
-                     for s in sorted(found, key=lambda s: s.at))  # fmt: skip
+    sizes = [(time[min(s.at, time.size - 1)], s.size / units.si, s.u / units.si) for s in found]
+    said = ", ".join(f"{number(size, u)} {units.unit} at {number(t)} s" for t, size, u in sorted(sizes))
     return (
         f"The level steps by {said}: a step, which no noise of the rest makes, is taken out before the model; left in, "
         "K and B take it for theirs. Find its cause."

@@ -13,6 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.series.channel_units import RATE, ChannelUnits, units_of
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
@@ -21,7 +22,7 @@ from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 
-from .regressors import RegressionSlope, regress
+from .regressors import RegressionSlope, regress, with_rates_of_change
 
 LEAST = 512  # samples of a record
 OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged"}
@@ -29,14 +30,15 @@ OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "
 
 @dataclass(frozen=True)
 class Prepared:
-    """A rate on the grid, rad/s, NaN in gaps, and its noise model; clean: without what columns, lines, steps explain,
-    and without its wild samples.
+    """A rate (rad/s) or force (m/s²) on the grid, NaN in gaps, and its noise model; clean: without what columns,
+    lines, steps explain, and without its wild samples.
 
     stretch: the longest part of ``clean`` without a long gap, for spectra and time-series models; what was missing or
     wild in it is drawn from the noise around.  step: s.
     """
 
     name: str
+    units: ChannelUnits
     time: Array  # of the first sample on, s
     step: float
     rate: Array
@@ -46,6 +48,8 @@ class Prepared:
     model: DriftModel  # of the stretch
     stretch: Array
     first: int  # place of the stretch on the grid
+    inseparable: list[str]
+    explained: float | None  # share of the variance of the samples that the columns taken out explain
 
     @property
     def cleaned(self) -> bool:
@@ -70,6 +74,8 @@ class Columns:
     others_unit: dict[str, str]
     step: float
     conventions: list[str] = field(default_factory=list)
+    units: dict[str, ChannelUnits] = field(default_factory=dict)  # of the channels that are no rate
+    inseparable: list[str] = field(default_factory=list)  # rates of change that follow their columns
 
 
 def columns_of(record: Record) -> Columns:
@@ -80,7 +86,9 @@ def columns_of(record: Record) -> Columns:
         others = {n: np.asarray(w[n], dtype=float) for n in run.series["others"]}
         rates = {n: np.asarray(w[n], dtype=float) for n in run.series["columns"]}
         start = np.asarray(w["t_start"], dtype=float)
-        return Columns(start - start[0], rates, others, run.window_units, step)
+        units = {n: units_of(run.window_units.get(n, "")) for n in rates}
+        others, named, left = with_rates_of_change(others, run.window_units, step)
+        return Columns(start - start[0], rates, others, named, step, units=units, inseparable=left)
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
     k = run_metadata.rate_per_reading(run)
@@ -111,11 +119,14 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
             [f"column '{name}': {np.count_nonzero(np.isfinite(rate))} samples; at least {LEAST} needed"]
         )
     regressions = regress(rate, columns.others, columns.others_unit)
-    left = rate
+    taken = np.zeros_like(rate)
     for r in regressions:
         if r.kept:
             x = columns.others[r.name]
-            left = left - r.slope * np.nan_to_num(x - np.nanmean(x))
+            taken += r.slope * np.nan_to_num(x - np.nanmean(x))
+    left = rate - taken
+    there = np.isfinite(rate)
+    share = float(np.var(taken[there]) / (np.var(rate[there]) or 1.0)) if regressions else None
     try:
         noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
         first, stretch = noise.longest
@@ -123,7 +134,8 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None
     return Prepared(
-        name, columns.time, columns.step, rate, noise.cleaned, regressions, noise, model, stretch, first
+        name, columns.units.get(name, RATE), columns.time, columns.step, rate, noise.cleaned, regressions,
+        noise, model, stretch, first, columns.inseparable, share,
     )  # fmt: skip
 
 

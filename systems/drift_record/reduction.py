@@ -14,16 +14,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from gyrobench.record.drift_columns import DIRECT
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.series.channel_correlation import whitened
 from gyrobench.reduction.series.checks import block_means
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -31,7 +33,7 @@ from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason
+from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason, Table
 from gyrobench.result_entries import (
     DeviationCurve,
     NoiseModelCurves,
@@ -40,9 +42,9 @@ from gyrobench.result_entries import (
     SampleCorrelation,
     SpectrumBand,
 )
-from gyrobench.units import DPH
 
-from . import description, model_tables, noise_tables
+from . import description, model_tables, noise_tables, together
+from .channels import RecordChannel, each
 from .preparation import Columns, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
@@ -73,9 +75,14 @@ def from_record(record: Record) -> DriftRecordResult:
     """Return what a record says.  Raises ReductionError where it is too short or cannot be analysed."""
     run = record.run
     columns = columns_of(record)
-    analysed = [analyse(name, columns, run) for name in columns.rates]
-    several = len(analysed) > 1
-    truth = truth_of(record)
+    names, truth = list(columns.rates), truth_of(record)
+    several = len(names) > 1
+    channels = each(lambda k: channel(names[k], columns, run, truth, several), len(names), columns.time.size)
+    reasons, summary = channels[0].reasons, channels[0].summary
+    shared = list[Table]()
+    if several:
+        shared, common, summary = together.tables(channels, columns.step, run)
+        reasons = [*common, *together.merged({c.name: c.reasons for c in channels})]
     return DriftRecordResult(
         method="Noise model of greatest evidence whose deviation is the record's own, deviations, spectrum, models",
         sources=["DRIFT-NOISE-MODEL, DRIFT-ALLAN; IEEE 952, annex C",
@@ -83,13 +90,14 @@ def from_record(record: Record) -> DriftRecordResult:
         equation='S(f) = N^2 abs(H)^2 + sum_i (2 sigma_i^2 tau_i)/(1 + (2 pi f tau_i)^2) + B^2/(2 pi f) + '
         'K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0)',
         conventions=[*columns.conventions, *description.conventions(run)],
-        coefficients=[c for a in analysed for c in _coefficients(a, run, truth, several)],
-        reasons=[r for a in analysed for r in _reasons(a, run, several)],
-        summary=[s for a in analysed for s in description.summary(a.of.name, a.noise, several)],
+        coefficients=[c for a in channels for c in a.coefficients],
+        reasons=[*reasons, *description.of_rows(run)],
+        summary=summary,
+        tables=shared,
         instrument=run.instrument,
         site={} if run.measured else run_metadata.Location.of(run).shown(),
         simulated=not run.measured,
-        columns=[_column(a, run) for a in analysed],
+        columns=[c.column for c in channels],
     )  # fmt: skip
 
 
@@ -99,18 +107,34 @@ def _named(term: str, a: Analysed, several: bool) -> str:
 
 def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
-    of = f"Column {a.of.name}: " if several else ""
-    said = [replace(r, text=of + r.text) for r in description.warnings(a.of, run)]
     names = tuple(_named(term, a, several) for term in (*TERMS, LEAST_DEVIATION))
     against = description.doubts(a.of, run).items()
-    return said + [Reason(id, of + text, ("pass", "fail"), names, severity="doubt") for id, text in against]
+    return description.warnings(a.of, run) + [
+        Reason(id, text, ("pass", "fail"), names, severity="doubt") for id, text in against
+    ]
+
+
+def channel(name: str, columns: Columns, run: RunDocument, truth: Mapping[str, float], several: bool) -> RecordChannel:
+    """Return what a column says, and what the findings of several need of it."""
+    a = analyse(name, columns, run)
+    p, noise, lines = a.of, a.noise, a.of.lines.lines
+    length = p.rate.size * p.step
+    ordinates = whitened(p.stretch, p.step, noise.spectrum) if several else np.empty(0)
+    return RecordChannel(
+        name=name, units=p.units, coefficients=_coefficients(a, run, truth, several), reasons=_reasons(a, run, several),
+        summary=description.summary(name, noise, p.units, several), column=_column(a, run), first=p.first,
+        ordinates=ordinates, lines=lines, resolution=1.0 / (p.stretch.size * p.step), N=noise["N"],
+        minimum=noise.minimum, agrees=noise.agrees, inside=min(x.share for x in noise.agreements),
+        explained=p.explained, found=description.in_short(p, run), mean=float(np.nanmean(p.rate)),
+        u_mean=float(noise.allan(np.array([length]))[0]),
+    )  # fmt: skip
 
 
 def analyse(name: str, columns: Columns, run: RunDocument) -> Analysed:
     """Return a column with its noise model and deviations."""
     series = run.series or {}
     about: Mapping[str, Any] = series["columns"][name] if series else {"kind": "", "white": True}
-    points = about["kind"] == "rate" and series.get("samples") == "points" and series["factor"] == 1
+    points = about["kind"] in DIRECT and series.get("samples") == "points" and series["factor"] == 1
     p = prepare(name, columns, bool(run.options.get("remove_lines", True)), not points, about["white"])
     held = deviations(p.clean, p.step, tuple(KINDS))
     every = {kind: _read(d) for kind, d in series.get("deviations", {}).get(name, {}).items()}
@@ -130,30 +154,35 @@ def _joined(short: Deviation, long: Deviation) -> Deviation:
 
 def _coefficients(a: Analysed, run: RunDocument, truth: Mapping[str, float], several: bool) -> list[Coefficient]:
     relative = float(run.options.get("u_scale_factor", 0.0))
-    out = [_coefficient(a, term, _named(term, a, several), truth.get(term), relative) for term in TERMS]
+    out = [_coefficient(a, term, several, truth.get(term), relative) for term in TERMS]
+    units = a.of.units
     least, when = a.noise.minimum.deviation, a.noise.minimum.tau
     meaning = f"bias instability as the least Allan deviation, at {noise_tables.range_text(when)} s"
     why = "" if least.determined else "not determined: the deviation still falls at the longest averaging time"
-    return [*out, _stated(a, _named(LEAST_DEVIATION, a, several), meaning, "°/h", least, DPH, why, None, relative)]
+    name = _named(LEAST_DEVIATION, a, several)
+    return [*out, _stated(a, name, meaning, units.unit, least, units.si, why, None, relative, not several)]
 
 
-def _coefficient(a: Analysed, term: str, name: str, truth: float | None, relative: float) -> Coefficient:
-    unit, si, meaning = TERMS[term]
+def _coefficient(a: Analysed, term: str, several: bool, truth: float | None, relative: float) -> Coefficient:
+    unit, si, meaning = a.of.units.terms[term]
     e: Estimate = a.noise[term]
     why = "" if e.determined else noise_tables.absent(term, a.noise)
-    return _stated(a, name, meaning, unit, e, si, why, truth, relative)
+    return _stated(a, _named(term, a, several), meaning, unit, e, si, why, truth, relative, not several)
 
 
 def _stated(
     a: Analysed, name: str, meaning: str, unit: str, e: Estimate, si: float, why: str, truth: float | None,
-    relative: float,
+    relative: float, bound: bool,
 ) -> Coefficient:  # fmt: skip
-    """Return a coefficient with its interval; without a value where ``why`` says why, or the model is not right."""
+    """Return a coefficient with its interval; without a value where ``why`` says why, or the model is not right.
+
+    bound: the reason states the upper end; of many channels it stands in the table alone.
+    """
     value, low, high = e.value / si, e.low / si, e.high / si
     true = None if truth is None else truth / si
     if not a.noise.agrees:
         why, low, high = noise_tables.contradicted(a.noise), math.nan, math.nan
-    elif why:
+    elif why and bound:
         why = f"{why}; below {max(abs(low), abs(high)):.2g} {unit} (95 %)"
     if why:
         return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
@@ -168,35 +197,39 @@ def _stated(
 
 
 def _column(a: Analysed, run: RunDocument) -> DriftColumn:
-    p, m = a.of, a.of.model
+    p, m, si = a.of, a.of.model, a.of.units.si
     longest = max(d.tau[-1] for d in a.deviations.values())
     tau = p.step * np.unique(np.rint(np.geomspace(1.0, longest / p.step, 120)))  # of whole samples
     s, c = m.spectrum, m.correlation
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
-    dev, density = a.noise.allan(tau) / DPH, 2.0 * a.noise.spectrum(f) / DPH**2
+    dev, density = a.noise.allan(tau) / si, 2.0 * a.noise.spectrum(f) / si**2
     lags = slice(0, SHOWN_LAGS + 1)
     return DriftColumn(
         name=p.name,
-        unit="°/h",
+        unit=p.units.unit,
+        quantity=p.units.words,
+        level_unit=p.units.level,
         record=_envelope(p),
-        deviations=[_deviation(kind, d) for kind, d in a.deviations.items()],
+        deviations=[_deviation(kind, d, si) for kind, d in a.deviations.items()],
         model=NoiseModelCurves(tau.tolist(), dev.tolist(), f.tolist(), density.tolist()),
-        spectrum=SpectrumBand(s.frequency.tolist(), *((v / DPH**2).tolist() for v in (s.density, s.low, s.high))),
+        spectrum=SpectrumBand(s.frequency.tolist(), *((v / si**2).tolist() for v in (s.density, s.low, s.high))),
         correlation=SampleCorrelation(c.lag[lags].tolist(), c.rho[lags].tolist(), c.partial[lags].tolist(), c.bound),
         tables={
             "acquisition": [description.acquisition(p, run)],
             "regression": description.regression(p),
-            "deviations": [noise_tables.bias_instability(a.noise), noise_tables.agreement(a.noise),
-                           description.slope_readings(a.noise, a.deviations["allan"])],
-            "spectrum": [*description.lines(p), *noise_tables.resonances(a.noise)],
-            "stationarity": [model_tables.stationarity(m)],
-            "model": [*noise_tables.gauss_markov(a.noise), *model_tables.models(m)],
+            "deviations": [noise_tables.bias_instability(a.noise, p.units),
+                           noise_tables.agreement(a.noise, p.units),
+                           description.slope_readings(a.noise, a.deviations["allan"], p.units)],
+            "spectrum": [*description.lines(p), *noise_tables.resonances(a.noise, p.units)],
+            "stationarity": [model_tables.stationarity(m, p.units)],
+            "model": [*noise_tables.gauss_markov(a.noise, p.units), *model_tables.models(m, p.units)],
         },
         texts={
             "acquisition": description.acquisition_texts(p, run),
+            "regression": p.inseparable,
             "deviations": [noise_tables.agreement_text(a.noise), *([RESIDUAL] if p.cleaned else [])],
             "spectrum": [*description.line_texts(p), noise_tables.terms_text(a.noise)],
-            "model": model_tables.model_texts(m),
+            "model": model_tables.model_texts(m, p.units),
         },
     )  # fmt: skip
 
@@ -212,11 +245,11 @@ def _smoothed(p: Prepared) -> RateBand | None:
     value, sd = smooth_drift(y - slope, m.model_dt, drift)
     every = slice(None, None, max(1, y.size // SHOWN))
     lines = (value + slope + side * NORMAL * sd for side in (-1.0, 0.0, 1.0))
-    return RateBand(t[every].tolist(), *((v[every] / DPH).tolist() for v in lines))
+    return RateBand(t[every].tolist(), *((v[every] / p.units.level_si).tolist() for v in lines))
 
 
-def _deviation(kind: str, d: Deviation) -> DeviationCurve:
-    dev, low, high = ((v / DPH).tolist() for v in (d.deviation, d.low, d.high))
+def _deviation(kind: str, d: Deviation, si: float) -> DeviationCurve:
+    dev, low, high = ((v / si).tolist() for v in (d.deviation, d.low, d.high))
     return DeviationCurve(KINDS[kind], d.tau.tolist(), dev, low, high, d.edf.tolist())
 
 
@@ -226,5 +259,7 @@ def _envelope(p: Prepared) -> RateRecord:
     parts = [p.rate[a:b] for a, b in pairwise(edges.tolist())]
     there = [k for k, v in enumerate(parts) if np.isfinite(v).any()]
     middle = 0.5 * (p.time[edges[:-1]] + p.time[edges[1:] - 1] + p.step)
-    low, mean, high = ([float(f(parts[k])) / DPH for k in there] for f in (np.nanmin, np.nanmean, np.nanmax))
+    low, mean, high = (
+        [float(f(parts[k])) / p.units.level_si for k in there] for f in (np.nanmin, np.nanmean, np.nanmax)
+    )
     return RateRecord(middle[there].tolist(), low, mean, high, _smoothed(p))

@@ -8,6 +8,8 @@ that tell the same one stays, where both at once would look insignificant.  Sele
 small: the interval with all columns is stated beside them; it holds whatever is kept.
 [RED-STEPWISE, RED-ORTHO, RED-HARMONIC; Hu 1981, eq. 4-12..4-22, 4-92..4-101]
 
+Beside a temperature stands its rate of change.
+
 Not modelled: lag of the rate behind a column; a slope that changes with time; columns with errors of their own.
 """
 
@@ -36,6 +38,7 @@ ALPHA = 0.05
 BLOCKS, MOST_BLOCKS = 200, 4000  # means that are fitted; more where a column moves within them
 LEFT = 0.9  # part of the rms of a column that its means keep
 SHORTEST = 8  # means of a stretch
+ALIKE = 0.98  # correlation of a temperature and its rate of change from which on they are one
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class RegressionSlope:
     u: float
     full: tuple[float, float]  # 95 % interval with all columns
     p: float  # of a true zero, when it left or in the end; of a harmonic: of cosine and sine together
-    share: float  # of the sum of squares of the means, after the columns above it
+    share: tuple[float, float, float]  # of the variance of the samples, with its 95 % interval
     kept: bool
 
 
@@ -67,12 +70,9 @@ def regress(rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]
     stretches = [slice(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a >= SHORTEST]
     try:
         series = SeriesRegression([(X[s], y[s]) for s in stretches], names)
-        # less the level of each stretch, as in the regression
-        centred = [np.concatenate([v[s] - v[s].mean(axis=0) for s in stretches]) for v in (X, y)]
-        Q, _ = orthonormal(centred[0], names)
+        orthonormal(np.concatenate([X[s] - X[s].mean(axis=0) for s in stretches]), names)  # refuses combinations
     except (SeriesError, RegressionError) as error:
         raise ReductionError([f"other columns of the record: {error}"]) from None
-    share = (Q.T @ centred[1]) ** 2 / float(centred[1] @ centred[1] or 1.0)
     groups = grouped(names)
     full, fit, removed = backward(names, groups, ALPHA / len(groups), series.fit, _test)
     p = {n: r.p for r in removed for n in r.names} | {
@@ -84,8 +84,54 @@ def regress(rate: Array, others: Mapping[str, Array], unit_of: Mapping[str, str]
         at, beta, half = of.names.index(n), float(full.beta[k]), float(full.half_width[k])
         ends = beta - half, beta + half
         slope, u = float(of.beta[at]), float(of.u[at])
-        out.append(RegressionSlope(n, unit_of.get(n, "1"), slope, u, ends, p[n], float(share[k]), n in fit.names))
+        share = share_of(slope, ends, others[n], rate)
+        out.append(RegressionSlope(n, unit_of.get(n, "1"), slope, u, ends, p[n], share, n in fit.names))
     return tuple(out)
+
+
+def share_of(slope: float, ends: tuple[float, float], column: Array, rate: Array) -> tuple[float, float, float]:
+    """Return the share of the variance of a rate (n,) that slope times a column (n,) makes, with its interval.
+
+    A sum of squares that a fit takes away holds what the slow noise of the rate happens to share with the column; the
+    slope under that noise, and its interval, do not.  Where the interval of the slope holds 0, that of the share does.
+    """
+    there = np.isfinite(column) & np.isfinite(rate)
+    ratio = float(np.var(column[there])) / (float(np.var(rate[there])) or 1.0)
+    low = 0.0 if ends[0] * ends[1] <= 0.0 else min(ends[0] ** 2, ends[1] ** 2) * ratio
+    return slope**2 * ratio, min(low, 1.0), min(max(ends[0] ** 2, ends[1] ** 2) * ratio, 1.0)
+
+
+def with_rates_of_change(
+    others: Mapping[str, Array], unit_of: Mapping[str, str], step: float
+) -> tuple[dict[str, Array], dict[str, str], list[str]]:
+    """Return the columns with the rate of change beside each temperature, their units, and sentences on what lacks one.
+
+    The rate of change, K/h, is that of means over 1/BLOCKS of the record, between the neighbours of each: faster
+    changes are the thermometer's.  One that follows its temperature cannot be told from it and is left out.
+    """
+    out, units, left = dict(others), dict(unit_of), list[str]()
+    for name in [n for n in others if unit_of.get(n) == "K"]:
+        x = others[name]
+        m = max(1, math.ceil(x.size / BLOCKS))
+        means = block_means_of(x, m)
+        middle = m * (np.arange(means.size) + 0.5) - 0.5
+        there = np.isfinite(means)
+        if np.count_nonzero(there) < 2 * SHORTEST or np.nanstd(means) == 0.0:
+            continue
+        slope = np.gradient(means[there], middle[there] * step / 3600.0)
+        if float(np.std(slope)) < 1e-6 * float(np.max(np.abs(slope))):
+            continue  # the level of the channel
+        likeness = float(np.corrcoef(means[there], slope)[0, 1])
+        if abs(likeness) > ALIKE:
+            left.append(
+                f"The rate of change of {name} follows {name} itself (correlation "
+                f"{f'{likeness:.3f}'.replace('-', '−')}): what each of them does to the channel cannot be told apart."
+            )
+            continue
+        grid = np.interp(np.arange(x.size), middle[there], slope)
+        changed = f"d({name})/dt"
+        out[changed], units[changed] = np.where(np.isfinite(x), grid, np.nan), "K/h"
+    return out, units, left
 
 
 def grouped(names: Sequence[str]) -> list[tuple[str, ...]]:

@@ -39,7 +39,7 @@ class DriftRecord(RateReading):
             "duration": Option("8h", "s", "length of the record", 60.0),
             "window": Option(1.0, "s", "averaging time of a sample", 0.01),
             "settle": Option(10.0, "s", "wait before the record", 1.0),
-            "channel": Option("", str, "measured data: columns to reduce; empty: every rate and angle"),
+            "channel": Option("", str, "measured data: columns to reduce; empty: every rate, angle and force"),
             "scale": Option("", str, "measured data: rate or angle of one unit of a column, as 0.5arcsec"),
             "sampling": Option(0.0, "Hz", "measured data without a column time: sampling rate", 0.0),
             "counts": Option("cumulative", str, "measured angles and counts: cumulative, or increments"),

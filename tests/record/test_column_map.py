@@ -201,9 +201,9 @@ def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
     rows = "".join(f"{0.01 * k:.2f},{k % 7},{k % 5},{20 + k % 3}\n" for k in range(600))
     text, problems = proposed(tmp_path, f"time,gyro_x,acc_x,temperature\n{rows}", "drift_record")
     assert "[columns.time]" in text and '[columns.gyro_x]\nfrom = "gyro_x"\n# unit = "deg/s"' in text
-    assert "# Not used: acc_x" in text
+    assert '[columns.acc_x]\nfrom = "acc_x"\n# unit = "m/s2"' in text and "# Not used: none" in text
     assert [p.split(";")[0] for p in problems] == [
-        f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "temperature")
+        f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "acc_x", "temperature")
     ]
     _, problems = proposed(tmp_path, "a,b\n1,2\n3,4\n", "drift_record")
     assert problems == ["column 'rate': none of the file fits by name and unit; not used so far: 'a', 'b'"]

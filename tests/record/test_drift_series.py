@@ -169,10 +169,10 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time": TIME, "rate [deg/h]": RATE}, "", "column 'time': no unit; write 'time [s]'"),
         ({"time [kg]": TIME, "rate [deg/h]": RATE}, "", "column 'time': wrong unit [kg]"),
         ({"time [s]": TIME, "rate": RATE}, "", "column 'rate': no unit; a drift record holds a rate [deg/h]"),
-        ({"time [s]": TIME, "rate [deg/m]": RATE}, "", "column 'rate': [deg/m] is neither a rate nor an angle"),
+        ({"time [s]": TIME, "rate [deg/m]": RATE}, "", "column 'rate': [deg/m] is no rate, angle or specific force"),
         ({"time [s]": TIME, "rate [°/hour]": RATE}, "", "unknown symbol 'hour'"),
         ({"time [s]": TIME, "i [mA]": RATE}, "17.2", "scale = 17.2: no unit"),
-        ({"time [s]": TIME, "i [mA]": RATE}, "17.2deg/h/V", "neither a rate nor an angle"),
+        ({"time [s]": TIME, "i [mA]": RATE}, "17.2deg/h/V", "is no rate, angle or specific force"),
         ({"rate [deg/h]": RATE}, "", "no sampling rate is given: write '# sampling = 100Hz'"),
         ({"t [ms]": TIME, "rate [deg/h]": RATE}, "", "column 'time [s]' is missing (is it 't [ms]'? name it time)"),
         ({"time [s]": TIME, "n": 15.0 * np.arange(N)}, "0.5arcsec", "column 'n': every step of it is 3.6361e-05 rad"),
@@ -180,7 +180,7 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time [s]": TIME, "rate [deg/h]": np.full(N, 2.0)}, "", "all its values are"),
         ({"time [s]": TIME, "rate [deg/h]": ["0.1", "fast"] * 500}, "", "column 'rate': 500 cells are not a number"),
         ({"time [s]": ["2026-05-01T00:00:00"] * N, "rate [deg/h]": RATE}, "", "00:00:00' (a date: write seconds from"),
-        ({"time [s]": TIME, "temperature [degC]": RATE}, "", "no rate and no angle among the columns of the file"),
+        ({"time [s]": TIME, "temperature [degC]": RATE}, "", "no rate, angle or specific force among the columns of"),
     ],
 )  # fmt: skip
 def test_wrong_files(tmp_path: Path, columns: dict[str, Any], scale: str, words: str) -> None:

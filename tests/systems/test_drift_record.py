@@ -131,7 +131,8 @@ def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     assert result["N x"].interval[0] < 0.02 / 60.0 < result["N x"].interval[1] and result["N x"].u < 1e-5
     assert result["N y"].interval[0] < 0.1 / 60.0 < result["N y"].interval[1]
     a, b = result.columns
-    (slope,) = a.tables["regression"][0].rows
+    slope, change = a.tables["regression"][0].rows
+    assert change[0] == "d(temperature)/dt" and change[-1] == "not significant, left in"
     assert slope[0] == "temperature" and slope[1] == pytest.approx(0.03, abs=2.0 * slope[2]) and slope[2] < 0.003
     (line,) = a.tables["spectrum"][0].rows
     assert line[1] == pytest.approx(0.3 / (2 * np.pi), abs=3 * line[2]) and line[3] == pytest.approx(

@@ -1,0 +1,85 @@
+"""Runs of equal samples: a channel that is frozen, rows that a logger wrote twice.
+
+A sample of independent noise equals the one before with a probability p0, the share of such pairs in the record; a run
+of L equal samples somewhere among n then has a probability below n p0^(L-1).  Readings that a low-pass or a coarse step
+make alike have a large p0 and long runs; what stands out of that is frozen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gyrobench.arrays import Array
+
+CHANCE = 1e-6  # of a run by the noise
+FEWEST = 20  # repeated rows that are said
+
+
+@dataclass
+class EqualSamples:
+    """Equal neighbours of channels that are read block by block; samples with a value alone, in their order."""
+
+    names: list[str]
+    samples: int = 0
+    repeated: int = 0  # rows in which every channel equals the row before
+    equal: dict[str, int] = field(default_factory=dict)
+    longest: dict[str, tuple[int, float]] = field(default_factory=dict)  # samples, time of the first, s
+    running: dict[str, tuple[int, float]] = field(default_factory=dict)
+    last: dict[str, float] = field(default_factory=dict)
+
+    def add(self, time: Array, values: Mapping[str, Array]) -> None:
+        """Take samples (n,) of every channel and their times, s; n > 0."""
+        size = time.size
+        every = np.ones(size, dtype=bool)
+        for name in self.names:
+            v = values[name]
+            same = np.empty(size, dtype=bool)
+            same[1:] = v[1:] == v[:-1]
+            same[0] = name in self.last and self.last[name] == v[0]
+            every &= same
+            self.equal[name] = self.equal.get(name, 0) + int(same.sum())
+            self._run(name, time, same)
+            self.last[name] = float(v[-1])
+        self.repeated += int(every.sum())
+        self.samples += size
+
+    def _run(self, name: str, time: Array, same: np.ndarray[Any, Any]) -> None:
+        """Follow the runs of one channel, over the edges of the blocks too."""
+        begins = np.flatnonzero(~same)
+        before, since = self.running.get(name, (0, float(time[0])))
+        first = int(begins[0]) if begins.size else same.size
+        runs = [(before + first, since)] if before + first else []
+        if begins.size:
+            lengths = np.diff(np.append(begins, same.size))
+            k = int(np.argmax(lengths))
+            runs.append((int(lengths[k]), float(time[begins[k]])))
+            self.running[name] = (int(lengths[-1]), float(time[begins[-1]]))
+        else:
+            self.running[name] = runs[0]
+        best = max(runs, key=lambda r: r[0])
+        if best[0] > self.longest.get(name, (0, 0.0))[0]:
+            self.longest[name] = best
+
+    def frozen(self) -> dict[str, tuple[int, float]]:
+        """Return the channels with a run of equal samples that noise does not make: its samples, its time, s."""
+        out = {}
+        for name, (length, when) in self.longest.items():
+            others = max(self.samples - length, 1)
+            p0 = min(max(self.equal[name] - length + 1, 0) / others + 1.0 / others, 1.0)
+            if self.samples * p0 ** (length - 1) < CHANCE:
+                out[name] = (length, when)
+        return out
+
+    def rows_repeated(self) -> int:
+        """Return the rows that repeat the one before in all of two or more channels, beyond what chance makes."""
+        if len(self.names) < 2 or not self.samples:
+            return 0
+        alike = np.prod([self.equal.get(n, 0) / self.samples for n in self.names])
+        shared = max(min(self.equal.get(n, 0) for n in self.names), 1)
+        chance = float(alike) * self.samples
+        several = self.repeated > 0.5 * shared and self.repeated > FEWEST + 10.0 * chance
+        return self.repeated if several else 0
