@@ -144,6 +144,8 @@ def test_the_site_is_built_without_a_warning_and_without_network(tmp_path: Path)
     command = [sys.executable, str(ROOT / "docs/site/build.py"), "--no-notebook", "--out", str(tmp_path / "site")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    listed = re.findall(r'href="(live/\w+\.html)"', (tmp_path / "site" / "live.html").read_text(encoding="utf-8"))
+    assert len(listed) >= 5 and all((tmp_path / "site" / name).is_file() for name in listed)
     for page in (tmp_path / "site").rglob("*.html"):
         text = page.read_text(encoding="utf-8")
         loaded = re.findall(r"<(?:script|img|link|iframe|source)[^>]*?(?:src|href)=[\"'](https?:)?//[^\"']*", text)

@@ -1,7 +1,7 @@
 """Build the documentation site:  python docs/site/build.py [--out build/site] [--no-notebook]
 
-Copies the Markdown pages and what they link to, adds a page for each module of gyrobench and the executed notebook, and
-runs Sphinx in strict mode.  Nothing is fetched: neither here nor when a page is opened.
+Copies the Markdown pages and what they link to, adds a page for each module of gyrobench, the executed notebook and
+systems that run in a page, and runs Sphinx in strict mode.  Nothing is fetched: neither here nor when a page is opened.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 
 from links import LINK, links, pages, prose
+from live import PAGE, export_live, live_page
 from notebook import markdown
 
 HERE = Path(__file__).parent
@@ -24,7 +25,7 @@ NOTEBOOK = Path("docs/guides/first_runs.ipynb")
 #: caption of the sidebar -> pages in their order, by pattern
 CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
-    "Tests and loops": ["docs/tests_and_loops", "docs/gallery", "systems/*/README"],
+    "Tests and loops": ["live", "docs/tests_and_loops", "docs/gallery", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "instruments/README", "reports/README", "fmus/README"],
@@ -130,6 +131,8 @@ def stage(source: Path, run_notebook: bool) -> None:
     copy = source / NOTEBOOK.with_suffix(".md")
     write(copy, markdown(ROOT / NOTEBOOK, run_notebook))
     written.add(copy)
+    write(source / PAGE, live_page())
+    written.add(source / PAGE)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     write(source / "README.md", rewritten(ROOT / "README.md", readme) + contents(source, written))
     for old in (*source.rglob("*.md"), *source.rglob("*.rst")):
@@ -151,6 +154,9 @@ def main() -> int:
     if done.returncode or warnings.read_text(encoding="utf-8").strip():
         return done.returncode or 1
     shutil.copy(given.out / "README.html", given.out / "index.html")
+    if problems := export_live(given.out / "live"):
+        print(*problems, sep="\n", file=sys.stderr)
+        return 1
     print(given.out / "index.html")
     return 0
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
+from gyrobench.component import elementary
 from gyrobench.component.vectors import Vector as Vector
 from gyrobench.component.vectors import cross as cross
 from gyrobench.component.vectors import dot as dot
@@ -101,33 +102,33 @@ def value(x: Any) -> float:
 
 
 def sin(x: Number) -> Number:
-    return Dual(math.sin(x.v), math.cos(x.v) * x.d) if isinstance(x, Dual) else math.sin(x)
+    return Dual(elementary.sin(x.v), elementary.cos(x.v) * x.d) if isinstance(x, Dual) else elementary.sin(x)
 
 
 def cos(x: Number) -> Number:
-    return Dual(math.cos(x.v), -math.sin(x.v) * x.d) if isinstance(x, Dual) else math.cos(x)
+    return Dual(elementary.cos(x.v), -elementary.sin(x.v) * x.d) if isinstance(x, Dual) else elementary.cos(x)
 
 
 def tan(x: Number) -> Number:
     if isinstance(x, Dual):
-        y = math.tan(x.v)
+        y = elementary.tan(x.v)
         return Dual(y, (1.0 + y * y) * x.d)
-    return math.tan(x)
+    return elementary.tan(x)
 
 
 def asin(x: Number) -> Number:
-    return Dual(math.asin(x.v), x.d / math.sqrt(1.0 - x.v * x.v)) if isinstance(x, Dual) else math.asin(x)
+    return Dual(elementary.asin(x.v), x.d / math.sqrt(1.0 - x.v * x.v)) if isinstance(x, Dual) else elementary.asin(x)
 
 
 def atan(x: Number) -> Number:
-    return Dual(math.atan(x.v), x.d / (1.0 + x.v * x.v)) if isinstance(x, Dual) else math.atan(x)
+    return Dual(elementary.atan(x.v), x.d / (1.0 + x.v * x.v)) if isinstance(x, Dual) else elementary.atan(x)
 
 
 def atan2(y: Number, x: Number) -> Number:
     if isinstance(y, Dual) or isinstance(x, Dual):
         a, b = lift(y), lift(x)
-        return Dual(math.atan2(a.v, b.v), (b.v * a.d - a.v * b.d) / (b.v * b.v + a.v * a.v))
-    return math.atan2(y, x)
+        return Dual(elementary.atan2(a.v, b.v), (b.v * a.d - a.v * b.d) / (b.v * b.v + a.v * a.v))
+    return elementary.atan2(y, x)
 
 
 def sqrt(x: Number) -> Number:
@@ -139,20 +140,20 @@ def sqrt(x: Number) -> Number:
 
 def exp(x: Number) -> Number:
     if isinstance(x, Dual):
-        y = math.exp(x.v)
+        y = elementary.exp(x.v)
         return Dual(y, y * x.d)
-    return math.exp(x)
+    return elementary.exp(x)
 
 
 def log(x: Number) -> Number:
-    return Dual(math.log(x.v), x.d / x.v) if isinstance(x, Dual) else math.log(x)
+    return Dual(elementary.log(x.v), x.d / x.v) if isinstance(x, Dual) else elementary.log(x)
 
 
 def tanh(x: Number) -> Number:
     if isinstance(x, Dual):
-        y = math.tanh(x.v)
+        y = elementary.tanh(x.v)
         return Dual(y, (1.0 - y * y) * x.d)
-    return math.tanh(x)
+    return elementary.tanh(x)
 
 
 def floor(x: Number) -> Number:

@@ -2,7 +2,7 @@
 
 The page needs no server and no network.  Its rows are instants of the run, at most :data:`ROWS` of them, evenly spaced;
 what a channel does between two rows is not drawn.  Not in the page: the reduction, the report, windows of a record.
-The numbers are those of the system's FMU but for the last digits of sin and cos, which come with the C library.
+The numbers are those of the system's FMU, bit for bit.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ COMPARISONS: dict[type[ast.AST], str] = {
     ast.Eq: "==",
     ast.NotEq: "!=",
 }
-OWN_C = {"fabs", "minimum", "maximum", "clip", "sign"}  # written in core.h, the others are libm's
+LIBRARY_C = {"sqrt", "floor"}  # exact in every library of C; the others are written in functions.h and elementary.h
 ARGUMENTS = {"atan2": 2, "minimum": 2, "maximum": 2, "clip": 3, "where": 3, "dot": 2, "cross": 2}  # the others take one
 WRITE = {"int": "floor", "round": "floor(x + 0.5)", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
@@ -187,7 +187,14 @@ class Expressions(Places):
         args = ", ".join(self.expression(a) for a in e.args)
         if self.dual:
             return self.number(f"d_{name}({args})")
-        return self.number(f"f_{name}({args})" if name in OWN_C else f"{name}({args})")
+        if name in ("sin", "cos") and self.is_paired(e, name):
+            name = f"paired_{name}"
+        return self.number(f"{name}({args})" if name in LIBRARY_C else f"f_{name}({args})")
+
+    def is_paired(self, e: ast.Call, name: str) -> bool:
+        """Return whether this piece of code asks for the other one of sine and cosine of the same text, too."""
+        other = f"{'cos' if name == 'sin' else 'sin'}({ast.unparse(e.args[0])})"
+        return any(isinstance(n, ast.Call) and ast.unparse(n) == other for n in ast.walk(self.code.node))
 
     def callee(self, e: ast.Call) -> Code | None:
         """Return the procedure or function that is called; None where it is one of the language."""

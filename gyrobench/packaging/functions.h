@@ -60,6 +60,8 @@ static inline double f_maximum(double a, double b) { return a > b ? a : b; }
 static inline double f_clip(double x, double lo, double hi) { return x < lo ? lo : (x > hi ? hi : x); }
 static inline double f_sign(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
+#include "elementary.h"
+
 /* A value and its derivative along one direction: see Dual in gyrobench/component/math.py. */
 typedef struct { double v, d; } dual;
 static inline dual d_con(double x) { dual r = {x, 0.0}; return r; }
@@ -69,18 +71,18 @@ static inline dual d_sub(dual a, dual b) { return d_of(a.v - b.v, a.d - b.d); }
 static inline dual d_mul(dual a, dual b) { return d_of(a.v * b.v, a.d * b.v + a.v * b.d); }
 static inline dual d_div(dual a, dual b) { double q = a.v / b.v; return d_of(q, (a.d - q * b.d) / b.v); }
 static inline dual d_neg(dual a) { return d_of(-a.v, -a.d); }
-static inline dual d_sin(dual x) { return d_of(sin(x.v), cos(x.v) * x.d); }
-static inline dual d_cos(dual x) { return d_of(cos(x.v), -sin(x.v) * x.d); }
-static inline dual d_tan(dual x) { double y = tan(x.v); return d_of(y, (1.0 + y * y) * x.d); }
-static inline dual d_asin(dual x) { return d_of(asin(x.v), x.d / sqrt(1.0 - x.v * x.v)); }
-static inline dual d_atan(dual x) { return d_of(atan(x.v), x.d / (1.0 + x.v * x.v)); }
+static inline dual d_sin(dual x) { return d_of(f_paired_sin(x.v), f_paired_cos(x.v) * x.d); }
+static inline dual d_cos(dual x) { return d_of(f_paired_cos(x.v), -f_paired_sin(x.v) * x.d); }
+static inline dual d_tan(dual x) { double y = f_tan(x.v); return d_of(y, (1.0 + y * y) * x.d); }
+static inline dual d_asin(dual x) { return d_of(f_asin(x.v), x.d / sqrt(1.0 - x.v * x.v)); }
+static inline dual d_atan(dual x) { return d_of(f_atan(x.v), x.d / (1.0 + x.v * x.v)); }
 static inline dual d_atan2(dual a, dual b) {
-    return d_of(atan2(a.v, b.v), (b.v * a.d - a.v * b.d) / (b.v * b.v + a.v * a.v));
+    return d_of(f_atan2(a.v, b.v), (b.v * a.d - a.v * b.d) / (b.v * b.v + a.v * a.v));
 }
 static inline dual d_sqrt(dual x) { double y = sqrt(x.v); return d_of(y, x.d / (2.0 * y)); }
-static inline dual d_exp(dual x) { double y = exp(x.v); return d_of(y, y * x.d); }
-static inline dual d_log(dual x) { return d_of(log(x.v), x.d / x.v); }
-static inline dual d_tanh(dual x) { double y = tanh(x.v); return d_of(y, (1.0 - y * y) * x.d); }
+static inline dual d_exp(dual x) { double y = f_exp(x.v); return d_of(y, y * x.d); }
+static inline dual d_log(dual x) { return d_of(f_log(x.v), x.d / x.v); }
+static inline dual d_tanh(dual x) { double y = f_tanh(x.v); return d_of(y, (1.0 - y * y) * x.d); }
 static inline dual d_floor(dual x) { return d_con(floor(x.v)); }
 static inline dual d_fabs(dual x) { return x.v < 0.0 ? d_neg(x) : x; }
 static inline dual d_minimum(dual a, dual b) { return a.v < b.v ? a : b; }

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 from gyrobench.component import Component
-from gyrobench.packaging.native_target import RUNTIME, c_source
+from gyrobench.packaging.native_target import c_source, runtime_files
 
-HERE = Path(__file__).parent
 DEFINED = re.compile(
     r"^(?:BY_PROCESSOR )?static (?:inline |NEVER_INLINE |COLD |OF_MATRIX )?\w+ \*?(\w+)\("  # functions
     r"|^static const .*?(\w+)\[\] = "  # tables
@@ -35,7 +33,7 @@ def linked_files(parts: Mapping[str, type[Component]]) -> dict[str, str]:
     parts: C name -> class.  What model.c and core.h define for the part ``gyro`` is called ``Part_gyro``,
     ``do_step_gyro`` and so on after ``parts.h``; what no part changes (functions.h) is there once.
     """
-    files = {n: (HERE / n).read_text(encoding="utf-8") for n in RUNTIME}
+    files = runtime_files()
     blocks = []
     for name, cls in parts.items():
         model = c_source(cls, "")

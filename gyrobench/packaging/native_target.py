@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
+from gyrobench.packaging import elementary_tables
 from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
 from gyrobench.packaging.source import PartCode, member
@@ -16,7 +17,6 @@ from gyrobench.packaging.translate import Translation
 from gyrobench.packaging.tuning import tuning
 
 HERE = Path(__file__).parent
-RUNTIME = ("core.h", "functions.h", "noise.h")  # what model.c includes
 PER = {"start": 0, "step": 1, "second": 2}
 
 
@@ -158,6 +158,12 @@ def header_folder() -> Path:
     return Path(spec.origin).parent / "c-code"
 
 
+def runtime_files() -> dict[str, str]:
+    """Return what model.c includes, by name."""
+    files = {n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "functions.h", "noise.h", "elementary.h")}
+    return files | {"elementary_tables.h": elementary_tables.tables()}
+
+
 def face_files(extents: Iterable[int], fmi: int) -> dict[str, str]:
     """Return the files beside model.c and what that includes, by name: instance.c, the FMI face and its headers.
 
@@ -177,6 +183,6 @@ def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
     """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
     return {
         "model.c": c_source(cls, guid),
-        **{n: (HERE / n).read_text(encoding="utf-8") for n in RUNTIME},
+        **runtime_files(),
         **face_files((n for v in variables(cls) for n in (len(v), *[0] * (len(v) - 1))), fmi),
     }

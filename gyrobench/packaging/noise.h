@@ -74,7 +74,7 @@ static inline void quantiles(const double p[AHEAD], double out[AHEAD]) {
     }
     for (i = 0; i < n; i++) {
         const double below = p[rare[i]], above = 1.0 - below;
-        root[i] = sqrt(-log(below < above ? below : above));
+        root[i] = sqrt(-f_log(below < above ? below : above));
     }
     for (; i % LANES != 0; i++) root[i] = 2.0; /* no one reads these */
     for (i = 0; i < n; i += LANES) {

@@ -10,8 +10,7 @@
 
 The comments hold the part and its version, the communication step, and every parameter that differs from its
 default.  A row is one communication point: the inputs set there, and the outputs read after that; then comes
-the step to the next row.  Floats are written with all their digits.  libm differs between platforms in the
-last digits, so a file made on another one agrees to rounding only.
+the step to the next row.  Floats are written with all their digits, which are the same on every platform.
 """
 
 from __future__ import annotations

@@ -37,12 +37,12 @@ class SubsetError(GyrobenchError):
 
 def member(name: str) -> str:
     """Return the C name of a declared quantity in struct Vars."""
-    return name + "_" if name in MEMBERS or name.endswith("_") else name
+    return name + "_" if name in MEMBERS or name.endswith("_") or name.startswith("EF_") else name
 
 
 def local(name: str) -> str:
     """Return the C name of a local variable or an argument."""
-    return name + "_" if name in LOCALS or name.endswith("_") or name.startswith(("d_", "f_")) else name
+    return name + "_" if name in LOCALS or name.endswith("_") or name.startswith(("d_", "f_", "EF_")) else name
 
 
 @functools.lru_cache(maxsize=256)

@@ -59,7 +59,7 @@ def test_the_page_runs_as_the_fmu_does(tmp_path: Path) -> None:
 
         def same(ours: np.ndarray[Any, Any], theirs: np.ndarray[Any, Any]) -> None:
             assert ours.shape == theirs.shape
-            assert np.all(np.abs(ours - theirs) <= 1e-12 * np.abs(theirs).max(axis=0))
+            assert np.array_equal(ours[:, 1:], theirs[:, 1:])  # but for the time, which FMPy sums up
 
         same(rows, fmu({}))
         inertia = browser.run("content.parameters[0].start")
