@@ -226,6 +226,8 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 name = declared.socket if isinstance(declared.socket, str) else declared.socket.name
                 here = "" if slot in system.slots else ", on request"
                 ui.label(f"socket {name}{here}").classes("range")
+                about = ui.link("Equations, ports, limits", f"/part/{declared.part}", new_tab=True)
+                about.props["aria-label"] = f"equations of {slot}"
             menu = ui.select(fitting[slot], value=declared.part).props(f'dense outlined aria-label="part in {slot}"')
             menu.mark(f"slot {slot}")
         with ui.expansion(f"Parameters of {slot}").props("dense").classes("full") as expansion:
@@ -234,8 +236,10 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 drop_fmu(studio, system.name, slot, partial(foreign, slot, menu))
         opened[slot] = expansion
 
-        def chosen(e: Any, slot: str = slot, own: str = declared.part) -> None:
+        def chosen(e: Any, slot: str = slot, own: str = declared.part, about: ui.link = about) -> None:
             choice.put(slot, e.value, own, dropped.get(e.value, ""))
+            about.set_visibility(e.value not in dropped)
+            about.props(f'href="/part/{e.value}"')
             if slot in drawn:
                 draw(slot)
 

@@ -132,12 +132,24 @@ def test_a_part_is_swapped_and_its_parameters_follow(page: Any, studio: tuple[st
     page.get_by_label("part in gyro").click()
     page.get_by_role("option", name="compliant_gyro").click()
     page.wait_for_function("document.querySelector('.code').textContent.includes('--part gyro=compliant_gyro')")
+    assert page.get_by_label("equations of gyro").get_attribute("href") == "/part/compliant_gyro"
     page.get_by_role("button", name="Parameters of gyro").click()
     page.get_by_label("gyro.H", exact=True).fill("0.3")
     page.wait_for_function("document.querySelector('.code').textContent.includes('--set gyro.H=0.3')")
     page.get_by_label("part in gyro").click()
     page.get_by_role("option", name="floated_gyro").click()
     page.wait_for_function("document.querySelector('.code').textContent === 'gyrobench run tumble_single_axis'")
+
+
+def test_a_part_shows_its_equations(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/part/cage")
+    page.get_by_role("heading", name="Equations").wait_for()
+    assert "i = K_p u" in page.locator("pre").first.text_content()
+    assert page.get_by_role("cell", name="torquer current").count() >= 1, "the table of ports"
+    page.goto(base_of(studio) + "/part/floated_gyro")
+    page.get_by_text("omega_IA - omega_d", exact=False).first.wait_for()  # low lines are no emphasis
+    page.goto(base_of(studio) + "/part/cag")
+    page.get_by_role("alert").get_by_text("cage").wait_for()
 
 
 def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[str, Path]) -> None:
@@ -413,3 +425,25 @@ def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[st
     page.get_by_role("button", name="Run").click()
     run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
     assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_shuts_anyone_out(browser: Any, studio: tuple[str, Path], scheme: str) -> None:
+    """axe-core: names of all controls, contrast of all texts, the language; nothing serious on any page."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    context = browser.new_context(viewport={"width": 1200, "height": 900}, color_scheme=scheme)
+    page = context.new_page()
+    page.set_default_timeout(LIMIT)
+    page.goto(studio[0])
+    found = []
+    for path in (
+        "/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/campaign", "/laboratory", "/part/cage",
+    ):  # fmt: skip
+        page.goto(base_of(studio) + path)
+        page.locator("h1").first.wait_for()
+        page.wait_for_timeout(700)
+        violations = Axe().run(page).response["violations"]
+        found += [(path, v["id"], v["nodes"][0]["html"]) for v in violations if v["impact"] in ("serious", "critical")]
+    context.close()
+    assert found == []
