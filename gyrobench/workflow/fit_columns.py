@@ -37,9 +37,13 @@ LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"acc.*|beschl.*|[af]
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:
     """Return names and units of the columns that a test reads, and its circumstances with an example each."""
     *comments, header = empty_record(test).strip().splitlines()
-    found = [re.fullmatch(r"(\S+)(?: \[(.*)\])?", text.strip()) for text in header.split(",")]
     stated = values_of(s for text in comments if (s := statement(text, 1)))
-    return [(m[1], m[2] or "") for m in found if m], stated
+    return _of_header(header), stated
+
+
+def _of_header(header: str) -> list[tuple[str, str]]:
+    found = [re.fullmatch(r"(\S+)(?: \[(.*)\])?", text.strip()) for text in header.split(",")]
+    return [(m[1], m[2] or "") for m in found if m]
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,9 @@ def _proposal(file: Path, test: System | Suite, table: str) -> ColumnProposal:
         if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
             wanted = series_columns(wanted)
         found = match_columns(wanted, layout)
+        samples = _of_header(test.measured_data.samples) if isinstance(test, System) and test.measured_data else []
+        if len(of_samples := match_columns(samples, layout)) > len(found):
+            found, wanted, stated = of_samples, samples, {"attitudes": "unknown", **stated}
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c

@@ -105,7 +105,7 @@ def _gravity(
 
 def _single(channels: Sequence[RecordChannel]) -> list[Reason]:
     """Return that accelerometers that are no triad read more than gravity."""
-    over = [c for c in channels if c.units is FORCE and abs(c.mean) > (1.0 + NEAR) * G0]
+    over = [c for c in channels if c.units == FORCE and abs(c.mean) > (1.0 + NEAR) * G0]
     return [
         _reason("gravity", f"{c.name} reads {number(c.mean)} m/s² at rest, {number(abs(c.mean) / G0)} times gravity: "
                 "its unit or its scale is mistaken.", [c])
@@ -163,6 +163,7 @@ def _earth(
     rows.append(["latitude φ, sin φ = ω·f/(|ω| |f|)", latitude, spread,
                  None if there is None else math.degrees(there), "°", "as far as the gyros have no bias"])  # fmt: skip
     words[0] += (
-        f" With the direction of gravity that is the latitude {number(latitude, spread)}°, if the bias is small."
+        f" With the direction of gravity that is the latitude {number(latitude, spread)}°, "
+        f"u = {number(spread, spread)}° by the noise alone, as far as the gyros have no bias."
     )
     return rows, words

@@ -95,10 +95,14 @@ def from_record(record: Record) -> DriftRecordResult:
         summary=summary,
         tables=shared,
         instrument=run.instrument,
-        site={} if run.measured else run_metadata.Location.of(run).shown(),
+        site=run_metadata.Location.of(run).shown() if not run.measured or _stated_site(run) else {},
         simulated=not run.measured,
         columns=[c.column for c in channels],
     )  # fmt: skip
+
+
+def _stated_site(run: RunDocument) -> bool:
+    return "latitude" in (run.series or {}).get("stated", [])
 
 
 def _named(term: str, a: Analysed, several: bool) -> str:

@@ -60,8 +60,8 @@ def summary(channels: Sequence[RecordChannel]) -> list[Table]:
                               n.high / si if c.agrees else None]  # fmt: skip
             if units is FORCE:
                 row.append(n.value / units.density_si if known else None)
-            shown = c.agrees and least.reached
-            row += [least.deviation.value / units.si if shown else None, least.tau.value if shown else None]
+            reached = c.agrees and least.reached
+            row += [least.deviation.value / units.si if reached else None, least.tau.value if reached else None]
             row.append(100.0 * c.inside)
             row += [None if c.explained is None else 100.0 * c.explained] if explained else []
             rows.append([*row, c.found])
@@ -75,7 +75,9 @@ def summary(channels: Sequence[RecordChannel]) -> list[Table]:
         )
         if explained:
             caption += "; columns: share of the variance of the samples that temperature and other columns explain"
-        out.append(Table(id, title, caption, head, rows))
+        filled = [k for k in range(len(head)) if k < 4 or any(row[k] not in (None, "") for row in rows)]
+        rows = [[row[k] for k in filled] for row in rows]
+        out.append(Table(id, title, caption, [head[k] for k in filled], rows))
     return out
 
 

@@ -2,7 +2,8 @@
 
     time [s],gx [deg/s],gy [deg/s],gz [deg/s],ax [g],ay [g],az [g]
 
-CSV or Parquet.  Positions at rest are found (still.py), or numbered in a column ``position`` (0 or empty: moved).
+CSV or Parquet; other names and units by a column map (gyrobench fit).  Without a unit, or [counts]: counts.  Positions
+at rest are found (still.py), or numbered in a column ``position`` (0 or empty: moved).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from gyrobench.arrays import AnyArray, Array
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head
-from gyrobench.record.drift_columns import open_table
+from gyrobench.record.drift_columns import named, open_table
 from gyrobench.record.record import Record
 from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import System
@@ -27,9 +28,7 @@ from .channels import CHANNELS
 
 UP_DOWN = "up_down"  # option attitudes
 
-GYRO = re.compile(r"(?:mean_)?(?:g|gyro|gyr|omega|w|rate)[ _.]?([xyz])", re.I)
-ACC = re.compile(r"(?:mean_)?(?:a|acc|accel|accelerometer|f)[ _.]?([xyz])", re.I)
-COUNTS = ("counts", "count", "lsb", "digits")
+COUNTS = re.compile(r" *\[(?:counts?|lsb|digits)\]", re.I)
 NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
 FEW = 20  # samples of a position, or of a piece of it
 MOVED = 6.0  # times the usual scatter
@@ -49,12 +48,11 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     problems += set_options(system, table.head.statements, values)
     if "latitude" not in system.given:
         problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
-    head, columns, unclear = _columns(table.head)
+    table.head.names[:] = [COUNTS.sub(" [1]", name) for name in table.head.names]
+    columns, unclear = _columns(table.head)
     problems += unclear
     if problems:
         raise DataError(data, problems)
-    for place, name in enumerate(head.names):
-        table.head.names[place] = name
     blocks = list(table.blocks(columns))
     samples = {c.name: np.concatenate([b[c.name] for b in blocks]) for c in columns}
     time, every, problems = _checked(samples)
@@ -73,38 +71,23 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     return Record(windows, channels, run)
 
 
-def _columns(head: Head) -> tuple[Head, list[CsvColumn], list[str]]:
-    """Return the head with the bench's names, the columns to read, and what is wrong with them."""
-    names, found, problems = list(head.names), dict[str, str](), list[str]()
-    for place, text in enumerate(head.names):
-        name, _, rest = text.partition("[")
-        unit = rest.rstrip("] ").strip()
-        for kind, pattern in (("g", GYRO), ("a", ACC)):
-            if match := pattern.fullmatch(name.strip()):
-                own = kind + match[1].lower()
-                if own in found:
-                    problems.append(f"columns '{found[own]}' and '{text}' are both {own}; leave one of them out")
-                    continue
-                found[own] = text
-                names[place] = f"{own} [1]" if unit.lower() in COUNTS else f"{own} [{unit}]" if unit else own
-        if name.strip().lower() in ("position", "phase", "pose"):
-            names[place] = "position"
-    lost = [c.name for c in CHANNELS if c.name not in found]
+def _columns(head: Head) -> tuple[list[CsvColumn], list[str]]:
+    """Return the columns to read, in units of rate and force, or as counts, and what is wrong with them."""
+    there, problems = named(head), list[str]()
+    lost = [c.name for c in CHANNELS if c.name not in there]
     if lost:
         problems.append(
-            f"columns not found: {', '.join(lost)} (gx or gyro_x, ax or acc_x ... with their units); columns of the "
-            f"file: {', '.join(head.names)}"
+            f"columns not found: {', '.join(lost)}; columns of the file: {', '.join(there)}. Other names are mapped: "
+            "gyrobench fit FILE --system imu_positions --out map.toml, then --columns map.toml"
         )
     columns = [CsvColumn("time", "s", "time of the sample")]
     for kind, si in (("g", "rad/s"), ("a", "m/s2")):
-        mine = [names[head.names.index(found[kind + a])] for a in "xyz" if kind + a in found]
-        counted = [n for n in mine if n.endswith("[1]")]
+        mine = [kind + a for a in "xyz" if kind + a in there]
+        counted = [n for n in mine if (there[n] or "1") == "1"]
         if counted and len(counted) < len(mine):
             problems.append(f"columns {', '.join(mine)}: counts and another unit in one triad")
-        columns += [CsvColumn(kind + a, "1" if counted else si, "reading") for a in "xyz" if kind + a in found]
-    if "position" in names:
-        columns.append(NUMBER)
-    return Head(names, head.statements, head.line, head.delimiter, head.decimal_comma), columns, problems
+        columns += [CsvColumn(n, "1" if n in counted else si, "reading") for n in mine]
+    return columns + ([NUMBER] if "position" in there else []), problems
 
 
 def _checked(samples: Mapping[str, Array]) -> tuple[Array, Array, list[str]]:

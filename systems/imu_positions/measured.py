@@ -57,4 +57,6 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     return read_record(system, data, values, needed=NEEDED, columns=COLUMNS)
 
 
-MEASURED = MeasuredData(TEMPLATE, read)
+#: header of a logger's file, for the proposal of a column map
+SAMPLES = "time [s],gx [deg/s],gy [deg/s],gz [deg/s],ax [g],ay [g],az [g]"
+MEASURED = MeasuredData(TEMPLATE, read, samples=SAMPLES)

@@ -32,7 +32,7 @@ SLOW = np.array([4.0, 4.0, 0.1, 0.1])  # rms of the process
 OF_WHITE = {(0, 1): 0.2, (1, 2): -0.1}
 OF_SLOW = {(0, 1): 0.6}
 PER_KELVIN, PER_CHANGE = 3.0, 0.02  # deg/h per K of gyro_x, mg per (K/h) of acc_y
-AMPLITUDE = {0: 4.0, 2: 0.13}
+AMPLITUDE = {0: 3.0, 2: 0.1}
 
 
 def matrix(of: dict[tuple[int, int], float]) -> np.ndarray:

@@ -67,7 +67,8 @@ def test_units_walks_gravity_and_the_latitude(tmp_path: Path) -> None:
     assert rate[1] == pytest.approx(EARTH, abs=4.0 / 64.0) and "the Earth's rate" in rate[-1]
     assert vertical[3] == pytest.approx(EARTH * math.sin(PHI)) and abs(vertical[1] - vertical[3]) < 4.0 * vertical[2]
     assert latitude[2] == pytest.approx(0.0595, rel=0.15) and abs(latitude[1] - 51.0) < 4.0 * latitude[2]
-    assert not result.warnings
+    assert result.site["latitude / °"] == pytest.approx(51.0)
+    assert not result.warnings and "columns / %" not in gyros.columns
 
 
 @pytest.mark.usefixtures("no_arma")
@@ -81,6 +82,20 @@ def test_a_mistaken_unit_is_named(tmp_path: Path) -> None:
     rate = table(result, "at_rest").rows[-1]
     assert "a bias hides it" in rate[-1] and len(table(result, "at_rest").rows) == 2
     assert not any("latitude" in s and "that is" in s for s in result.summary)
+
+
+@pytest.mark.usefixtures("no_arma")
+def test_a_single_accelerometer_above_gravity_is_named_from_a_forked_process_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1 g under a head of 10 g; what comes back from a process is a copy, equal but not the same."""
+    columns = unit_at_rest(2048)
+    few = {"time [s]": columns["time [s]"], "gyro_x [deg/h]": columns["gyro_x [deg/h]"],
+           "acc_z [g]": 9.8 * columns["acc_z [g]"]}  # fmt: skip
+    for long in (CHANNELS.LONG, 1):
+        monkeypatch.setattr(CHANNELS, "LONG", long)
+        (said,) = [r for r in reduce(tmp_path, few).reasons if r.id == "drift_record.gravity"]
+        assert said.text.startswith("acc_z reads 96.1 m/s² at rest, 9.8 times gravity")
 
 
 @pytest.mark.usefixtures("no_arma")

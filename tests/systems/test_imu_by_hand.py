@@ -13,10 +13,12 @@ from imu_world import Unit, handled, own_axes, poses
 from scipy.spatial.transform import Rotation
 
 import gyrobench as gb
+from gyrobench.record.column_map import read_map, translate
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
+from gyrobench.workflow.fit_columns import write_columns
 
 room = type(load_system("imu_positions")).__module__
 hand: Any = importlib.import_module(".hand", room)
@@ -162,8 +164,8 @@ def test_few_positions_say_what_is_missing(tmp_path: Path) -> None:
 def test_all_faults_of_a_file_in_one_list(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(
-        "# attitudes = unknown\n# u_atitude = 5arcsec\ntime [s],gx [deg/s],gyro_x [deg/s],gy [counts],gz [deg/s],"
-        "ax [g],ay [g]\n0,1,1,1,1,1,1\n", encoding="utf-8",
+        "# attitudes = unknown\n# u_atitude = 5arcsec\ntime [s],gx [deg/s],gy [counts],gz [deg/s],"
+        "ax [g],ay [g]\n0,1,1,1,1,1\n", encoding="utf-8",
     )  # fmt: skip
     with pytest.raises(DataError) as error:
         record(path)
@@ -171,8 +173,7 @@ def test_all_faults_of_a_file_in_one_list(tmp_path: Path) -> None:
     for said in (
         "u_atitude",
         "'latitude' is not given",
-        "are both gx",
-        "columns not found: az",
+        "columns not found: az; columns of the file: time, gx, gy, gz, ax, ay. Other names are mapped: gyrobench fit",
         "counts and another unit",
     ):
         assert said in text
@@ -194,7 +195,7 @@ def test_plan_that_is_not_enough_is_refused_before_the_run() -> None:
     assert "6 positions for nine unknowns" in str(error.value)
 
 
-def test_reads_other_names_and_numbered_positions(tmp_path: Path) -> None:
+def test_a_proposed_map_reads_other_names_and_numbered_positions(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     unit = Unit.drawn(rng)
     time, gyro, acc = handled(unit, poses(rng, 12), rng, gyro=GYRO, acc=ACC)
@@ -204,7 +205,11 @@ def test_reads_other_names_and_numbered_positions(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     text = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows.tolist())
     path.write_text(f"{HEAD}{','.join(heads)}\n{text}\n", encoding="utf-8")
-    read = record(path)
+    text, problems = write_columns(path, "imu_positions", None)
+    assert not problems and "# Not used: position" in text and '# attitudes = "unknown"' in text
+    (tmp_path / "map.toml").write_text(text.replace("# Not used", '[columns.position]\nfrom = "position"\n#'))
+    translate(path, read_map(tmp_path / "map.toml"), tmp_path / "columns.csv")
+    read = record(tmp_path / "columns.csv", attitudes="unknown", latitude="40.10704566deg", gravity="9.805m/s2")
     assert read.windows["phase"].size == 12
     result = hand.HandReduction.of_record(read)
     truth = own_axes(unit)
