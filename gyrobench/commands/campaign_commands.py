@@ -23,6 +23,7 @@ from gyrobench.commands.options import (
     Store,
     Strict,
     System,
+    WithCertificate,
     WithSite,
     Workers,
 )
@@ -70,6 +71,7 @@ def sweep(
     scheduler: Scheduler = None,
     retry: Retry = False,
     site: WithSite = False,
+    certificate: WithCertificate = False,
     strict: Strict = False,
     as_json: Json = False,
 ) -> None:
@@ -83,9 +85,12 @@ def sweep(
       gyrobench sweep tumble_single_axis --over "gyro.D_I=normal(0, 0.5) deg/h/g" --runs 256 --design lhs
       gyrobench sweep platform_single_axis --over "platform.J=1,2,4 kg.m2" --fixed-design
       gyrobench sweep tumble_single_axis --data "lot/*.csv" --spec floated_gyro --keep all --site
+      gyrobench sweep tumble_single_axis --data "lot/*.csv" --spec floated_gyro --certificate
     """
     from gyrobench.commands import run_campaign
 
+    if certificate:
+        keep = run_campaign.require_certifiable(data, keep)
     more = {
         "runs": runs, "design": design, "table": table, "data": data, "columns": columns, "spec": spec, "keep": keep,
         "fixed_design": fixed_design or None, "time_limit": time_limit, "memory_limit": memory_limit,
@@ -93,7 +98,7 @@ def sweep(
     axes = run_campaign.require_over(over, seeds, data, table)
     definition = run_campaign.from_arguments(system, axes, seeds, values, part, mapping, more)
     store = out or run_campaign.default_out(definition, True)
-    if not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site) and strict:
+    if not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site, certificate) and strict:
         raise typer.Exit(1)
 
 

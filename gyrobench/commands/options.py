@@ -77,6 +77,9 @@ From = Annotated[
         "libcosim's CSV files; values by --set, --part and --map as at the export.",
     ),
 ]
+WithCertificate = Annotated[
+    bool, typer.Option("--certificate", help="Write the certificate, too; needs laboratory.toml.")
+]
 Language = Annotated[str, typer.Option("--language", metavar="en|zh", help="Language of the report.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in the folder --out.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue this run from where it was interrupted.")]

@@ -53,11 +53,17 @@ def reduce(
     formats: Sequence[str] = FORMATS,
     fit_to: str | None = None,
     columns: Path | None = None,
+    certificate: bool = False,
 ) -> str:
     """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict.
 
-    fit_to: gyro of the bench that is to have the noise of the record.  columns: column map of the file.
+    fit_to: gyro of the bench that is to have the noise of the record.  columns: column map of the file.  certificate:
+    write that, too, by the profile of the laboratory, which is looked for first.
     """
+    from gyrobench.workflow.certificate import find_laboratory, write_certificate
+
+    if certificate:
+        find_laboratory()
     if isinstance(test, Suite):
         from gyrobench.workflow.suite_report import reduce_runs
 
@@ -68,7 +74,10 @@ def reduce(
         if not data:
             raise UsageError(f"no runs named; gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
-        return _print_outcome(reduce_runs(test, data, spec, out, force, formats), as_json)
+        outcome = reduce_runs(test, data, spec, out, force, formats)
+        verdict = _print_outcome(outcome, as_json)
+        _print_paths(write_certificate([outcome.folder]) if certificate and outcome.folder else [], as_json)
+        return verdict
     from gyrobench.workflow.gyro_values import channels_of, write_gyro_values
     from gyrobench.workflow.measured_run import reduce_measured
 
@@ -86,7 +95,13 @@ def reduce(
         file = outcome.folder / f"{fit_to}.toml"
         write_gyro_values(outcome.result, outcome.record, fit_to, file)
         console.print_note(f"noise of the record for {fit_to}: {display_path(file)}; gyrobench run SYSTEM --set @FILE")
+    _print_paths(write_certificate([outcome.folder]) if certificate and outcome.folder else [], as_json)
     return verdict
+
+
+def _print_paths(paths: Sequence[Path], as_json: bool) -> None:
+    for path in () if as_json else paths:
+        print(display_path(path))
 
 
 def reduce_result(

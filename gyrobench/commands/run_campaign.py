@@ -39,6 +39,18 @@ def from_arguments(
     return from_mapping({**content, "parts": parts, "maps": {s: str(f) for s, f in maps.items()}}, where="sweep")
 
 
+def require_certifiable(data: str | None, keep: str | None) -> str:
+    """Return that all reports are kept.  Raises UsageError where a certificate cannot be of what is asked for."""
+    from gyrobench.workflow.certificate import find_laboratory
+
+    if data is None:
+        raise UsageError("--certificate is of measured files: name them by --data")
+    if keep not in (None, "all"):
+        raise UsageError(f"--certificate needs the reports of all files: --keep all, not {keep}")
+    find_laboratory()
+    return "all"
+
+
 def default_out(definition: Definition, sweep: bool) -> str:
     """Return where a campaign is stored unless a place is named: by its name, a sweep by its content.
 
@@ -60,10 +72,11 @@ def run(
     retry: bool,
     as_json: bool,
     site: bool = False,
+    certificate: bool = False,
 ) -> bool:
     """Execute a campaign and print what it has; return whether every run is done and none fails its specification.
 
-    site: write the site of the campaign, too.
+    site, certificate: write the site of the campaign, and the certificate of its lot, too.
     """
     from gyrobench.campaign.execution.campaign_execution import execute_campaign
 
@@ -80,6 +93,11 @@ def run(
         written = write_site(outcome.campaign)
         if not as_json:
             print("", *written.answer, display_path(written.index), sep="\n")
+    if certificate:
+        from gyrobench.campaign.site.lot_certificate import certify_campaign
+
+        paths = certify_campaign(outcome.campaign)
+        print(*([] if as_json else map(display_path, paths)), sep="\n")
     bad = {"fail", "void", "inconclusive"} & summary["verdicts"].keys()
     return not bad and summary["states"].keys() <= {"done"}
 

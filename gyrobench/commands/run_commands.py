@@ -29,6 +29,7 @@ from gyrobench.commands.options import (
     Strict,
     System,
     TableFormat,
+    WithCertificate,
 )
 
 
@@ -141,6 +142,7 @@ def reduce(
     out: Out = None,
     force: Force = False,
     language: Language = "en",
+    certificate: WithCertificate = False,
     as_json: Json = False,
 ) -> None:
     """Reduce measured data, or a run of another tool, and report.
@@ -149,7 +151,7 @@ def reduce(
     Examples:
       gyrobench reduce tumble_single_axis --template > record.csv
       gyrobench reduce tumble_single_axis --data record.csv --set latitude=45.75deg
-      gyrobench reduce fixed_position --data messung.csv --columns messung.toml --set latitude=48.1deg
+      gyrobench reduce fixed_position --data messung.csv --columns messung.toml --set latitude=48.1deg --certificate
       gyrobench reduce drift_test_suite --data RUN1 --data RUN2 --set operator=...
       gyrobench reduce tumble_single_axis --from fmpy.csv --set latitude=45.75deg
       gyrobench reduce tumble_single_axis.ssp --from libcosim_output
@@ -170,9 +172,9 @@ def reduce(
     formats = ("json",) if no_report else FORMATS
     parts, maps = parse_swaps(part, mapping)
     if source is not None:
-        if data or fit_to or columns:
+        if data or fit_to or columns or certificate:
             raise UsageError(
-                "--from: a run of another tool; --data, --columns and --fit-to are of measured data, name one of them"
+                "--from: a run of another tool; --data, --columns, --fit-to and --certificate are of measured data"
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
         with reports_in(language, test.name, Bench.find().folder):
@@ -182,7 +184,9 @@ def reduce(
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
     given = parse_settings(values)
     with reports_in(language, test.name, Bench.find().folder):
-        verdict = print_runs.reduce(test, data or [], given, spec, out, force, as_json, formats, fit_to, columns)
+        verdict = print_runs.reduce(
+            test, data or [], given, spec, out, force, as_json, formats, fit_to, columns, certificate
+        )
     exit_on_fail(verdict, strict)
 
 
@@ -288,6 +292,9 @@ def certificate(
     number: Annotated[str, typer.Option(help="Number of the certificate; default: that of the report.")] = "",
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: the working folder.")] = None,
     language: Annotated[str, typer.Option(metavar="en|zh", help="Default: that of the profile.")] = "",
+    dcc: Annotated[
+        bool, typer.Option("--dcc", help="Also as XML, a Digital Calibration Certificate by the schema of PTB.")
+    ] = False,
 ) -> None:
     """Write the certificate of an instrument, or of a lot.
 
@@ -296,9 +303,10 @@ def certificate(
     \b
     Example: gyrobench certificate reports/out/tumble_single_axis/measured-47e4353f --number 2026-014
     """
+    from gyrobench.campaign.site.lot_certificate import control_charts
     from gyrobench.workflow.certificate import write_certificate
 
-    for path in write_certificate(runs, laboratory, number, out, language):
+    for path in write_certificate(runs, laboratory, number, out, language, dcc, control_charts):
         echo(display_path(path))
 
 

@@ -7,12 +7,14 @@ Its figures are those of the reports, whose ids and digests it names.  Nothing t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gyrobench.bench import UsageError
 from gyrobench.report.laboratory import SIGNATORIES, Laboratory
-from gyrobench.report.language import system_folder, used
+from gyrobench.report.language import Language, system_folder, used
 from gyrobench.report.numbers import FormattedNumber, write_number
 from gyrobench.report.page_model import (
     BulletList,
@@ -29,10 +31,13 @@ from gyrobench.report.page_model import (
 from gyrobench.report.report_files import own_texts
 from gyrobench.report.result_json import Report
 from gyrobench.report.result_page import date, place, what_u_is
+from gyrobench.report.standard_names import names_table
 from gyrobench.report.tables import limit_text
 from gyrobench.result import NO_VERDICT, Coefficient, Result
 
 Known = Callable[[str], bool]  # whether a text can be said in the language of the certificate
+
+Charts = Callable[[Sequence["Certified"], Laboratory], list[Any]]  # blocks of a lot
 
 NOT_PASSED = ("fail", "inconclusive", "void")
 ACROSS = 5  # coefficients side by side in the table of a lot
@@ -56,7 +61,9 @@ class Certified:
 
     @property
     def instrument(self) -> str:
-        return self.report.result.instrument or "not named"
+        """The instrument; of a record that does not name it the file of its data, so that those of a lot differ."""
+        data = getattr(self.report.about, "data", None)
+        return self.report.result.instrument or (data.file if data else "") or "not named"
 
     @property
     def remarks(self) -> list[tuple[str, str]]:
@@ -68,19 +75,43 @@ class Certified:
 
 
 def page(
-    of: Sequence[Certified], laboratory: Laboratory, number: str = "", language: str = "", bench: Path | None = None
+    of: Sequence[Certified],
+    laboratory: Laboratory,
+    number: str = "",
+    language: str = "",
+    bench: Path | None = None,
+    charts: Charts | None = None,
 ) -> Page:
     """Return the certificate of one report, or of a lot of the same test.  number: its own; "": that of the report.
 
-    language: default that of the profile.  bench: whose systems have catalogues.  Raises UsageError for reports of
-    different tests, and for a coefficient of the profile that the test has not.
+    language: default that of the profile.  bench: whose systems have catalogues.  charts: drawn of a lot.  Raises
+    UsageError for reports of different tests, and for a coefficient of the profile that the test has not.
     """
+    with spoken(of, laboratory, number, language, bench) as words:
+        drawn = charts(of, laboratory) if charts and len(of) > 1 else []
+        made = _page(of, laboratory, number, words.has if words else lambda text: True, drawn)
+        return words.page(made, "the certificate") if words else made
+
+
+def spoken(
+    of: Sequence[Certified], laboratory: Laboratory, number: str, language: str, bench: Path | None
+) -> AbstractContextManager[Language | None]:
+    """Return the language of a certificate, to be used, that knows the texts of laboratory and user."""
     own = {t for c in of for t in own_texts(c.report)[0]} | _own(laboratory) | {number}
     names = {t for c in of for t in own_texts(c.report)[1]}
     folder = system_folder(of[0].report.result.system, bench)
-    with used(language or laboratory.language, folder, own - {""}, names) as words:
-        made = _page(of, laboratory, number, words.has if words else lambda text: True)
-        return words.page(made, "the certificate") if words else made
+    return used(language or laboratory.language, folder, own - {""}, names)
+
+
+def number_of(of: Sequence[Certified]) -> str:
+    """Return the number of a certificate that was given none: the id of the report, of a lot with its count."""
+    first = of[0].report.report_id
+    return first if len(of) == 1 else f"{first}-{len(of)}"
+
+
+def chosen(certified: Certified, laboratory: Laboratory) -> list[Coefficient]:
+    """Return the coefficients of a report that the profile shows, in its order.  Raises UsageError."""
+    return _chosen(certified, _names(certified.report.result, laboratory))
 
 
 def _own(laboratory: Laboratory) -> set[str]:
@@ -93,17 +124,18 @@ def _address(laboratory: Laboratory) -> str:
     return ("，" if any("一" <= c <= "鿿" for line in lines for c in line) else ", ").join(lines)
 
 
-def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known) -> Page:
+def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: Known, charts: list[Any]) -> Page:
     """Return the certificate in English, without what is not known in its language: that is in the reports."""
     first = of[0].report
     systems = sorted({c.report.result.system for c in of})
     if len(systems) > 1:
         raise UsageError(f"a certificate is of one test, the runs are of {', '.join(systems)}")
     names = _names(first.result, laboratory)
-    number = number or (first.report_id if len(of) == 1 else f"{first.report_id}-{len(of)}")
+    number = number or number_of(of)
     results = _one(of[0], names, known) if len(of) == 1 else _lot(of, names)
     sections = [
-        Section("Results", "results", results),
+        Section("Results", "results", [*results, *names_table(_chosen(of[0], names))]),
+        Section("Control charts", "control", charts),
         Section("Conformity", "conformity", _conformity(of)),
         Section("Remarks", "remarks", _remarks(of, known)),
         Section("Reports", "reports", [_reports(of)]),
@@ -111,7 +143,9 @@ def _page(of: Sequence[Certified], laboratory: Laboratory, number: str, known: K
     ]
     title = first.result.title if known(first.result.title) else first.result.system
     title = f"{'Simulated test' if _simulated(of) else 'Test certificate'}: {title}"
-    return Page(title, number, _head(of, laboratory, number, known), sections, what="Certificate").finish()
+    return Page(
+        title, number, _head(of, laboratory, number, known), sections, what="Certificate", logo=laboratory.picture
+    ).finish()
 
 
 def _said(text: str, known: Known) -> str:

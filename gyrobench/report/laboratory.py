@@ -3,6 +3,8 @@
 name = "Inertial laboratory"
 address = ["Example street 1", "12345 Example town"]
 accreditation = "D-K-00000-00-00"                        # what follows is optional
+logo = "logo.svg"                                        # PNG or SVG, beside the profile, at most 500 kB
+country = "DE"                                           # needed for a digital calibration certificate
 statements = ["The measurements are traceable to the national standards."]
 coefficients = ["D_F", "D_I", "D_S"]                     # shown, in this order; default all
 language = "zh"                                          # of the certificate; default en
@@ -13,11 +15,12 @@ name = "N. N."
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, field_validator
 
 from gyrobench import reading
 from gyrobench.bench import UsageError
@@ -26,6 +29,8 @@ from gyrobench.files import write_whole
 from gyrobench.report.language import ENGLISH, codes
 
 FILE = "laboratory.toml"
+LARGEST_LOGO = 500_000
+PNG = b"\x89PNG\r\n\x1a\n"
 
 
 class Signatory(BaseModel):
@@ -48,10 +53,18 @@ class Laboratory(BaseModel):
     name: str = Field(min_length=1)
     address: list[str] = Field(min_length=1)
     accreditation: str = ""
+    logo: str = ""
+    country: str = Field(default="", pattern="^([A-Z]{2})?$")
     statements: list[str] = []
     coefficients: list[str] = []
     language: str = ENGLISH
     signatories: list[Signatory] = list(SIGNATORIES)
+    _picture: str = PrivateAttr("")
+
+    @property
+    def picture(self) -> str:
+        """The logo as a data URI; "" where there is none."""
+        return self._picture
 
     @field_validator("language")
     @classmethod
@@ -67,10 +80,29 @@ def read_laboratory(file: Path) -> Laboratory:
         raise UsageError(f"{file}: no profile of a laboratory; {FILE} needs two lines, name = and address = [...]")
     data = reading.toml(reading.read_text(file, UsageError), file, UsageError)
     try:
-        return Laboratory.model_validate(data)
+        found = Laboratory.model_validate(data)
+        found._picture = _logo(file.parent / found.logo) if found.logo else ""
+        return found
     except ValidationError as error:
         problems = faults_of(error, lambda place: Signatory if place[0] == "signatories" and place[1:] else Laboratory)
     raise UsageError("\n".join([f"{file}: not a profile of a laboratory:", *(f"  - {p}" for p in problems)]))
+
+
+def _logo(file: Path) -> str:
+    """Return a logo as a data URI.  Raises UsageError for a file that is no PNG or SVG, or is too large."""
+    if not file.is_file():
+        raise UsageError(f"{file}: no such logo")
+    content = file.read_bytes()
+    if len(content) > LARGEST_LOGO:
+        raise UsageError(f"{file}: {len(content) // 1000} kB; a logo has at most {LARGEST_LOGO // 1000} kB")
+    if content.startswith(PNG):
+        kind = "png"
+    elif file.suffix.lower() == ".svg":
+        reading.xml(content, file, UsageError)
+        kind = "svg+xml"
+    else:
+        raise UsageError(f"{file}: a logo is a PNG or an SVG file")
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def write_laboratory(profile: Laboratory, file: Path) -> None:

@@ -187,6 +187,7 @@ class Page:
     sections: list[Section]
     pictures: list[Picture] = field(default_factory=list)
     what: str = "Report"
+    logo: str = ""  # data URI
     language: str = "en"
     html_language: str = "en"
     words: dict[str, str] = field(default_factory=lambda: dict(WORDS))

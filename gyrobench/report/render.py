@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import functools
 import json
 import re
@@ -92,6 +93,10 @@ def pdf(page: Page, bench: Path | None = None) -> bytes:
     for section in data["sections"]:
         for block in section["blocks"]:
             _strip(block)
+    if page.logo:
+        head, _, content = page.logo.partition(",")
+        data["logo"] = "logo.png" if "png" in head else "logo.svg"
+        files[data["logo"]] = base64.b64decode(content)
     others = fonts_for(_texts(data), bench, page.language)
     data["fonts"] = [font.family for font in others]
     files["data.json"] = json.dumps(data, ensure_ascii=False).encode()

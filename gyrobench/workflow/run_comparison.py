@@ -76,12 +76,14 @@ def compare_results(results: Sequence[tuple[str, Result]]) -> Comparison:
 
 
 def compare_folders(runs: Sequence[Path]) -> Comparison:
-    """Return runs side by side, each by its result.json.  Raises UsageError."""
+    """Return runs side by side, each by its result.json, measured ones by their instruments.  Raises UsageError."""
     _require_two(len(runs))
     for folder in runs:
         _require_folder(folder)
     results = [read_result(f) for f in runs]
-    return compare_results(list(zip(short_names(runs), results, strict=True)))
+    instruments = [r.instrument for r in results if not r.simulated and r.instrument]
+    names = instruments if len(set(instruments)) == len(runs) else short_names(runs)
+    return compare_results(list(zip(names, results, strict=True)))
 
 
 def comparison_folder(runs: Sequence[Path]) -> Path:

@@ -65,3 +65,57 @@ def test_two_commands_to_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose(w["t_start"], [1800.0 * k for k in kept])
     np.testing.assert_allclose(w["t_end"], [1800.0 * (k + 1) for k in kept])
     np.testing.assert_allclose(w["temperature"], [294.15 + 0.1 * (k % 10) for k in kept])
+
+
+PROFILE = 'name = "Prüflabor"\naddress = ["Beispielweg 1"]\ncountry = "DE"\n'
+
+
+def test_two_commands_to_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The map, and what the file does not say; nothing else."""
+    monkeypatch.chdir(tmp_path)
+    Path("messung.csv").write_bytes(messy()[0])
+    Path("laboratory.toml").write_text(PROFILE, encoding="utf-8")
+    gyrobench("fit", "messung.csv", "--system", "fixed_position", "--out", "map.toml")
+    settings = [w for s in SETTINGS for w in ("--set", s)]
+    files = ["--data", "messung.csv", "--columns", "map.toml", "--out", "out"]
+    said = gyrobench("reduce", "fixed_position", *files, *settings, "--certificate")
+    (page,) = tmp_path.glob("certificate-*.html")
+    assert page.name in said and "Left out for an empty cell: row 18." in page.read_text("utf-8")
+    assert "Prüflabor, Beispielweg 1" in page.read_text("utf-8") and "messung.csv" in page.read_text("utf-8")
+
+
+def test_twenty_files_to_the_certificate_of_the_lot_in_one_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twenty files under one map.  Each has its row, and the coefficient a control chart."""
+    monkeypatch.chdir(tmp_path)
+    text = messy()[0].decode("cp1252")
+    Path("lot").mkdir()
+    for k in range(20):
+        numbered = text.replace(";0,0", f";0,0{k % 5}", 1 + k)
+        Path(f"lot/kreisel{k:02d}.csv").write_bytes(numbered.encode("cp1252"))
+    Path("laboratory.toml").write_text(PROFILE, encoding="utf-8")
+    gyrobench("fit", "lot/kreisel00.csv", "--system", "fixed_position", "--out", "map.toml")
+    settings = [w for s in SETTINGS[:3] for w in ("--set", s)]
+    lot = ["--data", "lot/*.csv", "--columns", "map.toml", "--workers", "1", "--out", "out"]
+    said = gyrobench("sweep", "fixed_position", *lot, *settings, "--certificate")
+    (page,) = (tmp_path / "out").glob("certificate-*.html")
+    shown = page.read_text("utf-8")
+    assert page.name in said and "Control charts" in shown and "Control chart of ω_d" in shown
+    assert len(list((tmp_path / "out" / "kept").iterdir())) == 20
+    assert all(f"kreisel{k:02d}.csv" in shown for k in range(20)), "the file names what has no name"
+
+
+def test_a_lot_is_certified_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("lot").mkdir()
+    Path("lot/a.csv").write_bytes(messy()[0])
+    Path("lot/b.csv").write_text("nothing of use\n1;2\n")
+    Path("laboratory.toml").write_text(PROFILE, encoding="utf-8")
+    gyrobench("fit", "lot/a.csv", "--system", "fixed_position", "--out", "map.toml")
+    settings = [w for s in SETTINGS[:3] for w in ("--set", s)]
+    lot = ["--data", "lot/*.csv", "--columns", "map.toml", "--workers", "1", "--out", "out"]
+    done = CliRunner().invoke(app, ["sweep", "fixed_position", *lot, *settings, "--certificate"])
+    assert done.exit_code != 0 and "no certificate: 1 of 2 files have no report: b.csv" in str(
+        done.exception or done.output
+    )

@@ -109,6 +109,37 @@ def test_all_that_is_wrong_with_a_profile_is_named(tmp_path: Path) -> None:
     assert "adress: unknown key; did you mean address?" in text and "0.rol: unknown key" in text, text
 
 
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="20"><rect width="40" height="20" fill="#123456"/></svg>'
+)
+
+
+def test_a_logo_is_on_both(tmp_path: Path) -> None:
+    (tmp_path / "logo.svg").write_text(SVG)
+    (tmp_path / "laboratory.toml").write_text(f'logo = "logo.svg"\n{PROFILE}', encoding="utf-8")
+    made = certificate_page.page([of()], read_laboratory(tmp_path / "laboratory.toml"))
+    assert '<img class="logo" src="data:image/svg+xml;base64,' in html(made)
+    bare = certificate_page.page([of()], read_laboratory(tmp_path / "laboratory.toml").model_copy(update={"name": "x"}))
+    assert len(pdf(made)) > 0 and made.logo == bare.logo != ""
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("logo.svg", None, "no such logo"),
+        ("logo.gif", b"GIF89a", "a logo is a PNG or an SVG file"),
+        ("logo.svg", b"<svg", "logo.svg"),
+        ("logo.png", b"\x89PNG\r\n\x1a\n" + bytes(600_000), "600 kB; a logo has at most 500 kB"),
+    ],
+)
+def test_a_logo_that_is_none(tmp_path: Path, name: str, content: bytes | None, problem: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "laboratory.toml").write_text(f'logo = "{name}"\n{PROFILE}', encoding="utf-8")
+    with pytest.raises(UsageError, match=problem):
+        read_laboratory(tmp_path / "laboratory.toml")
+
+
 def test_two_pages_at_most_and_the_same_in_both_renderers(laboratory: Laboratory, tmp_path: Path) -> None:
     page = certificate_page.page([of(simulated=False)], laboratory, "2026-1")
     shown = html(page)

@@ -18,6 +18,7 @@ from gyrobench.report.laboratory import Laboratory, read_laboratory
 from gyrobench.report.language import ENGLISH, PLACEHOLDER, WORD, Language, UntranslatedError, catalogue
 from gyrobench.report.page_model import BulletList, PageTable
 from gyrobench.report.render import html, pdf
+from gyrobench.report.standard_names import NAMES, names_table
 from gyrobench.result import Reason
 
 FILES = sorted([*language.FOLDER.glob("*.toml"), *standard_folder().glob("systems/*/zh.toml")])
@@ -162,3 +163,15 @@ def test_a_profile_says_the_language(tmp_path: Path) -> None:
     file.write_text('name = "A"\naddress = ["b"]\nlanguage = "klingon"\n')
     with pytest.raises(UsageError, match="no such language; there are: en, zh"):
         read_laboratory(file)
+
+
+def test_names_in_standards_both_ieee_and_chinese() -> None:
+    """IEEE's in English, as the standard has it, the other in Chinese; none where only one defines the quantity."""
+    one = certified(0).report.result["ω_d"]
+    made = page([certified(0, coefficients=[replace(one, meaning="angle random walk")])], LABORATORY, "1")
+    found = [b for s in made.sections for b in s.blocks if isinstance(b, PageTable)][1]
+    assert [c.text for c in found.rows[0].cells] == [
+        "ω_d", "IEEE Std 952", "angle random walk", "GJB 2426A-2015", "随机游走系数",
+    ]  # fmt: skip
+    assert all(catalogue("zh").texts[n.gjb[1]] for n in NAMES.values())
+    assert not names_table([one])

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import dataclasses
 import math
+from pathlib import Path
 
 import pytest
 from reading import pdf_text
-from simulated import tumble, with_coefficient
+from simulated import tumble, unplotted, with_coefficient
 
 from gyrobench import report
+from gyrobench.workflow.run_comparison import compare_folders
 
 
 def measure(doc, name):
@@ -80,3 +83,13 @@ def test_refusals(names, baseline, message, tmp_path):
     r = tumble(windows=12)
     with pytest.raises(ValueError, match=message):
         report.compare([(n, r) for n in names], tmp_path, baseline=baseline)
+
+
+def test_measured_runs_are_named_by_their_instruments(tmp_path: Path) -> None:
+    """Folders have names of runs; a reader knows the instruments.  Two runs of one keep the folders'."""
+    for folder, instrument in (("a", "FG-1"), ("b", "FG-2"), ("c", "FG-2")):
+        found = dataclasses.replace(unplotted(tumble()), instrument=instrument, simulated=False)
+        report.write(found, tmp_path / folder, ["json"])
+    folders = [tmp_path / name for name in "abc"]
+    assert [name for name, _ in compare_folders(folders[:2]).results] == ["FG-1", "FG-2"]
+    assert [name for name, _ in compare_folders(folders[1:]).results] == ["b", "c"]

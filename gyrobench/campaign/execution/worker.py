@@ -335,6 +335,7 @@ class _WorkerState:
     def _files(self, record: Record | None, result: Result | None) -> dict[str, bytes]:
         """Return the files of a run that is kept."""
         from gyrobench import report
+        from gyrobench.workflow.manifest import write_manifest
 
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
@@ -344,6 +345,7 @@ class _WorkerState:
                 record.folder = kept
             if result is not None:
                 report.write(result, folder, ("json", "html"), (record and record.channels) or None, self.bench)
+                write_manifest(folder)
             return {str(f.relative_to(folder)): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
 
     def _failure(self, error: Exception) -> tuple[str, str]:

@@ -211,9 +211,7 @@ def control_charts(measures: CampaignMeasures, lot: Json) -> list[Picture]:
         ax = axes[0, 0]
         if entry["low"] is not None:
             ax.axhspan(entry["low"], entry["high"], color=GREEN, alpha=0.18, linewidth=0, zorder=0)
-        ax.axhline(limits["centre"], color=INK, linewidth=0.8)
-        for key in ("low", "high"):
-            ax.axhline(limits[key], color=MUTED, linewidth=0.9, linestyle="--")
+        control_lines(ax, limits)
         plain = ~outlier & ~doubtful
         ax.plot(place[plain], y[plain], "o", color=BLUE, markersize=2.8, markeredgewidth=0)
         ax.plot(place[doubtful], y[doubtful], "s", color=ORANGE, markersize=4, markeredgewidth=0)
@@ -228,6 +226,13 @@ def control_charts(measures: CampaignMeasures, lot: Json) -> list[Picture]:
         caption = f"{name}: {entry['beyond']} beyond the control limits.{beyond}"
         pictures.append(Picture(key, svg(fig, key), caption, f"Control chart of {name}", half=True))
     return pictures
+
+
+def control_lines(ax: Any, limits: Mapping[str, float]) -> None:
+    """Draw centre and limits of a control chart."""
+    ax.axhline(limits["centre"], color=INK, linewidth=0.8)
+    for key in ("low", "high"):
+        ax.axhline(limits[key], color=MUTED, linewidth=0.9, linestyle="--")
 
 
 def _scale(ax: Any, y: Array, limits: Json, entry: Json) -> int:
