@@ -37,6 +37,7 @@ def tune(
             help="Factors of the controller beside its gain: lead-lag, pi, lag, lead, notch, rolloff.",
         ),
     ] = "lead-lag",
+    loop: Annotated[str, typer.Option("--loop", metavar="NAME", help="Loop of a system that has several.")] = "",
     values: Set = None,
     part: Part = None,
     mapping: Map = None,
@@ -62,7 +63,7 @@ def tune(
     parts, maps = parse_swaps(part, mapping)
     found = tune_loop(
         load_system(system, settings), want or [], over or [], structure, parts=parts, maps=maps, seed=seed,
-        given=settings,
+        given=settings, loop=loop,
     )  # fmt: skip
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
     if out is not None:

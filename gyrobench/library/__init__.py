@@ -189,6 +189,7 @@ def tune(
     over: Sequence[str] = (),
     structure: str = "lead-lag",
     *,
+    loop: str = "",
     seed: int = 1,
     values: Mapping[str, Any] | None = None,
     parts: Mapping[str, File] | None = None,
@@ -198,6 +199,7 @@ def tune(
     """Return the controller of a stabilizer loop for what is wanted, worst case over a spread, proven in co-simulation.
 
     want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+".
+    loop: its name, of a system that has several.
     values, options, parts, maps: as of :func:`load`.  ``had``: whether all of it can be had, by the linear models;
     ``proven``: and the co-simulation does not contradict; ``reasons``: why not.  ``settings`` and ``part`` are for
     :func:`load`; ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
@@ -210,5 +212,5 @@ def tune(
     test = load(name, given, parts=parts, maps=maps)
     return tune_loop(
         test.system, want, over, structure, parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
-        given={k: str(v) for k, v in given.items()},
+        given={k: str(v) for k, v in given.items()}, loop=loop,
     )  # fmt: skip

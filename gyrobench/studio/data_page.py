@@ -20,8 +20,7 @@ from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.record.column_map import cells_of_file
 from gyrobench.record.column_proposal import FileColumn
-from gyrobench.studio.frame import CopyLines, Studio, frame, inside, told
-from gyrobench.studio.gate import UPLOAD
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, told
 from gyrobench.studio.request import JobRequest
 from gyrobench.system.system import System
 from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
@@ -285,8 +284,7 @@ def add_data_page(studio: Studio) -> None:
                 ui.navigate.to(f"/data?file={place}&test={chosen.value or ''}")
 
             chosen.on_value_change(show)
-            drop = ui.upload(label="Drop a file of your laboratory: text, or a log", on_upload=taken, auto_upload=True)
-            drop.props("flat bordered").classes("full").props(f"max-file-size={UPLOAD - 4096}")
+            dropped("Drop a file of your laboratory: text, or a log", taken, "File")
             if there is None:
                 return
             if test not in tests:

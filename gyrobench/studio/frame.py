@@ -5,16 +5,20 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
 from nicegui import ui
+from nicegui.events import Handler, UploadEventArguments
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.reading import visible
+from gyrobench.studio.gate import UPLOAD
 from gyrobench.studio.jobs import StudioJobs
 from gyrobench.workflow.user_errors import user_message
 
+MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
@@ -66,6 +70,8 @@ def frame(studio: Studio, title: str) -> Iterator[None]:
     """Head and body of a page; what goes wrong inside is shown there."""
     ui.page_title(f"{title}: gyrobench")
     ui.add_css(STYLE)
+    ui.add_head_html('<script>document.documentElement.lang = "en";</script>')
+    ui.colors(primary=MARK)
     mode = ui.dark_mode(studio.dark)
 
     def change() -> None:
@@ -105,6 +111,21 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
             ui.notify(visible(user_message(error)), type="negative", multi_line=True, close_button="Close", timeout=0)
 
     return guarded
+
+
+def dropped(text: str, taken: Handler[UploadEventArguments], label: str, accept: str = "") -> None:
+    """Add the place where a file is dropped or chosen, by mouse or keyboard.
+
+    label: by which it is called aloud.  accept: ".fmu", "" for any file.
+    """
+    drop = ui.upload(on_upload=taken, auto_upload=True).props(f"flat bordered max-file-size={UPLOAD - 4096}")
+    drop.props(f'accept="{accept}"' if accept else "").classes("full").props["aria-label"] = label
+    drop.add_slot(
+        "header",
+        f"""<div class="pick"><label>{escape(text)}<q-uploader-add-trigger /></label>
+        <q-btn flat dense round icon="attach_file" aria-label="{escape(label)}: choose a file" @click="props.pickFiles"
+        /></div>""",
+    )
 
 
 class CopyLines:

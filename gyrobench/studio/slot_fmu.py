@@ -13,8 +13,7 @@ from gyrobench.bench import display_path
 from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.studio.data_page import keep
-from gyrobench.studio.frame import Studio
-from gyrobench.studio.gate import UPLOAD
+from gyrobench.studio.frame import Studio, dropped
 from gyrobench.workflow.fit_mapping import write_mapping
 from gyrobench.workflow.user_errors import user_message
 
@@ -41,9 +40,7 @@ def drop_fmu(studio: Studio, system: str, slot: str, chosen: Callable[[str, str]
         with body:
             _shown(file, mapping, text, problems)
 
-    drop = ui.upload(label="Drop an FMU of another tool", on_upload=taken, auto_upload=True)
-    drop.props(f'flat bordered accept=".fmu" max-file-size={UPLOAD - 4096}').classes("full").mark(f"fmu {slot}")
-    drop.props["aria-label"] = f"FMU for {slot}"
+    dropped("Drop an FMU of another tool", taken, f"FMU for {slot}", accept=".fmu")
 
 
 def _shown(file: Path, mapping: Path, text: str, problems: list[str]) -> None:

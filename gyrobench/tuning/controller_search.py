@@ -18,8 +18,9 @@ from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.robustness import grid, measured
-from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.wishes import Wish
+from gyrobench.tuning.sight_jitter import SightModel, SightWays
+from gyrobench.tuning.structures import BLOCKS, Controller, ControllerStructure
+from gyrobench.tuning.wishes import JITTER, Wish
 
 LOOK = 512  # controllers of the coarse look
 STARTS = 4  # of the simplex
@@ -40,11 +41,13 @@ class TuningProblem:
     f: Array
     corners: int = 1  # plants at nominal values and at the corners, which come first
     evaluations: int = 0
+    sights: list[SightModel] = field(default_factory=list)  # of the plants, for a jitter that is wanted
     _responses: list[Complex] = field(default_factory=list)
+    _ways: list[SightWays] = field(default_factory=list)
 
     def of(self, count: int) -> TuningProblem:
         """Return the problem with the first plants alone."""
-        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[])
+        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[], _ways=[])
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -68,14 +71,25 @@ class TuningProblem:
         growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
         if np.any(growth >= ROUNDING):
             return np.full(shape, UNSTABLE - 1e3 * float(np.maximum(growth, 0.0).sum()))
-        loops = np.array(self._responses) * held.response(np.exp(2j * np.pi * self.f * step))
-        got = measured(self.wishes, self.f, loops)
+        while len(self._ways) < min(len(self.sights), len(self.plants)):
+            self._ways.append(self.sights[len(self._ways)].at(self.f))
+        response = held.response(np.exp(2j * np.pi * self.f * step))
+        loops = np.array(self._responses) * response
+        got = with_jitter(self.wishes, measured(self.wishes, self.f, loops), self._ways, response)
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
         return np.asarray(np.clip(ratio, -9.0, CAP))
 
     def worst(self, x: Array) -> float:
         return float(self.ratios(x).min())
+
+
+def with_jitter(wishes: Sequence[Wish], got: Array, ways: Sequence[SightWays], response: Complex) -> Array:
+    """Return the measures (plants, wishes) with the jitter in its place.  response: of the controller."""
+    for i, wish in enumerate(wishes):
+        if wish.name == JITTER:
+            got[:, i] = [way.rms(response) for way in ways]
+    return got
 
 
 def search(problem: TuningProblem) -> Array:
@@ -86,7 +100,8 @@ def search(problem: TuningProblem) -> Array:
     low, high = problem.box.T
     nominal, corners = problem.of(1), problem.of(problem.corners)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
-    looked = [(nominal.worst(x), x) for x in low + cube * (high - low)]
+    spread = low + cube * (high - low)
+    looked = [(nominal.worst(x), x) for x in (*spread, *_notched(problem, spread[: LOOK // 2]))]
     starts: list[Array] = []
     for _, x in sorted(looked, key=lambda p: -p[0]):
         if all(np.linalg.norm((x - s) / (high - low)) > 0.25 for s in starts):
@@ -113,6 +128,18 @@ def search(problem: TuningProblem) -> Array:
     best = max((polished(problem, x) for x in ends[:2]), key=problem.worst)
     problem.evaluations += nominal.evaluations + corners.evaluations
     return best
+
+
+def _notched(problem: TuningProblem, spread: Array) -> Array:
+    """Return the controllers with their notches at the modes of the plant, where both are: few of a box have that."""
+    structure, modes = problem.structure, problem.plants[0].modes()
+    at = [1 + sum(len(BLOCKS[b].ranges) for b in structure.blocks[:k]) for k, b in enumerate(structure.blocks)]
+    places = [p for p, b in zip(at, structure.blocks, strict=True) if b == "notch"]
+    moved = spread.copy()
+    for place, mode in zip(places, modes, strict=False):
+        low, high = problem.box[place]
+        moved[:, place] = np.clip(np.log10(abs(mode)) - moved[:, 0], low, high)
+    return moved if places and modes else moved[:0]
 
 
 def polished(problem: TuningProblem, x: Array, rounds: int = 40) -> Array:

@@ -18,10 +18,8 @@ from gyrobench.linear.linear_model import Linear, operating_point
 from gyrobench.record.frequency_response import Complex, reached
 from gyrobench.record.run_document import LinearModel
 from gyrobench.system.wiring import Assembly
+from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
 from gyrobench.tuning.structures import Controller
-
-SLOT = "stabilizer"
-LOOP = {"stabilizer": "stabilizer.u"}
 
 
 @dataclass(frozen=True)
@@ -57,9 +55,10 @@ def plants(
     part_of: Callable[[str], type[Component]],
     step: float,
     points: Sequence[Mapping[str, float]],
+    ports: LoopPorts = STABILIZER,
 ) -> list[Plant]:
     """Return the plant at each point of the spread.  Raises LinearizationError and ComponentError."""
-    models = [_opened(assembly, {**parameters, **values}, part_of, step) for values in points]
+    models = [_opened(assembly, {**parameters, **values}, part_of, step, ports) for values in points]
     if len({len(m.states) for m in models}) > 1:
         raise UsageError("--over: the parts have other states at some points of the spread: narrow it")
     matrices = [_matrices(m) for m in models]
@@ -73,20 +72,27 @@ def plants(
 
 
 def _opened(
-    assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float
-) -> LinearModel:
+    assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float,
+    ports: LoopPorts,
+) -> LinearModel:  # fmt: skip
     """Return the loop with -1 in the place of the controller, opened before it."""
     linear = Linear(assembly, operating_point(assembly, parameters, part_of), step)
-    own = linear.blocks[SLOT]
+    return without_controller(linear, ports.slot, {("v", "u"): -1.0}).discrete(ports.opened)
+
+
+def without_controller(linear: Linear, slot: str, gains: Mapping[tuple[str, str], float]) -> Linear:
+    """Return the system with gains (output, input) -> number in the place of a controller."""
+    own = linear.blocks[slot]
     d = np.zeros((len(own.outputs), len(own.inputs)))
-    d[own.outputs.index("v"), own.inputs.index("u")] = -1.0
+    for (output, given), gain in gains.items():
+        d[own.outputs.index(output), own.inputs.index(given)] = gain
     m, p = len(own.inputs), len(own.outputs)
-    linear.blocks[SLOT] = LinearBlock(
-        SLOT, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d, [np.zeros((0, m))]
+    linear.blocks[slot] = LinearBlock(
+        slot, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d, [np.zeros((0, m))]
     )
-    linear.sampled.pop(SLOT, None)
+    linear.sampled.pop(slot, None)
     linear.states = [f"{s}.{v}" for s in linear.order for v in linear.blocks[s].states]
-    return linear.discrete(LOOP[SLOT])
+    return linear
 
 
 def _matrices(model: LinearModel) -> tuple[Array, Array, Array]:

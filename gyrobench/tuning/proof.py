@@ -18,15 +18,16 @@ from gyrobench.engine.session import Session
 from gyrobench.record.frequency_response import Complex
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.jitter import spectra
 from gyrobench.reduction.loops.loop_measures import Gate, Point, gates
 from gyrobench.reduction.loops.margins import interpolate_response
 from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_loop_point
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import System
+from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
 from gyrobench.tuning.robustness import bandwidth_limit, crossovers, gain_limits, measured
-from gyrobench.tuning.wishes import Wish
+from gyrobench.tuning.wishes import JITTER, Wish
 
-INSIDE, TEST, ANGLE = "stabilizer.e", "exciter.test[1]", "platform.attitude"
 SINES = 14  # beside those at the limits
 DRIVEN = 0.3  # of the largest voltage, at most, is taken by a test sine
 PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
@@ -59,6 +60,15 @@ class ProvenWish:
         if np.isinf(self.expected) or np.isinf(self.value):
             return self.value >= self.expected or self.wish.name in ("gain margin", "delay margin", "phase margin")
         return abs(self.value - self.expected) <= max(self.U, DIFFERENT * abs(self.expected))
+
+
+@dataclass(frozen=True)
+class ExpectedJitter:
+    """Jitter to be measured: phase of the system's plan, lowest frequency (Hz), rms of the linear model (rad)."""
+
+    ride: str
+    lowest: float
+    rms: float
 
 
 @dataclass(frozen=True)
@@ -101,7 +111,7 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
 
 
 def loop_plan(
-    system: System, frequencies: Sequence[float], largest: Callable[[float], float]
+    system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = ""
 ) -> tuple[LoopPlan, float]:  # fmt: skip
     """Return the plan of a proof and the torque of its load step, N.m.
 
@@ -109,8 +119,8 @@ def loop_plan(
     """
     own = system.plan()
     phases = list(getattr(own, "phases", []))
-    sines = [p for p in phases if p.kind == "test" and p.amplitude]
-    load = next((p for p in phases if p.kind == "torque" and p.shape == "step"), None)
+    sines = [p for p in phases if p.kind == "test" and p.amplitude and p.axis == axis]
+    load = next((p for p in phases if p.kind == "torque" and p.shape == "step" and p.axis == axis), None)
 
     def amplitude(f: float) -> float:
         near = min(sines, key=lambda p: abs(np.log(p.frequency / f)), default=None)
@@ -122,25 +132,27 @@ def loop_plan(
     fast = [f for f in frequencies if f * SLOWER > max(frequencies)]
     slow = [f for f in frequencies if f not in fast]
     sines_ahead = [
-        *sweep("loop", "test", slow, amplitude, periods=PERIODS // 3, settle=0.5 / slowest),
-        *sweep("loop", "test", fast, amplitude, periods=PERIODS, settle=0.5 / slowest),
+        *sweep("loop", "test", slow, amplitude, axis=axis, periods=PERIODS // 3, settle=0.5 / slowest),
+        *sweep("loop", "test", fast, amplitude, axis=axis, periods=PERIODS, settle=0.5 / slowest),
     ]
-    plan = LoopPlan([rest, *sines_ahead, *steps])
+    plan = LoopPlan([rest, *sines_ahead, *steps, *(p for p in phases if ride and p.label == ride)])
     return plan, float(load.amplitude) if load else 0.0
 
 
 def proof_of(
     session: Session, settings: Mapping[str, Any], at: Mapping[str, float], f: Array, L: Complex, G: Complex,
-    wishes: Sequence[Wish], seed: int = 1,
+    wishes: Sequence[Wish], seed: int = 1, ports: LoopPorts = STABILIZER,
+    sight: ExpectedJitter | None = None,
 ) -> Proof:  # fmt: skip
     """Run the loop test at a point of the spread.  L, G: loop and controller at this point over f.  Raises RunError."""
     system = session.system
     step = system.step
     chosen = sine_frequencies(f, L, wishes, step)
     known = session.prepare(settings, seed)[2].parameters
-    v_max = min(float(known.get(f"{slot}.v_max", np.inf)) for slot in ("stabilizer", "platform"))
+    v_max = min(float(np.min(known.get(f"{slot}.v_max", np.inf))) for slot in (ports.slot, "platform"))
     effort = np.abs(G / (1.0 + L))
-    plan, load = loop_plan(system, chosen, lambda x: DRIVEN * v_max / float(np.interp(x, f, effort)))
+    plan, load = loop_plan(system, chosen, lambda x: DRIVEN * v_max / float(np.interp(x, f, effort)), ports.axis,
+                           sight.ride if sight else "")  # fmt: skip
     kept = dict(vars(system))
     vars(system).update(
         plan=lambda: plan, channel_period=step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), nominal={}
@@ -150,30 +162,42 @@ def proof_of(
     finally:
         vars(system).clear()
         vars(system).update(kept)
-    return _read(record, at, f, L, wishes, load)
+    return _read(record, at, f, L, wishes, load, ports, sight)
 
 
 def _read(
-    record: Record, at: Mapping[str, float], f: Array, L: Complex, wishes: Sequence[Wish], load: float
+    record: Record, at: Mapping[str, float], f: Array, L: Complex, wishes: Sequence[Wish], load: float,
+    ports: LoopPorts, sight: ExpectedJitter | None,
 ) -> Proof:  # fmt: skip
     phases = gates(record)
     sines = [g for g in phases if g.kind == "test"]
-    judged = [open_loop_point(g, INSIDE, TEST) for g in sines]
+    judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
     friction, limits = friction_of(record.run), ", ".join(limits_hit(sines))
-    step = next((_step(g) for g in phases if g.kind == "torque" and ANGLE in g.channels), None)
+    step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
     if len(points) < FEW:
         why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"
         why += f"; the friction ({friction}) may hold the platform" if friction else ""
         return Proof(at, (), tuple(points), len(points), limits, friction, step, load, why)
+    of_loop = [_proven(w, points, f, L) for w in wishes if w.name != JITTER]
+    jitter = [_jitter(w, phases, ports, sight) for w in wishes if w.name == JITTER and sight]
     return Proof(
-        at, tuple(_proven(w, points, f, L) for w in wishes), tuple(points), len(points), limits, friction, step, load
+        at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load
     )  # fmt: skip
 
 
-def _step(gate: Gate) -> tuple[Array, Array]:
-    rest = gate.rest(ANGLE)
-    return gate.t - gate.t[0], gate[ANGLE] - (float(rest.mean()) if rest.size else 0.0)
+def _jitter(wish: Wish, phases: Sequence[Gate], ports: LoopPorts, sight: ExpectedJitter) -> ProvenWish:
+    gate = next((g for g in phases if g.label == sight.ride), None)
+    found = spectra(float(gate.t[1] - gate.t[0]), gate[ports.angle], sight.lowest) if gate is not None else None
+    if found is None:
+        return ProvenWish(wish, np.inf, 0.0, sight.rms)
+    v = found.rms(sight.lowest)
+    return ProvenWish(wish, v.value, v.k * v.u, sight.rms)
+
+
+def _step(gate: Gate, angle: str) -> tuple[Array, Array]:
+    rest = gate.rest(angle)
+    return gate.t - gate.t[0], gate[angle] - (float(rest.mean()) if rest.size else 0.0)
 
 
 def _proven(wish: Wish, points: Sequence[Point], f: Array, L: Complex) -> ProvenWish:

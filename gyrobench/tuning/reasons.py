@@ -11,9 +11,10 @@ from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.controller_search import TuningProblem, search
-from gyrobench.tuning.plant import Plant
+from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.robustness import crossovers, gain_limits
 from gyrobench.tuning.tuned_loop import WishResult
+from gyrobench.tuning.wishes import JITTER
 
 BINDS = 0.02  # of the worst ratio: wishes so near to it bind too
 FINER = 8  # of the communication step, for what the step costs
@@ -42,6 +43,7 @@ def reasons_of(
     at = dict(binding[0].at)
     k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
     crossed = max((c[0] for c in crossovers(f, loops[k])), default=None)
+    found += _jitter(problem, x, k, [r for r in results if r.wish.name == JITTER])
     if crossed is not None:
         found += _delay(loop, at, problem.plants[k], crossed)
         found += _modes(problem.plants[k], f, loops[k], crossed)
@@ -50,11 +52,22 @@ def reasons_of(
 
 def _alone(problem: TuningProblem, result: WishResult) -> str:
     """Return what the structure gives where only this wish, and stability, counts."""
-    one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f)
+    one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f, sights=problem.sights)
     best = max(result.ratio, float(np.exp(one.worst(search(one)))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)
     return f"{result.wish.name} alone: {much}" + ("" if best >= 1.0 else ", too little by itself")
+
+
+def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResult]) -> list[str]:
+    """Return what each source makes of the jitter, where one is wanted and not reached."""
+    if not any(r.ratio < 1.0 for r in wanted):
+        return []
+    step = problem.plants[k].step
+    response = HeldController(problem.controller(x), step).response(np.exp(2j * np.pi * problem.f * step))
+    sources = problem.sights[k].at(problem.f).sources(response)
+    parts = sorted(((v, n) for n, v in sources.items() if v > 0.0), reverse=True)
+    return [f"the jitter is of {', '.join(f'{n} {1e6 * v:.3g} µrad' for v, n in parts[:3])}"]
 
 
 def _delay(loop: Loop, at: Any, plant: Plant, crossed: float) -> list[str]:

@@ -95,6 +95,8 @@ def measure(wish: Wish, f: Array, L: Complex) -> float:
     """Return a measure of a stable loop, SI."""
     S = 1.0 / (1.0 + L)
     match wish.name:
+        case "jitter":  # not of the loop alone: sight_jitter
+            return np.nan
         case "phase margin":
             return min((abs(p) for _, p in crossovers(f, L)), default=np.inf)
         case "delay margin":

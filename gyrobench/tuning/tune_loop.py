@@ -6,6 +6,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +19,20 @@ from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
+from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
-from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
-from gyrobench.tuning.plant import LOOP, SLOT, HeldController, Plant, plants
-from gyrobench.tuning.proof import INSIDE, TEST, Proof, proof_of
+from gyrobench.system.values import flatten
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
+from gyrobench.tuning.loop_ports import LoopPorts, loops_of
+from gyrobench.tuning.plant import HeldController, Plant, plants
+from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
+from gyrobench.tuning.sight_jitter import SightModel, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.tuned_loop import WishResult
-from gyrobench.tuning.wishes import Wish, parse_wishes
+from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
 from gyrobench.tuning.written_loop import TunedLoop
 
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
@@ -51,29 +56,33 @@ def tune(
     maps: Mapping[str, Path] | None = None,
     seed: int = 1,
     given: Mapping[str, Any] | None = None,
+    loop: str = "",
 ) -> TunedLoop:
     """Return the controller of a structure with the largest worst ratio of got to wanted over the spread, proven.
 
     want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
+    loop: name of the loop, of a system that has several; the others stay as they are.
     Raises UsageError, TuningError, and what a session raises.
     """
     wishes, shape = parse_wishes(want), ControllerStructure(structure)
-    _require_loop(system, parts or {})
+    ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
     began = time.perf_counter()
     system.nominal = dict(system.overrides)
     with Session(system, parts, maps, bench=Bench.find().folder, child=True) as session:
         now, _, document = session.prepare({}, seed)
         nominal = document.parameters
-        ranges = parse_spread(over, lambda name: _known(session, nominal, name))
+        ranges = parse_spread(over, lambda name: _known(session, nominal, name, ports.slot))
         for w in wishes:
             if w.f >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
                                  f"{HIGHEST / now.step:g} Hz")  # fmt: skip
-        loop = _Loop(session, now, nominal, ranges)
-        problem = loop.problem(shape, wishes)
+        sources = _line_of_sight(now, nominal, wishes)
+        wishes = [replace(w, f=sources.lowest) if w.name == JITTER and sources else w for w in wishes]
+        models = _Loop(session, now, nominal, ranges, ports, sources)
+        problem = models.problem(shape, wishes)
         x = search(problem)
-        x = _worse_points(loop, problem, x)
+        x = _worse_points(models, problem, x)
     controller = problem.controller(x)
     seconds = time.perf_counter() - began
     f = frequencies(problem.plants, problem.box, wishes, DENSE)
@@ -85,20 +94,24 @@ def tune(
             f"{system.name}: no {structure} was found that holds the loop stable over the whole spread; take another "
             "structure, or a smaller spread"
         )
-    results = _results(wishes, f, loops, problem.plants)
-    part, settings = _settings(shape, controller, nominal, system)
-    settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]))
+    ways = [s.at(f) for s in problem.sights]
+    got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
+    results = _results(wishes, got, problem.plants)
+    part, settings = _settings(shape, controller, nominal, system, ports.slot)
+    settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
-    reasons = () if had else tuple(reasons_of(loop, problem, x, results, f, loops))
-    swaps = {**(parts or {}), **({SLOT: part} if part else {})}
+    reasons = () if had else tuple(reasons_of(models, problem, x, results, f, loops))
+    swaps = {**(parts or {}), **({ports.slot: part} if part else {})}
     worst = sorted(results, key=lambda r: r.ratio)[0].at
     runs = [{}, worst] if worst else [{}]
     proofs = []
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
+            jitter = ways[k].rms(responses) if ways else 0.0
+            sight = ExpectedJitter(sources.ride, sources.lowest, jitter) if sources else None
             try:
-                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed))
+                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
             except RunError as error:
                 proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
     return TunedLoop(
@@ -106,7 +119,8 @@ def tune(
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
-        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=tuple(_notes(proofs)),
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=(*_slips(sources), *_notes(proofs)),
+        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "",
     )  # fmt: skip
 
 
@@ -114,32 +128,42 @@ class _Loop:
     """The loop of a system at its nominal parameters, and elsewhere in the spread."""
 
     def __init__(
-        self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range]
+        self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range], ports: LoopPorts,
+        sources: LineOfSight | None = None,
     ) -> None:  # fmt: skip
         self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
         self.system, self.nominal, self.ranges = system, nominal, ranges
-        self.step = system.step
+        self.step, self.ports, self.sources = system.step, ports, sources
+        self.free = {**nominal, **(sources.free if sources else {})}
+
+    def part_of(self, slot: str) -> type[Component]:
+        if slot not in self.names:
+            raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
+        return load_part(self.names[slot], self.bench)
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
-
-        def part_of(slot: str) -> type[Component]:
-            if slot not in self.names:
-                raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
-            return load_part(self.names[slot], self.bench)
-
         try:
-            return plants(self.assembly, self.nominal, part_of, step or self.step, at)
+            return plants(self.assembly, self.free, self.part_of, step or self.step, at, self.ports)
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
 
+    def sights(self, at: Sequence[Mapping[str, float]]) -> list[SightModel]:
+        """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
+        if self.sources is None:
+            return []
+        slipping = {**self.nominal, **self.sources.slipping}
+        return sight_models(self.assembly, slipping, self.part_of, self.step, at, self.ports, self.sources)
+
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
-        models = self.plants(points(self.ranges))
-        wanted = self.system.crossovers().get("stabilizer")
+        at = points(self.ranges)
+        models = self.plants(at)
+        wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
-            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges)
-        )
+            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges),
+            sights=self.sights(at),
+        )  # fmt: skip
 
 
 @contextlib.contextmanager
@@ -154,19 +178,41 @@ def quiet() -> Iterator[None]:
         log.setLevel(level)
 
 
-def _has_loop(system: System) -> bool:
-    """Return whether a system has one loop, whose stabilizer gives a voltage and which its plan can open."""
-    driven = any("stabilizer -> platform: v" in line for line in system.wires.splitlines())
-    return dict(system.loops) == LOOP and driven and {INSIDE, TEST} <= set(system.channels)
-
-
-def _require_loop(system: System, parts: Mapping[str, str]) -> None:
-    """Raise UsageError for a system without one stabilizer that drives a platform by its voltage."""
-    if not _has_loop(system):
+def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:
+    """Return the loop to tune.  Raises UsageError for a system without one, and where one of several is not named."""
+    there = loops_of(system)
+    if not there:
         able = ", ".join(tunable())
-        raise UsageError(f"{system.name} has no single loop whose stabilizer drives a motor; tune works for {able}")
-    if SLOT in parts:
-        raise UsageError(f"--part {SLOT}={parts[SLOT]}: tune chooses the stabilizer")
+        raise UsageError(f"{system.name} has no loop whose stabilizer drives a motor; tune works for {able}")
+    if loop and loop not in there:
+        raise UsageError(f"--loop {loop}: {system.name} has no such loop; {suggest_names(loop, there)}")
+    if not loop and len(there) > 1:
+        raise UsageError(f"{system.name} has several loops: say --loop {' or --loop '.join(there)}")
+    ports = there[loop or next(iter(there))]
+    if ports.slot in parts:
+        raise UsageError(f"--part {ports.slot}={parts[ports.slot]}: tune chooses the stabilizer")
+    return ports
+
+
+def _line_of_sight(system: System, nominal: Mapping[str, Any], wishes: Sequence[Wish]) -> LineOfSight | None:
+    """Return what makes the line of sight of a system jitter, where that is wanted.  Raises UsageError."""
+    if not any(w.name == JITTER for w in wishes):
+        return None
+    stated = getattr(system, "line_of_sight", None)
+    if stated is None:
+        raise UsageError(f"--want jitter: {system.name} does not state what moves a line of sight")
+    found: LineOfSight = stated(nominal)
+    return found
+
+
+def _slips(sources: LineOfSight | None) -> list[str]:
+    """Return how dry friction is in the search, where it slips in the ride."""
+    if sources is None or not sources.slipping:
+        return []
+    return [
+        "dry friction slips in the ride: margins are searched without it, the jitter with viscous friction that makes "
+        "torques as large there; its reversals are in the co-simulation alone"
+    ]
 
 
 def tunable() -> list[str]:
@@ -177,21 +223,23 @@ def tunable() -> list[str]:
     for name in sorted(Bench.find().systems()):
         with contextlib.suppress(GyrobenchError):
             system = load_system(name)
-            if isinstance(system, System) and _has_loop(system):
+            if isinstance(system, System) and loops_of(system):
                 found.append(name)
     return found
 
 
-def _known(session: Session, nominal: Mapping[str, Any], name: str) -> tuple[float, str]:
+def _known(session: Session, nominal: Mapping[str, Any], name: str, slot_tuned: str) -> tuple[float, str]:
     slot, dot, parameter = name.partition(".")
     if not dot or slot not in session.assembly.bindings:
         raise UsageError(f"--over {name}: write SLOT.PARAMETER; slots: {', '.join(session.assembly.bindings)}")
-    if slot == SLOT:
+    if slot == slot_tuned:
         raise UsageError(f"--over {name}: the stabilizer is what is tuned")
-    bound = session.assembly.bindings[slot].parameters.get(parameter)
-    value = nominal.get(name)
-    if bound is None or isinstance(value, bool | list) or not isinstance(value, int | float):
-        known = [n.partition(".")[2] for n, v in nominal.items() if n.startswith(slot + ".") and isinstance(v, float)]
+    there = session.assembly.bindings[slot].parameters
+    bound = there.get(parameter) or there.get(parameter.partition("[")[0])
+    numbers = {k: v for n, v in nominal.items() if n.startswith(slot + ".") for k, v in flatten(n, v).items()}
+    value = numbers.get(name)
+    if bound is None or isinstance(value, bool) or not isinstance(value, int | float):
+        known = [n.partition(".")[2] for n, v in numbers.items() if isinstance(v, float)]
         raise UsageError(f"--over {name}: {slot} has no such number; {suggest_names(parameter, known)}")
     unit = units.unit(bound.unit or "1")
     return float(value), unit.name if unit.factor == 1.0 and not unit.offset else unit.dimension
@@ -201,11 +249,12 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
     """Return the controller after worse points of the spread, where there are any, were added to the problem."""
     from scipy.optimize import minimize
 
+    elements = {k: v for n, value in loop.nominal.items() for k, v in flatten(n, value).items()}
     for _ in range(ROUNDS if loop.ranges else 0):
         controller = problem.controller(x)
         ratios = problem.judged(controller)
         k = int(np.argmin(ratios.min(axis=1)))
-        start = np.array([problem.plants[k].values.get(r.name, loop.nominal[r.name]) for r in loop.ranges])
+        start = np.array([problem.plants[k].values.get(r.name, elements[r.name]) for r in loop.ranges])
         low, high = np.array([[r.low, r.high] for r in loop.ranges]).T
 
         def at(share: Any, low: Any = low, high: Any = high) -> dict[str, float]:
@@ -213,7 +262,8 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
             return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
-            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f)
+            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f,
+                                sights=loop.sights([at(share)]))  # fmt: skip
             return float(one.judged(controller).min())
 
         found = minimize(
@@ -223,12 +273,13 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
         if found.fun > ratios.min() - 2e-3:
             break
         problem.plants.append(loop.plants([at(found.x)])[0])
+        problem.sights.extend(loop.sights([at(found.x)]))
         x = polished(problem, x)
     return x
 
 
-def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]) -> list[WishResult]:
-    got = measured(wishes, f, loops)
+def _results(wishes: Sequence[Wish], got: Any, models: Sequence[Plant]) -> list[WishResult]:
+    """Return the wishes with nominal and worst values; got: (plants, wishes)."""
     found = []
     for k, wish in enumerate(wishes):
         worst = int(np.argmin([wish.ratio(g) for g in got[:, k]]))
@@ -237,21 +288,25 @@ def _results(wishes: Sequence[Wish], f: Any, loops: Any, models: Sequence[Plant]
 
 
 def _settings(
-    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any], system: System
+    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any], system: System, slot: str
 ) -> tuple[str, dict[str, Any]]:  # fmt: skip
     """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
-    if shape.is_lead_lag and all(f"{SLOT}.{n}" in nominal for n in NETWORK):
+    if shape.is_lead_lag and all(f"{slot}.{n}" in nominal for n in NETWORK):
         neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
         values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
         owners = {option.sets: name for name, option in system.options.items()}  # "stabilizer.K" -> its option
-        names = (f"{SLOT}.{n}" for n in NETWORK)
+        names = (f"{slot}.{n}" for n in NETWORK)
         return "", {owners.get(n, n): float(f"{values[n.partition('.')[2]]:.9g}") for n in names}
-    direct = len(np.trim_zeros(controller.num, "b")) == len(np.trim_zeros(controller.den, "b"))
-    return _part_of_any(), {
-        f"{SLOT}.form": 1,
-        f"{SLOT}.num": list(np.trim_zeros(controller.num, "b")),
-        f"{SLOT}.den": list(np.trim_zeros(controller.den, "b")),
-        **({f"{SLOT}.conditioned": 1} if direct else {}),
+    own = all(f"{slot}.{n}" in {k.partition("[")[0] for k in nominal} for n in ANY)
+    num, den = (list(np.trim_zeros(p, "b")) for p in (controller.num, controller.den))
+    for n, row in (("num", num), ("den", den)):  # what the design of the system has beyond is taken away
+        row += [0.0] * (len(np.trim_zeros(np.atleast_1d(nominal.get(f"{slot}.{n}", 0.0)), "b")) - len(row))
+    direct = len(np.trim_zeros(num, "b")) == len(np.trim_zeros(den, "b"))
+    return "" if own else _part_of_any(), {
+        f"{slot}.form": 1,
+        f"{slot}.num": num,
+        f"{slot}.den": den,
+        **({f"{slot}.conditioned": 1} if direct else {}),
     }
 
 
@@ -269,7 +324,7 @@ def _part_of_any() -> str:
 
 def _crossover(
     system: System, nominal: Mapping[str, Any], session: Session, settings: Mapping[str, Any],
-    crossed: Sequence[tuple[float, float]],
+    crossed: Sequence[tuple[float, float]], slot: str,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the option crossover, whose sines the system's own plan has, where nothing else follows it."""
     option = system.options.get("crossover")
@@ -283,7 +338,7 @@ def _crossover(
             other = session.prepare({"crossover": at})[2].parameters
     except GyrobenchError:
         return {}
-    plain = {n: v for n, v in nominal.items() if n.partition(".")[0] not in (SLOT, "exciter")}
+    plain = {n: v for n, v in nominal.items() if n.partition(".")[0] not in (slot, "exciter")}
     return {"crossover": f"{at:g}Hz"} if all(other.get(n) == v for n, v in plain.items()) else {}
 
 

@@ -13,11 +13,10 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.plant import SLOT
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
-from gyrobench.tuning.wishes import Wish
+from gyrobench.tuning.wishes import JITTER, Wish
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,13 @@ class LoopTuning:
     evaluations: int = 0
     reasons: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    slot: str = "stabilizer"  # of the controller
+    loop: str = ""  # name of the loop, of a system with several
+
+    @property
+    def name(self) -> str:
+        """Return the system, and the loop where it has several."""
+        return f"{self.system}, loop {self.loop}" if self.loop else self.system
 
     @property
     def had(self) -> bool:
@@ -76,7 +82,7 @@ class LoopTuning:
     @property
     def command(self) -> str:
         """Return the command that runs the system with this controller."""
-        parts = {**self.swaps, **({SLOT: self.part} if self.part else {})}
+        parts = {**self.swaps, **({self.slot: self.part} if self.part else {})}
         named = [("part", parts), ("map", self.maps), ("set", {**self.given, **self.settings})]
         words = [f"--{option} {shlex.quote(f'{n}={_text(v)}')}" for option, values in named for n, v in values.items()]
         return " ".join(["gyrobench run", self.system, *words])
@@ -85,6 +91,7 @@ class LoopTuning:
         """Return plain JSON values; unlimited margins are null."""
         return {
             "system": self.system,
+            "loop": self.loop,
             "structure": self.structure.name,
             "had": self.had,
             "proven": self.proven,
@@ -153,7 +160,7 @@ def _lines(t: LoopTuning) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
     over = ", ".join(range_text(r) for r in t.spread)
     lines = [
-        f"{t.system}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
+        f"{t.name}: {state} ({t.structure.name}, {t.evaluations} controllers judged in {t.seconds:.1f} s)",
         f"over {over}: {len(t.points)} points" if over else "at nominal values",
         "",
     ]
@@ -190,6 +197,8 @@ def margin_text(w: ProvenWish) -> str:
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""
     match w.wish.unit:
+        case "rad" if w.wish.name == JITTER:
+            return f" ± {1e6 * w.U:.2g} µrad"
         case "rad":
             return f" ± {math.degrees(w.U):.2g}°"
         case "":

@@ -12,6 +12,7 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.tuned_loop import LoopTuning
+from gyrobench.tuning.wishes import JITTER
 
 SPAN = 40.0  # figures over frequency show so much about the crossover
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
@@ -158,7 +159,7 @@ def sensitivities(t: LoopTuning) -> str:
         elif w.name in ("peak S", "peak T"):
             ax = top if w.name == "peak S" else bottom
             ax.axhline(20.0 * math.log10(w.value), **style, label="wanted")
-        elif w.f:
+        elif w.f and w.name != JITTER:
             top.plot([w.f], [20.0 * math.log10(w.value)], "v", color=VERMILION, markersize=6, label="wanted", zorder=5)
     if t.proofs and t.proofs[0].points:
         points = t.proofs[0].points

@@ -42,7 +42,7 @@ def page(t: LoopTuning) -> Page:
     over = "; ".join(range_text(r) for r in t.spread) or "none"
     head = [
         ("Report", report_id),
-        ("System", t.system),
+        ("System", t.name),
         ("Structure", t.structure.name),
         ("Spread", over),
         ("Set", ", ".join(f"{n} = {v}" for n, v in t.given.items()) or "nothing"),
@@ -56,7 +56,7 @@ def page(t: LoopTuning) -> Page:
             Section("Controller", "controller", _controller(t)),
             Section("Method", "method", _method(t)),
         ]
-    return Page(f"Tuned loop: {t.system}", report_id, head, sections, what="Tuning").finish()
+    return Page(f"Tuned loop: {t.name}", report_id, head, sections, what="Tuning").finish()
 
 
 def summary(t: LoopTuning) -> str:

@@ -27,13 +27,18 @@ MEASURES: dict[str, tuple[str, bool, str]] = {
     ),
     "peak S": (FACTOR, False, "largest |S|, S = 1/(1 + L)"),
     "peak T": (FACTOR, False, "largest |T|, T = L/(1 + L)"),
+    "jitter": ("rad", False, "rms of the line of sight, of a system that states what moves it"),
 }
+JITTER = "jitter"
 AT = "S at "  # "S at 1Hz": |S| at a frequency, at most
 
 
 @dataclass(frozen=True)
 class Wish:
-    """One wish: ``value`` of a measure, SI, at least (``least``) or at most; f: Hz of "S at", else 0."""
+    """One wish: ``value`` of a measure, SI, at least (``least``) or at most.
+
+    f: Hz, of "S at", and where a jitter begins; else 0.
+    """
 
     name: str
     value: float
@@ -50,6 +55,8 @@ class Wish:
         if math.isinf(value):
             return "unlimited"
         match self.unit:
+            case "rad" if self.name == JITTER:
+                return f"{1e6 * value:.3g} µrad"
             case "rad":
                 return f"{math.degrees(value):.3g}°"
             case "":
@@ -72,7 +79,7 @@ def parse_wishes(texts: Sequence[str]) -> list[Wish]:
     for k, w in enumerate(wishes):
         if w.name in [other.name for other in wishes[:k]]:
             raise UsageError(f"--want {w.name}: given twice")
-    if not any(w.name == "bandwidth" or w.f for w in wishes):
+    if not any(w.name in ("bandwidth", JITTER) or w.f for w in wishes):
         raise UsageError(
             "margins are largest in a loop that does nothing: want what the loop is for, too, "
             '--want "bandwidth>20Hz" or --want "S at 1Hz<-40dB"'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import shortest
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import LoopTest
-from gyrobench.system.loop_plan import LoopPhase, sweep
+from gyrobench.system.line_of_sight import Density, LineOfSight
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
@@ -25,6 +27,7 @@ ON_INNER = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # gyro axes x, y along x (pitch) 
 INTEGRAL = 8.0  # crossover over the corner of the integral
 NOTCH = (0.1, 0.7)  # damping of its zeros and of its poles
 TONES = (0.3, 0.6, 0.85, 1.0, 1.2, 1.6, 2.2, 2.6, 3.0, 3.6)  # of the crossover
+NEVER = 100  # number of a phase that no plan has
 TEST = 0.3  # V (rad/s), of the test sines
 
 
@@ -112,11 +115,9 @@ class GimbalStabilization(LoopTest):
             found += sweep(f"base {name}", "motion", [1.0, 3.0, 8.0], self.swing, axis=k, settle=1.0, dwell=4.0)
         return [*found, self.ride()]
 
-    def plan(self) -> Any:
-        plan = super().plan()
-        if self.values.get("profile"):
-            plan.phases = [self.ride()]
-        return plan
+    def plan(self) -> LoopPlan:
+        """Return the phases, or the ride alone by a recorded motion."""
+        return LoopPlan([self.ride()] if self.values.get("profile") else self.phases())
 
     def ride(self) -> LoopPhase:
         """Return the ride, in which the base vibrates."""
@@ -133,11 +134,60 @@ class GimbalStabilization(LoopTest):
             return None
         return SPECTRA[name] if name in SPECTRA else read_spectrum(Path(name))
 
+    def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
+        """Return what makes the line of sight jitter, for a jitter that is wanted of a loop."""
+        spectrum, scale = self.spectrum(), float(parameters.get("vibration.scale", 1.0)) ** 2
+
+        def rate(axis: int) -> Density:
+            return lambda f: scale * spectrum.density("rate", axis, f) if spectrum else np.zeros(f.size)
+
+        white = 2.0 * float(parameters.get("gyro.white", 0.0)) ** 2
+        band, K = float(parameters.get("gyro.bandwidth", np.inf)), float(parameters.get("decoupler.K", 1.0))
+
+        def noise(axis: str) -> Density:
+            gain = K if axis == self.inner else K / math.cos(self[self.inner])
+            return lambda f: white * gain**2 / (1.0 + (f / band) ** 4)
+
+        free, slipping = self.slips(parameters, spectrum, math.sqrt(scale)) if spectrum else ({}, {})
+        return LineOfSight(
+            self["jitter_from"], (rate(0), rate(1), rate(2)), {a: noise(a) for a in AXES}, free=free, slipping=slipping
+        )
+
+    def slips(
+        self, parameters: Mapping[str, Any], spectrum: VibrationSpectrum, scale: float
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the gimbal without dry friction, and with viscous friction for it; {}, {} where the joints stick.
+
+        A line of sight at rest leaves the base's rate to the joints, v rms.  Friction M that slips makes torques of M
+        rms, as viscous friction M / v does; they slip where the angle exceeds presliding.
+        """
+        most = np.maximum(parameters["platform.friction"], parameters["platform.stiction"])
+        f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
+        density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale**2
+        squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
+        k_in, k_out = (0, 2) if self.inner == "pitch" else (2, 0)
+        c, s = (fun(self["yaw" if self.inner == "pitch" else "pitch"]) ** 2 for fun in (math.cos, math.sin))
+        rate, angle = (np.sqrt([
+            c * x[k_in] + s * x[1], x[k_out] + math.tan(self[self.inner]) ** 2 * (c * x[1] + s * x[k_in])
+        ]) for x in squares)  # fmt: skip
+        rate, angle = (x if self.inner == "pitch" else x[::-1] for x in (rate, angle))  # pitch, yaw
+        if not np.any(most) or not np.all(angle > float(parameters["platform.presliding"])):
+            return {}, {}
+        free = {"platform.friction": [0.0, 0.0], "platform.stiction": [0.0, 0.0]}
+        viscous = np.asarray(parameters["platform.viscous"]) + np.asarray(parameters["platform.friction"]) / rate
+        return free, {**free, "platform.viscous": viscous.tolist()}
+
+    @property
+    def inner(self) -> str:
+        """Return the name of the inner joint."""
+        return "pitch" if self["form"] == FORMS[0] else "yaw"
+
     def design(self, parts: PartValues) -> dict[str, Any]:
         form = FORMS.index(self["form"])
         spectrum = self.spectrum()
         found: dict[str, Any] = {
             "platform.form?": form,
+            "platform.step?": self.step,  # a mode of 60 Hz wants less than the millisecond of the part
             "decoupler.form?": form,
             "platform.theta_0": [self["pitch"], self["yaw"]],
             "platform.bending": [self["bending"]] * 2,
@@ -146,7 +196,7 @@ class GimbalStabilization(LoopTest):
             "gyro.mount": ON_INNER,
             "gyro.white?": self["gyro_noise"] / math.sqrt(2.0),
             **(spectrum.parameters() if spectrum else {"vibration.points?": 0}),
-            "vibration.first?": len(self.plan().phases),
+            "vibration.first?": next((k for k, p in enumerate(self.plan().phases, 1) if p.label == "ride"), NEVER),
         }
         for k, axis in enumerate(AXES):
             found |= self.controller(axis, k, parts)
@@ -209,7 +259,7 @@ class GimbalStabilization(LoopTest):
         return problems
 
     def warnings(self) -> list[str]:
-        inner = self["pitch" if self["form"] == FORMS[0] else "yaw"]
+        inner = self[self.inner]
         if abs(inner) > 75 * DEG:
             return [
                 f"the inner joint begins at {math.degrees(inner):.3g}°, in the keyhole: the gain of the outer loop is "

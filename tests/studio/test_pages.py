@@ -425,3 +425,25 @@ def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[st
     page.get_by_role("button", name="Run").click()
     run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
     assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_shuts_anyone_out(browser: Any, studio: tuple[str, Path], scheme: str) -> None:
+    """axe-core: names of all controls, contrast of all texts, the language; nothing serious on any page."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    context = browser.new_context(viewport={"width": 1200, "height": 900}, color_scheme=scheme)
+    page = context.new_page()
+    page.set_default_timeout(LIMIT)
+    page.goto(studio[0])
+    found = []
+    for path in (
+        "/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/campaign", "/laboratory", "/part/cage",
+    ):  # fmt: skip
+        page.goto(base_of(studio) + path)
+        page.locator("h1").first.wait_for()
+        page.wait_for_timeout(700)
+        violations = Axe().run(page).response["violations"]
+        found += [(path, v["id"], v["nodes"][0]["html"]) for v in violations if v["impact"] in ("serious", "critical")]
+    context.close()
+    assert found == []

@@ -24,6 +24,7 @@ from gyrobench.tuning.tune_loop import tunable, tune
 from gyrobench.tuning.wishes import parse_wishes
 
 NAMES = ["platform_single_axis", "stabilizer_floated_2dof", "stabilizer_sdf"]
+SEVERAL = ["gimbal_stabilization", "platform_four_gimbal", "platform_three_axis", "platform_three_gimbal"]
 WISHES = ["phase margin=40deg", "gain margin=6dB", "disk margin=0.5", "bandwidth>10Hz"]
 
 
@@ -180,10 +181,21 @@ def test_what_cannot_be_had_is_said_with_the_reason() -> None:
 
 
 def test_systems_without_such_a_loop_are_refused_with_those_that_have_one() -> None:
-    assert tunable() == NAMES
-    for name in ("platform_three_axis", "stabilizer_power_2dof", "fixed_position"):
-        with pytest.raises(UsageError, match=f"{name} has no single loop .*; tune works for {', '.join(NAMES)}"):
+    able = tunable()
+    assert able == sorted([*NAMES, *SEVERAL])
+    for name in ("stabilizer_power_2dof", "fixed_position"):
+        with pytest.raises(UsageError, match=f"{name} has no loop .*; tune works for {', '.join(able)}"):
             tune(load_system(name), ["bandwidth>1Hz"])
+
+
+def test_one_of_several_loops_is_named() -> None:
+    system = load_system("gimbal_stabilization")
+    with pytest.raises(UsageError, match="several loops: say --loop pitch or --loop yaw"):
+        tune(system, ["bandwidth>1Hz"])
+    with pytest.raises(UsageError, match="--loop roll: gimbal_stabilization has no such loop"):
+        tune(system, ["bandwidth>1Hz"], loop="roll")
+    with pytest.raises(UsageError, match="platform_single_axis does not state what moves a line of sight"):
+        tune(load_system(NAMES[0]), ["jitter=1urad"])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,119 @@
+"""A loop of a gimbal tuned for the jitter of its line of sight: model, search, proof, dry friction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gyrobench.bench import Bench
+from gyrobench.engine.session import Session
+from gyrobench.packaging import load_part
+from gyrobench.system.system import load_system
+from gyrobench.tuning.loop_ports import LoopPorts, loops_of
+from gyrobench.tuning.plant import HeldController, plants
+from gyrobench.tuning.sight_jitter import sight_models
+from gyrobench.tuning.structures import rounded
+from gyrobench.tuning.tune_loop import tune
+
+F = np.geomspace(0.05, 1000.0, 3000)
+
+
+def gimbal(**values: object):
+    """Return the gimbal with options set."""
+    system = load_system("gimbal_stabilization")
+    for name, x in values.items():
+        system.set(name, x)
+    return system
+
+
+def models(axis: str, **values: object):
+    """Return the plant, the sight model, the system's own controller over F and its parameters."""
+    system = gimbal(**values)
+    ports = loops_of(system)[axis]
+    with Session(system, bench=Bench.find().folder, child=True) as session:
+        now, _, document = session.prepare()
+        q = document.parameters
+        sources = now.line_of_sight(q)
+
+        def part_of(slot: str):
+            return load_part(session.names[slot])
+
+        free, slipping = ({**q, **more} for more in (sources.free, sources.slipping))
+        plant = plants(session.assembly, free, part_of, now.step, [{}], ports)[0]
+        sight = sight_models(session.assembly, slipping, part_of, now.step, [{}], ports, sources)[0]
+    G = HeldController(rounded(np.array(q[f"{axis}.num"]), np.array(q[f"{axis}.den"]), {}), now.step)
+    return plant, sight, G.response(np.exp(2j * np.pi * F * now.step)), q
+
+
+def test_the_loops_of_a_gimbal() -> None:
+    assert loops_of(gimbal()) == {
+        "pitch": LoopPorts("pitch", "pitch", 1, "platform.los[1]"),
+        "yaw": LoopPorts("yaw", "yaw", 3, "platform.los[2]"),
+    }
+
+
+@pytest.mark.parametrize("axis", ["pitch", "yaw"])
+def test_the_model_without_controller_makes_the_loop(axis: str) -> None:
+    """-G Q is G times the plant, which is made by another road."""
+    plant, sight, G, _ = models(axis, pitch=0.5)
+    ways = sight.at(F)
+    L = plant.response(F) * G
+    assert -G[ways.use] * ways.back == pytest.approx(L[ways.use], rel=1e-6)
+    assert ways.f[0] >= 1.0
+
+
+def test_jitter_by_hand() -> None:
+    """No mode, no vibration: line of sight = T n / s, T = L/(1 + L), L = G F k/(J s).
+
+    J = 0.05 kg.m2, k = 0.4 N.m/V; from 1 Hz on, white noise of 0.005 deg/s/sqrt(Hz).  The step of 0.2 ms: 2 %.
+    """
+    _, sight, G, q = models("pitch", bending=0.0, psd="none")
+    s = 2j * np.pi * F
+    low_pass = 1.0 / (1.0 + math.sqrt(2.0) * s / (200 * np.pi) + (s / (200 * np.pi)) ** 2)
+    num, den = (np.polynomial.polynomial.polyval(s, np.array(q[f"pitch.{n}"])) for n in ("num", "den"))
+    L = num / den * low_pass * 0.4 / (0.05 * s + 0.01)
+    density = np.abs(num / den * low_pass * 0.4 / (0.05 * s + 0.01) / s / (1 + L)) ** 2 * math.radians(0.005) ** 2
+    use = F >= 1.0
+    by_hand = math.sqrt(np.trapezoid(density[use], F[use]))
+    assert sight.at(F).rms(G) == pytest.approx(by_hand, rel=0.02)
+    assert set(sight.at(F).sources(G)) == {f"vibration about {a}" for a in "xyz"} | {"noise of the sensor"}
+
+
+def test_slipping_friction_is_viscous_friction_of_the_same_torque() -> None:
+    """M over the rms of the base's rate; joints that stick stay as they are."""
+    system = gimbal(stiction=0.05)
+    v = system.spectrum().rms("rate", 0)
+    _, _, _, q = models("pitch", stiction=0.05)
+    sources = system.line_of_sight(q)
+    assert sources.slipping["platform.viscous"][0] == pytest.approx(0.01 + 0.04 / v, rel=2e-3)
+    assert sources.free["platform.stiction"] == [0.0, 0.0]
+    still = system.line_of_sight({**q, "platform.presliding": 0.5})
+    assert still.slipping == {} and still.free == {}
+
+
+def test_wanted_jitter_is_had_and_measured() -> None:
+    wishes = ["phase margin=40deg", "gain margin=6dB", "jitter=20urad"]
+    found = tune(gimbal(jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="pitch")
+    assert found.proven, str(found)
+    assert {w.wish.name for w in found.proofs[0].wishes} == {"phase margin", "gain margin", "jitter"}
+    jitter = next(w for w in found.proofs[0].wishes if w.wish.name == "jitter")
+    assert jitter.value == pytest.approx(jitter.expected, abs=jitter.U + 0.05 * jitter.expected)
+    assert "µrad" in str(found) and found.command.count("--set") == 4 and "loop pitch" in str(found)
+
+
+def test_a_jitter_that_friction_forbids_says_so() -> None:
+    """Much less than the loop can do: the sources are named, the note says how friction was taken."""
+    wishes = ["phase margin=40deg", "jitter=20urad"]
+    found = tune(gimbal(stiction=0.05, jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="yaw")
+    assert not found.had and not found.proven
+    text = str(found)
+    assert "cannot be had" in text and "the jitter is of vibration about z" in text
+    assert "dry friction slips in the ride" in text
+
+
+def test_a_controller_of_less_order_takes_the_design_away() -> None:
+    """The design of the system has a notch: its coefficients beyond those of a pi controller become 0."""
+    found = tune(gimbal(), ["phase margin=40deg", "S at 1Hz<-20dB"], structure="pi", loop="yaw")
+    assert len(found.settings["yaw.num"]) == 4 and found.settings["yaw.num"][2:] == [0.0, 0.0]
