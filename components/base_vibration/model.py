@@ -44,7 +44,7 @@ class BaseVibration(Component):
     onset = Parameter(1.0, "s", "time in which it fades in", min=0.0)
     phases = Noise(1.0, "1", "1: phases by the seed", per="start", samples=12 * LINES)
 
-    phase = Input(0, int, "number of the running phase")
+    phase = Input(0.0, "1", "number of the running phase")
     omega_b = Input(NONE, "rad/s", "inertial rate of the base without vibration, base axes")
     alpha_b = Input(NONE, "rad/s2", "its derivative")
     f_b = Input([0.0, 0.0, 9.80665], "m/s2", "specific force without vibration, base axes")
