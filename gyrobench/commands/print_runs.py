@@ -74,9 +74,9 @@ def reduce(
         if not data:
             raise UsageError(f"no runs named; gyrobench reduce {test.name} --data RUN --data RUN")
         apply_values(test, values)
-        outcome = reduce_runs(test, data, spec, out, force, formats)
-        verdict = _print_outcome(outcome, as_json)
-        _print_paths(write_certificate([outcome.folder]) if certificate and outcome.folder else [], as_json)
+        compared = reduce_runs(test, data, spec, out, force, formats)
+        verdict = _print_outcome(compared, as_json)
+        _print_paths(write_certificate([compared.folder]) if certificate and compared.folder else [], as_json)
         return verdict
     from gyrobench.workflow.gyro_values import channels_of, write_gyro_values
     from gyrobench.workflow.measured_run import reduce_measured
