@@ -20,6 +20,8 @@ TEXT = {".py", ".md", ".csv", ".toml", ".json", ".c", ".h", ".html", ".typ", ".c
 #: A-B that are no ids of methods
 WORDS = {
     "UTF-8",
+    "BY-NC-SA",
+    "MIL-STD-810F",
     "UTF-16",
     "SHA-256",
     "BSD-3",

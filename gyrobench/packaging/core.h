@@ -17,6 +17,10 @@ typedef struct {
     double running, dirty;
 } Numbers; /* all that decides the future */
 
+#if N_X > 0
+typedef double Square[N_X][N_X];
+#endif
+
 typedef struct { /* what follows from the numbers, kept because it seldom changes */
     double step, largest, h, root; /* a communication step, cut in n internal steps h; sqrt(h) */
     int held; /* h is of rounding size: the last samples of noise hold */
@@ -26,6 +30,10 @@ typedef struct { /* what follows from the numbers, kept because it seldom change
     uint64_t first;
     double ahead[AHEAD * (N_STREAMS + 1)]; /* size times normal number of the counts first, first + 1, ...: rows of n_drawn */
     double seen[N_FOLLOWED > 0 ? N_FOLLOWED : 1]; /* what the outputs were last made from, while `settled` */
+#if N_X > 0
+    int phi_known; /* phi was made from the matrix z */
+    Square z;
+#endif
     int settled, changes, anew; /* changes: steps since the outputs were last found as they were; anew: made in this step */
 } Kept;
 
@@ -139,7 +147,6 @@ static inline void draw(Part *p) { /* the samples of an internal step */
 
 /* ------------------------------------------------------------------------------------ integration */
 #if N_X > 0
-typedef double Square[N_X][N_X];
 #ifdef __GNUC__
 typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
 #endif
@@ -228,9 +235,13 @@ static inline void advance(Part *p, double h) {
         jacobian(p, z);
         for (i = 0; i < N_X; i++)
             for (j = 0; j < N_X; j++) z[i][j] = z[i][j] * h;
-        phi1(z, phi);
-        for (i = 0; i < N_X; i++)
-            for (j = 0; j < N_X; j++) p->n.phi[j][i] = phi[i][j];
+        if (!p->kept.phi_known || memcmp(z, p->kept.z, sizeof z) != 0) { /* a limit changes it between two matrices */
+            memcpy(p->kept.z, z, sizeof z);
+            p->kept.phi_known = 1;
+            phi1(z, phi);
+            for (i = 0; i < N_X; i++)
+                for (j = 0; j < N_X; j++) p->n.phi[j][i] = phi[i][j];
+        }
         p->n.phi_h = h;
     }
     flow(p);

@@ -44,8 +44,7 @@ COLD Instance *new_instance(const char *name, const Face *face) {
 
 static COLD void restart(Instance *m, const Numbers *n) {
     m->part.n = *n;
-    m->part.kept.settled = m->part.kept.keyed = 0;
-    m->part.kept.step = 0.0;
+    memset(&m->part.kept, 0, sizeof m->part.kept);
     m->part.failed = 0;
 }
 

@@ -17,6 +17,7 @@ from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Coefficient, Reason, Specification, StepChange, StepCheck
 from gyrobench.system.system import System
+from gyrobench.workflow.ahead import importing
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
 from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
@@ -108,6 +109,8 @@ def _run(
     feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
     try:
         with feedback.progress(session.system.name) as progress:
+            if {"html", "pdf"} & set(request.formats) and folder is not None and session.system.has_reduction:
+                progress = importing(progress)
             record = session.run({}, request.seed, request.step, None, progress, checkpoints)
     except RunError as error:
         if error.record is None or folder is None:

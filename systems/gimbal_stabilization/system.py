@@ -14,7 +14,7 @@ from gyrobench.reduction.loops.jitter import shortest
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.loop_test import LoopTest
 from gyrobench.system.line_of_sight import Density, LineOfSight
-from gyrobench.system.loop_plan import LoopPhase, sweep
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
@@ -115,11 +115,9 @@ class GimbalStabilization(LoopTest):
             found += sweep(f"base {name}", "motion", [1.0, 3.0, 8.0], self.swing, axis=k, settle=1.0, dwell=4.0)
         return [*found, self.ride()]
 
-    def plan(self) -> Any:
-        plan = super().plan()
-        if self.values.get("profile"):
-            plan.phases = [self.ride()]
-        return plan
+    def plan(self) -> LoopPlan:
+        """Return the phases, or the ride alone by a recorded motion."""
+        return LoopPlan([self.ride()] if self.values.get("profile") else self.phases())
 
     def ride(self) -> LoopPhase:
         """Return the ride, in which the base vibrates."""

@@ -1,6 +1,6 @@
 """Whole IMUs at rest: what a report states of correlations, temperature, common lines and N, against known truth.
 
-    python tests/benchmarks/imu_static.py [SEEDS] [SAMPLES]
+    python tests/benchmarks/imu_static.py [seeds] [samples]
 
 Records from the equations with numpy and scipy alone: two gyros and two accelerometers whose white noise and whose
 Gauss-Markov drift are correlated, a rate that follows the temperature, a force that follows its rate of change, a sine

@@ -1,4 +1,4 @@
-"""Jitter of random gimbals against their linear budgets:  python tests/benchmarks/jitter_budget.py [COUNT]
+"""Jitter of random gimbals against their linear budgets:  python tests/benchmarks/jitter_budget.py [count]
 
 Each has random inertias with products, unbalance, form, joint angles, mode, friction, cogging, cables, gyro and base
 spectra; a ride of 60 s from 1 Hz.  Printed: co-simulated over budget, its u, and how many are within 5 % and 2 u.

@@ -82,7 +82,8 @@ def table(digests: Mapping[str, str]) -> str:
     """Return the text of the file of digests."""
     head = [
         "# SHA-256 of the records of the first 200 steps of every system, seed 7: see tests/support/bits.py.",
-        "# Any machine, any platform and any target gives the same.  Write it again, where a part has changed, with",
+        "# Any platform and target gives the same; Python's own sin may change the last digit of a parameter.",
+        "# Write it again, where a part has changed, with",
         "# `python tests/benchmarks/same_bits.py --write`.",
         "[digests]",
     ]
