@@ -95,8 +95,8 @@ class _Writer:
         _add(file, "mimeType", "application/pdf")
         _add(file, "dataBase64", base64.b64encode(pdf).decode())
         ET.indent(root)
-        content: bytes = ET.tostring(root, encoding="utf-8")
-        return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
+        text: bytes = ET.tostring(root, encoding="utf-8")
+        return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text + b"\n"
 
     def _text(self, parent: ET.Element, name: str, text: str, own: bool = False) -> ET.Element:
         """Add a text, in English and, unless it is the user's own, in the language of the certificate."""
