@@ -157,21 +157,22 @@ class Language:
             return text
         text = text.replace("\N{NO-BREAK SPACE}", " ")
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
-            if form in self.catalogue.texts:
+            if form in self.catalogue.texts and (form == text or text not in self.names):  # the slot table is no Table
                 return self.catalogue.texts[form]
-        if self._is_named(text) or self.catalogue.names.issuperset(WORD.findall(text)):
+        if self.catalogue.names.issuperset(WORD.findall(text)):
             return DATE.sub(lambda m: self.catalogue.joints["date"].format(*map(int, m.groups())), text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
                 if (match := pattern.fullmatch(form)) and (made := self._filled(said, match)) is not None:
                     return made
-        return self._apart(text)
+        return self._named(text) or self._apart(text)
 
-    def _is_named(self, text: str) -> bool:
-        """Return whether a text is a name, several one under the other, one broken at "_", or one cut short by "…"."""
+    def _named(self, text: str) -> str | None:
+        """Return a name, several ones in lines, one broken after "_", or what one is called that "…" cuts short."""
         if text.endswith("…"):
-            return any(name.startswith(text[:-1]) for name in self.names)
-        return self.names.issuperset(text.replace("_\n", "_").split("\n"))
+            return next((self.find(name) for name in sorted(self.names) if name.startswith(text[:-1])), None)
+        lines = text.replace("_\n", "_")
+        return text if self.names.issuperset(lines.split("\n")) or lines.replace("\n", " ") in self.names else None
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
         parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
