@@ -5,10 +5,11 @@
 
 Code writes English, and no logic reads it.  ``catalogue/zh.toml`` has the texts of the bench, ``systems/NAME/zh.toml``
 those of a test: English = translation.  In both, ``{placeholders}`` stand for a text, which is translated too, ``{n}``,
-``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  A text that is no line is taken apart at full
-stops, semicolons, colons, commas, brackets and " and "; ``[joints]`` are what the parts are joined by.  Symbols,
-numbers, units and names stay.  A test whose catalogue has ``report = true`` has all texts of its report, else those of
-its certificate.
+``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  A word of two senses has a line with its unit
+or with the head of its column: "phase / °", "shape: step".  A text that is no line is taken apart at full stops,
+semicolons, colons, commas, brackets and " and "; ``[joints]`` are what the parts are joined by.  Symbols, numbers,
+units and names stay.  A test whose catalogue has ``report = true`` has all texts of its report, else those of its
+certificate.
 """
 
 from __future__ import annotations
@@ -245,13 +246,18 @@ class Language:
 
     def _table(self, table: PageTable) -> None:
         table.caption = self.text(table.caption)
+        heads = [column.head for column in table.columns]
         for column in table.columns:
-            column.head = self.text(column.head)
+            column.head = self._within(column.head, f"{column.head} / {column.unit}").removesuffix(f" / {column.unit}")
         for row in table.rows:
             row.group = self.text(row.group)
-            for cell in row.cells:
+            for head, cell in zip(heads, row.cells, strict=False):
                 if not (cell.number or cell.own or cell.mark == "hash"):
-                    cell.text = self.text(cell.text)
+                    cell.text = self._within(cell.text, f"{head}: {cell.text}")
+
+    def _within(self, text: str, whole: str) -> str:
+        """Return a text by the line that tells its sense, with its unit or its column, where there is one."""
+        return self.catalogue.texts.get(whole) or self.text(text)
 
 
 @contextmanager
