@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
 NUMBER = r"(?:[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]|e(?=[+-]\d))+(?: UTC)?"
 #: English words: letters that are no symbol and no part of an identifier (table.angle, u_a, --set, x.csv)
 WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as|eq|ch)(?![\w\\@]|[./-]\w)")
-SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(])")
+SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(:])")
 DATE = re.compile(r"\b(\d{4})-(\d\d)-(\d\d)\b")
 
 
@@ -97,14 +97,20 @@ def check_code(code: str) -> str:
 
 
 @functools.lru_cache(maxsize=64)
-def catalogue(code: str, folder: Path | None = None) -> Catalogue:
-    """Return the catalogue of a language, with that of a system in its folder.  Raises UsageError for a wrong file."""
+def catalogue(code: str, folder: Path | None = None, *others: Path) -> Catalogue:
+    """Return the catalogue of a language, with those of a system in its folder and of others that it speaks of.
+
+    Raises UsageError for a wrong file.
+    """
     own = _read(FOLDER / f"{check_code(code)}.toml")
     texts, names, more = dict(own["texts"]), set(own["names"]), {}
-    if folder is not None and (file := folder / f"{code}.toml").is_file():
-        more = _read(file)
-        texts |= more["texts"]
-        names |= set(more.get("names", ()))
+    for place in filter(None, (*others, folder)):  # the system's own texts win
+        if (file := place / f"{code}.toml").is_file():
+            more = _read(file)
+            texts |= more["texts"]
+            names |= set(more.get("names", ()))
+        else:
+            more = {}
     return Catalogue(code, texts, frozenset(names), own["joints"], own["html"], bool(more.get("report", False)))
 
 
@@ -132,6 +138,12 @@ class Language:
     missing: dict[str, None] = field(default_factory=dict)
     known: dict[str, str | None] = field(default_factory=dict)
 
+    def short(self, text: str, shorten: Callable[[str], str]) -> str:
+        """Return a text in the language, shortened, which is not translated once more."""
+        found = shorten(self.text(text))
+        self.known[found] = found
+        return found
+
     def text(self, text: str) -> str:
         """Return a text in the language; one that has no translation stays and is noted in ``missing``."""
         found = self.find(text)
@@ -156,6 +168,8 @@ class Language:
         if text in self.own or not text.strip():
             return text
         text = text.replace("\N{NO-BREAK SPACE}", " ")
+        if "_\n" in text and "\n" not in (name := text.replace("_\n", "_")):  # broken for its place in a figure
+            return text if self.find(name) == name else None
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
             if form in self.catalogue.texts:
                 return self.catalogue.texts[form]
@@ -180,8 +194,11 @@ class Language:
             if (made := self._all([text[: gap.start()], text[gap.end() :]])) is not None:
                 return "".join(made)
         for sign in ("\n", " / ", "; ", ": ", ", ", " and "):
-            if sign in text and (made := self._all(text.split(sign))) is not None:
+            if sign in text and (made := self._all(re.split(rf"(?<!_){re.escape(sign)}", text))) is not None:
                 return joints[sign].join(made)
+        name, sign, said = text.partition(": ")
+        if sign and (made := self._all([name, said])) is not None:
+            return joints[sign].join(made)
         if text.endswith((".", ":")) and (made1 := self.find(text[:-1])) is not None:
             return made1 + joints[text[-1]]
         for opening, closing in (("(", ")"), ("[", "]"), ("“", "”")):
@@ -276,13 +293,18 @@ _in_use: ContextVar[Language | None] = ContextVar("language", default=None)
 
 @contextmanager
 def used(
-    code: str, folder: Path | None = None, own: Collection[str] = (), names: Collection[str] = ()
+    code: str,
+    folder: Path | None = None,
+    own: Collection[str] = (),
+    names: Collection[str] = (),
+    others: Collection[Path] = (),
 ) -> Iterator[Language | None]:
     """Make a language that of the figures drawn within; None is English.
 
-    folder: of the system; own, names: as in :class:`Language`.
+    folder: of the system; own, names: as in :class:`Language`; others: folders of the tests of a suite.
     """
-    language = None if code == ENGLISH else Language(catalogue(code, folder), frozenset(own), frozenset(names))
+    known = None if code == ENGLISH else catalogue(code, folder, *others)
+    language = Language(known, frozenset(own), frozenset(names)) if known else None
     token = _in_use.set(language)
     try:
         yield language
