@@ -168,18 +168,22 @@ class Language:
         if text in self.own or not text.strip():
             return text
         text = text.replace("\N{NO-BREAK SPACE}", " ")
-        if "_\n" in text and "\n" not in (name := text.replace("_\n", "_")):  # broken for its place in a figure
-            return text if self.find(name) == name else None
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
             if form in self.catalogue.texts:
                 return self.catalogue.texts[form]
-        if text in self.names or self.catalogue.names.issuperset(WORD.findall(text)):
+        if self._is_named(text) or self.catalogue.names.issuperset(WORD.findall(text)):
             return DATE.sub(lambda m: self.catalogue.joints["date"].format(*map(int, m.groups())), text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
                 if (match := pattern.fullmatch(form)) and (made := self._filled(said, match)) is not None:
                     return made
         return self._apart(text)
+
+    def _is_named(self, text: str) -> bool:
+        """Return whether a text is a name, several one under the other, one broken at "_", or one cut short by "…"."""
+        if text.endswith("…"):
+            return any(name.startswith(text[:-1]) for name in self.names)
+        return self.names.issuperset(text.replace("_\n", "_").split("\n"))
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
         parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
@@ -194,7 +198,7 @@ class Language:
             if (made := self._all([text[: gap.start()], text[gap.end() :]])) is not None:
                 return "".join(made)
         for sign in ("\n", " / ", "; ", ": ", ", ", " and "):
-            if sign in text and (made := self._all(re.split(rf"(?<!_){re.escape(sign)}", text))) is not None:
+            if sign in text and (made := self._all(text.split(sign))) is not None:
                 return joints[sign].join(made)
         name, sign, said = text.partition(": ")
         if sign and (made := self._all([name, said])) is not None:

@@ -82,7 +82,8 @@ def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
         own |= {run.data.file, run.data.sha256, run.data.columns, run.data.columns_sha256} if run.data else set()
         names |= {*run.parts, *(part.name for part in run.parts.values()), *run.options, *run.parameters, *run.versions}
         names |= {f"{k} {slot}" for k, slot in enumerate(run.order, 1)}  # as they stand in the drawing of the system
-        names |= {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}
+        ends = {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}
+        names |= ends | {end.partition("[")[0] for end in ends}
         names |= {column.name for column in getattr(result, "columns", [])}
     return own - {""}, names - {""}
 
