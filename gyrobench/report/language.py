@@ -186,6 +186,8 @@ class Language:
         return self.names.issuperset(text.replace("_\n", "_").split("\n"))
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
+        if any(v.count(a) != v.count(b) for v in match.groupdict().values() for a, b in ("“”", "()")):
+            return None  # not a part of one text and of the next
         parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
         if None in parts.values():
             return None
@@ -196,7 +198,7 @@ class Language:
         joints = self.catalogue.joints
         for gap in SENTENCE.finditer(text):
             if (made := self._all([text[: gap.start()], text[gap.end() :]])) is not None:
-                return "".join(made)
+                return made[0] + " " * made[0].isascii() + made[1]
         for sign in ("\n", " / ", "; ", ": ", ", ", " and "):
             if sign in text and (made := self._all(text.split(sign))) is not None:
                 return joints[sign].join(made)

@@ -9,7 +9,7 @@ from typing import Any
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
-from gyrobench.record.run_document import ABOUT, SuiteTestRun
+from gyrobench.record.run_document import ABOUT
 from gyrobench.report.language import ENGLISH, system_folder, used
 from gyrobench.report.page_model import Page
 from gyrobench.report.result_json import Report
@@ -74,8 +74,6 @@ def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
     if not result.simulated:
         own |= {result.instrument}
     if isinstance(result, SuiteResult):
-        tests = [SuiteTestRun.model_validate(m.test) for m in result.suite.members]
-        names |= {name for t in tests for slot, part in t.parts.items() for name in (slot, part.name)}
         names |= {m.label for m in result.suite.members}
     else:
         run = report.run
