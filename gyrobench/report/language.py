@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -44,7 +44,7 @@ NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
 NUMBER = r"(?:[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]|e(?=[+-]\d))+(?: UTC)?"
 #: English words: letters that are no symbol and no part of an identifier (table.angle, u_a, --set, x.csv)
 WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as|eq|ch)(?![\w\\@]|[./-]\w)")
-SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(])")
+SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(:])")
 DATE = re.compile(r"\b(\d{4})-(\d\d)-(\d\d)\b")
 
 
@@ -98,14 +98,20 @@ def check_code(code: str) -> str:
 
 
 @functools.lru_cache(maxsize=64)
-def catalogue(code: str, folder: Path | None = None) -> Catalogue:
-    """Return the catalogue of a language, with that of a system in its folder.  Raises UsageError for a wrong file."""
+def catalogue(code: str, folder: Path | None = None, *others: Path) -> Catalogue:
+    """Return the catalogue of a language, with those of a system in its folder and of others that it speaks of.
+
+    Raises UsageError for a wrong file.
+    """
     own = _read(FOLDER / f"{check_code(code)}.toml")
     texts, names, more = dict(own["texts"]), set(own["names"]), {}
-    if folder is not None and (file := folder / f"{code}.toml").is_file():
-        more = _read(file)
-        texts |= more["texts"]
-        names |= set(more.get("names", ()))
+    for place in filter(None, (*others, folder)):  # the system's own texts win
+        if (file := place / f"{code}.toml").is_file():
+            more = _read(file)
+            texts |= more["texts"]
+            names |= set(more.get("names", ()))
+        else:
+            more = {}
     return Catalogue(code, texts, frozenset(names), own["joints"], own["html"], bool(more.get("report", False)))
 
 
@@ -132,6 +138,12 @@ class Language:
     names: frozenset[str] = frozenset()
     missing: dict[str, None] = field(default_factory=dict)
     known: dict[str, str | None] = field(default_factory=dict)
+
+    def short(self, text: str, shorten: Callable[[str], str]) -> str:
+        """Return a text in the language, shortened, which is not translated once more."""
+        found = shorten(self.text(text))
+        self.known[found] = found
+        return found
 
     def text(self, text: str) -> str:
         """Return a text in the language; one that has no translation stays and is noted in ``missing``."""
@@ -176,6 +188,8 @@ class Language:
         return text if self.names.issuperset(lines.split("\n")) or lines.replace("\n", " ") in self.names else None
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
+        if any(v.count(a) != v.count(b) for v in match.groupdict().values() for a, b in ("“”", "()")):
+            return None  # not a part of one text and of the next
         parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
         if None in parts.values():
             return None
@@ -186,10 +200,13 @@ class Language:
         joints = self.catalogue.joints
         for gap in SENTENCE.finditer(text):
             if (made := self._all([text[: gap.start()], text[gap.end() :]])) is not None:
-                return "".join(made)
+                return made[0] + " " * made[0].isascii() + made[1]
         for sign in ("\n", " / ", "; ", ": ", ", ", " and "):
             if sign in text and (made := self._all(text.split(sign))) is not None:
                 return joints[sign].join(made)
+        name, sign, said = text.partition(": ")
+        if sign and (made := self._all([name, said])) is not None:
+            return joints[sign].join(made)
         if text.endswith((".", ":")) and (made1 := self.find(text[:-1])) is not None:
             return made1 + joints[text[-1]]
         for opening, closing in (("(", ")"), ("[", "]"), ("“", "”")):
@@ -289,13 +306,18 @@ _in_use: ContextVar[Language | None] = ContextVar("language", default=None)
 
 @contextmanager
 def used(
-    code: str, folder: Path | None = None, own: Collection[str] = (), names: Collection[str] = ()
+    code: str,
+    folder: Path | None = None,
+    own: Collection[str] = (),
+    names: Collection[str] = (),
+    others: Collection[Path] = (),
 ) -> Iterator[Language | None]:
     """Make a language that of the figures drawn within; None is English.
 
-    folder: of the system; own, names: as in :class:`Language`.
+    folder: of the system; own, names: as in :class:`Language`; others: folders of the tests of a suite.
     """
-    language = None if code == ENGLISH else Language(catalogue(code, folder), frozenset(own), frozenset(names))
+    known = None if code == ENGLISH else catalogue(code, folder, *others)
+    language = Language(known, frozenset(own), frozenset(names)) if known else None
     token = _in_use.set(language)
     try:
         yield language

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from gyrobench.report.language import in_use
 from gyrobench.report.numbers import write_number
 from gyrobench.report.style import (
     BLUE,
@@ -33,10 +35,24 @@ MANY = 20  # coefficients, from which a correlation below 0.3 is colour only
 
 
 def short(label: str, length: int = 26) -> str:
-    """Return a series label for a figure: the part before the colon when it is long."""
-    head = label.split(":")[0].strip() or label
-    label = label if len(label) <= length else head
-    return label if len(label) <= length else label[: length - 1] + "…"
+    """Return a series label for a figure, in its language: the part before the colon when it is long."""
+    language = in_use()
+    if language is not None:
+        return language.short(label, lambda said: _shortened(said, length, "："))
+    return _shortened(label, length, ":")
+
+
+def _shortened(label: str, length: int, colon: str) -> str:
+    head = label.split(colon)[0].strip() or label
+    label = label if width(label) <= length else head
+    while width(label) > length:
+        label = label.removesuffix("…")[:-1] + "…"
+    return label
+
+
+def width(label: str) -> int:
+    """Return how wide a label is, in letters: a Chinese character is as wide as two."""
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in label)
 
 
 def finite(*columns: Sequence[float | None]) -> list[list[float]]:

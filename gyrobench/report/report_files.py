@@ -59,7 +59,9 @@ def page_in(code: str, report: Report[Any], record: Mapping[str, Any] | None = N
     """Return the page of a report in another language.  Raises UntranslatedError where it would be half English."""
     system = report.result.system
     own, names = own_texts(report)
-    with used(code, system_folder(system, bench), own, names) as language:
+    tests = {m.system for m in report.result.suite.members} if isinstance(report.result, SuiteResult) else set()
+    others = [folder for name in sorted(tests) if (folder := system_folder(name, bench))]
+    with used(code, system_folder(system, bench), own, names, others) as language:
         made = page(report, record)
         return language.page(made, f"the report of {system}") if language else made
 
@@ -71,7 +73,9 @@ def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
     names = {result.system, *(c.name for c in result.coefficients), result.instrument.removesuffix(", simulated")}
     if not result.simulated:
         own |= {result.instrument}
-    if not isinstance(result, SuiteResult):
+    if isinstance(result, SuiteResult):
+        names |= {m.label for m in result.suite.members}
+    else:
         run = report.run
         own |= {run.data.file, run.data.sha256, run.data.columns, run.data.columns_sha256} if run.data else set()
         names |= {*run.parts, *(part.name for part in run.parts.values()), *run.options, *run.parameters, *run.versions}

@@ -340,7 +340,13 @@ def _provenance(report: Report[SuiteResult]) -> list[Any]:
     blocks.append(PageTable(columns, hashes, "Records and results of the tests, with their hash.", small=True))
     if parts:
         rows = [
-            Row([text_cell(slot, "strong"), *map(text_cell, (*about, "".join(who))), Cell(sha, mark="hash")])
+            Row(
+                [
+                    text_cell(slot, "strong", own=True),
+                    *(text_cell(x, own=True) for x in (*about, "".join(who))),
+                    Cell(sha, mark="hash"),
+                ]
+            )
             for (slot, *about, sha), who in sorted(parts.items())
         ]
         columns = [*map(Column, ("slot", "component", "version", "tests")), Column("SHA-256", wide=True)]

@@ -17,6 +17,7 @@ from gyrobench.report.certificate_page import page
 from gyrobench.report.laboratory import Laboratory, read_laboratory
 from gyrobench.report.language import ENGLISH, PLACEHOLDER, WORD, Language, UntranslatedError, catalogue
 from gyrobench.report.page_model import BulletList, PageTable, Row, columns, text_cell
+from gyrobench.report.plots import short
 from gyrobench.report.render import html, pdf
 from gyrobench.report.standard_names import NAMES, names_table
 from gyrobench.result import Reason
@@ -143,10 +144,11 @@ def test_a_report_in_chinese_and_what_it_lacks(tmp_path: Path) -> None:
     assert not (tmp_path / "b" / "report.html").exists()
 
 
-def test_a_test_without_its_texts_is_refused_before_it_runs() -> None:
+def test_a_test_without_its_texts_is_refused_before_it_runs(tmp_path: Path) -> None:
+    (tmp_path / "systems" / "mine").mkdir(parents=True)
     with (
-        pytest.raises(UsageError, match="the report of servo_polar has no translation, it would be half English"),
-        language.reports_in("zh", "servo_polar"),
+        pytest.raises(UsageError, match="the report of mine has no translation, it would be half English"),
+        language.reports_in("zh", "mine", tmp_path),
     ):
         pass
     with pytest.raises(UsageError, match="xx: no such language; there are: en, zh"), language.reports_in("xx", "a"):
@@ -154,6 +156,44 @@ def test_a_test_without_its_texts_is_refused_before_it_runs() -> None:
     with language.reports_in("zh", "fixed_position"):
         assert language.chosen() == "zh"
     assert language.chosen() == ENGLISH
+
+
+def test_what_a_name_says_is_said_with_the_name_and_a_name_broken_in_a_figure_stays() -> None:
+    words = small(names=frozenset({"angle_x_read", "in_position"}))
+    said = words.find("gx: Constant drift, time. gy: Constant drift, no value.")
+    assert said == "gx：常值漂移，时间。gy：常值漂移，无值。"
+    assert words.find("angle_\nx_\nread\nin_\nposition") == "angle_\nx_\nread\nin_\nposition"
+
+
+def test_a_label_is_shortened_in_the_language_of_the_page() -> None:
+    """Of ten letters 常值漂移 takes eight, so that one more character and the sign of the cut do not fit."""
+    texts = {**TEXTS, "Constant drift of the gyro": "常值漂移，陀螺仪", "Constant drift in time": "常值漂移：时间"}
+    chinese = catalogue("zh")
+    words = Language(language.Catalogue("zh", texts, chinese.names, chinese.joints))
+    token = language._in_use.set(words)
+    try:
+        shown = [short(t, 10) for t in ("Constant drift of the gyro", "Constant drift in time", "time")]
+    finally:
+        language._in_use.reset(token)
+    assert shown == ["常值漂移…", "常值漂移", "时间"]
+    assert [words.text(t) for t in shown] == shown and not words.missing
+    assert short("Constant drift of the gyro", 10) == "Constant …"
+
+
+def test_a_suite_has_the_texts_of_its_tests_and_its_own_come_first(tmp_path: Path) -> None:
+    for name, lines in {"suite": '"a" = "甲"', "one": '"a" = "乙"\n"b" = "丙"'}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "zh.toml").write_text(f"report = {str(name == 'suite').lower()}\n[texts]\n{lines}\n")
+    found = catalogue("zh", tmp_path / "suite", tmp_path / "one")
+    assert (found.texts["a"], found.texts["b"], found.reports) == ("甲", "丙", True)
+
+
+def test_whole_reports_are_all_but_those_that_the_guide_names() -> None:
+    text = (standard_folder() / "docs" / "guides" / "run_a_test.md").read_text()
+    (said,) = re.findall(r"All tests have their certificate(.+?)their whole report", " ".join(text.split()))
+    systems = {f.parent.name for f in standard_folder().glob("systems/*/system.py")}
+    whole = {name for name in systems if catalogue("zh", language.system_folder(name)).reports}
+    assert set(re.findall(r"`(\w+)`", said)) == systems - whole and len(whole) >= 18
 
 
 def test_a_profile_says_the_language(tmp_path: Path) -> None:
