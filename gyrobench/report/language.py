@@ -5,10 +5,11 @@
 
 Code writes English, and no logic reads it.  ``catalogue/zh.toml`` has the texts of the bench, ``systems/NAME/zh.toml``
 those of a test: English = translation.  In both, ``{placeholders}`` stand for a text, which is translated too, ``{n}``,
-``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  A text that is no line is taken apart at full
-stops, semicolons, colons, commas, brackets and " and "; ``[joints]`` are what the parts are joined by.  Symbols,
-numbers, units and names stay.  A test whose catalogue has ``report = true`` has all texts of its report, else those of
-its certificate.
+``{n2}`` for numbers and dates, ``{v}`` for names and values that stay.  A word of two senses has a line with its unit
+or with the head of its column: "phase / °", "shape: step".  A text that is no line is taken apart at full stops,
+semicolons, colons, commas, brackets and " and "; ``[joints]`` are what the parts are joined by.  Symbols, numbers,
+units and names stay.  A test whose catalogue has ``report = true`` has all texts of its report, else those of its
+certificate.
 """
 
 from __future__ import annotations
@@ -169,21 +170,22 @@ class Language:
             return text
         text = text.replace("\N{NO-BREAK SPACE}", " ")
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
-            if form in self.catalogue.texts:
+            if form in self.catalogue.texts and (form == text or text not in self.names):  # the slot table is no Table
                 return self.catalogue.texts[form]
-        if self._is_named(text) or self.catalogue.names.issuperset(WORD.findall(text)):
+        if self.catalogue.names.issuperset(WORD.findall(text)):
             return DATE.sub(lambda m: self.catalogue.joints["date"].format(*map(int, m.groups())), text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
                 if (match := pattern.fullmatch(form)) and (made := self._filled(said, match)) is not None:
                     return made
-        return self._apart(text)
+        return self._named(text) or self._apart(text)
 
-    def _is_named(self, text: str) -> bool:
-        """Return whether a text is a name, several one under the other, one broken at "_", or one cut short by "…"."""
+    def _named(self, text: str) -> str | None:
+        """Return a name, several ones in lines, one broken after "_", or what one is called that "…" cuts short."""
         if text.endswith("…"):
-            return any(name.startswith(text[:-1]) for name in self.names)
-        return self.names.issuperset(text.replace("_\n", "_").split("\n"))
+            return next((self.find(name) for name in sorted(self.names) if name.startswith(text[:-1])), None)
+        lines = text.replace("_\n", "_")
+        return text if self.names.issuperset(lines.split("\n")) or lines.replace("\n", " ") in self.names else None
 
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
         if any(v.count(a) != v.count(b) for v in match.groupdict().values() for a, b in ("“”", "()")):
@@ -261,13 +263,18 @@ class Language:
 
     def _table(self, table: PageTable) -> None:
         table.caption = self.text(table.caption)
+        heads = [column.head for column in table.columns]
         for column in table.columns:
-            column.head = self.text(column.head)
+            column.head = self._within(column.head, f"{column.head} / {column.unit}").removesuffix(f" / {column.unit}")
         for row in table.rows:
             row.group = self.text(row.group)
-            for cell in row.cells:
+            for head, cell in zip(heads, row.cells, strict=False):
                 if not (cell.number or cell.own or cell.mark == "hash"):
-                    cell.text = self.text(cell.text)
+                    cell.text = self._within(cell.text, f"{head}: {cell.text}")
+
+    def _within(self, text: str, whole: str) -> str:
+        """Return a text by the line that tells its sense, with its unit or its column, where there is one."""
+        return self.catalogue.texts.get(whole) or self.text(text)
 
 
 @contextmanager

@@ -168,10 +168,10 @@ class Reduction(LoopReduction):
         caption = (
             "Angle of the line of sight that each source makes by the linear model, rms of each axis, and its share of "
             "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part "
-            "of the others. "
+            "of the others."
         )
         if "dry friction" in sources:
-            caption += "The joints slip: their dry friction is the torque that their angles make, not a spring."
+            caption += " The joints slip: their dry friction is the torque that their angles make, not a spring."
         title = "Jitter budget, by source"
         self.found.tables.append(
             Table("budget.sources", title, caption, ["source", "pitch / µrad", "yaw / µrad", "share / %"], rows)

@@ -16,7 +16,7 @@ from gyrobench.report import fonts, language, write
 from gyrobench.report.certificate_page import page
 from gyrobench.report.laboratory import Laboratory, read_laboratory
 from gyrobench.report.language import ENGLISH, PLACEHOLDER, WORD, Language, UntranslatedError, catalogue
-from gyrobench.report.page_model import BulletList, PageTable
+from gyrobench.report.page_model import BulletList, PageTable, Row, columns, text_cell
 from gyrobench.report.plots import short
 from gyrobench.report.render import html, pdf
 from gyrobench.report.standard_names import NAMES, names_table
@@ -215,3 +215,29 @@ def test_names_in_standards_both_ieee_and_chinese() -> None:
     ]  # fmt: skip
     assert all(catalogue("zh").texts[n.gjb[1]] for n in NAMES.values())
     assert not names_table([one])
+
+
+def test_a_word_of_two_senses_is_said_by_its_unit_or_its_column_and_a_name_in_a_drawing_stays() -> None:
+    texts = {
+        "phase": "阶段",
+        "phase / °": "相位 / °",
+        "step": "步长",
+        "shape: step": "阶跃",
+        "shape": "波形",
+        "Table": "表",
+    }
+    chinese = catalogue("zh")
+    names = frozenset({"table", "motion_angle", "gate", "error in the field"})
+    words = Language(language.Catalogue("zh", texts, chinese.names, chinese.joints), names=names)
+    table = PageTable(
+        columns("phase", ("phase", "°"), "shape"), [Row([text_cell(t) for t in ("phase", "", "step")])], ""
+    )
+    words._block(table)
+    assert [c.head for c in table.columns] == ["阶段", "相位", "波形"]
+    assert [c.text for c in table.rows[0].cells] == ["阶段", "", "阶跃"] and words.text("step") == "步长"
+    assert [words.text(t) for t in ("table", "motion_\nangle\ngate", "2\ntable")] == [
+        "table",
+        "motion_\nangle\ngate",
+        "2\ntable",
+    ]
+    assert words.text("error in the…") == "error in the field" and not words.missing
