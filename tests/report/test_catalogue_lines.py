@@ -18,7 +18,7 @@ LETTERS = re.compile(r"[^\W\d_]+")
 JOINED = re.compile(r"\\n|[\"']\s*[fr]?[\"']")  # a text that goes on in the next line of the code
 LEAST = 8  # runs of four words, of which half are said: fewer are too few to judge
 #: put together by code of single words
-PUT_TOGETHER = re.compile("aliased with|the filter (over|under)states|over its stated covariance")
+PUT_TOGETHER = re.compile("aliased with|the filter (over|under)states|its stated covariance|Error of the attitude in")
 
 Runs = set[tuple[str, str, str, str]]
 
