@@ -1,4 +1,4 @@
-"""The intermittent tumble: a table that rests at equally spaced angles, simulated and written from the equations alone."""
+"""The intermittent tumble: a table that rests at equally spaced angles, simulated and written from the equations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tumbling import DPH, NAME, errors, gyro, latitude, load, quiet
+from tumbling import DPH, errors, gyro, latitude, load, quiet
 
 from gyrobench.engine.session import Session
 from gyrobench.exchange.external_record import shortest_window
@@ -162,3 +162,88 @@ def test_a_file_from_the_equations(tmp_path: Path, stops: int, each: int) -> Non
         assert c.estimate == pytest.approx(TRUE[c.name[2:]], abs=6e-7), c.name
         assert c.closed == pytest.approx(c.estimate, abs=6e-7), c.name
     assert "at rest" in result.method
+
+
+def test_stops_not_equally_spaced(tmp_path: Path) -> None:
+    """Without four of its stops least squares holds, the harmonics of the source do not and are left out."""
+    w = windows(24, 2)
+    w["mean"] += np.random.default_rng(1).normal(size=w["mean"].size) * 1e-7 * DPH / SCALE
+    keep = ~((w["phase"] == 2) & (w["angle_start"] < -5.2))
+    file = tmp_path / "lab.csv"
+    file.write_text(text({n: v[keep] for n, v in w.items()}), encoding="utf-8")
+    result = reduced(file)
+    for c in result.coefficients:
+        assert c.estimate == pytest.approx(TRUE[c.name[2:]], abs=6e-7), c.name
+        assert c.closed is None
+
+
+def test_a_time_series(command: Command, tmp_path: Path) -> None:
+    """A sample every 10 s with the phase in each, 0 in the moves: windows are those of stop_dwell."""
+    w = windows(12, 1, 120.0, 1)
+    lines = text(w, "12").splitlines()[:-15]
+    head = [x for x in lines if x.startswith("#")] + ["# stop_dwell = 120s", "# windows = 12", "# settle = 1s"]
+    rows = ["time [s],phase,angle [deg],current [mA]"]
+    noise = np.random.default_rng(5).normal(size=(w["mean"].size, 13)) * 1e-6 * DPH / SCALE
+    for k in range(w["mean"].size):
+        for j in range(13):
+            row = (w["t_start"][k] + 10.0 * j, math.degrees(w["angle_start"][k]), (w["mean"][k] + noise[k, j]) * 1e3)
+            rows.append(f"{row[0]:.6f},{w['phase'][k]:.0f},{row[1]:.10f},{row[2]:.14g}")
+        rows.append(f"{w['t_end'][k] + 5.0:.6f},0,{math.degrees(w['angle_start'][k]) - 7.0:.6f},0.1")
+    file = tmp_path / "series.csv"
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    result = reduced(file)
+    for c in result.coefficients:
+        assert c.estimate == pytest.approx(TRUE[c.name[2:]], abs=1e-5), c.name
+
+
+# ------------------------------------------------------------------------------------------- refused files
+def still(w: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    return {**w, "angle_start": 0.0 * w["angle_start"], "angle_end": 0.0 * w["angle_end"]}
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (text(windows(), ""), ["does not move", "state stops = N"]),
+    (text(still(windows()), ""), ["does not move, expected a turning table (rate 0?)\n"]),
+    (text(windows(72, 1, rate=10.0), "24"), ["turns by 5° in a window", "of a turning table state stops = 0"]),
+    (text(still(windows())), ["rests at 1 angles of the circle, at least 5"]),
+    (text(windows(), "100"), ["stops", "100", "72"]),
+])  # fmt: skip
+def test_refused_files(command: Command, tmp_path: Path, content: str, words: list[str]) -> None:
+    file = tmp_path / "lab.csv"
+    file.write_text(content, encoding="utf-8")
+    code, _, err = command("reduce", "tumble_single_axis", "--data", file)
+    assert code == 2, err
+    for word in words:
+        assert word in err + "\n"
+
+
+# ------------------------------------------------------------------------------------------- against the continuous one
+#: a turn of either takes 8616 s; of a stop, 11 s are lost in moving and settling
+TURN_TIME = 2.0 * math.pi / (10.0 * EARTH)
+EQUAL = {"stops": 24, "each": 3, "dwell": TURN_TIME / 24.0 - 11.0, "rest": 10}
+
+
+def noisy(w: dict[str, np.ndarray[Any, Any]], rng: np.random.Generator) -> dict[str, np.ndarray[Any, Any]]:
+    """White drift, 0.003 deg/h in a window of 120 s, and a Gauss-Markov one of 1000 s and 0.003 deg/h, at its middle."""
+    t, out = (w["t_start"] + w["t_end"]) / 2.0, rng.normal(size=w["mean"].size) * 0.003
+    out *= np.sqrt(120.0 / (w["t_end"] - w["t_start"]))
+    slow = rng.normal() * 0.003
+    for k in range(t.size):
+        if k:
+            stay = math.exp(-(t[k] - t[k - 1]) / 1000.0)
+            slow = slow * stay + rng.normal() * 0.003 * math.sqrt(1.0 - stay * stay)
+        out[k] += slow
+    return {**w, "mean": w["mean"] + out * DPH / SCALE}
+
+
+def test_continuous_and_intermittent_agree(tmp_path: Path) -> None:
+    """The same gyro in equal time: the differences are within what both state."""
+    file = tmp_path / "lab.csv"
+    results = []
+    for w, stops, seed in ((windows(**EQUAL), "24", 1), (windows(72, 1, 1200.0 / 10.0, 10, 10.0), "", 2)):
+        file.write_text(text(noisy(w, np.random.default_rng(seed)), stops), encoding="utf-8")
+        results.append({c.name: c for c in reduced(file).coefficients})
+    for name, c in results[0].items():
+        other = results[1][name]
+        assert abs(c.estimate - other.estimate) < 3.0 * math.hypot(c.u, other.u), name
+        assert abs(c.estimate - TRUE[name[2:]]) < 3.5 * c.u, name

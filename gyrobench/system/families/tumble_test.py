@@ -70,7 +70,7 @@ class TumbleTest(TableTest):
     def _window(self) -> float:
         """Return the time of a window of a turn or of a stop, s."""
         if self.stops:
-            return float(self["stop_dwell"]) / max(1, round(self["windows"] / self.stops))
+            return float(self["stop_dwell"]) / max(1, round(int(self["windows"]) / self.stops))
         rate = abs(self["rate"])
         return float(TURN / rate / self["windows"]) if rate > 0.0 else 1.0
 
