@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tumble as T
 from tumbling import DPH, errors, gyro, latitude, load, quiet
 
 from gyrobench.engine.session import Session
 from gyrobench.exchange.external_record import shortest_window
+from gyrobench.reduction.estimation import noise
 from gyrobench.result import Result
 from gyrobench.workflow.saved_run import lacking_phases
 
@@ -25,7 +27,7 @@ STOPPING: dict[str, Any] = {
 }  # fmt: skip
 
 
-def tumble(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
+def reduced_run(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
     system = load().with_values(values)
     result: Result = system.reduce(session.run(values, seed=seed))
     return result
@@ -37,7 +39,7 @@ def test_random_gyros_at_random_latitudes(session: Session, seed: int) -> None:
     """Noise off: at rest the loop has no lag, so what is left is rounding."""
     rng = np.random.default_rng(seed)
     values = {**STOPPING, **quiet(load()), **gyro(rng), "latitude": latitude(rng)}
-    result = tumble(session, values)
+    result = reduced_run(session, values)
     for name, off in errors(result, values).items():
         assert abs(off) < 1e-9, name
     for c in result.coefficients:
@@ -183,10 +185,10 @@ def test_a_time_series(command: Command, tmp_path: Path) -> None:
     lines = text(w, "12").splitlines()[:-15]
     head = [x for x in lines if x.startswith("#")] + ["# stop_dwell = 120s", "# windows = 12", "# settle = 1s"]
     rows = ["time [s],phase,angle [deg],current [mA]"]
-    noise = np.random.default_rng(5).normal(size=(w["mean"].size, 13)) * 1e-6 * DPH / SCALE
+    scatter = np.random.default_rng(5).normal(size=(w["mean"].size, 13)) * 1e-6 * DPH / SCALE
     for k in range(w["mean"].size):
         for j in range(13):
-            row = (w["t_start"][k] + 10.0 * j, math.degrees(w["angle_start"][k]), (w["mean"][k] + noise[k, j]) * 1e3)
+            row = (w["t_start"][k] + 10.0 * j, math.degrees(w["angle_start"][k]), (w["mean"][k] + scatter[k, j]) * 1e3)
             rows.append(f"{row[0]:.6f},{w['phase'][k]:.0f},{row[1]:.10f},{row[2]:.14g}")
         rows.append(f"{w['t_end'][k] + 5.0:.6f},0,{math.degrees(w['angle_start'][k]) - 7.0:.6f},0.1")
     file = tmp_path / "series.csv"
@@ -223,27 +225,73 @@ TURN_TIME = 2.0 * math.pi / (10.0 * EARTH)
 EQUAL = {"stops": 24, "each": 3, "dwell": TURN_TIME / 24.0 - 11.0, "rest": 10}
 
 
-def noisy(w: dict[str, np.ndarray[Any, Any]], rng: np.random.Generator) -> dict[str, np.ndarray[Any, Any]]:
-    """White drift, 0.003 deg/h in a window of 120 s, and a Gauss-Markov one of 1000 s and 0.003 deg/h, at its middle."""
-    t, out = (w["t_start"] + w["t_end"]) / 2.0, rng.normal(size=w["mean"].size) * 0.003
-    out *= np.sqrt(120.0 / (w["t_end"] - w["t_start"]))
-    slow = rng.normal() * 0.003
-    for k in range(t.size):
-        if k:
-            stay = math.exp(-(t[k] - t[k - 1]) / 1000.0)
-            slow = slow * stay + rng.normal() * 0.003 * math.sqrt(1.0 - stay * stay)
-        out[k] += slow
-    return {**w, "mean": w["mean"] + out * DPH / SCALE}
+TURNING: dict[str, Any] = {"stops": 72, "each": 1, "dwell": 120.0, "rest": 10, "rate": 10.0}
+
+
+def noisy(w: dict[str, np.ndarray[Any, Any]], seed: int, size: float = 0.003) -> dict[str, np.ndarray[Any, Any]]:
+    """White drift, ``size`` deg/h in a window of 120 s."""
+    scatter = size * np.sqrt(120.0 / (w["t_end"] - w["t_start"]))
+    return {**w, "mean": w["mean"] + np.random.default_rng(seed).normal(size=w["mean"].size) * scatter * DPH / SCALE}
 
 
 def test_continuous_and_intermittent_agree(tmp_path: Path) -> None:
     """The same gyro in equal time: the differences are within what both state."""
     file = tmp_path / "lab.csv"
     results = []
-    for w, stops, seed in ((windows(**EQUAL), "24", 1), (windows(72, 1, 1200.0 / 10.0, 10, 10.0), "", 2)):
-        file.write_text(text(noisy(w, np.random.default_rng(seed)), stops), encoding="utf-8")
+    for w, stops, seed in ((windows(**EQUAL), "24", 1), (windows(**TURNING), "", 2)):
+        file.write_text(text(noisy(w, seed), stops), encoding="utf-8")
         results.append({c.name: c for c in reduced(file).coefficients})
     for name, c in results[0].items():
         other = results[1][name]
         assert abs(c.estimate - other.estimate) < 3.0 * math.hypot(c.u, other.u), name
         assert abs(c.estimate - TRUE[name[2:]]) < 3.5 * c.u, name
+
+
+def known_noise(
+    w: dict[str, np.ndarray[Any, Any]], mode: str, share: float, tilt: bool = False
+) -> np.ndarray[Any, Any]:
+    """u of the nine coefficients under noise that is known: ``share`` of the variance of a window of 120 s is slow, of
+    3000 s, the rest white.
+    """
+    rows = {**w, "phase": w["phase"].astype(int), "std": 0.0 * w["mean"]}
+    s = T.setup(gravity=G, modes={1: "dwell", 2: mode, 3: "dwell", 4: mode}, tilt=tilt)
+    test = T.reduction.Reduction(rows, s)
+    test.terms = T.NAMES
+    X, t0, t1 = test.design(test.turning), w["t_start"], w["t_end"]
+    white = np.diag((1.0 - share) * 120.0 / (t1 - t0) + 1e-9)
+    C = white + share * noise.process_covariance(t0, t1, 3000.0)
+    u: np.ndarray[Any, Any] = np.sqrt(np.diag(np.linalg.inv(X.T @ np.linalg.solve(C, X))))
+    return u
+
+
+@pytest.mark.parametrize(("share", "low", "high"), [(0.0, 1.013, 1.018), (0.5, 0.97, 1.02), (1.0, 0.49, 1.05)])
+def test_which_noise_is_seen_better_by_which(share: float, low: float, high: float) -> None:
+    """Ratio of u in equal time, intermittent to continuous.
+
+    White noise: a turn averages 348 s of every 359 s, sqrt(359/348) = 1.016.  Slow drift alone cannot follow a move of
+    15 degrees in 11 s: D_I, D_IO, D_OS, D_IS have half the u.  As much white noise in a window takes that away.
+    """
+    ratio = known_noise(windows(**EQUAL), "step", share) / known_noise(windows(**TURNING), "rate", share)
+    assert np.all((low < ratio) & (ratio < high))
+    if share == 1.0:
+        assert ratio[[1, 6, 7, 8]] == pytest.approx([0.53, 0.53, 0.53, 0.50], abs=0.01)
+
+
+def test_tilt_of_the_input_axis(tmp_path: Path) -> None:
+    """60" towards the output axis: at rest it brings W sin 60" = 0.0044 deg/h, in turns of 10 W 9 times as much.
+
+    Both find it; the closed formulas read D_O too large by eps W sin(phi)/gamma = 0.0031 deg/h/g.  u(eps) from the
+    means of the mounts against the dwells: at rest the tilt is hardly another thing than D_O.
+    """
+    file, tilt = tmp_path / "lab.csv", math.pi / 10800.0
+    for w, stops in ((windows(**EQUAL, tilt=tilt), "24"), (windows(**TURNING, tilt=tilt), "")):
+        file.write_text(text(noisy(w, 3, 1e-5), stops).replace("# type_b", "# tilt = yes\n# type_b"), encoding="utf-8")
+        found = {c.name: c for c in reduced(file).coefficients}
+        assert found["ε_IO"].estimate == pytest.approx(60.0, abs=5.0 * found["ε_IO"].u)
+        assert found["D_O"].estimate == pytest.approx(TRUE["O"], abs=5.0 * found["D_O"].u)
+        off = tilt * EARTH * math.sin(math.radians(45.75)) / (G / 9.80665) / DPH
+        assert found["D_O"].closed == pytest.approx(TRUE["O"] + off, abs=1e-4)
+    both = [known_noise(w, mode, 0.0, True) for w, mode in ((windows(**EQUAL), "step"), (windows(**TURNING), "rate"))]
+    ratio = both[0] / both[1]
+    assert ratio[[2, 9]] == pytest.approx([2.28, 19.9], abs=0.05)  # D_O, eps
+    assert np.delete(ratio, [2, 9]) == pytest.approx(np.full(8, 1.016), abs=0.003)
