@@ -203,11 +203,17 @@ def still(w: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]
     return {**w, "angle_start": 0.0 * w["angle_start"], "angle_end": 0.0 * w["angle_end"]}
 
 
+def hurried(w: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    """The windows reach from the end of the one before, over the moves."""
+    return {**w, "t_start": np.concatenate([[0.0], w["t_end"][:-1]])}
+
+
 @pytest.mark.parametrize(("content", "words"), [
     (text(windows(), ""), ["does not move", "state stops = N"]),
     (text(still(windows()), ""), ["does not move, expected a turning table (rate 0?)\n"]),
     (text(windows(72, 1, rate=10.0), "24"), ["turns by 5° in a window", "of a turning table state stops = 0"]),
     (text(still(windows())), ["rests at 1 angles of the circle, at least 5"]),
+    (text(hurried(windows())), ["the table moves by 15° at t = ", "in no time, expected windows at rest alone"]),
     (text(windows(), "100"), ["stops", "100", "72"]),
 ])  # fmt: skip
 def test_refused_files(command: Command, tmp_path: Path, content: str, words: list[str]) -> None:

@@ -212,13 +212,14 @@ class TurningSetup(RebalanceSetup):
         ]
         start, end = (np.asarray(windows[f"angle_{e}"], dtype=float) for e in ("start", "end"))
         width = np.abs(end - start)
+        times = [np.asarray(windows[f"t_{e}"], dtype=float) for e in ("start", "end")]
         for p in self.faces:
             largest = float(np.max(width[phase == p], initial=0.0))
             where = f"phase {p} ({self.label(p)}): "
             if p not in present:
                 continue
             if self.stops(p):
-                problems += [where + text for text in stop_problems(start[phase == p], end[phase == p])]
+                problems += [where + text for text in stop_problems(*(c[phase == p] for c in (start, end, *times)))]
             elif not self.turns(p):
                 if largest > 1e-2:
                     problems.append(f"{where}the table turns by {math.degrees(largest):.3g}° in a dwell")

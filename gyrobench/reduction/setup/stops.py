@@ -38,8 +38,10 @@ def whole_stops(start: Array, end: Array, tolerance: float = 0.01) -> bool:
     return bool(np.all(np.abs(steps - 1.0) < tolerance) and np.all(counts == counts[0]))
 
 
-def stop_problems(start: Array, end: Array) -> list[str]:
-    """Return what is wrong with the windows of a table that should rest at five angles of the circle or more."""
+def stop_problems(start: Array, end: Array, t_start: Array, t_end: Array) -> list[str]:
+    """Return what is wrong with the windows of a table that should rest at five angles of the circle or more, and move
+    between them in no window.
+    """
     creep = float(np.max(np.abs(end - start)))
     if creep > REST:
         turned = f"{math.degrees(creep):.3g}° in a window"
@@ -47,4 +49,9 @@ def stop_problems(start: Array, end: Array) -> list[str]:
     angles = rests(start, end)
     if angles.size < 5:
         return [f"the table rests at {angles.size} angles of the circle, at least 5 are needed for two harmonics"]
+    moved = np.abs(end[1:] - end[:-1]) > REST
+    if np.any(hasty := moved & (t_start[1:] <= t_end[:-1])):
+        k = int(np.argmax(hasty))
+        way = math.degrees(abs(float(end[k + 1] - end[k])))
+        return [f"the table moves by {way:.4g}° at t = {t_end[k]:.9g} s in no time, expected windows at rest alone"]
     return []
