@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tumble as T
-from tumbling import DPH, errors, gyro, latitude, load, quiet
+from tumbling import DPH, STOPPING, errors, gyro, latitude, load, quiet
 
 from gyrobench.engine.session import Session
 from gyrobench.exchange.external_record import shortest_window
@@ -19,12 +19,6 @@ from gyrobench.result import Result
 from gyrobench.workflow.saved_run import lacking_phases
 
 Command = Callable[..., tuple[int, str, str]]
-
-#: 48 stops and two dwells in some 350 s.  Settling takes 3 s: exp(-11.25 3) = 2e-15 is left of the move.
-STOPPING: dict[str, Any] = {
-    "stops": 24, "stop_dwell": 2.0, "windows": 48, "dwell": 20.0, "settle": 3.0,
-    "table.index_rate": 1.0, "table.acceleration": 1.0,
-}  # fmt: skip
 
 
 def reduced_run(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
