@@ -23,6 +23,9 @@ class Sequencer(Component):
                 rate phases without travel have windows by time, as a hold phase: a second axis may turn alone
         close   GUARD further samples with the gate open
 
+    A step phase goes through all of them at every stop, k = 0, 1, ... : it commands the table to index to
+    target + k step, until the stops have covered the travel; its windows are by time, its number stays.
+
     so that a sampler which receives gate or angle a sample late or early, or an encoder with a coarse quantum,
     still finds its last window complete: it counts windows from its own first open sample.  Times are
     differences of sample times t0 + k h, rounded to the nearest sample; nothing is accumulated.  A table that
@@ -34,17 +37,24 @@ class Sequencer(Component):
     Not modelled: the time that a real change of mount takes, health interlocks, automatic repetition.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
     phases = Parameter(1, int, "number of phases", min=1, max=99)
-    modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate, 3 servo")
-    targets = Parameter([0.0] * 99, "1", "target of each phase: angle in rad (index), rate in rad/s (rate)")
+    modes = Parameter([0] * 99, int, "mode of each phase: 0 hold, 1 index, 2 rate, 3 servo, 4 step")
+    targets = Parameter(
+        [0.0] * 99, "1", "target of each phase: angle in rad (index; step: first), rate in rad/s (rate)"
+    )
     targets_y = Parameter([0.0] * 99, "1", "target of each phase for a second axis, same mode: rad or rad/s")
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
-    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo; rate without travel)")
-    travel = Parameter([0.0] * 99, "rad", "angle turned while the gate is open (rate, 0: by dwell; servo: at least)")
-    windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo) or rad (rate)")
+    dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo, each stop; rate without travel)")
+    travel = Parameter(
+        [0.0] * 99,
+        "rad",
+        "angle turned while the gate is open (rate, 0: by dwell; servo: at least); all stops (step)",
+    )
+    steps = Parameter([0.0] * 99, "rad", "angle from stop to stop, with its sense (step)")
+    windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo, step) or rad (rate)")
     face_of = Parameter([1] * 99, int, "which of the faces each phase uses, from 1")
     faces = Parameter([IDENTITY] * 12, "1", "mounts: rows of the face matrix one after the other")
 
@@ -62,6 +72,7 @@ class Sequencer(Component):
 
     now = Discrete(1.0, "1", "running phase")
     stage = Discrete(0.0, "1", "0 move, 1 settle, 2 open, 3 close, 4 done")
+    stop = Discrete(0.0, "1", "stops done in the running phase (step)")
     waited = Discrete(0.0, "1", "samples in this stage (move, close)")
     t_ref = Discrete(0.0, "s", "time at which settle or open began")
     angle_ref = Discrete(0.0, "rad", "angle at which the gate opened")
@@ -71,13 +82,20 @@ class Sequencer(Component):
     def start(self) -> None:
         self.now = 1.0
         self.stage = MOVE
+        self.stop = 0.0
         self.waited = 0.0
         for p in range(index(self.phases)):
             self.bad_phase = p + 1.0
             rate = self.modes[p] == 2.0
             self.refuse(
-                not (self.modes[p] == 0.0 or self.modes[p] == 1.0 or rate or self.modes[p] == 3.0),
-                "phase {bad_phase}: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo",
+                not (
+                    self.modes[p] == 0.0 or self.modes[p] == 1.0 or rate or self.modes[p] == 3.0 or self.modes[p] == 4.0
+                ),
+                "phase {bad_phase}: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo, 4 step",
+            )
+            self.refuse(
+                self.modes[p] == 4.0 and (self.steps[p] == 0.0 or self.travel[p] < 0.0),
+                "phase {bad_phase}: a step phase needs a step other than 0 rad and a travel of 0 rad or more",
             )
             self.refuse(
                 self.face_of[p] < 1.0 or self.face_of[p] > 12.0 or self.face_of[p] != floor(self.face_of[p]),
@@ -94,7 +112,7 @@ class Sequencer(Component):
             )
             self.refuse(
                 not by_angle and self.dwell[p] <= 0.0,
-                "phase {bad_phase}: a hold, index or servo phase, or a rate phase without travel, needs a dwell > 0 s",
+                "phase {bad_phase}: a hold, index, servo, step phase, or a rate phase without travel, needs a dwell",
             )
             self.refuse(self.windows[p] <= 0.0, "phase {bad_phase}: the window must be above 0")
             longest = (self.travel[p] if by_angle else self.dwell[p]) * (1.0 + 1e-9)
@@ -153,8 +171,14 @@ class Sequencer(Component):
             self.waited = self.waited + 1.0
             if self.waited >= GUARD:
                 self.waited = 0.0
-                if self.now < self.phases:
+                step = fabs(self.steps[index(self.now - 1.0)])
+                done = (self.stop + 0.5) * step >= self.travel[index(self.now - 1.0)]
+                if self.modes[index(self.now - 1.0)] == 4.0 and not done:
+                    self.stop = self.stop + 1.0
+                    self.stage = MOVE
+                elif self.now < self.phases:
                     self.now = self.now + 1.0
+                    self.stop = 0.0
                     self.stage = MOVE
                 else:
                     self.stage = DONE
@@ -164,6 +188,9 @@ class Sequencer(Component):
         self.mode = self.modes[index(self.now - 1.0)]
         self.target = self.targets[index(self.now - 1.0)]
         self.target_y = self.targets_y[index(self.now - 1.0)]
+        if self.mode == 4.0:
+            self.mode = 1.0
+            self.target = self.target + self.stop * self.steps[index(self.now - 1.0)]
         self.window = self.windows[index(self.now - 1.0)]
         for i in range(3):
             for j in range(3):

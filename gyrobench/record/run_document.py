@@ -65,12 +65,17 @@ def _defaults(entry: type[Entry]) -> dict[str, Any]:
     return {name: field.get_default(call_default_factory=True) for name, field in entry.model_fields.items()}
 
 
+def stops(mode: str, travel: float, step: float) -> int:
+    """Return at how many angles a table rests that steps by ``step`` over ``travel`` (rad); 1 in other modes."""
+    return round(travel / abs(step)) + 1 if mode == "step" and step else 1
+
+
 class PlanRow(Entry):
     """A phase of the plan, numbered from 1 as in the record; angles in rad, rates in rad/s, times in s."""
 
     phase: int = Field(description="number of the phase, from 1")
     label: str = ""
-    mode: str = Field(default="", description="hold, index, rate, servo; of a loop test: what is excited")
+    mode: str = Field(default="", description="hold, index, rate, servo, step; of a loop test: what is excited")
     face: str = Field(default="", description="attitude of the instrument on its table or in the laboratory")
     day: str = Field(default="", description="of a record of several days")
     cycle: int = Field(default=0, description="of a test that repeats its positions: cycle of the day, from 1")
@@ -78,13 +83,19 @@ class PlanRow(Entry):
     target_y: float = Field(default=0.0, description="angle of the second axis, rad")
     settle: float = Field(default=0.0, description="wait before the first window, s")
     dwell: float = Field(default=0.0, description="length, s")
-    travel: float = Field(default=0.0, description="angle turned in mode rate, rad")
+    travel: float = Field(default=0.0, description="angle turned in mode rate, rad; in mode step, all stops")
     window: float = Field(default=0.0, description="length of a window, s; in mode rate an angle, rad")
+    step: float = Field(default=0.0, description="angle from stop to stop in mode step, rad")
     shape: str = Field(default="", description="of a loop test: step, sine ...")
     axis: int = Field(default=0, description="of a loop test: axis of the excitation, from 1")
     amplitude: float = Field(default=0.0, description="of a loop test: size of the excitation, in its unit")
     unit: str = ""
     frequency: float = Field(default=0.0, description="of a loop test, Hz")
+
+    @property
+    def stops(self) -> int:
+        """Number of angles at which the table rests, 1 but in mode step."""
+        return stops(self.mode, self.travel, self.step)
 
 
 class PartInfo(Entry):

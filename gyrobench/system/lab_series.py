@@ -167,7 +167,7 @@ def _expected(plan: Sequence[Phase], said: Mapping[str, str], attitudes: Mapping
         if unknown:
             raise ValueError(f"phase {', '.join(unknown)} is not in the plan; it has {', '.join(of)}")
         plan = [of[said[f"phase {n}"]] for n in numbers]
-    if not plan or any(p.mode == "servo" or p.target_y for p in plan):
+    if not plan or any(p.mode in ("servo", "step") or p.target_y for p in plan):
         raise ValueError(
             "the phases of this test are not recognised by the motion of the table: add a column 'phase' (their number "
             "in each row, 0 while moving or settling) and comments '# phase 1 = ...'"

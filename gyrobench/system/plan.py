@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-MODES = {"hold": 0, "index": 1, "rate": 2, "servo": 3}
+from gyrobench.record.run_document import stops
+
+MODES = {"hold": 0, "index": 1, "rate": 2, "servo": 3, "step": 4}
 LIMIT = 99  # phases
 FACES = 12  # different mounts
 
@@ -19,12 +21,13 @@ class Phase:
     """One phase: the table goes to its target, settles, then windows are averaged until dwell or travel is reached.
 
     mode "hold": stay where the table is; "index": go to the angle ``target`` (rad); "rate": turn at ``target`` (rad/s);
-    "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned.
-    settle: s before the first window.  dwell: s of windows (hold, index, servo).  travel: rad of windows (rate).
-    window: length of one window, s (hold, index, servo) or rad (rate).  A rate phase without travel has windows by
+    "servo": the gyro holds the table, windows until ``dwell`` has passed and at least ``travel`` is turned; "step":
+    index to target, target + step, ... and settle and dwell at each, until the stops have covered ``travel``.
+    settle: s before the first window.  dwell: s of windows (hold, index, servo, each stop).  travel: rad of windows
+    (rate).  window: length of one window, rad (rate) or s.  A rate phase without travel has windows by
     time, as the others: its second axis may turn alone.  face: name of the mount in :attr:`Plan.faces`.
     target_y: as target, of the second axis of a table that has two.  expected: s that the travel of a servo phase is
-    expected to take.
+    expected to take.  step: rad from stop to stop, with its sense.
     """
 
     label: str
@@ -37,17 +40,23 @@ class Phase:
     window: float = 0.0
     target_y: float = 0.0
     expected: float = 0.0
+    step: float = 0.0
 
     @property
     def by_angle(self) -> bool:
         """True of windows by the angle of the first axis."""
         return self.mode == "rate" and self.travel > 0.0
 
+    @property
+    def stops(self) -> int:
+        """Number of angles at which the table rests, 1 but in a step phase."""
+        return stops(self.mode, self.travel, self.step)
+
     def duration(self) -> float:
-        """Time of the phase without the way to its target, s."""
+        """Time of the phase without the ways to its targets, s."""
         if self.by_angle and self.target:
             return self.settle + self.travel / abs(self.target)
-        return self.settle + max(self.dwell, self.expected)
+        return self.stops * (self.settle + max(self.dwell, self.expected))
 
 
 @dataclass
@@ -78,6 +87,8 @@ class Plan:
                 found.append(f"{where}: window = {p.window:g}: must be > 0 and at most the {name} {length:g}")
             if p.mode == "rate" and not p.target and not (by_time and p.target_y):
                 found.append(f"{where}: target rate 0: the table would never turn; use mode hold")
+            if p.mode == "step" and not p.step:
+                found.append(f"{where}: step 0: the table would never leave its first stop; use mode index")
         return found
 
     def parameters(self, slot: str = "sequencer") -> dict[str, Any]:
@@ -92,6 +103,8 @@ class Plan:
         }
         if any(p.target_y for p in self.phases):
             columns["targets_y"] = [float(p.target_y) for p in self.phases]
+        if any(p.step for p in self.phases):
+            columns["steps"] = [float(p.step) for p in self.phases]
         for key in ("settle", "dwell", "travel"):
             columns[key] = [float(getattr(p, key)) for p in self.phases]
         return {f"{slot}.phases": len(self.phases), **{f"{slot}.{k}": v for k, v in columns.items()}}
@@ -115,6 +128,7 @@ class Plan:
                 "dwell": p.dwell,
                 "travel": p.travel,
                 "window": p.window,
+                **({"step": p.step} if p.step else {}),
             }
             for k, p in enumerate(self.phases, 1)
         ]

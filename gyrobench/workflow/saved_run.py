@@ -100,7 +100,7 @@ def lacking_phases(record: Record, spare: int = 0) -> list[str]:
     lines = []
     for row in record.run.plan:
         length = row.travel if row.mode == "rate" and row.travel else row.dwell
-        expected = round(length / row.window) if row.window else 0
+        expected = row.stops * round(length / row.window) if row.window else 0
         have = done.count(row.phase)
         if have < expected - spare:
             lines.append(f"phase {row.phase} ({row.label}): {have} of {expected} windows")

@@ -1,4 +1,4 @@
-"""The test as choices of turns and of the dwell's share, each with the time of turning."""
+"""The test as choices of turns and of the dwell's share, each with the time of turning, or of rests at stops."""
 
 from __future__ import annotations
 
@@ -34,6 +34,31 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
     Faster turning costs no time and lifts the signal above slow drift; the rate is kept below 60 Earth rates.
     """
     setup, p = Reduction.setup_of(record.run), record.run.parameters
+    noise = gyro_noise(p)
+
+    def covariances(fits: Sequence[Findings], record: Record) -> list[Array]:
+        return [noise.covariance(f.t_start, f.t_end) for f in fits]
+
+    names = drift.terms(9 if setup.terms == 10 else setup.terms)
+    unseen = ("D_OO, which constant |g| folds into D_F, D_II and D_SS", *gyro_unseen(p))
+    choices = [_stopping(system)] if system["stops"] else _turning(system, setup)
+    return OptionProtocol(tuple(choices), covariances, names, unseen, noise)
+
+
+def _stopping(system: System) -> Choice:
+    """Return the plan with stops; the length is the time of averaging at the stops of a mount, s."""
+    stops = int(system["stops"]) * int(system["turns"]) * (2 if system["both_senses"] else 1)
+    start = stops * float(system["stop_dwell"])
+    share = float(system["dwell"]) / start
+
+    def options(length: float) -> Mapping[str, Any]:
+        return {"stop_dwell": format_time(length / stops), "dwell": format_time(share * length)}
+
+    return Choice(f"{system['stops']} stops a turn, dwells {share:.2g} of a mount's", options, start, float(stops))
+
+
+def _turning(system: System, setup: TumbleSetup) -> list[Choice]:
+    """Return turns in each mount and shares of the dwells; the length is the time of turning in a mount, s."""
     share = float(system["dwell"] * system["rate"] / (TURN * system["turns"]))
     own = (int(system["turns"]), share)
     each = [own, *((n, s) for n in TURNS for s in SHARES if (n, s) != own)]
@@ -46,14 +71,7 @@ def protocol_of(system: System, record: Record) -> OptionProtocol:
         known = functools.partial(_windows, system, setup, turns, part) if (turns, part) != own else None
         label = f"{turns} turn{'s' if turns > 1 else ''}, dwells {part:.2g} of a mount's turning"
         choices.append(Choice(label, options, start, TURN * turns / FASTEST, known))
-    noise = gyro_noise(p)
-
-    def covariances(fits: Sequence[Findings], record: Record) -> list[Array]:
-        return [noise.covariance(f.t_start, f.t_end) for f in fits]
-
-    names = drift.terms(9 if setup.terms == 10 else setup.terms)
-    unseen = ("D_OO, which constant |g| folds into D_F, D_II and D_SS", *gyro_unseen(p))
-    return OptionProtocol(tuple(choices), covariances, names, unseen, noise)
+    return choices
 
 
 def _options(turns: int, share: float, length: float) -> Mapping[str, Any]:

@@ -9,7 +9,8 @@ from gyrobench.system.lab_record import WITH_POLARITY, read_record
 from gyrobench.system.system import MeasuredData
 
 TEMPLATE = """\
-# Single-axis tumble of a floated gyro in torque rebalance: one row for each averaging window.
+# Single-axis tumble of a floated gyro in torque rebalance: one row for each averaging window, of a table that turns
+# (continuous tumble) or rests at one angle after the other (intermittent tumble).
 # latitude = 45.75deg
 # k = 17.2deg/h/mA
 # gravity = 9.8067m/s2
@@ -22,10 +23,12 @@ TEMPLATE = """\
 # phase 4 = mount 2
 #
 # latitude, k (torquer scale factor): needed, here or by --set.  gravity, height: optional (WGS84 normal gravity).
+# stops: of an intermittent tumble, a comment "stops = 24" with the number of angles in a turn at which the table rests;
+# angle_start and angle_end are then equal, and a stop has one row or several.  Without it the table turns.
 # polarity: project (k i = input rate - drift, positive current precesses positively) or book (the opposite sign).
 # phase N: which attitude the rows with this number were taken in:
-#   mount 1   table turning, output axis along +pole, input axis east at angle 0
-#   mount 2   table turning, output axis along -pole, input axis east at angle 0
+#   mount 1   table turning, or at its stops, output axis along +pole, input axis east at angle 0
+#   mount 2   table turning, or at its stops, output axis along -pole, input axis east at angle 0
 #   static 3  table at rest at angle 0, output axis up, input axis east
 #   static 4  table at rest at angle 0, output axis down, input axis east
 # angle: of the table, right-handed about the pole, counted on through the turns; against the Earth it decreases.

@@ -3,6 +3,7 @@
     y = omega_IA - k i = D_F + D_I X + D_O Y + D_S Z + D_II X2 + D_SS Z2 + D_IO XY + D_OS YZ + D_IS XZ + noise
 
 Every window is a row; regressors are averaged over the window as the current is, so no [AVG-SINC] damping is left.
+Of a table that rests at its angles they are those of the angles: nothing is averaged, and its rate is 0.  [TUM1-STOPS]
 The noise (white, Gauss-Markov or both) is estimated from the same record and weighs the rows.  The closed
 formulas stand beside the estimates.  [TEST-TUMBLE1-SDF; Hu 1981, eq. 3-12..3-21]
 
@@ -38,6 +39,15 @@ from gyrobench.reduction.toolkit import (
 
 from . import closed
 from .refusals import refusals
+
+CONTINUOUS = (
+    "Torque-rebalance tumble about the polar axis in two mounts with two dwells; least squares over all windows under "
+    "an estimated noise model"
+)
+INTERMITTENT = (
+    "Intermittent torque-rebalance tumble about the polar axis, at rest at the angles of two mounts, with two dwells; "
+    "least squares over all windows under an estimated noise model"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,9 +107,9 @@ class Reduction(TurningTest[TumbleSetup]):
         every = [n for n in drift.NAMES if n != "D_OO"]
         missing = drift_terms.left_out(s.truth, self.terms, every, f"{s.terms}-term")
         return Account(
-            method="Torque-rebalance tumble about the polar axis in two mounts with two dwells; least squares over all "
-            "windows under an estimated noise model [TEST-TUMBLE1-SDF]",
+            method=f"{INTERMITTENT if s.intermittent else CONTINUOUS} [TEST-TUMBLE1-SDF]",
             sources=[
+                *(["TUM1-STOPS; Hu 1981, 3.2.4-1, 5.4"] if s.intermittent else []),
                 "TEST-TUMBLE1-SDF, TUM1-REDUCE; Hu 1981, eq. 3-12..3-21, corrected by E20-E23",
                 "GYRO-STATIC-9; Hu 1981, eq. 2-36, 2-47",
                 "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",

@@ -32,6 +32,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         SITE
         | PHYSICAL_FORM
         | TumbleTest.tumble
+        | TumbleTest.intermittent
         | FOLD
         | TILT
         | NUISANCES

@@ -199,9 +199,12 @@ class Case:
 
 
 TURNING: Values = {"rate": 0.15, "windows": 24, "dwell": 17.5, "settle": 2.0}
+STOPPING: Values = {"stops": 24, "stop_dwell": 1.75, "windows": 24, "dwell": 17.5, "settle": 2.0,
+                    "table.index_rate": 1.0, "table.acceleration": 1.0}  # fmt: skip
 FAST: Values = {"table.acceleration": 20.0}
 CASES = {
     "tumble_single_axis": Case("tumble_single_axis", TURNING, floated, latitude(12.0, 78.0)),
+    "tumble_single_axis, stops": Case("tumble_single_axis", STOPPING, floated, latitude(12.0, 78.0)),
     "tumble_two_channel, nine": Case(
         "tumble_two_channel", {**TURNING, **FAST}, two_channels, latitude(20.0, 70.0), of_two_channels
     ),

@@ -97,6 +97,24 @@ def test_servo_phase_lasts_until_time_and_angle_have_passed():
     assert changes(play(part, 80, angle=lambda t: 0.0)) == [(8, 1.0, 1.0, 0.0), (31, 1.0, 0.0, 1.0)]
 
 
+def test_step_phase_settles_and_dwells_at_every_stop():
+    # stops at 1.0, 0.5, 0.0 rad (travel 1).  Each as an index phase: opens 3 + 5 samples on, dwells 10, three more: 21
+    step = {"mode": 4, "target": 1.0, "settle": 0.05, "dwell": 0.1, "travel": 1.0, "window": 0.1}
+    part = Sequencer(**plan([step, {"dwell": 0.1, "window": 0.1}], [EYE]), steps=[-0.5] + [0.0] * 98)
+    part.initialize()
+    seen, track = [(part.mode, part.target)], [(0, part.phase, part.gate, part.done)]
+    for k in range(90):
+        part.do_step(k * H, H)
+        seen.append((part.mode, part.target))
+        track.append((k + 1, part.phase, part.gate, part.done))
+    assert changes(track) == [
+        (8, 1.0, 1.0, 0.0), (21, 1.0, 0.0, 0.0), (29, 1.0, 1.0, 0.0), (42, 1.0, 0.0, 0.0), (50, 1.0, 1.0, 0.0),
+        (63, 2.0, 0.0, 0.0), (66, 2.0, 1.0, 0.0), (79, 2.0, 0.0, 1.0),
+    ]  # fmt: skip
+    assert [seen[k] for k in (0, 20, 21, 41, 42, 62)] == [(1.0, v) for v in (1.0, 1.0, 0.5, 0.5, 0.0, 0.0)]
+    assert seen[63] == (0.0, 0.0)
+
+
 def test_phases_follow_and_faces_change():
     part = started(
         [
@@ -159,21 +177,23 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
 @pytest.mark.parametrize(
     "phase, message",
     [
-        ({**OK, "mode": 4}, "phase 2: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo"),
+        ({**OK, "mode": 5}, "phase 2: unknown mode; modes are 0 hold, 1 index, 2 rate, 3 servo"),
         ({**OK, "face": 13}, "phase 2: face_of must be 1 to 12"),
         ({**OK, "face": 0}, "phase 2: face_of must be 1 to 12"),
         ({**RATE, "target": 0.0}, "phase 2: the table does not turn"),
         ({**RATE, "travel": -1.0}, "phase 2: a rate phase needs a travel above 0 rad, or none and a dwell"),
         (
             {**RATE, "travel": 0.0, "dwell": 0.0},
-            "phase 2: a hold, index or servo phase, or a rate phase without travel,",
+            "phase 2: a hold, index, servo, step phase, or a rate phase without travel,",
         ),
         ({**RATE, "travel": 0.0, "dwell": 1.0, "target": 0.0}, "phase 2: the table does not turn"),
-        ({**OK, "dwell": 0.0}, "phase 2: a hold, index or servo phase, or a rate phase without travel, needs a dwell"),
+        ({**OK, "dwell": 0.0}, "phase 2: a hold, index, servo, step phase, or"),
         (
             {**OK, "mode": 1, "dwell": -1.0},
-            "phase 2: a hold, index or servo phase, or a rate phase without travel, needs a dwell",
+            "phase 2: a hold, index, servo, step phase, or",
         ),
+        ({**OK, "mode": 4}, "phase 2: a step phase needs a step other than 0 rad"),
+        ({**OK, "mode": 2.5}, "phase 2: unknown mode"),
         ({**OK, "window": 0.0}, "phase 2: the window must be above 0"),
         ({**OK, "window": 1.1}, "phase 2: the window is longer than the dwell"),
         ({**RATE, "window": 6.1}, "phase 2: the window is longer than the dwell"),

@@ -26,6 +26,13 @@ RANGES = {"D_F": (0.05, 0.55), "D_I": (0.5, 1.3), "D_O": (0.5, 1.3), "D_S": (0.5
 SQUARES = (0.01, 0.06)
 
 
+#: An intermittent one in some 350 s: 48 stops and two dwells, windows of 1 s.  Of a move exp(-11.25 3) is left.
+STOPPING: dict[str, Any] = {
+    "stops": 24, "stop_dwell": 2.0, "windows": 48, "dwell": 20.0, "settle": 3.0,
+    "table.index_rate": 1.0, "table.acceleration": 1.0,
+}  # fmt: skip
+
+
 def load() -> System:
     return load_system(NAME)
 

@@ -101,6 +101,7 @@ def voltage(w: dict[str, Array], p: dict[str, Any], rng: np.random.Generator, n:
 
 READ: dict[str, tuple[Any, int]] = {  # what is read, runs of the benchmark
     "tumble_single_axis": (current, 75),
+    "tumble_single_axis, stops": (current, 75),
     "tumble_two_channel, nine": (currents, 56),
     "tumble_two_channel, simple": (currents, 80),
     "tumble_two_axis": (current, 75),

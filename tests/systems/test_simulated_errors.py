@@ -11,7 +11,7 @@ import pytest
 import servoing_two_axes
 from scipy.spatial.transform import Rotation
 from servoing import DAY50, QUIET, W50
-from tumbling import DPH, NAMES, SHORT
+from tumbling import DPH, NAMES, SHORT, STOPPING
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
@@ -70,9 +70,9 @@ def test_a_miss_that_was_predicted_is_told_so() -> None:
     assert "D_F (z = " in said and "account for it, see the table of predicted shifts" in said
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_tumble(seed: int) -> None:
-    """Axis, mount and encoder wrong at once, sizes and signs drawn."""
+@pytest.mark.parametrize(("seed", "plan"), [(1, SHORT), (2, SHORT), (3, STOPPING)])
+def test_tumble(seed: int, plan: dict[str, Any]) -> None:
+    """Axis, mount and encoder wrong at once, sizes and signs drawn; turning, and at rest at its stops."""
     a = np.random.default_rng(seed).normal(0.0, 60.0, 9) * ARCSEC
     errors = {
         "table.tilt": a[:2].tolist(),
@@ -80,7 +80,7 @@ def test_tumble(seed: int) -> None:
         "table.encoder_amplitude": np.abs(a[5:7]).tolist(),
         "table.encoder_phase": (a[7:] / ARCSEC).tolist(),
     }
-    agree("tumble_single_axis", {}, {**SHORT, **STILL, **DRIFT, "rebalance.meter": 0.0}, errors, 0.05)
+    agree("tumble_single_axis", {}, {**plan, **STILL, **DRIFT, "rebalance.meter": 0.0}, errors, 0.05)
 
 
 def test_tumble_on_the_table_as_it_is_built() -> None:

@@ -36,6 +36,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.setup import setups, sources
 from gyrobench.reduction.setup.sources import Effect, Source
+from gyrobench.reduction.setup.stops import whole_stops
 
 T = TypeVar("T", bound=setups.TurningSetup)
 Formulas = tuple[dict[str, float], dict[str, Fit], str]
@@ -191,6 +192,10 @@ class TurningTest(DriftReduction[T]):
                 continue
             for p in mine:
                 start, end = t.angle_start[self.phase == p], t.angle_end[self.phase == p]
+                if self.setup.stops(p):
+                    if not whole_stops(start, end):
+                        return {}, {}, f"phase {p}: its stops are not equally spaced; least squares only"
+                    continue
                 if harmonic.whole_turns(start, end) is None:
                     turned = math.degrees(float(np.sum(np.abs(end - start))))
                     return {}, {}, f"phase {p} covers {turned:.4g}°, no whole turns without gap; least squares only"

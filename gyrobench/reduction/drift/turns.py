@@ -21,6 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.reduction.setup.stops import spacing
 from gyrobench.result import Harmonic, Table
 
 AGREE, HIGH = "turns.agree", "turns.harmonics"  # ids of the tests
@@ -44,8 +45,9 @@ class Turns:
     def __post_init__(self) -> None:
         middle = (self.start + self.end) / 2.0
         self.turn = np.zeros(middle.size, dtype=int)
-        for _, mine in self.phases:
-            way = np.abs(middle[mine] - self.start[mine][0])
+        self.spacing = [spacing(self.start[mine], self.end[mine]) for _, mine in self.phases]
+        for (_, mine), step in zip(self.phases, self.spacing, strict=True):
+            way = np.abs(middle[mine] - middle[mine][0]) + step / 2.0
             self.turn[mine] = np.floor(way / (2.0 * math.pi)).astype(int)
 
     def test(self) -> None:
@@ -59,9 +61,8 @@ class Turns:
     # ------------------------------------------------------------------------------------------ harmonics
     def _harmonic_test(self, top: int = 6) -> None:
         columns, labels = [], []
-        for label, mine in self.phases:
-            width = float(np.max(np.abs(self.end[mine] - self.start[mine])))
-            orders = range(self.held + 1, min(top, int(0.45 * 2.0 * math.pi / width)) + 1)
+        for (label, mine), step in zip(self.phases, self.spacing, strict=True):
+            orders = range(self.held + 1, min(top, int(0.45 * 2.0 * math.pi / step)) + 1)
             if len(orders):
                 block, _ = harmonic.columns(self.start, self.end, orders)
                 columns.append(np.where(mine[:, None], block, 0.0))

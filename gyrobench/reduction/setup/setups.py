@@ -23,6 +23,7 @@ from gyrobench.component.set_up import Errors
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.setup.run_metadata import Location, Remount, phases, remount_of, sizes
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.stops import REST, stop_problems
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 
@@ -136,9 +137,10 @@ class RebalanceSetup(SiteSetup):
 class TurningSetup(RebalanceSetup):
     """A tumble on a table whose axis lies along the pole; matrices with rows = axes.
 
-    base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate" or
-    "dwell" (None: by the direction of the second gyro axis).  tilt: small angles of the gyro are estimated with the
-    coefficients (True), taken as zero (False), or among the nuisances, which the data weigh (None).
+    base: table axes in (E, N, U) at angle 0.  faces: phase -> gyro axes in table axes.  modes: phase -> "rate", "step"
+    (at rest at one angle after the other) or "dwell" (None: by the direction of the second gyro axis).  tilt: small
+    angles of the gyro are estimated with the coefficients (True), taken as zero (False), or among the nuisances, which
+    the data weigh (None).
     """
 
     faces: Mapping[int, Array]
@@ -161,7 +163,7 @@ class TurningSetup(RebalanceSetup):
         of_run = {
             "faces": {p: faces[row.face] for p, row in plan.items()},
             "labels": {p: row.label for p, row in plan.items()},
-            "modes": {p: "rate" if row.mode == "rate" else "dwell" for p, row in plan.items()},
+            "modes": {p: row.mode if row.mode in ("rate", "step") else "dwell" for p, row in plan.items()},
             "tilt": TILTS[choice(run, "tilt", tuple(TILTS), "auto")],
         }
         return cls.of(run, **of_run, **own)
@@ -170,13 +172,22 @@ class TurningSetup(RebalanceSetup):
         return self.labels.get(phase, f"phase {phase}")
 
     def turns(self, phase: int) -> bool:
-        """True where the table turns: by ``modes``, or where the second gyro axis is nearer to its axis than to the
-        vertical.
+        """True where the table goes through its angles, turning or from stop to stop: by ``modes``, or where the second
+        gyro axis is nearer to its axis than to the vertical.
         """
         if self.modes is not None and phase in self.modes:
-            return self.modes[phase] == "rate"
+            return self.modes[phase] != "dwell"
         second = np.asarray(self.faces[phase])[1]
         return bool(abs(second[2]) >= abs(second @ (np.asarray(self.base) @ frames.U)))
+
+    def stops(self, phase: int) -> bool:
+        """True where the table rests at one angle after the other."""
+        return self.modes is not None and self.modes.get(phase) == "step"
+
+    @property
+    def intermittent(self) -> bool:
+        """True where the table rests at its angles in every mount."""
+        return all(self.stops(p) for p in self.faces if self.turns(p))
 
     def problems(self, folding: bool = True) -> list[str]:
         mounts = {f"mount of {self.label(p)}": face for p, face in self.faces.items()}
@@ -199,17 +210,24 @@ class TurningSetup(RebalanceSetup):
         problems += [
             f"phase {p} is in the record, but its mount is not given" for p in sorted(present - set(self.faces))
         ]
-        width = np.abs(np.asarray(windows["angle_end"], dtype=float) - np.asarray(windows["angle_start"], dtype=float))
+        start, end = (np.asarray(windows[f"angle_{e}"], dtype=float) for e in ("start", "end"))
+        width = np.abs(end - start)
+        times = [np.asarray(windows[f"t_{e}"], dtype=float) for e in ("start", "end")]
         for p in self.faces:
             largest = float(np.max(width[phase == p], initial=0.0))
             where = f"phase {p} ({self.label(p)}): "
             if p not in present:
                 continue
-            if not self.turns(p):
+            if self.stops(p):
+                problems += [where + text for text in stop_problems(*(c[phase == p] for c in (start, end, *times)))]
+            elif not self.turns(p):
                 if largest > 1e-2:
                     problems.append(f"{where}the table turns by {math.degrees(largest):.3g}° in a dwell")
             elif largest < 1e-3:
-                problems.append(f"{where}the table angle does not move, expected a turning table (rate 0?)")
+                text = f"{where}the table angle does not move, expected a turning table (rate 0?)"
+                if np.ptp(start[phase == p]) > REST:
+                    text += "; of a table that rested at each of these angles state stops = N, their number in a turn"
+                problems.append(text)
             elif largest > 2.0 * math.pi / 5.0 * 1.001:
                 problems.append(
                     f"{where}{2 * math.pi / largest:.2g} windows a turn, at least 5 are needed for two harmonics"
