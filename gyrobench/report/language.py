@@ -172,7 +172,7 @@ class Language:
         for form in (text, text[:1].lower() + text[1:], text[:1].upper() + text[1:]):
             if form in self.catalogue.texts and (form == text or text not in self.names):  # the slot table is no Table
                 return self.catalogue.texts[form]
-        if self.catalogue.names.issuperset(WORD.findall(text)):
+        if ": " not in text and self.catalogue.names.issuperset(WORD.findall(text)):
             return DATE.sub(lambda m: self.catalogue.joints["date"].format(*map(int, m.groups())), text)
         for form in dict.fromkeys((text, text[:1].upper() + text[1:], text[:1].lower() + text[1:])):
             for pattern, said in self.catalogue.templates:
