@@ -20,7 +20,11 @@ TEXT = {".py", ".md", ".csv", ".toml", ".json", ".c", ".h", ".html", ".typ", ".c
 #: A-B that are no ids of methods
 WORDS = {
     "UTF-8",
+    "AVX-512",
     "BY-NC-SA",
+    "FG-1",
+    "FG-2",
+    "KG-0",
     "MIL-STD-810F",
     "UTF-16",
     "SHA-256",

@@ -174,7 +174,8 @@ def reduce(
     if source is not None:
         if data or fit_to or columns or certificate:
             raise UsageError(
-                "--from: a run of another tool; --data, --columns, --fit-to and --certificate are of measured data"
+                "--from is a run of another tool; --data, --columns, --fit-to and --certificate are of measured data: "
+                "name one of them"
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
         with reports_in(language, test.name, Bench.find().folder):

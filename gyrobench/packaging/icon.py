@@ -43,11 +43,12 @@ PICTURES = {
 WORDS = (
     ("compass", "compass|north"), ("estimator", "estimator|kalman|attitude|mekf|compensator"),
     ("accelerometer", "accelerometer"), ("unit", "imu|inertial"),
-    ("table", "table_(?!command|program)|table$|fixture|index|bracket|wobble"), ("platform", "platform"),
+    ("table", "table_(?!command|program)|table$|fixture|index|bracket|wobble"), ("platform", "platform|gimbal"),
     ("controller", "controller|stabilizer|rebalance|servo|decoupler|cage|slaving|current|coupling"),
     ("plan", "sequencer|program|command|supervisor|sampler|monitor"), ("motor", "motor|slipring|bearing|tachometer"),
     ("reader", "meter|inductosyn|gate|inverse|averager|reference|reading|sensor"),
-    ("place", "site|ground|surroundings"), ("source", "source|exciter|motion|manoeuvre|torque"), ("gyro", "gyro"),
+    ("place", "site|ground|surroundings"), ("source", "source|exciter|motion|manoeuvre|torque|vibration"),
+    ("gyro", "gyro"),
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 Values are in SI, with the unit in the form of D-SI (``\\radian\\second\\tothe{-1}``), expanded uncertainty, coverage
 factor and probability; the text beside them has the printed unit.  The report and the digest of its manifest are named
 in a statement, the certificate for people is attached.  Not stated, since a record has them not: quantity kinds of
-QUDT, equipment item by item, electronic signatures within the XML.  [PTB DCC 3.3.0; D-SI 2.2.1]
+QUDT, equipment item by item, electronic signatures within the XML.  DCC 3.3.0 of PTB, D-SI 2.2.1.
 """
 
 from __future__ import annotations

@@ -98,7 +98,8 @@ def up_and_down(path: Path, name: str, shift: float) -> Any:
     first, second = (down, up) if down["time"][0] < up["time"][0] else (up, down)
     second["time"] = second["time"] + shift
     units = {"time": "s", **{f"gyro_{a}": "deg/s" for a in "xyz"}, **{f"acc_{a}": "m/s2" for a in "xyz"}}
-    data = {f"{n} [{u}]": np.concatenate([first[n], second[n]]) for n, u in units.items()}
+    short = {n: n if n == "time" else f"{n[0]}{n[-1]}" for n in units}  # gx, ax
+    data = {f"{short[n]} [{u}]": np.concatenate([first[n], second[n]]) for n, u in units.items()}
     return reduced(path, "# attitudes = up_down\n# latitude = 51deg\n# type_b = none\n", data)
 
 

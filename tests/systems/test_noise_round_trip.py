@@ -109,7 +109,7 @@ def test_the_largest_gauss_markov_process_goes_into_the_gyro(tmp_path: Path) -> 
     """0.5 deg/h of 200 s into the gyro, 0.1 deg/h of 20 s into the comment: the gyro has one process."""
     some, none = Estimate(2e-7, 1e-7, 3e-7, True), Estimate(0.0, 0.0, 1e-7, False)
     rows = [[1, 0.01, 0.1, 0.0, 0.0, 20.0], [2, 0.25, 0.5, 0.0, 0.0, 200.0]]
-    column = SimpleNamespace(tables={"model": [SimpleNamespace(id="gauss_markov", rows=rows)]})
+    column = SimpleNamespace(unit="°/h", tables={"model": [SimpleNamespace(id="gauss_markov", rows=rows)]})
     text = written(tmp_path / "v.toml", reported(NoiseCoefficients(some, none, none, none, none)), columns=[column])
     assert float(text["gyro.markov"]) == pytest.approx(0.5 * DPH) and float(text["gyro.markov_tau"]) == 200.0
     assert "the largest of 2 processes" in (tmp_path / "v.toml").read_text("utf-8")
