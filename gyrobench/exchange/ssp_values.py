@@ -136,10 +136,16 @@ def _schema(name: str) -> Any:
 
 
 def schema_errors(file: Path, source: str) -> list[str]:
-    """Return what the schema of SSP 1.0 forbids in a file that is XML, the first places; nothing of a later version."""
+    """Return what the schema of SSP 1.0 forbids in a file that is XML, the first places; nothing of a later version.
+
+    Raises ArchiveError for a namespace that is no URI.
+    """
     from lxml import etree
 
-    root = etree.fromstring(file.read_bytes(), etree.XMLParser(resolve_entities=False, no_network=True))
+    try:
+        root = etree.fromstring(file.read_bytes(), etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:  # the other reader took it: a namespace that is no URI
+        raise ArchiveError(f"{source}: {error.msg}") from None
     if root.tag not in SCHEMAS or root.get("version") != "1.0":
         return []
     schema = _schema(SCHEMAS[root.tag])
