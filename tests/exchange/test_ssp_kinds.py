@@ -122,7 +122,7 @@ def test_what_the_schema_forbids_but_can_be_read(write: Write) -> None:
 def test_a_namespace_that_is_no_address(write: Write) -> None:
     """One reader of XML takes it, the schema's own does not: refused, for its values would not be found."""
     values = VALUE_SET.format(real("a.y0", 1.0)).replace("http://ssp", "http://:ssp")
-    with pytest.raises(InvalidConfigurationError, match=r"v\.ssv: xmlns:ssv: .* is not a valid URI"):
+    with pytest.raises(InvalidConfigurationError, match=r"v\.ssv: xmlns:ssd: .* is not a valid URI"):
         read_ssp(write(A, "", FILE.format(""), files={"v.ssv": values}), 0.01)
 
 
