@@ -18,7 +18,11 @@ OUT = ["f[1]", "f[2]", "f[3]"]
 
 def test_which_parts_keep_their_outputs() -> None:
     assert followed(PartCode(load_part("fixture"))) == ["mount", "omega_face", "alpha_face", "f_face"]
-    assert followed(PartCode(load_part("sequencer"))) == ["now", "stage"]  # start-only discretes stay as they are
+    assert followed(PartCode(load_part("sequencer"))) == [
+        "now",
+        "stage",
+        "stop",
+    ]  # start-only discretes stay as they are
     assert followed(PartCode(load_part("site"))) == []  # nothing changes its outputs while it runs
     for changing in ("floated_gyro", "table_servo", "rebalance_analog"):  # state, state, noise
         assert followed(PartCode(load_part(changing))) is None
