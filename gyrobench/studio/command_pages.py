@@ -266,6 +266,8 @@ def _add_laboratory_page(studio: Studio) -> None:
                     lines.show(certificate_request(studio, runs.value, number.value or "").command(), "")
 
             def keep() -> None:
+                if studio.read_only:
+                    raise UsageError("the studio is read-only: nothing is kept")
                 write_laboratory(_profile(fields, there), file)
                 ui.notify(f"Saved: {display_path(file)}")
 

@@ -23,6 +23,5 @@ def add_part_page(studio: Studio) -> None:
             if not readme.is_file():
                 raise UsageError(f"{name}: the part has no README.md that says what it does")
             text = LINK.sub(lambda m: "" if m[1] else m[2], read_text(readme, UsageError))
-            ui.markdown(text, extras=["fenced-code-blocks", "tables", "code-friendly"]).classes(
-                "readme"
-            )  # D_F: no emphasis
+            extras = ["fenced-code-blocks", "tables", "code-friendly"]  # the last: D_F is no emphasis
+            ui.markdown(text, extras=extras).classes("readme")

@@ -201,7 +201,7 @@ async def _signals(folder: Path, document: RunDocument) -> None:
     if not signals.names or not len(signals.time):
         ui.label("The record holds no signals over time.").classes("soft")
         return
-    first = first_shown(signals.names, _shown_byreport_frame(document.system))
+    first = first_shown(signals.names, _shown_by_report(document.system))
     await _chosen({folder.name: signals}, signals.names, first)
 
 
@@ -216,7 +216,7 @@ async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
         ui.label("The record holds no angle of a body that moves.").classes("soft")
 
 
-def _shown_byreport_frame(name: str) -> list[Any]:
+def _shown_by_report(name: str) -> list[Any]:
     try:
         return list(getattr(load_test(name), "shown", ()))
     except Exception:  # a run of a system that is not there any more
@@ -358,7 +358,7 @@ async def _overlay(folders: list[Path]) -> None:
         ui.label("The runs have no signal in common.").classes("soft")
         return
     document = await asyncio.to_thread(read_run, folders[0])
-    await _chosen(records, common, first_shown(common, _shown_byreport_frame(document.system))[:2])
+    await _chosen(records, common, first_shown(common, _shown_by_report(document.system))[:2])
 
 
 async def _chosen(records: dict[str, RecordSignals], names: list[str], first: list[str]) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction, Response, Table, margins, told
+from gyrobench.reduction.loops.open_loop import limits_hit
 from gyrobench.reduction.loops.platform_measures import late_noise
 from gyrobench.result import Curve
 
@@ -26,13 +27,6 @@ WRONG = 0.2  # relative: a jitter that differs more from the linear prediction i
 NOISY = 0.25  # relative u of a ratio beyond which its dB say nothing
 DECIBEL = 20.0 / math.log(10.0)
 SMALL = 0.1  # %, share of the variance below which a source has no row
-LIMITS = {
-    "platform.saturated": "a motor",
-    "pitch.saturated": "the pitch controller",
-    "yaw.saturated": "the yaw controller",
-    "gyro.saturated": "the gyro",
-    "decoupler.saturated": "the secant of the outer axis (keyhole)",
-}
 
 
 class Reduction(LoopReduction):
@@ -49,7 +43,7 @@ class Reduction(LoopReduction):
         self._isolation()
         ride = next((g for g in found.of("hold") if g.label == "ride"), None)
         self.cause = self._jitter(ride) if ride is not None else ""
-        self._limits()
+        self._keyhole()
         return Account(
             method="Load steps, test sines of both loops, sines of the base and a ride on a vibrating base, line of "
             "sight of a gimbal of two axes",
@@ -178,8 +172,8 @@ class Reduction(LoopReduction):
         )
         whole = math.sqrt(square)
         if abs(measured / whole - 1.0) > WRONG:
-            causes = [text for name, text in LIMITS.items() if self._hit(name)]
-            why = f"at their limit were {', '.join(causes)}" if causes else ""
+            limited = limits_hit([g for g in self.found.gates if g.label == "ride"])
+            why = f"a limit was active in {', '.join(limited)}" if limited else ""
             if not why and self._stuck():
                 why = "dry friction sticks for a part of the ride and slips in another"
             text = (
@@ -216,14 +210,7 @@ class Reduction(LoopReduction):
                 Response(name, "spectrum", caption, first.x, "frequency", "Hz", first.y, name, unit, curves=curves)
             )
 
-    def _hit(self, name: str) -> bool:
-        return any(name in g.channels and bool(np.any(g[name] > 0.5)) for g in self.found.gates if g.label == "ride")
-
-    def _limits(self) -> None:
-        for name, text in LIMITS.items():
-            labels = [g.label for g in self.found.gates if name in g.channels and np.any(g[name] > 0.5)]
-            said = f"At its limit was {text} in: {', '.join(labels)}. What was measured there is not linear."
-            self.found.warn(f"limit:{name}", said if labels else "")
+    def _keyhole(self) -> None:
         keyhole = [g.label for g in self.found.gates if np.any(g["platform.keyhole"] > 0.5)]
         if keyhole:
             text = (

@@ -97,8 +97,7 @@ class GimbalStabilization(LoopTest):
         "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]",
         *loop.three("motion.angle", "vibration.omega", "vibration.f"),
         *(f"{n}[{k}]" for n in ("platform.los", "platform.theta") for k in (1, 2)),
-        "platform.keyhole", "platform.saturated", "gyro.saturated", "decoupler.saturated",
-        *(f"{axis}.{n}" for axis in AXES for n in ("e", "v", "saturated")),
+        "platform.keyhole", "decoupler.saturated", *(f"{axis}.{n}" for axis in AXES for n in ("e", "v")),
     )  # fmt: skip
     shown = ("platform.los", "platform.theta", "vibration.omega", "pitch.e yaw.e", "pitch.v yaw.v")
     channel_period = 1e-3

@@ -203,7 +203,7 @@ class LoopFindings(MeasureFindings):
             models = float(pair[0] or 0.0), float(pair[1] or 0.0)
             self.coefficients = [replace(c, models=models) if c.name == name else c for c in self.coefficients]
 
-    def limits_reached(self) -> None:
+    def _limits_reached(self) -> None:
         """Say in which phases a part was at a limit."""
         for slot in limits_hit(self.gates):
             labels = ", ".join(g.label for g in self.gates if max(g[f"{slot}.saturated"]) > 0.5)
@@ -358,6 +358,7 @@ class LoopFindings(MeasureFindings):
 
     def result(self, account: Account, summary: Sequence[str] = (), ranked_by: str = "") -> LoopResult:
         """Return what was found, with what the test says of itself."""
+        self._limits_reached()
         self.reasons += [*account.reasons, *(Reason("linear", w) for w in self.linear.warnings)]
         if self.agreement:
             title = "Linear models and measured loop"

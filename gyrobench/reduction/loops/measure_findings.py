@@ -45,9 +45,6 @@ class MeasureFindings:
         reason = Reason(id, text, severity=severity)
         self.reasons += [reason] if text and reason not in self.reasons else []
 
-    def limits_reached(self) -> None:
-        """Say where a part was at a limit, in a test that has phases."""
-
     def doubt(self, id: str, text: str) -> None:
         """Add why nothing may pass or fail; nothing for ""."""
         self.reasons += [Reason(id, text, ("pass", "fail"), severity="doubt")] if text else []

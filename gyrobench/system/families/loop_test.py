@@ -84,9 +84,13 @@ def stabilizer(part: str = "", signal: str = "angle") -> Slot:
     return Slot("Stabilizer", part, {"u": signal})
 
 
+#: what these limit is a gain, which stays linear: a system records it where it wants to say so
+GAINS = ("Decoupler", "LosDecoupler")
+
+
 def _has_limit(slot: Slot) -> bool:
-    """Return whether a part there says that a signal is at a limit; the gain of a decoupler at its limit is a gain."""
-    return slot.socket != "Decoupler" and socket(slot.socket).connector("saturated") is not None
+    """Return whether a part there says that a signal is at a limit."""
+    return slot.socket not in GAINS and socket(slot.socket).connector("saturated") is not None
 
 
 class LoopTest(System):
