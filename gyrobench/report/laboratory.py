@@ -78,7 +78,11 @@ def read_laboratory(file: Path) -> Laboratory:
     """Return the profile of a TOML file.  Raises UsageError naming all that is wrong with it."""
     if not file.is_file():
         raise UsageError(f"{file}: no profile of a laboratory; {FILE} needs two lines, name = and address = [...]")
-    data = reading.toml(reading.read_text(file, UsageError), file, UsageError)
+    return laboratory_of(reading.toml(reading.read_text(file, UsageError), file, UsageError), file)
+
+
+def laboratory_of(data: dict[str, Any], file: Path) -> Laboratory:
+    """Return the profile that the keys of a file make.  Raises UsageError naming all that is wrong with them."""
     try:
         found = Laboratory.model_validate(data)
         found._picture = _logo(file.parent / found.logo) if found.logo else ""

@@ -13,7 +13,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from gyrobench.bench import UsageError, display_path
-from gyrobench.report.laboratory import FILE, Laboratory, read_laboratory, write_laboratory
+from gyrobench.report.laboratory import FILE, Laboratory, laboratory_of, read_laboratory, write_laboratory
 from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem, told
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
@@ -88,6 +88,7 @@ TUNE = CommandForm(
     (
         FormField("--want", "", "Wanted", "list", "phase margin=40deg\nbandwidth>10Hz\ndisk margin=0.5"),
         FormField("--over", "over", "Spread of the parts", "list", "platform.J=±30%"),
+        FormField("--loop", "loop", "Loop, of a system with several", "text", "pitch"),
         FormField("--structure", "structure", "Structure of the controller", "choice", choices=STRUCTURES),
         SET,
     ), under="tuning",
@@ -183,37 +184,38 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
 
 
 # ---------------------------------------------------------------------------------------------- laboratory
+#: key of a profile -> its label, and whether it has a line each
+PROFILE = {
+    "name": ("Name", False), "address": ("Address, one line each", True),
+    "accreditation": ("Accreditation number", False), "country": ("Country, two letters", False),
+    "logo": ("Logo, a file beside laboratory.toml", False), "language": ("Language of the certificate, en or zh", False),
+    "statements": ("Statements of the certificate, one a line", True),
+    "coefficients": ("Coefficients shown, one a line; none: all", True),
+}  # fmt: skip
+SIGNATORIES = "Signatories, ROLE: NAME, one a line"
+
+
 def _profile_fields(there: Laboratory | None) -> dict[str, Any]:
     """Add the fields of a profile; return them by the name of the key."""
-    shown = [
-        ("name", "Name", there.name if there else ""),
-        ("address", "Address, one line each", "\n".join(there.address) if there else ""),
-        ("accreditation", "Accreditation number", there.accreditation if there else ""),
-        ("statements", "Statements of the certificate, one a line", "\n".join(there.statements) if there else ""),
-        ("coefficients", "Coefficients shown, one a line; none: all", "\n".join(there.coefficients) if there else ""),
-        ("signatories", "Signatories, ROLE: NAME, one a line",
-         "\n".join(f"{s.role}: {s.name}" for s in there.signatories) if there else ""),
-    ]  # fmt: skip
-    made = {}
-    for key, label, value in shown:
-        field = ui.input(label, value=value) if key in ("name", "accreditation") else ui.textarea(label, value=value)
-        made[key] = field.props("dense outlined autogrow stack-label").classes("full")
+    made: dict[str, Any] = {}
+    for key, (label, many) in PROFILE.items():
+        value = getattr(there, key, "") or ""
+        made[key] = ui.textarea(label, value="\n".join(value)) if many else ui.input(label, value=value)
+    signs = "\n".join(f"{s.role}: {s.name}" for s in there.signatories) if there else ""
+    made["signatories"] = ui.textarea(SIGNATORIES, value=signs)
+    for field in made.values():
+        field.props("dense outlined autogrow stack-label").classes("full")
     return made
 
 
-def _profile(fields: dict[str, Any], there: Laboratory | None) -> Laboratory:
-    """Return the profile that the fields make, with what else the one before says.  Raises UsageError."""
+def _profile(fields: dict[str, Any], file: Path) -> Laboratory:
+    """Return the profile that the fields make.  Raises UsageError naming all that is wrong with it."""
     lines = {k: [s.strip() for s in (f.value or "").splitlines() if s.strip()] for k, f in fields.items()}
-    content: dict[str, Any] = there.model_dump() if there else {}
-    content |= {k: lines[k] for k in ("address", "statements", "coefficients")}
-    content |= {k: (fields[k].value or "").strip() for k in ("name", "accreditation")}
+    content: dict[str, Any] = {k: v if PROFILE[k][1] else v[0] for k, v in lines.items() if v and k in PROFILE}
     if lines["signatories"]:
         pairs = (line.partition(":") for line in lines["signatories"])
         content["signatories"] = [{"role": role.strip(), "name": name.strip()} for role, _, name in pairs]
-    for key in ("name", "address"):
-        if not content[key]:
-            raise UsageError(f"{key}: a certificate needs it")
-    return Laboratory.model_validate(content)
+    return laboratory_of(content, file)
 
 
 def certificate_request(studio: Studio, runs: list[str], number: str) -> CommandRequest:
@@ -268,7 +270,9 @@ def _add_laboratory_page(studio: Studio) -> None:
             def keep() -> None:
                 if studio.read_only:
                     raise UsageError("the studio is read-only: nothing is kept")
-                write_laboratory(_profile(fields, there), file)
+                if file.is_file() and there is None:
+                    raise UsageError(f"{display_path(file)} cannot be read; mend or remove it, it is not written over")
+                write_laboratory(_profile(fields, file), file)
                 ui.notify(f"Saved: {display_path(file)}")
 
             def certify() -> None:

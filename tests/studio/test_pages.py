@@ -393,11 +393,22 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     page.get_by_label("Name", exact=True).fill('Labor "Nord"')
     page.get_by_label("Address, one line each").fill("Street 1\n12345 Town")
     page.get_by_label("Signatories, ROLE: NAME, one a line").fill("Head: A. B.")
+    page.get_by_label("Country, two letters").fill("Germany")
+    page.wait_for_timeout(400)
+    page.get_by_role("button", name="Save").click()
+    page.locator(".q-notification").get_by_text(re.compile("country")).wait_for()
+    page.get_by_role("button", name="Close").click()
+    assert not (studio[1] / "laboratory.toml").exists(), "what is wrong is not kept"
+    page.get_by_label("Country, two letters").fill("DE")
     page.wait_for_timeout(400)
     page.get_by_role("button", name="Save").click()
     page.get_by_text("Saved:").wait_for()
     profile = tomllib.loads((studio[1] / "laboratory.toml").read_text(encoding="utf-8"))
-    assert profile["name"] == 'Labor "Nord"' and profile["signatories"] == [{"role": "Head", "name": "A. B."}]
+    assert (
+        profile["name"] == 'Labor "Nord"'
+        and profile["country"] == "DE"
+        and profile["signatories"] == [{"role": "Head", "name": "A. B."}]
+    )
     page.goto(base_of(studio) + "/laboratory")
     assert page.get_by_label("Name", exact=True).input_value() == 'Labor "Nord"'
     page.get_by_label("Run of an instrument, runs of a lot").click()
