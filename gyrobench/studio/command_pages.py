@@ -188,7 +188,8 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
 PROFILE = {
     "name": ("Name", False), "address": ("Address, one line each", True),
     "accreditation": ("Accreditation number", False), "country": ("Country, two letters", False),
-    "logo": ("Logo, a file beside laboratory.toml", False), "language": ("Language of the certificate, en or zh", False),
+    "logo": ("Logo, a file beside laboratory.toml", False),
+    "language": ("Language of the certificate, en or zh", False),
     "statements": ("Statements of the certificate, one a line", True),
     "coefficients": ("Coefficients shown, one a line; none: all", True),
 }  # fmt: skip
@@ -264,8 +265,8 @@ def _add_laboratory_page(studio: Studio) -> None:
                 button.set_visibility(not studio.read_only)
 
             def show() -> None:
-                if runs.value:
-                    lines.show(certificate_request(studio, runs.value, number.value or "").command(), "")
+                asked = certificate_request(studio, runs.value, number.value or "").command() if runs.value else ""
+                lines.show(asked, "")
 
             def keep() -> None:
                 if studio.read_only:
@@ -283,6 +284,7 @@ def _add_laboratory_page(studio: Studio) -> None:
             make.on_click(told(certify))
             runs.on_value_change(show)
             number.on_value_change(show)
+            show()
 
 
 # ---------------------------------------------------------------------------------------------- results

@@ -1,0 +1,107 @@
+"""Commands by form, and FMUs of other tools, in headless Chromium."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import foreign_fmus
+import pytest
+from studio_pages import CHROMIUM, NONE, TESTS, base_of, run_of
+
+import gyrobench as gb
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NONE)
+
+
+def filled(page: Any, fields: dict[str, str], command: str) -> None:
+    """Fill fields by their labels, see the command, start it, and wait for its end."""
+    for label, text in fields.items():
+        page.get_by_label(label).fill(text)
+    page.wait_for_function("t => document.querySelector('.code').textContent.startsWith(t)", arg=command)
+    page.get_by_role("button", name="Start").click()
+    page.wait_for_url("**/job/**")
+    page.wait_for_function("['done', 'failed'].includes(document.querySelector('[role=status]').textContent)")
+
+
+def test_a_loop_is_tuned_by_a_form(page: Any, studio: tuple[str, Path]) -> None:
+    """What the command prints stands on the page, its figures are one click away."""
+    page.goto(base_of(studio) + "/tune?system=platform_single_axis")
+    filled(
+        page, {"Wanted, one a line": "phase margin=40deg\nbandwidth>10Hz"},
+        "gyrobench tune platform_single_axis '--want=phase margin=40deg' '--want=bandwidth>10Hz'",
+    )  # fmt: skip
+    text = page.locator(".printed").text_content()
+    assert "phase margin" in text and "--set stabilizer." in text, text
+    page.get_by_role("link", name="Its pages").click()
+    page.frame_locator("iframe.report").get_by_text("phase margin", exact=False).first.wait_for()
+
+
+def test_what_a_command_refuses_is_said(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/tune?system=platform_single_axis")
+    filled(page, {"Wanted, one a line": "beauty=3"}, "gyrobench tune platform_single_axis --want=beauty=3")
+    assert page.get_by_role("status").text_content() == "failed"
+    assert "beauty" in (page.locator(".printed").text_content() or "")
+
+
+def test_a_campaign_is_watched_and_its_site_opened(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/campaign?system=fixed_position")
+    fields = {"Varied, all combinations, one a line": "latitude=10deg,50deg", "Seeds at each point": "2",
+              "Other values, one a line": "dwell=60s"}  # fmt: skip
+    filled(page, fields, "gyrobench sweep fixed_position --over=latitude=10deg,50deg --seeds=2 --set=dwell=60s")
+    assert "4 runs: 4 done" in (page.locator(".printed").text_content() or ""), page.locator(".printed").text_content()
+    page.get_by_role("link", name="Its pages").click()
+    with page.context.expect_page() as opened:
+        page.get_by_role("link", name="site/index.html").click()
+    opened.value.get_by_text("fixed_position", exact=False).first.wait_for()
+
+
+def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, Path]) -> None:
+    gb.load("fixed_position", {"dwell": "60s"}).run().report(studio[1] / "reports" / "out" / "fixed_position" / "mine")
+    page.goto(base_of(studio) + "/laboratory")
+    page.get_by_label("Name", exact=True).fill('Labor "Nord"')
+    page.get_by_label("Address, one line each").fill("Street 1\n12345 Town")
+    page.get_by_label("Signatories, ROLE: NAME, one a line").fill("Head: A. B.")
+    page.get_by_label("Country, two letters").fill("Germany")
+    page.wait_for_timeout(400)
+    page.get_by_role("button", name="Save").click()
+    page.locator(".q-notification").get_by_text(re.compile("country")).wait_for()
+    page.get_by_role("button", name="Close").click()
+    assert not (studio[1] / "laboratory.toml").exists(), "what is wrong is not kept"
+    page.get_by_label("Country, two letters").fill("DE")
+    page.wait_for_timeout(400)
+    page.get_by_role("button", name="Save").click()
+    page.get_by_text("Saved:").wait_for()
+    profile = tomllib.loads((studio[1] / "laboratory.toml").read_text(encoding="utf-8"))
+    assert profile["name"] == 'Labor "Nord"' and profile["country"] == "DE"
+    assert profile["signatories"] == [{"role": "Head", "name": "A. B."}]
+    page.goto(base_of(studio) + "/laboratory")
+    assert page.get_by_label("Name", exact=True).input_value() == 'Labor "Nord"'
+    page.get_by_label("Run of an instrument, runs of a lot").click()
+    page.get_by_role("option").first.click()
+    page.keyboard.press("Escape")
+    page.get_by_label("Number of the certificate").fill("2026-7")
+    page.wait_for_function("document.querySelector('.code').textContent.includes('--number=2026-7')")
+    page.get_by_role("button", name="Make the certificate").click()
+    page.get_by_role("link", name="Its pages").click()
+    page.frame_locator("iframe.report").get_by_text("2026-7").first.wait_for()
+
+
+def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
+    """The proposed mapping is shown, what the vendor's data sheet says is written into it, and the run has the gyro."""
+    fmu = foreign_fmus.make("vendor_gyro", tmp_path)
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("dwell", exact=True).fill("60s")
+    page.get_by_role("button", name="Parameters of gyro").click()
+    page.locator('[aria-label="FMU for gyro"] input[type=file]').set_input_files(fmu)
+    mapping = page.get_by_label("Mapping")
+    assert "into the socket SdfGyro" in mapping.input_value()
+    page.wait_for_function("document.querySelector('.code').textContent.includes('--map gyro=')")
+    mapping.fill((TESTS / "foreign" / "vendor_gyro.toml").read_text(encoding="utf-8"))
+    page.wait_for_timeout(500)
+    page.get_by_role("button", name="Run").click()
+    run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
+    assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]
