@@ -26,7 +26,7 @@ class GroundMotion(Place):
     (`local`, 5 Hz), independent of each other.
 
     Refused: a motion given by displacement and acceleration both, tilts that can exceed 0.01 rad.
-    Not modelled: rotation that belongs to the waves (give it as tilt), propagation, response of pier and isolation,
+    Not modelled: rotation that belongs to the waves (give it as tilt), propagation, soil, foundation,
     change of the gravity with the displacement (3e-6 per metre).
     Source: Hu 1981, section 5.6, Tables 5-4..5-6.
     """

@@ -144,7 +144,8 @@ def _measured(record: Record, p: Mapping[str, float], run: Mapping[str, Any]) ->
     if not rows:
         return []
     caption = (
-        "Standard deviations of the accelerations, in the channels of this run and by spectrum and transmissibility."
+        "Standard deviations of the accelerations, in the channels of this run and by spectrum and transmissibility. "
+        "In the channels, not in the spectrum: how an active foundation follows a lean of the ground or by a person."
     )
     head = ["axis", "ground / µg", "by spectrum / µg", "table / µg", "by spectrum / µg", "ratio"]
     return [Table("foundation.run", "Noise of the ground in this run", caption, head, rows)]
