@@ -143,6 +143,8 @@ class System(Configurable):
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
+    #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
+    takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
