@@ -206,6 +206,24 @@ def sensor() -> list[Example]:
     ]  # fmt: skip
 
 
+def foundations() -> list[Example]:
+    """Frequencies from which on a mount of 3.5 Hz, and the servo of an active foundation, take motion away."""
+    isolation = room("table_environment", "isolation")
+    f = np.geomspace(0.01, 20.0, 20_000)
+    passive = np.abs(isolation.along(f, {"frequency": 3.5, "damping": 0.1}))
+    servo = {"frequency": 0.5, "damping": 0.1, "corner": 0.04, "corner_damping": 0.7, "servo_band": 30.0}
+    active = np.abs(isolation.along(f, servo))
+    helps = [float(f[1 + np.flatnonzero(T > level)[-1]]) for T, level in ((passive, 1.0), (active, math.sqrt(0.5)))]
+    return [
+        Example(
+            "5.6, three-2", "a mount of 3.5 Hz takes away what is above", "5", "Hz", "`foundation_passive`", helps[0]
+        ),
+        Example(
+            "5.6, three-3", "servos respond from 0.03 to 0.05 Hz on", "<0.05", "Hz", "`foundation_active`", helps[1]
+        ),
+    ]
+
+
 def capture() -> list[Example]:
     """Return of a servo table to null from 2 degrees."""
     with Session("table_capture") as session:
@@ -216,4 +234,4 @@ def capture() -> list[Example]:
 
 def examples() -> list[Example]:
     """Return the worked numbers of these chapters, in order."""
-    return [*capture(), *bearings(), *readers(), *rates(), *ground(), *sensor()]
+    return [*capture(), *bearings(), *readers(), *rates(), *ground(), *sensor(), *foundations()]
