@@ -213,14 +213,11 @@ def foundations() -> list[Example]:
     passive = np.abs(isolation.along(f, {"frequency": 3.5, "damping": 0.1}))
     servo = {"frequency": 0.5, "damping": 0.1, "corner": 0.04, "corner_damping": 0.7, "servo_band": 30.0}
     active = np.abs(isolation.along(f, servo))
-    helps = [float(f[1 + np.flatnonzero(T > level)[-1]]) for T, level in ((passive, 1.0), (active, math.sqrt(0.5)))]
+    mount, held = (float(f[1 + np.flatnonzero(gain > 1.0)[-1]]) for gain in (passive, math.sqrt(2.0) * active))
+    parts, place = ("`foundation_passive`", "`foundation_active`"), "5.6, three"
     return [
-        Example(
-            "5.6, three-2", "a mount of 3.5 Hz takes away what is above", "5", "Hz", "`foundation_passive`", helps[0]
-        ),
-        Example(
-            "5.6, three-3", "servos respond from 0.03 to 0.05 Hz on", "<0.05", "Hz", "`foundation_active`", helps[1]
-        ),
+        Example(place, "a mount of 3.5 Hz takes away what is above", "5", "Hz", parts[0], mount),
+        Example(place, "servos respond from 0.03 to 0.05 Hz on", "<0.05", "Hz", parts[1], held),
     ]
 
 
