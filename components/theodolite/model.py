@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Input, Noise, Output, Parameter, sampled
-from gyrobench.component.math import Number, atan2, cos, fabs, pi, sin, sqrt, tan
+from gyrobench.component.math import Number, atan2, cos, fabs, floor, pi, sin, sqrt, tan
 
 ARCSEC = pi / 648000.0
 STAR, MIRROR, AXIS = 1.0, 2.0, 3.0
@@ -86,8 +86,8 @@ class Theodolite(Component):
     @sampled(every=1)
     def tick(self) -> None:
         kind = fabs(self.target)
-        known = kind == 0.0 or kind == STAR or kind == MIRROR or kind == AXIS
-        self.refuse(not known, "target = {target}: it must be 1 star, 2 mirror or 3 axis, 0 at the end of a plan")
+        whole = fabs(kind - floor(kind + 0.5)) < 1e-9
+        self.refuse(not whole or kind > AXIS, "target = {target}: must be 1 star, 2 mirror, 3 axis, or 0 at the end")
         self.refuse(kind == STAR and self.height() < 0.0873, "the star is below 5 deg")
 
     def outputs(self) -> None:
