@@ -166,7 +166,7 @@ class Reduction(DriftReduction[AlignmentSetup]):
         return Account(
             method="Polaris and a mirror by theodolite in both faces, the axis by an inclinometer turned round; least "
             "squares [STAND-ALIGNMENT]",
-            sources=["STAND-ALIGNMENT, ALIGN-ERRORS; Hu 1981, section 5.7; Meeus 1998, chapters 12, 13, 16, 21 to 23"],
+            sources=["STAND-ALIGNMENT, ALIGN-ERRORS; Hu 1981, section 5.7; Meeus 1998; Capitaine 2003"],
             equation="R + v tan h - A = -o + f (c/cos h + i tan h), quad R = a/cos phi - o + f c, "
             "quad R - phi = e + f z",
             conventions=[
@@ -200,7 +200,7 @@ class Reduction(DriftReduction[AlignmentSetup]):
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [
-            *told(coefficients, "The axis is off the pole by {about east} about east and {about p × east} across."),
+            *told(coefficients, "Axis off the pole: {about east} about east, {about p × east} across."),
             f"Residual standard deviation {found.residual_std:.3g}″ of a sight.",
         ]
 
