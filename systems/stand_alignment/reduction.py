@@ -42,6 +42,16 @@ from . import polaris
 
 STAR, MIRROR, AXIS = 1, 2, 3
 NAMES = {STAR: "star", MIRROR: "mirror", AXIS: "axis"}
+#: name -> meaning, unit, name of its true value
+FITTED = {
+    "about east": ("axis off the pole, about east: too high", "arcsec", "elevation"),
+    "about p × east": ("axis off the pole, about p × east: to the east", "arcsec", "across"),
+    "collimation": ("collimation of the theodolite", "arcsec", "collimation"),
+    "trunnion": ("tilt of its trunnion axis", "arcsec", "trunnion"),
+    "circle zero": ("azimuth of the zero of its circle", "deg", "circle_zero"),
+    "inclinometer zero": ("zero of the inclinometer", "arcsec", "inclinometer_zero"),
+}
+ZERO = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # the fitted zero of the circle counts from a first value
 CLOCK = Source("clock", "clock", "s", "u_time", "positive where it is fast")
 PLACE = Source("star.place", "place of the star", "rad", "u_star", "each way", ("declination", "hour angle"))
 LEVEL = Source(
@@ -125,26 +135,25 @@ class Reduction(DriftReduction[AlignmentSetup]):
         self.v = np.where(sights, f * (level - self.level_zero), 0.0)
         read = np.asarray(self.windows["mean"], dtype=float)
         y = read + star * (self.v * np.tan(self.h) - self.A) - axis * s.latitude
+        self.zero = -float(np.median(y[self.kind == MIRROR]))  # of the circle, nearly: what is fitted is small
+        y = y + (star + mirror) * self.zero
         X = np.column_stack([
             axis, mirror / math.cos(s.latitude), f * (star / np.cos(self.h) + mirror), f * star * np.tan(self.h),
             -(star + mirror), f * axis,
         ])  # fmt: skip
-        true = s.truth or {}
-        across = None if "azimuth" not in true else true["azimuth"] * math.cos(s.latitude)
-        quantities = [
-            Quantity.of("about east", "axis off the pole, about east: too high", "arcsec", true.get("elevation")),
-            Quantity.of("about p × east", "axis off the pole, about p × east: to the east", "arcsec", across),
-            Quantity.of("collimation", "collimation of the theodolite", "arcsec", true.get("collimation")),
-            Quantity.of("trunnion", "tilt of its trunnion axis", "arcsec", true.get("trunnion")),
-            Quantity.of("circle zero", "azimuth of the zero of its circle", "deg", true.get("circle_zero")),
-            Quantity.of("inclinometer zero", "zero of the inclinometer", "arcsec", true.get("inclinometer_zero")),
-        ]  # fmt: skip
         groups = [
             Group(f"{name}, {side}", np.flatnonzero((self.kind == k) & (self.face == g)),
                   self.t[(self.kind == k) & (self.face == g)] / 60.0, "time", "min")
             for k, name in NAMES.items() for g, side in ((1, "left"), (-1, "right"))
         ]  # fmt: skip
-        return Regression(quantities, X, y, None, None, groups, "circle", "″", ARCSEC, "white")
+        return Regression(list(FITTED), X, y, None, None, groups, "circle less its zero", "″", ARCSEC, "white")
+
+    def derived(self, found: Findings) -> Findings:
+        true, phi = dict(self.setup.truth or {}), self.setup.latitude
+        if "azimuth" in true:
+            true["across"] = true["azimuth"] * math.cos(phi)
+        quantities = [Quantity.of(n, text, unit, true.get(key)) for n, (text, unit, key) in FITTED.items()]
+        return found.derive(quantities, lambda b: b[: len(FITTED)] + self.zero * ZERO)
 
     def effects(self, found: Findings) -> list[Effect]:
         s, star = self.setup, np.where(self.kind == STAR, 1.0, 0.0)

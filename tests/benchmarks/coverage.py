@@ -91,21 +91,6 @@ def latitude(low: float, high: float) -> Callable[[Rng], float]:
     return lambda rng: math.radians(rng.uniform(low, high)) * sign(rng)
 
 
-def north(low: float, high: float) -> Callable[[Rng], float]:
-    return lambda rng: math.radians(rng.uniform(low, high))
-
-
-def aligned(rng: Rng) -> Values:
-    """A stand off the pole, and a theodolite with its errors."""
-    names = ("azimuth", "elevation", "collimation", "trunnion", "level_zero", "inclinometer_zero")
-    found: Values = {f"theodolite.{n}": rng.uniform(-30.0, 30.0) * ARCSEC for n in names}
-    return {**found, "theodolite.lean": list(rng.uniform(-10.0, 10.0, 2) * ARCSEC), "longitude": rng.uniform(-3.0, 3.0)}
-
-
-def of_sights(_: Noise, values: Values) -> Values:
-    return {"theodolite.pointing": 1.0 * ARCSEC, "theodolite.bubble": 0.1 * ARCSEC}
-
-
 SIZES = (0.55, 1.3, 0.1)  # deg/h per g^n
 
 
@@ -241,7 +226,6 @@ CASES = {
         "table_environment", {"dwell": 225.0, "readings": 90, "tilting": 100.0 * ARCSEC, "settle": 2.0}, exposed,
         latitude(0.0, 70.0),
     ),
-    "stand_alignment": Case("stand_alignment", {"sets": 4}, aligned, north(12.0, 70.0), of_sights),
     "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
     "open_loop_drift": Case(
         "open_loop_drift", {"wait": 2.0, "dwell": 0.1}, floated, latitude(0.0, 85.0), of_pickoff(0.1, 0.02 * DPH),
