@@ -94,6 +94,8 @@ class ServoVerticalLevel(ServoTest):
         return super().check_parameters(parameters) + (problems if names else [])
 
     def warnings(self) -> list[str]:
+        from gyrobench.reduction.drift.channels import words
+
         from .refusals import unseen
 
-        return unseen(self.attitudes())
+        return [words(text, self.channel) for text in unseen(self.attitudes())]

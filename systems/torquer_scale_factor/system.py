@@ -8,7 +8,8 @@ from typing import Any
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
-from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
+from gyrobench.system.families.servo_channel import gyro_on_table
+from gyrobench.system.families.servo_test import GYRO_SERVO
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
