@@ -14,6 +14,7 @@ import numpy as np
 
 from gyrobench import drift
 from gyrobench.arrays import Array
+from gyrobench.component.set_up import Errors
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
@@ -41,6 +42,20 @@ def truth_in(run: RunDocument, channel: str) -> dict[str, float] | None:
     own = {drift.name_2dof(channel, n): n for n in drift.NAMES}
     found = truth_of(run, own)
     return None if found is None else {own[n]: drift.sign_2dof(channel, own[n]) * v for n, v in found.items()}
+
+
+def errors_in(errors: Errors, channel: str) -> Errors:
+    """Return simulated errors of the set-up, a gyro turned about its x, y, z axes as one turned about I, O, S.
+
+    About O = -x the y channel is turned by minus the angle about x: its input axis then leans towards the spin axis.
+    """
+    if channel != "y":
+        return errors
+    about = {n: errors[n] for n in ("mount.1", "mount.2") if n in errors}
+    kept = {n: x for n, x in errors.items() if n not in (*about, "mount.input_to_spin")}
+    if isinstance(x := about.get("mount.1"), float):
+        kept |= {"mount.2": -x, "mount.input_to_spin": x}
+    return kept | ({"mount.1": about["mount.2"]} if "mount.2" in about else {})
 
 
 def words(text: str, channel: str) -> str:

@@ -69,7 +69,8 @@ class HeldSetup(SiteSetup):
             "truth": channels.truth_in(run, channel),
             "remount": remount_of(run),
         }
-        return super().of(run, **{**known, **own})
+        made = super().of(run, **{**known, **own})
+        return replace(made, errors=channels.errors_in(made.errors, channel))
 
     def name(self, phase: int) -> str:
         """Return the attitude of a phase, with its number where the attitude comes back."""
