@@ -167,6 +167,10 @@ def of_encoder(n: Noise, values: Values) -> Values:
     return {**of_gyro(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
 
 
+def of_encoder_2dof(n: Noise, values: Values) -> Values:
+    return {**of_two_channels(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
+
+
 def of_two_encoders(n: Noise, values: Values) -> Values:
     quantum = n.error(0.02 * DPH) * math.sqrt(12.0)
     return {**of_two_channels(n, values), "outer.quantum": quantum, "inner.quantum": quantum}
@@ -247,6 +251,12 @@ CASES = {
          "settle": 2.0},
         floated, latitude(12.0, 78.0), of_encoder,
     ),
+    "servo_polar, y axis": Case(
+        "servo_polar",
+        {"channel": "y", "site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "lock.i_max": 10.0,
+         "time": 172.4, "window": 4.8, "dwell": 48.0, "settle": 2.0},
+        two_channels, latitude(12.0, 78.0), of_encoder_2dof,
+    ),
     "servo_two_axis": Case(
         "servo_two_axis",
         {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage_x.i_max": 10.0, "cage_y.i_max": 10.0, "time": 172.8,
@@ -304,7 +314,10 @@ class Count:
 def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> list[Values]:
     """What each run of a case is given: values and a seed."""
     rng = np.random.default_rng(seed)
-    with Session(case.system) as session:
+    system = load_system(case.system)
+    if "channel" in case.values:  # it decides which slots there are
+        system.set("channel", case.values["channel"])
+    with Session(system) as session:
         probe = case.drawn(rng)
         with seen_windows() as seen:
             load_system(case.system).with_values(probe).reduce(session.run(probe, seed=1))

@@ -29,7 +29,8 @@ CHANNEL = {
         "", str, "of a two-degree-of-freedom gyro: the axis along the table axis, x or y; empty: a floated gyro"
     ),
 }
-GYRO, LOCK, LOCKED = "gyro_2dof", "rebalance_two_axis", "locked"
+LOCKED = "locked"  # the sampler of the current that locks the other axis
+LOCK_SLOTS = {"lock": Slot("Rebalance", "rebalance_two_axis"), LOCKED: Slot("Sampler", "sampler")}
 #: gyro axes x, y, z (rows) in table axes, for the channel along the table axis
 FACES = {"": ON_TABLE, "x": ON_TABLE, "y": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))}
 #: what a servo table is told of a free rotor, which neither lags nor pulls at the table: H/C = 1, hardly any inertia
@@ -111,6 +112,15 @@ class ChannelTest(System):
         """Return the gyro axes (rows) in table axes."""
         return FACES.get(self.channel, ON_TABLE)
 
+    def request(self, slot: str) -> None:
+        """Add what is asked for; a value of the locking loop asks for a channel."""
+        super().request(slot)
+        if slot in LOCK_SLOTS and not self.channel:
+            self.set("channel", "x")
+
+    def all_slots(self) -> dict[str, Slot]:
+        return {**super().all_slots(), **{n: s for n, s in LOCK_SLOTS.items() if n not in self.slots}}
+
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
         if slot == "gyro" and not self.channel and has_port(part, "u_x", bench):
@@ -130,8 +140,8 @@ class ChannelTest(System):
         c = self.channel
         if c in OTHER:
             slots = {n: s for n, s in self.slots.items() if n not in ("gyro", "sampler")}
-            slots |= {"gyro": Slot("TwoAxisGyro", GYRO), "lock": Slot("Rebalance", LOCK)}
-            slots |= {"sampler": self.slots["sampler"], LOCKED: Slot("Sampler", "sampler")}
+            slots |= {"gyro": Slot("TwoAxisGyro", "gyro_2dof"), "lock": LOCK_SLOTS["lock"]}
+            slots |= {"sampler": self.slots["sampler"], LOCKED: LOCK_SLOTS[LOCKED]}
             windows = self.windows
             assert windows is not None
             vars(self).update(
