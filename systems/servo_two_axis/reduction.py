@@ -254,7 +254,7 @@ def _shared_table(found: Mapping[str, Findings]) -> Table:
     for symbol in ("K_zx", "K_zy"):
         pair = []
         for c, fit in found.items():
-            ours, sign = closed.BOOK[c][symbol]
+            ours, sign = channels.BOOK[c][symbol]
             k = [q.name for q in fit.quantities].index(ours)
             pair.append((sign * float(fit.value[k]) / DPH, float(fit.u[k]) / DPH))
         (a, ua), (b, ub) = pair

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench import frames
 from gyrobench.arrays import Array
@@ -36,6 +36,7 @@ class TorquerScaleFactor(ChannelTest, TableTest):
         table=Slot("ServoTable", "table_servo"), source=Slot("CurrentSource", "current_source"),
         gyro=Slot("SdfGyro", "floated_gyro"),
     )  # fmt: skip
+    axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     # in servo mode the table has no target: the sequencer's target is the current
     wires = f"""
         {TableTest.wires}

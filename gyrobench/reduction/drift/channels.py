@@ -87,7 +87,8 @@ def in_channel(found: Findings, channel: str) -> Findings:
     before = found.function
 
     def turned(beta: Array) -> Array:
-        return signs * (beta if before is None else np.asarray(before(beta)))
+        out: Array = signs * (beta if before is None else np.asarray(before(beta)))
+        return out
 
     return found.derive([_named(q, channel, float(s)) for q, s in zip(own, signs, strict=True)], turned)
 

@@ -30,7 +30,6 @@ CHANNEL = {
     ),
 }
 LOCKED = "locked"  # the sampler of the current that locks the other axis
-LOCK_SLOTS = {"lock": Slot("Rebalance", "rebalance_two_axis"), LOCKED: Slot("Sampler", "sampler")}
 #: gyro axes x, y, z (rows) in table axes, for the channel along the table axis
 FACES = {"": ON_TABLE, "x": ON_TABLE, "y": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))}
 #: what a servo table is told of a free rotor, which neither lags nor pulls at the table: H/C = 1, hardly any inertia
@@ -100,6 +99,7 @@ class ChannelTest(System):
     loop leaves, zero with its integral.
     """
 
+    axis_parts: ClassVar[Mapping[str, str]]  # of the slots gyro and lock, unless others are given
     locked_columns: ClassVar[Mapping[str, str]] = {"locked": f"{LOCKED}.mean", "flagged_locked": f"{LOCKED}.flagged"}
 
     @property
@@ -115,11 +115,15 @@ class ChannelTest(System):
     def request(self, slot: str) -> None:
         """Add what is asked for; a value of the locking loop asks for a channel."""
         super().request(slot)
-        if slot in LOCK_SLOTS and not self.channel:
+        if slot in ("lock", LOCKED) and not self.channel:
             self.set("channel", "x")
 
     def all_slots(self) -> dict[str, Slot]:
-        return {**super().all_slots(), **{n: s for n, s in LOCK_SLOTS.items() if n not in self.slots}}
+        return {**self.locking(), **super().all_slots()}
+
+    def locking(self) -> dict[str, Slot]:
+        """Return the slots of the loop that locks the other axis."""
+        return {"lock": Slot("Rebalance", self.axis_parts["lock"]), LOCKED: Slot("Sampler", "sampler")}
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
@@ -140,8 +144,9 @@ class ChannelTest(System):
         c = self.channel
         if c in OTHER:
             slots = {n: s for n, s in self.slots.items() if n not in ("gyro", "sampler")}
-            slots |= {"gyro": Slot("TwoAxisGyro", "gyro_2dof"), "lock": LOCK_SLOTS["lock"]}
-            slots |= {"sampler": self.slots["sampler"], LOCKED: LOCK_SLOTS[LOCKED]}
+            lock = self.locking()
+            slots |= {"gyro": Slot("TwoAxisGyro", self.axis_parts["gyro"]), "lock": lock["lock"]}
+            slots |= {"sampler": self.slots["sampler"], LOCKED: lock[LOCKED]}
             windows = self.windows
             assert windows is not None
             vars(self).update(
