@@ -50,7 +50,7 @@ def test_random_gyros(session: Session, seed: int) -> None:
         assert found[f"K{c}_q"].estimate == pytest.approx(K_q, abs=1e-11)
         assert found[f"K{c}_φ"].estimate == pytest.approx(K_phi, abs=1e-11)
         assert found[f"K{c}_q"].truth == K_q and found[f"K{c}_φ"].truth == K_phi
-    # the rotor stands at the null of the pickoff n: psi_x' = 0 = -omega_x + (omega_z + K_q) n_y - K_phi n_x + ... + k_y i_y
+    # the rotor stands at the null n of its pickoffs: 0 = -omega_x + (omega_z + K_q) n_y - K_phi n_x + ... + k_y i_y
     C = np.array(json.loads(given["attitude"]))
     phi = given["latitude"]
     g = frames.normal_gravity(phi) / frames.G0
@@ -80,7 +80,7 @@ def test_random_gyros(session: Session, seed: int) -> None:
 def test_what_the_springs_allow_and_what_the_loops_have(session: Session) -> None:
     """kappa = 0.05 1/s, 0.01 deg/h: a tenth is 1e-3 deg/h = 1e-3 arcsec/s, so 0.02 arcsec and a gain of W/0.02 arcsec.
 
-    W = 15.041 arcsec/s: 752 1/s.  The loop with K_p alone has k K_sg K_p = 100 1/s and leaves 0.15 arcsec: 0.0075 deg/h.
+    W = 15.041 arcsec/s: 752 1/s.  The loop with K_p alone, k K_sg K_p = 100 1/s, leaves 0.15 arcsec: 0.0075 deg/h.
     """
     quiet = dict.fromkeys(load_system(NAME).noises, 0.0)
     springs = {"gyro.K_q": 0.03, "gyro.K_phi": 0.04, "rebalance_x.K_i": 0.0}
