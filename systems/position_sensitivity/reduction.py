@@ -83,7 +83,7 @@ class PositionSetup(SiteSetup):
         return out
 
 
-class Channel(DriftReduction[PositionSetup]):
+class PositionChannel(DriftReduction[PositionSetup]):
     """One channel, with the current of the torquer about the other axis."""
 
     def __init__(self, windows: Mapping[str, Array], setup: PositionSetup, channel: str) -> None:
@@ -114,7 +114,8 @@ class Channel(DriftReduction[PositionSetup]):
             Quantity.of(q, f"quadrature stiffness, {c} channel", "1/s", true.get(q)),
             Quantity.of(phi, f"in-phase stiffness, {c} channel", "1/s", true.get(phi)),
         ]
-        shown = Group(f"{c} channel", np.arange(y.size), ((t0 + t1) / 2.0 - t0[0]) / 60.0, "time", "min")
+        about = OTHER[c]
+        shown = Group("at the offsets", np.arange(y.size), self.psi[about] / ARCSEC, f"angle about {about}", "″")
         candidates = nuisances.common(self.windows) if s.nuisances else ()
         return Regression(quantities, X, y, t0, t1, [shown], candidates=candidates)
 
@@ -161,7 +162,7 @@ class Reduction(ChannelTests[PositionSetup]):
     """Both channels from windows with :data:`COLUMNS`, and what they ask of the loops."""
 
     handling = staticmethod(handling_candidates.at_rest)
-    channel = Channel
+    channel = PositionChannel
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> PositionSetup:

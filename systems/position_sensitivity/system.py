@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from gyrobench import drift
 from gyrobench.attitudes import attitude_problems, parse
@@ -29,6 +29,8 @@ OFFSET = Socket(
         out("u_out", "V", "pickoff voltage with the offset"),
     ),
 )
+#: 1/s: of the gyro, unless others are given
+SPRINGS = {"K_q": 0.01, "K_phi": 0.002}
 #: offsets of a cycle, in units of the option: about x, about y
 CYCLE = ((0, 0), (1, 0), (-1, 0), (0, 0), (0, 1), (0, -1))
 #: the pickoff about x is nulled by the loop that feeds the torquer about y
@@ -108,7 +110,7 @@ class PositionSensitivity(TwoChannelTest):
             **{f"u_{a}": f"angle_{a}.mean" for a in "xy"},
         },
     )
-    channel_period: ClassVar[float] = 1.0
+    channel_period = 1.0
 
     def plan(self) -> Plan:
         """Return the offsets of every cycle, with the angles as targets of a table at rest."""
@@ -126,7 +128,8 @@ class PositionSensitivity(TwoChannelTest):
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         told = {f"offset_{a}.K_sg?": parts[f"gyro.K_sg_{a}"] for a in "xy" if f"gyro.K_sg_{a}" in parts}
-        return {**super().parameters(parts), **told}
+        springs = {f"gyro.{n}?": value for n, value in SPRINGS.items()}
+        return {**super().parameters(parts), **springs, **told}
 
     def check(self) -> list[str]:
         problems = attitude_problems(self["attitude"], self["latitude"]) + super().check()
