@@ -114,10 +114,19 @@ class PositionChannel(DriftReduction[PositionSetup]):
             Quantity.of(q, f"quadrature stiffness, {c} channel", "1/s", true.get(q)),
             Quantity.of(phi, f"in-phase stiffness, {c} channel", "1/s", true.get(phi)),
         ]
-        about = OTHER[c]
-        shown = Group("at the offsets", np.arange(y.size), self.psi[about] / ARCSEC, f"angle about {about}", "″")
         candidates = nuisances.common(self.windows) if s.nuisances else ()
-        return Regression(quantities, X, y, t0, t1, [shown], candidates=candidates)
+        return Regression(quantities, X, y, t0, t1, self._groups(), candidates=candidates)
+
+    def _groups(self) -> list[Group]:
+        """Return the readings with the rotor off null about the channel's own axis, and the others, over that angle."""
+        own = np.abs(self.psi[self.channel])
+        off = own > 0.5 * float(own.max())
+        each = ((OTHER[self.channel], ~off), (self.channel, off))
+        return [
+            Group(f"off null about {a}", np.flatnonzero(rows), self.psi[a][rows] / ARCSEC, f"angle about {a}", "″")
+            for a, rows in each
+            if rows.any()
+        ]
 
     def effects(self, found: Findings) -> list[Effect]:
         s, k, turned = self.setup, self.setup.k[self.torquer], []
