@@ -107,6 +107,12 @@ def two_channels(rng: Rng, terms: int = 9) -> Values:
     return found
 
 
+def on_springs(rng: Rng) -> Values:
+    """Two channels whose rotor is on springs, and pickoffs that are off null."""
+    null = {f"gyro.null_{a}": rng.uniform(-10.0, 10.0) * ARCSEC for a in "xy"}
+    return {**two_channels(rng), **null, "gyro.K_q": rng.uniform(-0.03, 0.03), "gyro.K_phi": rng.uniform(0.0, 0.03)}
+
+
 def simple_channels(rng: Rng) -> Values:
     """The four terms a channel of the simple model; the others are 0."""
     return {n: v if n[6:] in SIMPLE or ".k" in n or "terms" in n else 0.0 for n, v in two_channels(rng).items()}
@@ -256,6 +262,10 @@ CASES = {
         {"channel": "y", "site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "lock.i_max": 10.0,
          "time": 172.4, "window": 4.8, "dwell": 48.0, "settle": 2.0},
         two_channels, latitude(12.0, 78.0), of_encoder_2dof,
+    ),
+    "position_sensitivity": Case(
+        "position_sensitivity", {"dwell": 10.0, "settle": 1.0}, on_springs, latitude(0.0, 85.0), of_two_channels,
+        attitude=True,
     ),
     "servo_two_axis": Case(
         "servo_two_axis",
