@@ -25,6 +25,15 @@ Set = Annotated[
         autocompletion=complete_setting,
     ),
 ]
+FromRun = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--from-run",
+        metavar="RUN",
+        help="Take values of the result of another test, where this one says how (accelerometer_four: the first "
+        "harmonic of a table_position_test); --set goes before them.  Repeatable.",
+    ),
+]
 Part = Annotated[
     list[str] | None,
     typer.Option(

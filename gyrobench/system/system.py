@@ -91,7 +91,7 @@ class OnRequest:
     """Slots that a system has only where they are asked for: a part is put into the first, or a parameter of it is set.
 
     Without them the system is the one it was: no FMU, no wire, no column more.  columns: further ones of the windows.
-    instead_of: the line of the system's wires that theirs replace.
+    instead_of: the lines of the system's wires that theirs replace.
     """
 
     slots: Mapping[str, Slot]
@@ -143,6 +143,8 @@ class System(Configurable):
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
+    #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
+    takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
@@ -346,8 +348,9 @@ class System(Configurable):
         return found
 
 
-def _without(wires: str, line: str) -> str:
-    return "\n".join(x for x in wires.splitlines() if not line or x.split() != line.split())
+def _without(wires: str, lines: str) -> str:
+    gone = [line.split() for line in lines.splitlines()]
+    return "\n".join(x for x in wires.splitlines() if not x.split() or x.split() not in gone)
 
 
 def load_system(name: str, bench: Path | None = None) -> System:
