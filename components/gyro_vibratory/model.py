@@ -13,7 +13,7 @@ class GyroVibratory(VibratoryGyro):
         sense motion = -coupling x drive amplitude x Re(z exp(i w_x t))
         z' = -p z + r (W + i W_q + white - u)            p = 1/tau - i delta, r: see VibratoryGyro  [GYRO-VIBRATORY]
         w  = exp(-i phi) (z + pickoff)                                      demodulated, phi: phase error
-        open loop:  u = 0,   v = p0/r0 w                              p0, r0: p, r at the temperature of the coefficients
+        open loop:  u = 0,   v = p0/r0 w                             p0, r0: p, r at the temperature of the coefficients
         rebalance:  v = 2 pi loop/r0 (w + p0 integral of w),   u = exp(i phi) v
         rate = Re v through the output filter, sampled (FilteredRateGyro)
 

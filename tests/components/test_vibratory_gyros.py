@@ -1,5 +1,5 @@
-"""gyro_vibratory, gyro_vibratory_carrier: phasors, closed forms and an integration of both modes that use no code of the
-parts.  [GYRO-VIBRATORY]"""
+"""gyro_vibratory, gyro_vibratory_carrier: phasors, closed forms and an integration of both modes that use no code of
+the parts.  [GYRO-VIBRATORY]"""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def test_open_loop_against_the_phasor(split: float) -> None:
 
 
 def test_scale_factor_over_temperature_open_and_closed() -> None:
-    """Split 100 Hz that grows by 1 Hz/K: 10 K leave 1/1.1 of the open loop, and nothing of a rebalanced scale factor."""
+    """Split 100 Hz that grows by 1 Hz/K: 10 K leave 1/1.1 of the open loop, all of the rebalanced scale."""
     common = {"omega": (0.5, 0.0, 0.0), "temperature": 10.0, "split_T": 1.0, "frequency_T": 0.0}
     wide = run(gyro(closed=0.0, **common), 0.01)[-1, 0] / 0.5
-    ratio = ((F + 100.0) ** 2 - F**2) / ((F + 110.0) ** 2 - F**2)  # stiffness against the inertia at the drive frequency
+    ratio = ((F + 100.0) ** 2 - F**2) / ((F + 110.0) ** 2 - F**2)  # stiffness less inertia at w_x
     assert wide == pytest.approx(ratio, rel=1e-4)  # 1/Q is left: (1/(tau delta))2 = 6e-5
     assert run(gyro(closed=1.0, **common), 0.5)[-1, 0] == pytest.approx(0.5, rel=1e-9)
 

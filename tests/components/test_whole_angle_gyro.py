@@ -1,5 +1,5 @@
-"""gyro_hemispherical: the Bryan factor by kinetic energies, its slow equations by an integration of both modes with their
-loops, drift by pattern angle, threshold.  No code of the part is used.  [GYRO-WHOLE-ANGLE]"""
+"""gyro_hemispherical: the Bryan factor by kinetic energies, its slow equations by an integration of both modes with
+their loops, drift by pattern angle, threshold.  No code of the part is used.  [GYRO-WHOLE-ANGLE]"""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_quadrature_that_is_left() -> None:
 
 
 def test_readout_mismatch() -> None:
-    """tan alpha_read = (1 - e/2) sin alpha/((1 + e/2) cos alpha): -e/2 sin 2 alpha, four ripples a turn of the pattern."""
+    """tan alpha_read = (1 - e/2) sin alpha/((1 + e/2) cos alpha): -e/2 sin 2 alpha."""
     e, w = 1e-3, 0.5
     part = gyro(omega=(w, 0.0, 0.0), readout_mismatch=e)
     read = run(part, 10.0)[:, 0].sum() * 1e-3
@@ -161,7 +161,7 @@ def test_readout_mismatch() -> None:
 
 
 def test_a_step_halved_is_four_times_as_near() -> None:
-    """Second order: 40 rad/s and axes a thousand times worse than those of the defaults, against a sixteenth of the step."""
+    """Second order: 40 rad/s, axes a thousand times worse than by default, against a sixteenth of the step."""
     given = {"damping_difference": 0.5, "frequency_difference": 0.02, "quadrature_phase": 0.1, "drive_angle": 0.05}
     ends = []
     for h in (4e-3, 2e-3, 2.5e-4):

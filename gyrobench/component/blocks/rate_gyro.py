@@ -120,8 +120,8 @@ class RateGyro(Component):
 class FilteredRateGyro(RateGyro):
     """Common part of rate gyros with an output filter, a range, an output rate and a word.  [GYRO-MEMS]
 
-        y'' = wn2 (s - y) - sqrt(2) wn y',   wn = 2 pi bandwidth                              Butterworth, second order
-        rate = y within +-range_max, sampled every `period`, in steps of `resolution`
+    y'' = wn2 (s - y) - sqrt(2) wn y',   wn = 2 pi bandwidth                              Butterworth, second order
+    rate = y within +-range_max, sampled every `period`, in steps of `resolution`
     """
 
     bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)

@@ -12,10 +12,10 @@ from gyrobench.component.math import Number, Vector, cos, pi, sin, sqrt, vector
 class VibratoryGyro(FilteredRateGyro):
     """Common part of vibrating rate gyros: two resonators of one make, for x and y.  [GYRO-VIBRATORY]
 
-        p = 1/tau - i delta,   1/tau = w_y / (2 Q),   delta = w_y - w_x,   r = 2 w_x / (w_y + w_x)    T: temperature
-        w_x = 2 pi frequency (1 + frequency_T T),   w_y = w_x + 2 pi (split + split_T T),   Q (1 + Q_T T)
-        W = scaled rate + drift + g2 f2 + damping_difference / (1 + Q_T T) sin(2 damping_axis) / (2 coupling)
-        W_q = quadrature + quadrature_T T
+    p = 1/tau - i delta,   1/tau = w_y / (2 Q),   delta = w_y - w_x,   r = 2 w_x / (w_y + w_x)    T: temperature
+    w_x = 2 pi frequency (1 + frequency_T T),   w_y = w_x + 2 pi (split + split_T T),   Q (1 + Q_T T)
+    W = scaled rate + drift + g2 f2 + damping_difference / (1 + Q_T T) sin(2 damping_axis) / (2 coupling)
+    W_q = quadrature + quadrature_T T
     """
 
     white_noise: ClassVar[str] = "white"
@@ -50,7 +50,7 @@ class VibratoryGyro(FilteredRateGyro):
     drive = Discrete(0.0, "rad/s", "angular frequency of the drive mode")
     decay = Discrete(0.0, "1/s", "decay rate of the sense mode")
     delta = Discrete(0.0, "rad/s", "detuning of the sense mode")
-    reach = Discrete(1.0, "1", "r: what a force does at the drive frequency over what it does at that of the sense mode")
+    reach = Discrete(1.0, "1", "r: effect of a force at the drive frequency, over that at the sense mode's")
     damping = Discrete([0.0, 0.0], "rad/s", "rate that the axes of damping make")
     c = Discrete([1.0, 1.0], "1", "cosine of the phase error")
     s = Discrete([0.0, 0.0], "1", "sine of the phase error")
@@ -78,7 +78,8 @@ class VibratoryGyro(FilteredRateGyro):
         self.delta = sense - self.drive
         self.reach = 2.0 * self.drive / (sense + self.drive)
         for j in range(2):
-            self.damping[j] = 0.5 * self.damping_difference / (self.coupling * quality) * sin(2.0 * self.damping_axis[j])
+            largest = 0.5 * self.damping_difference / (self.coupling * quality)
+            self.damping[j] = largest * sin(2.0 * self.damping_axis[j])
             phi = self.phase_error[j] + self.phase_T * T
             self.c[j] = cos(phi)
             self.s[j] = sin(phi)
