@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Noise, Output, Parameter, sampled
 from gyrobench.component.blocks.rate_gyro import AngleCounter, RateGyro
-from gyrobench.component.math import cos, exp, pi, sin, tan, vector
+from gyrobench.component.math import Number, cos, exp, pi, sin, tan, vector
 
 
 class GyroHemispherical(RateGyro):
@@ -65,7 +65,7 @@ class GyroHemispherical(RateGyro):
             self.q[j] = -pi * self.frequency_difference * sin(beta) / self.held()
             self.misread[j] = 0.5 * self.readout_mismatch * sin(2.0 * self.alpha[j])
 
-    def held(self) -> float:
+    def held(self) -> Number:
         """Return the rate at which the quadrature decays in its loop."""
         return 1.0 / self.tau + self.quadrature_gain * cos(self.quadrature_phase)
 

@@ -95,7 +95,7 @@ class VibratoryGyro(FilteredRateGyro):
 
     def at_right_angles(self) -> Vector:
         """Return the rates at right angles to Coriolis' force in phase, without white noise."""
-        return vector(self.quadrature) + self.temperature * vector(self.quadrature_T)
+        return vector(vector(self.quadrature) + self.temperature * vector(self.quadrature_T))
 
     def outputs(self) -> None:
         both = (self.rate_0 * self.rate_0 + self.delta_0 * self.delta_0) / (self.reach_0 * self.reach_0)
