@@ -111,3 +111,12 @@ class GyroVibratoryCarrier(VibratoryGyro):
         if self.temperature != self.T_seen:
             self.tune(self.temperature)
         self.read_out()
+
+    def outputs(self) -> None:
+        self.residual = vector([0.0, 0.0])
+        if self.closed > 0.5:
+            for j in range(2):
+                b = self.xd[j] / self.drive
+                qv = self.qd[j] / self.drive
+                wi = self.c[j] * (self.q[j] * b - qv * self.x[j]) - self.s[j] * (self.q[j] * self.x[j] + qv * b)
+                self.residual[j] = self.gain * (wi + self.rate_0 * self.ii[j] - self.delta_0 * self.ir[j])

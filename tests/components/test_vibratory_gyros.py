@@ -198,6 +198,7 @@ def test_carrier_against_envelope(closed: float, given: dict[str, float]) -> Non
     after = [run(part, 0.15) for part in parts]
     for one, other in (before, after):
         assert np.abs(one - other).max() < 2e-3 * 0.7
+    assert list(parts[1].residual) == pytest.approx(list(parts[0].residual), abs=5e-3)
 
 
 def test_carrier_with_half_the_step() -> None:
