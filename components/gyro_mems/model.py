@@ -1,8 +1,9 @@
 from __future__ import annotations
 
 from gyrobench.component import Discrete, Noise, Output, Parameter, State, sampled
+from gyrobench.component.blocks.mems import butterworth, sample_number, word
 from gyrobench.component.blocks.rate_gyro import RateGyro
-from gyrobench.component.math import Vector, clip, floor, pi, sqrt, vector
+from gyrobench.component.math import Vector, clip, pi, sqrt, vector
 
 DEG = pi / 180.0
 
@@ -59,11 +60,10 @@ class GyroMems(RateGyro):
         return vector(out)
 
     def flow(self) -> None:
-        wn = 2.0 * pi * self.bandwidth
         s = self.sensed() + self.noise.white
         for j in range(2):
             self.der.y[j] = self.v[j]
-            self.der.v[j] = wn * wn * (s[j] - self.y[j]) - sqrt(2.0) * wn * self.v[j]
+            self.der.v[j] = butterworth(s[j], self.y[j], self.v[j], self.bandwidth)
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -73,7 +73,7 @@ class GyroMems(RateGyro):
             self.before[j] = now
         due = 1.0
         if self.period > 0.0:
-            count = floor(self.t / self.period + 1e-6)
+            count = sample_number(self.t, self.period)
             due = 1.0 if count > self.number else 0.0
             self.number = count
         if due > 0.5:
@@ -81,7 +81,7 @@ class GyroMems(RateGyro):
             self.limit(self.range_max)
             if self.resolution > 0.0:
                 for j in range(2):
-                    self.measured[j] = self.resolution * floor(self.measured[j] / self.resolution + 0.5)
+                    self.measured[j] = word(self.measured[j], self.resolution)
 
     def outputs(self) -> None:
         self.density = self.white

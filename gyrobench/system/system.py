@@ -91,7 +91,7 @@ class OnRequest:
     """Slots that a system has only where they are asked for: a part is put into the first, or a parameter of it is set.
 
     Without them the system is the one it was: no FMU, no wire, no column more.  columns: further ones of the windows.
-    instead_of: the line of the system's wires that theirs replace.
+    instead_of: the lines of the system's wires that theirs replace.
     """
 
     slots: Mapping[str, Slot]
@@ -346,8 +346,9 @@ class System(Configurable):
         return found
 
 
-def _without(wires: str, line: str) -> str:
-    return "\n".join(x for x in wires.splitlines() if not line or x.split() != line.split())
+def _without(wires: str, lines: str) -> str:
+    gone = [x.split() for x in lines.splitlines()]
+    return "\n".join(x for x in wires.splitlines() if x.split() not in gone)
 
 
 def load_system(name: str, bench: Path | None = None) -> System:

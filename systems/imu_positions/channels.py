@@ -85,7 +85,18 @@ def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, floa
             row = np.atleast_1d(values[i]) if values.ndim == 1 else values[i]
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
-    return found
+    return found | _own_accelerometers(parameters)
+
+
+def _own_accelerometers(parameters: Mapping[str, Any], slot: str = "accelerometers") -> dict[str, float]:
+    """Return the coefficients of accelerometers that stand in their own slot, SI; {} where there are none."""
+    if f"{slot}.bias" not in parameters:
+        return {}
+    bias, scale = (np.asarray(parameters[f"{slot}.{n}"], dtype=float) for n in ("bias", "scale"))
+    axes = np.reshape(np.asarray(parameters.get(f"{slot}.axes", np.eye(3)), dtype=float), (3, 3))
+    matrix = (1.0 + scale[:, None]) * axes - np.eye(3)
+    found = {f"ba_{a}": float(b) for a, b in zip(AXES, bias, strict=True)}
+    return found | {f"Sa_{a}{b}": float(matrix[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}
 
 
 def overview(every: Sequence[Coefficient]) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SETT
 from gyrobench.system.families.table_test import TableTest, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, parse_visits
 
@@ -30,6 +31,16 @@ IMU = Socket(
         out("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
     ),
 )
+#: what accelerometers of their own replace
+ACCELEROMETERS = {
+    f"imu.f_read[{k}] -> sampler_a{a}.x": f"accelerometers.f_read[{k}] -> sampler_a{a}.x" for k, a in enumerate("xyz", 1)
+}
+#: noises of the accelerometers of the bench
+ACCELEROMETER_NOISES = tuple(
+    f"accelerometers.{n}"
+    for n in ("turn_on", "white", *(f"{a}_{m}" for a in "xyz" for m in ("flicker", "walk")),
+              *(f"white_{a}" for a in "xyz"))
+)  # fmt: skip
 INDEX_RATE, ACCELERATION = [0.5, 0.5], [0.5, 0.5]  # rad/s, rad/s2
 
 
@@ -60,6 +71,14 @@ class ImuPositions(TableTest):
         *(sampled(f"sampler_{c.name}", f"table: angle_{'y' if k == 1 else 'x'}_read") for k, c in enumerate(CHANNELS)),
         *(f"imu.{c.output}[{c.axis + 1}] -> sampler_{c.name}.x" for c in CHANNELS),
     ])  # fmt: skip
+    on_request: ClassVar[Mapping[str, OnRequest]] = {
+        "accelerometers": OnRequest(
+            {"accelerometers": Slot("Accelerometers", "accelerometer_mems")},
+            "\n".join(["table -> accelerometers: f", *ACCELEROMETERS.values()]),
+            channels=tuple(f"accelerometers.f_read[{k}]" for k in (1, 2, 3)),
+            instead_of="\n".join(ACCELEROMETERS),
+        )
+    }
     options = (
         SITE
         | {
@@ -108,6 +127,14 @@ class ImuPositions(TableTest):
     def channel_period(self) -> float:  # type: ignore[override]
         """Every step where the turns between the positions are integrated."""
         return self.step if self["attitudes"] == UNKNOWN else 10.0
+
+    def request(self, slot: str) -> None:
+        there = slot in self.slots
+        super().request(slot)
+        if slot == "accelerometers" and not there:
+            vars(self).update(
+                noises=(*self.noises, *ACCELEROMETER_NOISES), assumed=(*self.assumed, "accelerometers.mount")
+            )
 
     def times(self) -> plans.Times:
         """Return dwells and turns.  Raises InvalidValueError."""
