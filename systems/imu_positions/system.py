@@ -33,7 +33,8 @@ IMU = Socket(
 )
 #: what accelerometers of their own replace
 ACCELEROMETERS = {
-    f"imu.f_read[{k}] -> sampler_a{a}.x": f"accelerometers.f_read[{k}] -> sampler_a{a}.x" for k, a in enumerate("xyz", 1)
+    f"imu.f_read[{k}] -> sampler_a{a}.x": f"accelerometers.f_read[{k}] -> sampler_a{a}.x"
+    for k, a in enumerate("xyz", 1)
 }
 #: noises of the accelerometers of the bench
 ACCELEROMETER_NOISES = tuple(
