@@ -231,6 +231,10 @@ class Reduction(ChannelTests[ImuSetup]):
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
         return tables.tables(coefficients)
 
+    def result(self) -> DriftTestResult:
+        found = super().result()
+        return replace(found, tables=[*found.tables, tables.by_position(self.windows, self.kinematics.motion, found)])
+
 
 def _places(force: Array) -> Array:
     """Return the different directions (n, 3) of specific forces, some arc minutes apart at least."""

@@ -42,7 +42,6 @@ ACCELEROMETER_NOISES = tuple(
     for n in ("turn_on", "white", *(f"{a}_{m}" for a in "xyz" for m in ("flicker", "walk")),
               *(f"white_{a}" for a in "xyz"))
 )  # fmt: skip
-INDEX_RATE, ACCELERATION = [0.5, 0.5], [0.5, 0.5]  # rad/s, rad/s2
 
 
 class ImuPositions(TableTest):
@@ -56,6 +55,7 @@ class ImuPositions(TableTest):
     title = "Multi-position and rate test of an inertial measurement unit"
     spec = ("IMU-POSITIONS", "IMU-HAND", "IMU-UPDOWN")
     reduction = "reduction"
+    protocol = "design"
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
@@ -84,7 +84,7 @@ class ImuPositions(TableTest):
         SITE
         | {
             "attitudes": Option("table", str, "table (read by it), unknown (gravity and turns), up_down (of a file)"),
-            "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
+            "positions": Option(12, int, "positions: 6, 12, 18, 20, 24, 26 or 36"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
             "windows": Option(4, int, "averages a position", 1, 100),
@@ -158,7 +158,11 @@ class ImuPositions(TableTest):
         return plans.plan(self.visits(), self.times())
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**super().parameters(parts), "table.index_rate": INDEX_RATE, "table.acceleration": ACCELERATION}
+        return {
+            **super().parameters(parts),
+            "table.index_rate": [plans.INDEX_RATE] * 2,
+            "table.acceleration": [plans.ACCELERATION] * 2,
+        }
 
     def check(self) -> list[str]:
         if self["attitudes"] not in ("table", UNKNOWN):

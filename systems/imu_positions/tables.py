@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.result import Coefficient, Table
+from gyrobench.result import Coefficient, DriftTestResult, Table
 from gyrobench.units import factor
+
+from .channels import CHANNELS
+from .geometry import Motion
 
 AXES = "xyz"
 TRIADS = {"g": ("gyros", "rad/s"), "a": ("accelerometers", "m/s²")}
@@ -47,6 +50,27 @@ def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
         head = ["triad", "axes", "angle − 90° / ″", "u, type A / ″"]
         out.append(Table("imu.angles", "Angles between the input axes", caption, head, angles))
     return out
+
+
+def by_position(windows: Mapping[str, Any], motion: Motion, found: DriftTestResult) -> Table:
+    """Return what is left of the mean reading of each instrument in each phase."""
+    phase = np.asarray(windows["phase"]).astype(int)
+    left = {s.label: (np.rint(s.x), np.asarray(s.residual)) for s in found.series}
+    rows: list[list[Any]] = []
+    for p in np.unique(phase):
+        k = int(np.flatnonzero(phase == p)[0])
+        turned = [math.degrees((end[k] - start[k]) / motion.length[k]) for start, end in (motion.outer, motion.inner)]
+        at = [math.degrees(start[k]) for start, _ in (motion.outer, motion.inner)]
+        rest = bool(motion.at_rest[k])
+        means = [
+            float(np.mean(r[x == p])) if np.any(x == p) else None
+            for x, r in (left[f"{c.name}: {c.words}"] for c in CHANNELS)
+        ]
+        rows.append([int(p), *(at if rest else [None, None]), 0.0 if rest else max(turned, key=abs), *means])
+    head = ["phase", "outer / °", "inner / °", "rate / (°/s)"]
+    head += [f"{c.name} / {'(°/h)' if c.gyro else 'µg'}" for c in CHANNELS]
+    caption = "Mean of the readings of a phase less the fit; one that stands out is a position that was mistaken"
+    return Table("imu.positions", "Residuals by position", caption, head, rows)
 
 
 def _matrix(kind: str, by_name: Mapping[str, Coefficient]) -> Array:

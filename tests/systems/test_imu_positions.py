@@ -170,7 +170,7 @@ def test_mistakes_are_named(said: str) -> None:
     [
         ("visits", "0 0; 90 0; 180 0; -90 0; 45 0; 135 0", "directions of gravity: rank"),
         ("visits", "0 0; 90 0; 180 0", "positions for 4 unknowns of an instrument: at least 5"),
-        ("positions", "7", "positions = 7: 6, 12, 18, 26 are possible"),
+        ("positions", "7", "positions = 7: 6, 12, 18, 20, 24, 26, 36 are possible"),
         ("rate_axes", "xw", "rate_axes = xw: letters of xyz are expected"),
         ("visits", "0 up", "visits, visit 1"),
     ],
