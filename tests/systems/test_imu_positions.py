@@ -273,6 +273,44 @@ def test_mistaken_angles_of_a_file_are_named(said: str, tmp_path: Path) -> None:
     assert said in str(error.value)
 
 
+def stayed(w: dict[str, Any]) -> dict[str, Any]:
+    """The case stood in position 4 while position 5 was written down."""
+    out = dict(w)
+    for a in "xyz":
+        for n in (f"mean_g{a}", f"mean_a{a}"):
+            out[n] = w[n].copy()
+            out[n][w["phase"] == 5] = w[n][w["phase"] == 4]
+    return out
+
+
+def left_out(w: dict[str, Any]) -> dict[str, Any]:
+    """Position 7 was left out: the readings of 8 to 18 were written beside the angles of 7 to 17."""
+    kept = {n: v[w["phase"] != 18] for n, v in w.items()}
+    for a in "xyz":
+        for n in (f"mean_g{a}", f"mean_a{a}"):
+            kept[n] = np.where(kept["phase"] < 7, kept[n], w[n][w["phase"] != 7])
+    return kept
+
+
+FORGOTTEN = {
+    "position 5 forgotten (the case stayed in position 4)": stayed,
+    "position 7 forgotten (from it on the next ones were read)": left_out,
+}
+
+
+@pytest.mark.parametrize("said", FORGOTTEN)
+def test_a_forgotten_position_is_named(said: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(10)
+    world, places = World(), (*EDGES[4:], *FACES, *EDGES[:4])
+    w = FORGOTTEN[said](world.windows(plan(places, rate=0.0), Unit.drawn(rng), white(rng)))
+    try:  # refused where the readings are not those of three axes, otherwise a reason that takes the verdicts
+        result = reduction.Reduction.from_record(laboratory(tmp_path, w, world))
+        told = " ".join(r.text for r in result.reasons if r.id == "handling.error")
+    except ReductionError as error:
+        told = str(error)
+    assert said in told
+
+
 def test_a_file_gives_what_its_windows_give(tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     world, unit = World(), Unit.drawn(rng)
