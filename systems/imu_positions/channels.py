@@ -12,10 +12,15 @@ from gyrobench.frames import G0
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.result import Coefficient
-from gyrobench.units import DPH
+from gyrobench.units import ARCSEC, DPH
 
 UG = 1e-6 * G0  # m/s2
 AXES = "xyz"
+#: printed unit -> SI, of all coefficients of the test
+SCALES = {
+    "ppm": 1e-6, "″": ARCSEC, "°/h": DPH, "°/h/g": DPH, "µg": UG, "counts": 1.0, "counts/(rad/s)": 1.0,
+    "counts/(m/s²)": 1.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,8 +79,8 @@ BY_NAME = {c.name: c for c in CHANNELS}
 _PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba": "acc_bias", "Sa": "acc_scale"}
 
 
-def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
-    """Return the coefficients of the simulated part, SI; None where it has none."""
+def instruments_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
+    """Return the coefficients of the simulated instruments, SI; None where they have none."""
     found: dict[str, float] = {}
     for short, long in _PARAMETERS.items():
         if f"{slot}.{long}" not in parameters:

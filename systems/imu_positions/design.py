@@ -19,7 +19,7 @@ from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.visit_protocol import GUARD, DataNoise, random_terms
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.system.plan import Phase
+from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import System
 from gyrobench.system.visits import format_time
 
@@ -176,7 +176,7 @@ class _Candidates:
     def _windows(self, options: Mapping[str, Any]) -> tuple[Array, Array, Array, Array, Any]:
         """Return rate and specific force (n, 3), start and end (n,) of the windows of a plan, and which are at rest."""
         planned = self.system.with_values(options).plan()
-        assert isinstance(planned, plans.Plan)
+        assert isinstance(planned, Plan)
         t, at, speed = 0.0, np.zeros(2), np.zeros(2)
         rows: list[tuple[float, ...]] = []
         for phase in planned.phases:

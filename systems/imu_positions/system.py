@@ -9,14 +9,14 @@ import numpy as np
 
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SETTLE, SITE, type_b
-from gyrobench.system.families.table_test import TableTest, sampled
+from gyrobench.system.families.table_test import TableTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, parse_visits
 
-from . import geometry, norms, plans
+from . import geometry, instruments, norms, plans
 from .channels import CHANNELS
 from .hand import UNKNOWN
 from .measured import MEASURED
@@ -31,11 +31,16 @@ IMU = Socket(
         out("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
     ),
 )
-#: what accelerometers of their own replace
-ACCELEROMETERS = {
-    f"imu.f_read[{k}] -> sampler_a{a}.x": f"accelerometers.f_read[{k}] -> sampler_a{a}.x"
-    for k, a in enumerate("xyz", 1)
-}
+COMPENSATOR = Socket(
+    "ImuCompensator",
+    "takes known errors off the readings of an inertial measurement unit",
+    (
+        inp("rate", "rad/s", "rates that the gyros x, y, z read", 3),
+        inp("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
+        out("omega", "rad/s", "inertial rate, axes of the case", 3),
+        out("f", "m/s2", "specific force, axes of the case", 3),
+    ),
+)
 #: noises of the accelerometers of the bench
 ACCELEROMETER_NOISES = tuple(
     f"accelerometers.{n}"
@@ -63,23 +68,18 @@ class ImuPositions(TableTest):
         "imu": Slot(IMU, "imu"),
         **{f"sampler_{c.name}": Slot("Sampler", "sampler") for c in CHANNELS},
     }
-    # every sampler averages one channel; the first brings the outer angle, the second the inner one
-    wires = "\n".join([
-        "site -> table: f=f_local omega=omega_local",
-        "sequencer -> table: mode=mode_x mode=mode_y target=target_x target_y face",
-        "table -> sequencer: angle_x_read=angle in_position",
-        "table -> imu: omega f",
-        *(sampled(f"sampler_{c.name}", f"table: angle_{'y' if k == 1 else 'x'}_read") for k, c in enumerate(CHANNELS)),
-        *(f"imu.{c.output}[{c.axis + 1}] -> sampler_{c.name}.x" for c in CHANNELS),
-    ])  # fmt: skip
+    wires = instruments.wires()
     on_request: ClassVar[Mapping[str, OnRequest]] = {
-        "accelerometers": OnRequest(
-            {"accelerometers": Slot("Accelerometers", "accelerometer_mems")},
-            "\n".join(["table -> accelerometers: f", *ACCELEROMETERS.values()]),
+        instruments.ACCELEROMETERS: OnRequest(
+            {instruments.ACCELEROMETERS: Slot("Accelerometers", "accelerometer_mems")}, "",
             channels=tuple(f"accelerometers.f_read[{k}]" for k in (1, 2, 3)),
-            instead_of="\n".join(ACCELEROMETERS),
-        )
-    }
+        ),
+        instruments.COMPENSATOR: OnRequest(
+            {instruments.COMPENSATOR: Slot(COMPENSATOR, "imu_compensator")}, "",
+            channels=tuple(f"compensator.{n}[{k}]" for n in ("omega", "f") for k in (1, 2, 3)),
+        ),
+    }  # fmt: skip
+    fitted: ClassVar[Mapping[str, tuple[str, str]]] = {"imu_compensator": (instruments.COMPENSATOR, "compensation")}
     options = (
         SITE
         | {
@@ -130,12 +130,14 @@ class ImuPositions(TableTest):
         return self.step if self["attitudes"] == UNKNOWN else 10.0
 
     def request(self, slot: str) -> None:
+        """Add the slots asked for, and read what comes last: the compensator, accelerometers of their own, the unit."""
         there = slot in self.slots
         super().request(slot)
-        if slot == "accelerometers" and not there:
-            vars(self).update(
-                noises=(*self.noises, *ACCELEROMETER_NOISES), assumed=(*self.assumed, "accelerometers.mount")
-            )
+        if slot in self.on_request and not there:
+            vars(self)["wires"] = instruments.wires(self.slots)
+        if slot == instruments.ACCELEROMETERS and not there:
+            more = (*self.noises, *ACCELEROMETER_NOISES), (*self.assumed, "accelerometers.mount")
+            vars(self).update(noises=more[0], assumed=more[1])
 
     def times(self) -> plans.Times:
         """Return dwells and turns.  Raises InvalidValueError."""

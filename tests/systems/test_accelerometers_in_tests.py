@@ -26,11 +26,11 @@ def test_imu_positions_reads_accelerometers_of_their_own() -> None:
     }  # fmt: skip
     found = {c.name: c for c in gb.load("imu_positions", values).run(seed=1, check_step=False).result.coefficients}
     for i, a in enumerate("xyz"):
-        assert found[f"ba_{a}"].estimate * tables.SCALE["µg"] == pytest.approx(bias[i], abs=1e-7)
+        assert found[f"ba_{a}"].estimate * tables.SCALES["µg"] == pytest.approx(bias[i], abs=1e-7)
         for j, b in enumerate("xyz"):
             c, true = found[f"Sa_{a}{b}"], (1.0 + scale[i]) * axes[i][j] - (i == j)
-            assert c.estimate * tables.SCALE[c.unit] == pytest.approx(true, abs=2e-8)
-            assert c.truth is not None and c.truth * tables.SCALE[c.unit] == pytest.approx(true, abs=1e-12)
+            assert c.estimate * tables.SCALES[c.unit] == pytest.approx(true, abs=2e-8)
+            assert c.truth is not None and c.truth * tables.SCALES[c.unit] == pytest.approx(true, abs=1e-12)
 
 
 def test_drift_record_of_an_accelerometer() -> None:

@@ -43,7 +43,7 @@ def white(rng: np.random.Generator) -> Any:
 
 
 def estimates(result: Any) -> dict[str, float]:
-    return {c.name: c.estimate * tables.SCALE[c.unit] for c in result.coefficients}
+    return {c.name: c.estimate * tables.SCALES[c.unit] for c in result.coefficients}
 
 
 def test_felt_is_that_of_a_plain_world() -> None:
@@ -104,7 +104,7 @@ def test_intervals_hold_the_truth() -> None:
         w = world.windows(plan(FACES + EDGES), unit, white(rng))
         truth = unit.coefficients()
         for c in reduction.reduce(w, setup(world)).coefficients:
-            low, high = (x * tables.SCALE[c.unit] for x in c.interval)
+            low, high = (x * tables.SCALES[c.unit] for x in c.interval)
             hits += low <= truth[c.name] <= high
             total += 1
     assert total == 24 * 33 and 0.92 < hits / total < 0.98
