@@ -86,6 +86,15 @@ From = Annotated[
         "libcosim's CSV files; values by --set, --part and --map as at the export.",
     ),
 ]
+FitTo = Annotated[
+    str | None,
+    typer.Option(
+        "--fit-to",
+        metavar="PART",
+        help="Write values of the result for a part, files for --set @FILE.toml, and of JSON and C: the noise of a "
+        "drift_record for a gyro (floated_gyro), the errors that imu_positions found for imu_compensator.",
+    ),
+]
 WithCertificate = Annotated[
     bool, typer.Option("--certificate", help="Write the certificate, too; needs laboratory.toml.")
 ]
