@@ -26,10 +26,9 @@ from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compar
 from gyrobench.reduction.noise_model.noise_model import Minimum, NoiseModel, Process, Scale
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
-from gyrobench.reduction.noise_model.prior import PEAKS
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -145,7 +144,7 @@ def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treate
         new = replace(treated, stretches=(*treated.stretches[:i], replace(s, steps=(*s.steps, step)),
                                           *treated.stretches[i + 1 :]))  # fmt: skip
         data = new.ordinates(means)
-        data.fixed = found.data.fixed
+        data.hold(found.resonances)
         fits = [maximize(data, found.prior, f.model, f.p) for f in found.ranked[:3]]
         tried.append((min(f.value for f in fits), new, min(fits, key=lambda f: f.value)))
     if not tried:
@@ -337,7 +336,7 @@ def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) ->
     if not treated.wild.size:
         return {}
     data: Ordinates = treated.ordinates(means, keep_wild=True)
-    data.fixed = found.data.fixed
+    data.hold(found.resonances)
     again = maximize(data, found.prior, at.model, at.p)
     out = {}
     for name, term in CALLED.items():

@@ -23,7 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft
+from numpy.typing import NDArray
+from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicker, markov_parts
@@ -31,6 +32,8 @@ from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicke
 LOW = 16  # first ordinates of each parity that are kept singly
 WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
 SHORTEST = 64  # samples of a stretch
+AROUND, NEAR, CLEAR = 257, 9, 5.0  # ordinates around and near one, and how much the near ones exceed the others at a peak
+CHI = 1.2703628454614782  # log of chi squared of one degree of freedom: its mean is minus this
 HUGE = 1e30
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
@@ -74,9 +77,7 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
     n = x.size
     c = fft.dct(x, norm="ortho")
     square = c * c if extra is None else c * c + extra
-    edges = [2 * LOW + 1]
-    while edges[-1] < n:
-        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
+    edges = _edges(square)
     out = []
     for odd in (True, False):
         k = np.arange(1 if odd else 2, n, 2)
@@ -88,6 +89,25 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
         out.append(_Part(odd, n, c[low], 0.5 * (first + last), 0.5 * (last - first) + 1.0, count,
                          np.add.reduceat(square[k], start), np.add.reduceat(c[k], start)))  # fmt: skip
     return out
+
+
+def _edges(square: Array) -> NDArray[np.int64]:
+    """Return the first ordinates of bins of powers (n,): of equal logarithmic width, but single ones of each parity
+    where a peak stands out that is narrower than they are.
+    """
+    n = square.size
+    edges = [2 * LOW + 1]
+    while edges[-1] < n:
+        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
+    start = np.array(edges)
+    # by the geometric mean around, that peaks do not move
+    log = np.log(np.maximum(square, 1e-300)) + CHI
+    around = np.exp(ndimage.uniform_filter1d(log, AROUND, mode="reflect"))
+    near = ndimage.uniform_filter1d(square, NEAR, mode="reflect")
+    peak = ndimage.maximum_filter1d((near > CLEAR * around).astype(np.int8), 2 * NEAR)
+    peak[: edges[0]] = 0
+    single = np.flatnonzero(peak)
+    return np.unique(np.concatenate([start, single[single % 2 == 1]]))
 
 
 class Ordinates:
@@ -131,6 +151,12 @@ class Ordinates:
         self.all_count = np.concatenate([self.count, np.ones(self.low_omega.size)])
         self.all_power = np.concatenate([self.power, self.columns.ravel() ** 2])
         self.fixed = np.zeros(grid.size)  # spectrum of terms that are not fitted
+        self.fixed_angle = 0.0  # and the variance of their errors of an angle
+
+    def hold(self, terms: Sequence[tuple[NoiseTerm, Array]]) -> None:
+        """Take terms with their parameters as they are, beside those of a model."""
+        self.fixed = np.asarray(sum((t.spectrum(p, self.grid) for t, p in terms), np.zeros(self.fixed.size)))
+        self.fixed_angle = sum(float(t.angle(p)) for t, p in terms)
 
     # ------------------------------------------------------------------ spectra and the covariance of the first ones
     def low_covariance(self, term: NoiseTerm, p: Array, S: Array) -> Array:
@@ -195,10 +221,7 @@ class Ordinates:
 
     def angle(self, model: Model, p: Array) -> Array:
         """Return the variance of the error of an angle (...), 0 where the model has none."""
-        for term, q in split(model, p):
-            if term.name == "quantization":
-                return np.exp(q[..., 0])
-        return np.zeros(p.shape[:-1])
+        return np.asarray(self.fixed_angle + sum(term.angle(q) for term, q in split(model, p)))
 
     def value(self, model: Model, p: Array) -> Array:
         """Return -2 log restricted likelihood (M,) of parameters p (M, q)."""
@@ -244,7 +267,7 @@ class Ordinates:
         gradient = slope[:, high] @ (self.count - self.power / S[high])
         h = 1e-4
         q2 = float(self.angle(model, p))
-        dq = np.array([float(q2) * (t.name == "quantization") for t, q in split(model, p) for _ in range(q.size)])
+        dq = (self.angle(model, p + h * np.eye(p.size)) - self.angle(model, p - h * np.eye(p.size))) / (2.0 * h)
         signs = np.concatenate([[0.0], np.full(p.size, h), np.full(p.size, -h)])
         which = np.concatenate([[0], np.arange(p.size), np.arange(p.size)])
         moved = S[high] + signs[:, None] * dS[which][:, high] if q2 else np.broadcast_to(S[high], (signs.size, self.b))

@@ -11,8 +11,8 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
-from gyrobench.reduction.noise_model.prior import PEAKS, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import NoiseTerm
+from gyrobench.reduction.noise_model.prior import SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
@@ -253,7 +253,7 @@ class ModelSearch:
             self._freeze(found)
         for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
             term, p = self.resonances.pop(0)
-            self.data.fixed = np.maximum(self.data.fixed - term.spectrum(p, self.data.grid), 0.0)
+            self.data.hold(self.resonances)
             at = self.best
             without = maximize(self.data, self.prior, at.model, at.p)
             found = self._with(at, term, p)
@@ -269,7 +269,7 @@ class ModelSearch:
         """Keep the last term of a fit as it is, forget what was tried without it."""
         term, p = found.model[-1], found.p[-3:]
         self.resonances.append((term, p))
-        self.data.fixed = self.data.fixed + term.spectrum(p, self.data.grid)
+        self.data.hold(self.resonances)
         self.seen = {}
         self.fit(found.model[:-1], found.p[:-3])
 
@@ -282,7 +282,7 @@ class ModelSearch:
 
 def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
     """Return the models tried for a record that differs little from another one, from the best models of that."""
-    data.fixed = before.data.fixed
+    data.hold(before.resonances)
     found = ModelSearch(data, Prior(data), resonances=before.resonances)
     for f in before.ranked[:3]:
         found.fit(f.model, f.p)

@@ -33,8 +33,10 @@ from scipy import special
 
 from gyrobench.arrays import Array
 
+PEAKS = ("resonance", "band")
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 LAGS = 4096  # of the covariance of a filter "shape"
+RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
 
 class Grid:
@@ -207,6 +209,20 @@ class NoiseTerm:
     def spectrum(self, p: Array, grid: Grid) -> Array:
         """Return S (..., b) for parameters p (..., size)."""
         return np.exp(p[..., 0:1]) * self.unit(p[..., 1:], grid)
+
+    def angle(self, p: Array) -> Array:
+        """Return the variance (...) of the errors of single angles: of what rises from frequency 0 on, (S - S(0))/
+        (4 sin^2(omega/2)).  Of a stretch the first and the last one stay in the sum of its samples.
+        """
+        v = np.exp(p[..., 0])
+        if self.name == "quantization":
+            return np.asarray(v)
+        if self.name in PEAKS:
+            return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2])) ** 2))
+        if self.name == "white" and (self.filter == "second" or self.filter.startswith("shape")):
+            grid = Grid(math.pi * (np.arange(RISES) + 0.5) / RISES)
+            return v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1)
+        return np.zeros_like(v)
 
     def allan(self, p: Array, m: Array, means: bool = False) -> Array:
         """Return the Allan variance (..., k) of means over m (k,) samples, m whole numbers."""
