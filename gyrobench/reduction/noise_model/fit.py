@@ -133,9 +133,9 @@ def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treate
     tried: list[tuple[float, Treated, Fitted]] = []
     for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
         parts = [*split(model, p), *found.resonances]
-        places = []
+        places, angle = [], sum(float(t.angle(q)) for t, q in parts)
         for i, s in enumerate(treated.stretches):
-            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means))
+            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means), angle)
             places.append((ratio, i, step))
         ratio, i, step = max(places, key=lambda c: c[0])
         if ratio < bound:

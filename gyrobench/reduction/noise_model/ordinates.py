@@ -136,7 +136,7 @@ class Ordinates:
         self.count, self.power, self.total = (
             np.concatenate([getattr(p, name) for p in parts]) for name in ("count", "power", "total")
         )
-        self.count, self.power = weight * self.count, weight * self.power
+        self.count, self.power, self.total = weight * self.count, weight * self.power, weight * self.total
         self.starts = np.cumsum([0] + [p.k.size for p in parts])[:-1]
         grid = np.concatenate([omega, self.low_omega.ravel()])
         sizes = np.concatenate([np.repeat(self.n, [p.k.size for p in parts]), np.repeat(self.n, LOW)]).astype(float)

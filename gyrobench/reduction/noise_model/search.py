@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,8 @@ from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-MOST_MARKOV, MOST_RESONANCES = 3, 12
+MOST_MARKOV, MOST_RESONANCES = 3, 24
+MOST_VAIN, BESIDE = 4, 0.005  # places where no resonance is found, and how near them none is sought again (log frequency)
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
@@ -217,13 +218,17 @@ class ModelSearch:
         return at
 
     # ------------------------------------------------------------------ resonances
-    def peak(self, at: Fitted) -> Array | None:
-        """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear."""
+    def peak(self, at: Fitted, vain: Sequence[float] = ()) -> Array | None:
+        """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear;
+        vain: frequencies near which one was sought already.
+        """
         data = self.data
         order = np.argsort(data.grid.omega[: data.b])
         S, _ = self.excess(at)
         omega, count = data.grid.omega[order], data.count[order]
         ratio = data.power[order] / S[order]
+        for centre in vain:
+            ratio[np.abs(np.log(omega) - centre) < BESIDE] = 0.0
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
         best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
         for width in WIDTHS:
@@ -241,15 +246,17 @@ class ModelSearch:
 
     def add_resonances(self) -> None:
         """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
-        while len(self.resonances) < MOST_RESONANCES:
+        vain: list[float] = []
+        while len(self.resonances) < MOST_RESONANCES and len(vain) < MOST_VAIN:
             at = self.best
-            start = self.peak(at)
+            start = self.peak(at, vain)
             if start is None:
                 break
             tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
             found = max(tried, key=lambda f: f.evidence)
             if found.evidence < at.evidence + 2.0:
-                break
+                vain.append(float(start[2]))
+                continue
             self._freeze(found)
         for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
             term, p = self.resonances.pop(0)
