@@ -144,6 +144,7 @@ class Ordinates:
         self.ends = np.sqrt(2.0 / np.repeat(self.n, [p.k.size for p in parts])) * np.cos(0.5 * omega)
         half_low = 0.5 * self.low_omega
         self.low_ends = np.sqrt(2.0 / self.n[:, None]) * np.cos(half_low)
+        self.all_ends = np.concatenate([self.ends, self.low_ends.ravel()])
         self.ramp = np.where(self.odd[:, None], -self.low_ends / (2.0 * np.sin(half_low) ** 2), 0.0)
         ratio, correlation = flicker_covariance()
         self._flicker = np.array([correlation[1 - o :: 2, 1 - o :: 2] for o in self.odd.astype(int)])

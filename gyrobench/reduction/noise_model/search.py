@@ -17,7 +17,7 @@ from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
 MOST_MARKOV, MOST_RESONANCES = 3, 24
-MOST_VAIN, BESIDE = 4, 0.005  # places where no resonance is found, and how near them none is sought again (log frequency)
+MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
@@ -138,9 +138,12 @@ class ModelSearch:
 
     # ------------------------------------------------------------------ moves
     def excess(self, at: Fitted) -> tuple[Array, Array]:
-        """Return the spectrum of a fit at all ordinates and their powers over it less their number."""
+        """Return the variance of all ordinates by a fit, with the errors of the end angles, and their powers over it
+        less their number.
+        """
         S, low = self.data.covariance(at.model, at.p[None])
         S = np.concatenate([S[0], np.diagonal(low[0], axis1=-2, axis2=-1).ravel()])
+        S = S + 2.0 * float(self.data.angle(at.model, at.p)) * self.data.all_ends**2
         return S, self.data.all_power / S - self.data.all_count
 
     def starts(self, at: Fitted, term: NoiseTerm) -> list[Array]:
@@ -218,17 +221,17 @@ class ModelSearch:
         return at
 
     # ------------------------------------------------------------------ resonances
-    def peak(self, at: Fitted, vain: Sequence[float] = ()) -> Array | None:
+    def peak(self, at: Fitted, vain: Sequence[Array] = ()) -> Array | None:
         """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear;
-        vain: frequencies near which one was sought already.
+        vain: where one was sought already.
         """
         data = self.data
         order = np.argsort(data.grid.omega[: data.b])
         S, _ = self.excess(at)
         omega, count = data.grid.omega[order], data.count[order]
         ratio = data.power[order] / S[order]
-        for centre in vain:
-            ratio[np.abs(np.log(omega) - centre) < BESIDE] = 0.0
+        for start in vain:  # its own width about it
+            ratio[np.abs(omega - math.exp(start[2])) < 2.0 * math.exp(-start[1])] = 0.0
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
         best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
         for width in WIDTHS:
@@ -246,7 +249,7 @@ class ModelSearch:
 
     def add_resonances(self) -> None:
         """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
-        vain: list[float] = []
+        vain: list[Array] = []
         while len(self.resonances) < MOST_RESONANCES and len(vain) < MOST_VAIN:
             at = self.best
             start = self.peak(at, vain)
@@ -255,7 +258,7 @@ class ModelSearch:
             tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
             found = max(tried, key=lambda f: f.evidence)
             if found.evidence < at.evidence + 2.0:
-                vain.append(float(start[2]))
+                vain.append(start)
                 continue
             self._freeze(found)
         for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
@@ -268,6 +271,29 @@ class ModelSearch:
                 self._freeze(found)
             else:
                 self.seen = {without.model: without}
+        if self.resonances:
+            self._match()
+
+    def _match(self) -> None:
+        """Give each resonance the power that is there, where it is most of the spectrum: what few ordinates show of its
+        shape, the likelihood takes at the price of its power, which the deviation is the sum of.
+        """
+        S, _ = self.excess(self.best)
+        data = self.data
+        power, count = data.all_power, data.all_count
+        matched = []
+        for term, p in self.resonances:
+            own = term.spectrum(p, data.grid)
+            most = own > 0.5 * S
+            expected = float(np.sum((count * own)[most]))
+            found = float(np.sum((power - count * (S - own))[most]))
+            more = min(max(found / expected, 0.2), 5.0) if expected > 0.0 else 1.0
+            matched.append((term, p + math.log(more) * np.array([1.0, 0.0, 0.0])))
+        self.resonances = matched
+        data.hold(matched)
+        at = self.best
+        self.seen = {}
+        self.fit(at.model, at.p)
 
     def _with(self, at: Fitted, term: NoiseTerm, start: Array) -> Fitted:
         return maximize(self.data, self.prior, (*at.model, term), np.concatenate([at.p, start]))

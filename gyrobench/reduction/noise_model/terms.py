@@ -10,7 +10,8 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
     gauss_markov     sigma^2 P(e^(-1/tau))                            sigma^2, tau
     flicker          B^2/omega, means over T                          B^2
     walk             K^2/(4 sin^2(omega/2))                           K^2
-    resonance        sigma^2 Re P(e^(-1/tau + i omega0))              sigma^2, tau, omega0
+    resonance        sigma^2 Re P(e^(-1/tau + i omega0)) sin^2(omega/2)/sin^2(omega0/2): a vibration, whose angle
+                     swings about a mean                              sigma^2, tau, omega0
     band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
 
 Filters: "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
@@ -244,15 +245,19 @@ class NoiseTerm:
             lag = np.arange(math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0)
             gamma = np.exp(-0.5 * (lag * np.exp(-p[..., 1:2])) ** 2) * np.cos(lag * np.exp(p[..., 2:3]))
             return v * _allan_covariance(gamma, m)
-        z = np.exp(-np.exp(-p[..., 1:2]) + 1j * np.exp(p[..., 2:3]))
-        return np.asarray(v * np.real(_allan_pole(z, m)))
+        once, twice = (np.real(np.exp(k * m * (-np.exp(-p[..., 1:2]) + 1j * np.exp(p[..., 2:3])))) for k in (1.0, 2.0))
+        return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2:3])) ** 2) * (3.0 - 4.0 * once + twice) / m**2)
 
 
 def _resonance(p: Array, grid: Grid) -> Array:
-    """Mean of Re P over each bin: of the antiderivative 2 arctan((1 + r)/(1 - r) tan(x/2)) where a bin has a width."""
+    """Re P of the angle, its mean over each bin by the antiderivative 2 arctan((1 + r)/(1 - r) tan(x/2)), times the
+    spectrum of a difference, 1 at the centre.
+    """
     r, centre = np.exp(-np.exp(-p[..., 0:1])), np.exp(p[..., 1:2])
+    rate = grid.sine / (4.0 * np.sin(0.5 * centre) ** 2)
     if not grid.half_width.any():
-        return np.asarray(0.5 * (poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre))))
+        both = poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre))
+        return np.asarray(0.5 * rate * both)
     h = np.maximum(grid.half_width, 1e-9)
     out: Array = np.zeros(np.broadcast_shapes(centre.shape, grid.omega.shape))
     for shift in (-centre, centre):
@@ -260,7 +265,7 @@ def _resonance(p: Array, grid: Grid) -> Array:
         t1, t0 = (2.0 * np.arctan((1.0 + r) / (1.0 - r) * np.tan(0.5 * np.clip(x + s * h, -3.14159, 3.14159)))
                   for s in (1.0, -1.0))  # fmt: skip
         out += 0.5 * (t1 - t0) / (2.0 * h)
-    return out
+    return rate * out
 
 
 def _band(p: Array, grid: Grid) -> Array:
