@@ -231,7 +231,8 @@ class ModelSearch:
         omega, count = data.grid.omega[order], data.count[order]
         ratio = data.power[order] / S[order]
         for start in vain:  # its own width about it
-            ratio[np.abs(omega - math.exp(start[2])) < 2.0 * math.exp(-start[1])] = 0.0
+            mine = np.abs(omega - math.exp(start[2])) < 2.0 * math.exp(-start[1])
+            ratio[mine] = count[mine]
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
         best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
         for width in WIDTHS:
@@ -244,7 +245,7 @@ class ModelSearch:
                 centre = float(np.average(omega[part], weights=np.maximum(ratio[part], 1e-9)))
                 spread = max(0.3 * float(omega[i + width - 1] - omega[i]), 2.0 * math.pi / data.n.max())
                 power = float(np.sum((ratio[part] - count[part]) * S[order][part]) / data.samples)
-                best, found = float(p[i]), np.array([math.log(power), -math.log(spread), math.log(centre)])
+                best, found = float(p[i]), np.array([math.log(max(power, 1e-12)), -math.log(spread), math.log(centre)])
         return found
 
     def add_resonances(self) -> None:
