@@ -87,11 +87,12 @@ def compare(own: Deviation, implied: Array, samples: int) -> DeviationAgreement:
     return DeviationAgreement(own.tau[k], own.deviation[k], own.low[k], own.high[k], implied[k])
 
 
-def with_spectrum(own: Deviation, model: Model, p: Array) -> Deviation:
+def with_spectrum(own: Deviation, model: Model, p: Array, spread: float = 1.0) -> Deviation:
     """Return a deviation with the intervals that a spectrum S allows, where it is narrower than a power law.
 
     Of n differences with the transfer function H, degrees of freedom n <S H>^2/<(S H)^2>, sigma^2 = <S H>: a resonance,
     or noise that rises more steeply than a power law, makes fewer of them.
+    spread: variance of the mean square of the noise over that of even normal noise; as many times fewer.
     """
     longest = 4.0 * float(own.tau[-1])
     edges = np.unique(np.concatenate([np.geomspace(np.pi / longest, np.pi, LOW_CELLS), np.linspace(0.0, np.pi, CELLS)]))
@@ -104,6 +105,6 @@ def with_spectrum(own: Deviation, model: Model, p: Array) -> Deviation:
         eighth = (35.0 - 56.0 * wave[0] + 28.0 * wave[1] - 8.0 * wave[2] + wave[3]) / 128.0
         fourth = float(np.sum(width * y * y * np.maximum(eighth, 0.0))) * 4.0 / (np.pi * m**4)
         edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / fourth)
-    edf = np.maximum(edf, 1.0)
+    edf = np.maximum(edf / max(spread, 1.0), 1.0)
     low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
     return replace(own, low=low, high=high, edf=edf)

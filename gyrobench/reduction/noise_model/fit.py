@@ -77,7 +77,7 @@ def fit_noise(
     treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
     treated, found = _without_steps(treated, means)
     clouds = posterior.draw(found)
-    judge = _Judge(found, _deviations(raw / scale.size, treated), treated.samples)
+    judge = _Judge(found, _deviations(raw / scale.size, treated), treated)
     at = judge.choose(clouds)
     ramp = _ramp(found, clouds)
     slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
@@ -181,10 +181,10 @@ def _deviations(raw: Array, treated: Treated) -> _Scaled:
 class _Judge:
     """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
 
-    def __init__(self, found: ModelSearch, scaled: _Scaled, samples: int) -> None:
-        self.found, self.samples, self.means = found, samples, found.data.grid.means
+    def __init__(self, found: ModelSearch, scaled: _Scaled, treated: Treated) -> None:
+        self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
         terms, p = found.whole
-        self.own, self.clean = (with_spectrum(d, terms, p) for d in (scaled.own, scaled.clean))
+        self.own, self.clean = (with_spectrum(d, terms, p, treated.spread) for d in (scaled.own, scaled.clean))
         self.removed = scaled.removed
         peaks = found.resonances
         self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0

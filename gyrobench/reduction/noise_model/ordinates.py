@@ -32,7 +32,8 @@ from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicke
 LOW = 16  # first ordinates of each parity that are kept singly
 WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
 SHORTEST = 64  # samples of a stretch
-AROUND, NEAR, CLEAR = 257, 9, 5.0  # ordinates around and near one, and how much the near ones exceed the others at a peak
+AROUND, NEAR, CLEAR = 257, 9, 5.0  # ordinates around and near a peak, and how much the near ones exceed the others
+SINGLE = 500  # of the near ones that exceed most, at most
 CHI = 1.2703628454614782  # log of chi squared of one degree of freedom: its mean is minus this
 HUGE = 1e30
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
@@ -77,7 +78,7 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
     n = x.size
     c = fft.dct(x, norm="ortho")
     square = c * c if extra is None else c * c + extra
-    edges = _edges(square)
+    edges = _edges(c * c)
     out = []
     for odd in (True, False):
         k = np.arange(1 if odd else 2, n, 2)
@@ -104,10 +105,11 @@ def _edges(square: Array) -> NDArray[np.int64]:
     log = np.log(np.maximum(square, 1e-300)) + CHI
     around = np.exp(ndimage.uniform_filter1d(log, AROUND, mode="reflect"))
     near = ndimage.uniform_filter1d(square, NEAR, mode="reflect")
-    peak = ndimage.maximum_filter1d((near > CLEAR * around).astype(np.int8), 2 * NEAR)
-    peak[: edges[0]] = 0
-    single = np.flatnonzero(peak)
-    return np.unique(np.concatenate([start, single[single % 2 == 1]]))
+    excess = near / around
+    excess[: edges[0]] = 0.0
+    least = max(CLEAR, float(np.partition(excess, -SINGLE)[-SINGLE])) if n > SINGLE else CLEAR
+    single = np.flatnonzero(ndimage.maximum_filter1d((excess > least).astype(np.int8), 2 * NEAR))
+    return np.unique(np.concatenate([start, single[(single % 2 == 1) & (single >= edges[0])]]))
 
 
 class Ordinates:

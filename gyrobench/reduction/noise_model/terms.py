@@ -222,7 +222,7 @@ class NoiseTerm:
             return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2])) ** 2))
         if self.name == "white" and (self.filter == "second" or self.filter.startswith("shape")):
             grid = Grid(math.pi * (np.arange(RISES) + 0.5) / RISES)
-            return v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1)
+            return np.asarray(v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1))
         return np.zeros_like(v)
 
     def allan(self, p: Array, m: Array, means: bool = False) -> Array:
@@ -252,8 +252,8 @@ class NoiseTerm:
 
 
 def _resonance(p: Array, grid: Grid) -> Array:
-    """Spectrum of the angle of a damped oscillator, covariance r^h (cos omega0 h + sin omega0 h/(omega0 tau)), times that
-    of a difference, 1 at the centre.
+    """Spectrum of the angle of a damped oscillator, covariance r^h (cos omega0 h + sin omega0 h/(omega0 tau)), times
+    that of a difference, 1 at the centre.
 
     Its mean over each bin by the antiderivatives 2 arctan((1 + r)/(1 - r) tan(x/2)) of sum r^|h| cos hx and
     log(1 - 2 r cos x + r^2) of 2 sum_(h > 0) r^h sin hx, x = omega +- omega0.
