@@ -201,10 +201,10 @@ class Reduction(LoopReduction):
         if tan > ASKEW:
             axis, other = tuple(AXES)[inner], tuple(AXES)[1 - inner]
             text = (
-                f"{share:.0f} % of the variance of the jitter is {source}. With {axis} at an angle, a roll of the outer "
-                f"gimbal turns the line of sight whatever the bearings: the {other} motor must follow it with {tan:.2g} "
-                "times its rate, and what the loop leaves of that is jitter. It is the largest where the inner joint "
-                "stands farthest from 0: a wider loop or a third axis, of roll, makes it less."
+                f"{share:.0f} % of the variance of the jitter is {source}. With {axis} at an angle, a roll of the "
+                f"outer gimbal turns the line of sight whatever the bearings: the {other} motor must follow it with "
+                f"{tan:.2g} times its rate, and what the loop leaves of that is jitter. It is the largest where the "
+                "inner joint stands farthest from 0: a wider loop or a third axis, of roll, makes it less."
             )
             self.found.warn("roll.askew", text)
 

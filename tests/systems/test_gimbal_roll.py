@@ -15,11 +15,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.signal import tf2ss
+from support.gimbal_rides import ridden, rows
 
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
-
-from support.gimbal_rides import ridden, rows
 
 README = Path(__file__).parents[2] / "systems" / "gimbal_stabilization" / "README.md"
 ASKEW = math.radians(40.0)

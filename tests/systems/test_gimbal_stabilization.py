@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.gimbal_rides import ridden, rows
 
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
-from support.gimbal_rides import ridden, rows
+
 
 @pytest.fixture(scope="module")
 def quiet() -> Any:
