@@ -32,6 +32,8 @@ SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of t
 SIMPLEX = 150  # evaluations of one
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
 ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
+ACROSS = np.linspace(-3.0, 3.0, 31)  # of a resonance, in half widths, for its frequencies
+SHARP = 0.002  # damping of the sharpest resonance that the frequencies follow
 CAP = np.log(100.0)  # more than that is no better
 
 
@@ -226,11 +228,14 @@ def box(structure: ControllerStructure, wishes: Sequence[Wish], wanted: float | 
 
 def frequencies(plants: Sequence[Plant], decades: Array, wishes: Sequence[Wish], count: int = 400) -> Array:
     """Return the grid for the loops of these plants."""
-    modes = [abs(m) / (2.0 * np.pi) for p in plants for m in p.modes()]
-    apart: list[float] = []
-    for m in sorted(modes):
-        if not apart or m > 1.1 * apart[-1]:
+    modes = sorted((m for p in plants for m in p.modes()), key=abs)
+    apart: list[complex] = []
+    for m in modes:
+        if not apart or abs(m) > 1.1 * abs(apart[-1]):
             apart.append(m)
     low = float(10.0 ** decades[0, 0] / (2.0 * np.pi))
-    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), apart[:6], count)
-    return np.unique(np.concatenate([found, [w.f for w in wishes if w.f]]))
+    hertz = [abs(m) / (2.0 * np.pi) for m in apart[:6]]
+    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), hertz, count)
+    # a resonance that a search pushes under 1 must not rise between two frequencies
+    peaks = [np.exp(max(-m.real / abs(m), SHARP) * ACROSS) * x for m, x in zip(apart, hertz, strict=False)]
+    return np.unique(np.concatenate([found, *(p[p < found[-1]] for p in peaks), [w.f for w in wishes if w.f]]))

@@ -195,7 +195,7 @@ def _lines(t: LoopTuning) -> list[str]:
 def margin_text(w: ProvenWish) -> str:
     """Return the expanded uncertainty of a measured wish as text."""
     if w.bound:
-        return " or more (beyond it the sines are not above the noise)"
+        return " or more (as far as sines above the noise reach)"
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""
     match w.wish.unit:
