@@ -1,8 +1,8 @@
 """Nonlinearity of a loop from the harmonics that a periodic excitation leaves out.
 
-An odd multisine excites odd harmonics alone, and not all of them.  What a linear loop shows at the others is noise; what
-is more at even ones comes from even nonlinearities (u2, backlash with an offset), at odd ones from odd ones (friction,
-saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them away: there the
+An odd multisine excites odd harmonics alone, and not all of them.  What a linear loop shows at the others is noise;
+what is more at even ones comes from even nonlinearities (u2, backlash with an offset), at odd ones from odd ones
+(friction, saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them away: there the
 response is the best linear approximation for this excitation, and their level, read beside it, is part of its
 uncertainty.  Source: Pintelon 2012, 4.3 (best linear approximation, robust and fast method by detection lines).
 """

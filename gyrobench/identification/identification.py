@@ -22,7 +22,8 @@ from gyrobench.identification.ratios import Response
 class LoopIdentification:
     """Responses L, S, T and P (plant, output over input, SI) of a loop, each with u; its margins; remarks.
 
-    periods: how many were used, each of ``period``, s; 0, 0 for an excitation without.  excited_output: amplitude of the output at each frequency, SI.
+    periods: how many were used, each of ``period``, s; 0, 0 for an excitation without.
+    excited_output: amplitude of the output at each frequency, SI.
     """
 
     record: LoopRecord = field(repr=False)

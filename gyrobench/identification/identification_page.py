@@ -111,7 +111,8 @@ def _plant(t: LoopIdentification) -> list[Any]:
 def _distortion(t: LoopIdentification) -> list[Any]:
     rows = [
         Row([
-            text_cell(d.kind), text_cell(str(d.count)), text_cell(minus(f"{_db(d.level):.3g} dB") if d.level else "none"),
+            text_cell(d.kind), text_cell(str(d.count)),
+            text_cell(minus(f"{_db(d.level):.3g} dB") if d.level else "none"),
             text_cell(minus(f"{_db(d.floor):.3g} dB")), text_cell("< 0.001" if d.p < 1e-3 else f"{d.p:.2g}"),
             text_cell("significant" if d.significant else "not seen", "warn" if d.significant else ""),
         ])
@@ -145,7 +146,7 @@ def _responses(t: LoopIdentification) -> PageTable:
             if name == "L":
                 cells.append(f"{_db(1.0 + 1.96 * g.u[k]):.2g}")
         rows.append(Row([text_cell(minus(c)) for c in cells]))
-    heads = columns(("frequency", "Hz"), ("|L|", "dB"), ("phase", "°"), ("U of L", "dB"), ("|S|", "dB"), ("phase of S", "°"),
+    heads = columns(("frequency", "Hz"), ("|L|", "dB"), ("phase", "°"), ("U of L", "dB"), ("|S|", "dB"), ("phase", "°"),
                     (f"|P| re {unit}", "dB"), ("phase of P", "°"))  # fmt: skip
     return PageTable(heads, rows, "Responses at some of the frequencies; all are in identification.json.", small=True)
 
@@ -159,7 +160,7 @@ def _method(t: LoopIdentification) -> list[Any]:
         "The spectrum of the whole record has the excitation in every so many bins; noise, drift and the transient are "
         "read from those between, as a parabola in frequency and what is left of it."
         if t.period
-        else "In each band of frequency the response and the transient are parabolas in frequency; what is left is noise."
+        else "In each band of frequency the response and the transient are parabolas in frequency; the rest is noise."
     )
     text = (
         f"The excitation r enters where {enters}. {how} The responses of u and y to r hold no bias from the noise that "

@@ -152,9 +152,10 @@ def _about(kinds: list[Distortion], lines: Lines, period: float) -> list[str]:
         return [f"nonlinearity cannot be seen: {why}; an odd multisine with omitted lines shows it"]
     notes = []
     for d in kinds:
+        level = f"{20.0 * math.log10(max(d.level, 1e-9)):.3g}".replace("-", "−")
         if d.significant:
             notes.append(
-                f"nonlinear: {d.count} {d.kind} harmonics that are not excited hold {20.0 * math.log10(max(d.level, 1e-9)):.3g} dB "
+                f"nonlinear: {d.count} {d.kind} harmonics that are not excited hold {level} dB "
                 f"of the {d.signal} at the excited ones, beside noise. "
                 + (
                     "The responses are the best linear approximation for this excitation and amplitude (friction, "

@@ -2,11 +2,11 @@
 
 About each frequency the spectra of r, u, y, of the whole record, are
 
-    periodic r:     Z(k + d) = t0 + t1 d + t2 d2 + V(k + d)            at bins without excitation;  Z(k) = G R(k) + t0 + V
+    periodic r:     Z(k + d) = t0 + t1 d + t2 d2 + V(k + d)            between the lines;  Z(k) = G R(k) + t0 + V
     any other r:    Z(k + d) = (g0 + g1 d + g2 d2) R(k + d) + t0 + t1 d + t2 d2 + V(k + d)
 
-The t are the transient and what leaks of slow drift, smooth in frequency where the signals are not.  V is the noise: its
-covariance between u and y comes from the residuals, so that the ratio of two signals of one loop has the right
+The t are the transient and what leaks of slow drift, smooth in frequency where the signals are not.  V is the noise:
+its covariance between u and y comes from the residuals, so that the ratio of two signals of one loop has the right
 uncertainty although both hold the same noise.  Estimates at different frequencies share no bin of noise.
 
 Not modelled: noise that changes along the record; a response with features narrower than some bins (lengthen the

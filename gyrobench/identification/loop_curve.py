@@ -72,7 +72,7 @@ class LoopCurve:
 
 @dataclass(frozen=True)
 class _Models:
-    """A model for each measured frequency: coefficients (n, 6) and covariance in units of a scale, Hz; p of its residuals."""
+    """A model for each measured frequency: coefficients (n, 6) and covariance by a scale, Hz; p of its rest."""
 
     theta: Complex
     cov: Complex
@@ -122,7 +122,7 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
 
 
 def _level(s: Response) -> Array:
-    """Return the variance of S: its logarithm through parabolas over neighbours, less the mean of that of chi-squared."""
+    """Return the variance of S: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2
     least = (SMALLEST * np.abs(s.value).max()) ** 2

@@ -230,7 +230,8 @@ def changed(file: Path, to: Path, **columns) -> Path:
     kept = {k: v for k, v in table.items() if v is not None}
     path = to / "changed.csv"
     head = columns.get("comment", "") + ",".join(kept)
-    np.savetxt(path, np.column_stack(list(kept.values()))[: columns.get("rows")], fmt="%.9g", delimiter=",", header=head,
+    values = np.column_stack(list(kept.values()))[: columns.get("rows")]
+    np.savetxt(path, values, fmt="%.9g", delimiter=",", header=head,
                comments="")  # fmt: skip
     return path
 
@@ -269,7 +270,7 @@ def test_gaps_and_controllers(file: Path, tmp_path: Path) -> None:
     t = 1e3 * H * np.arange(record.r.size)
     late = np.where(np.arange(t.size) > 5000, t + 3.0, t)
     with pytest.raises(
-        gb.GyrobenchError, match="time steps are not even: 0.001 s is the usual one, 0.004 s the longest"
+        gb.GyrobenchError, match=r"time steps are not even: 0\.001 s is the usual one, 0\.004 s the longest"
     ):
         gb.identify(changed(file, tmp_path, **{"time [ms]": late}))
     other = changed(file, tmp_path, **{"input [N.m]": None, "controller [N.m]": record.u - record.r})

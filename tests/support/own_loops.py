@@ -66,8 +66,9 @@ def random_platform(rng: np.random.Generator) -> SampledLoop:
 
 
 def odd_multisine(samples: int, rng: np.random.Generator, low: float, high: float, group: int = 4) -> np.ndarray:
-    """Return a period of random phases: odd harmonics between two frequencies, one of each group left out (group 0: none);
-    rms 1.
+    """Return a period of random phases: odd harmonics between two frequencies, one of each group left out; rms 1.
+
+    group: 0: none is left out.
     """
     odd = np.arange(1, samples // 2, 2)
     odd = odd[(odd / (samples * H) >= low) & (odd / (samples * H) <= high)]
