@@ -2,8 +2,8 @@
 
 An odd multisine excites odd harmonics alone, and not all of them.  What a linear loop shows at the others is noise;
 what is more at even ones comes from even nonlinearities (u2, backlash with an offset), at odd ones from odd ones
-(friction, saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them away: there the
-response is the best linear approximation for this excitation, and their level, read beside it, is part of its
+(friction, saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them
+away: there the response is the best linear approximation for this excitation, and their level, read beside it, is part of its
 uncertainty.  Source: Pintelon 2012, 4.3 (best linear approximation, robust and fast method by detection lines).
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from gyrobench.arrays import Array
-from gyrobench.identification.line_spectrum import Lines
+from gyrobench.identification.line_spectrum import LineAmplitudes
 
 LEAST = 4  # lines left out, for a statement
 NEIGHBOURS = 8  # lines left out whose mean is the level at an excited one
@@ -46,17 +46,17 @@ class Distortion:
         return self.p < SIGNIFICANT
 
 
-def harmonics(lines: Lines, period: float) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
+def harmonics(lines: LineAmplitudes, period: float) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
     """Return the numbers of the harmonics."""
     return np.round(lines.f * period).astype(int)
 
 
-def is_odd(excited: Lines, period: float) -> bool:
+def is_odd(excited: LineAmplitudes, period: float) -> bool:
     """Return whether odd harmonics alone are excited."""
     return bool(np.all(harmonics(excited, period) % 2 == 1))
 
 
-def distortions(excited: Lines, omitted: Lines, period: float) -> list[Distortion]:
+def distortions(excited: LineAmplitudes, omitted: LineAmplitudes, period: float) -> list[Distortion]:
     """Return what odd and even harmonics show that are left out; nothing of a kind with too few lines."""
     if not is_odd(excited, period):
         return []
@@ -65,7 +65,7 @@ def distortions(excited: Lines, omitted: Lines, period: float) -> list[Distortio
     return [_of(kind, lines, excited) for kind, lines in kinds if lines.f.size >= LEAST]
 
 
-def _of(kind: str, lines: Lines, excited: Lines) -> Distortion:
+def _of(kind: str, lines: LineAmplitudes, excited: LineAmplitudes) -> Distortion:
     best: tuple[float, float, float, str] | None = None
     for k, name in ((1, SIGNALS[0]), (2, SIGNALS[1])):
         power, noise = np.abs(lines.z[:, k]) ** 2, lines.cov[:, k, k].real
@@ -85,7 +85,7 @@ def _of(kind: str, lines: Lines, excited: Lines) -> Distortion:
     return Distortion(kind, lines.f.size, level, floor, p, name, lines.f, np.abs(lines.z[:, 2]))
 
 
-def with_distortion(excited: Lines, omitted: Lines, period: float) -> Lines:
+def with_distortion(excited: LineAmplitudes, omitted: LineAmplitudes, period: float) -> LineAmplitudes:
     """Return the excited lines with the level of the odd ones left out beside them as their covariance."""
     odd = omitted.take(harmonics(omitted, period) % 2 == 1)
     products = odd.z[:, :, None] * np.conj(odd.z[:, None, :])

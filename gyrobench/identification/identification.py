@@ -15,7 +15,7 @@ from gyrobench.identification.distortion import Distortion
 from gyrobench.identification.loop_curve import LoopCurve
 from gyrobench.identification.loop_margins import Margin
 from gyrobench.identification.loop_record import LoopRecord
-from gyrobench.identification.ratios import Response
+from gyrobench.identification.ratios import MeasuredResponse
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class LoopIdentification:
     record: LoopRecord = field(repr=False)
     periods: int
     period: float
-    responses: Mapping[str, Response] = field(repr=False)
+    responses: Mapping[str, MeasuredResponse] = field(repr=False)
     margins: list[Margin]
     distortions: list[Distortion]
     curve: LoopCurve = field(repr=False)
@@ -116,7 +116,7 @@ class LoopIdentification:
         return "\n".join(lines)
 
 
-def _points(g: Response) -> dict[str, list[float | None]]:
+def _points(g: MeasuredResponse) -> dict[str, list[float | None]]:
     low, high = g.gain()
     return {
         "f": g.f.tolist(),

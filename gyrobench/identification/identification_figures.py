@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.identification.identification import LoopIdentification
-from gyrobench.identification.ratios import Response
+from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.record.frequency_response import Complex
 from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
 
@@ -55,7 +55,7 @@ def _known(t: LoopIdentification) -> NDArray[np.bool_]:
     return t.responses["L"].determined
 
 
-def _bode(axes: Any, g: Response, which: NDArray[np.bool_], factor: float = 1.0) -> Array:
+def _bode(axes: Any, g: MeasuredResponse, which: NDArray[np.bool_], factor: float = 1.0) -> Array:
     """Draw points with intervals; return their phase, unwrapped, degrees."""
     f, value = g.f[which], g.value[which]
     low, high = (decibel(factor * x[which]) for x in g.gain())

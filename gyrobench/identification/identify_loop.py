@@ -20,7 +20,7 @@ from gyrobench.identification.distortion import (
 )
 from gyrobench.identification.line_spectrum import (
     PERIODS,
-    Lines,
+    LineAmplitudes,
     broadband_lines,
     find_period,
     misfit,
@@ -133,7 +133,7 @@ def _samples_of_period(record: LoopRecord) -> tuple[int, list[str]]:
     return samples, []
 
 
-def _too_few(record: LoopRecord, samples: int, lines: Lines, known: int) -> str:
+def _too_few(record: LoopRecord, samples: int, lines: LineAmplitudes, known: int) -> str:
     kind = "lines of the excitation" if samples else "bands of frequency"
     return (
         f"{known} of {lines.f.size} {kind} have a response above the noise, {LINES if samples else BANDS} are needed: "
@@ -141,7 +141,7 @@ def _too_few(record: LoopRecord, samples: int, lines: Lines, known: int) -> str:
     )
 
 
-def _about(kinds: list[Distortion], lines: Lines, period: float) -> list[str]:
+def _about(kinds: list[Distortion], lines: LineAmplitudes, period: float) -> list[str]:
     """Return what the harmonics that are left out say."""
     if not kinds:
         why = (

@@ -39,7 +39,7 @@ REPEATS = 1e-3  # of the power of r: what a period may differ from the next
 
 
 @dataclass(frozen=True)
-class Lines:
+class LineAmplitudes:
     """Amplitudes of r, u, y at frequencies, with the covariance of their noise.
 
     f: Hz, (n,).  z: (n, 3).  cov: of the noise of z, complex and circular, (n, 3, 3).  dof: complex degrees of freedom
@@ -51,9 +51,9 @@ class Lines:
     cov: Complex
     dof: Array
 
-    def take(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Lines:
+    def take(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> LineAmplitudes:
         """Return some of them."""
-        return Lines(self.f[which], self.z[which], self.cov[which], self.dof[which])
+        return LineAmplitudes(self.f[which], self.z[which], self.cov[which], self.dof[which])
 
 
 def find_period(r: Array) -> int:
@@ -116,7 +116,7 @@ def without_slope(signals: Array, period: int) -> Array:
     return np.asarray(signals - means.mean(axis=1)[:, None] - slope[:, None] * t)
 
 
-def periodic_lines(record: LoopRecord, period: int) -> tuple[Lines, Lines]:
+def periodic_lines(record: LoopRecord, period: int) -> tuple[LineAmplitudes, LineAmplitudes]:
     """Return the lines of a periodic excitation, and those of its harmonics between them that it leaves out."""
     count = periods_used(record.r.size, period)
     start = record.r.size - count * period  # the transient is at the beginning
@@ -132,7 +132,7 @@ def periodic_lines(record: LoopRecord, period: int) -> tuple[Lines, Lines]:
     return every.take(excited), every.take(omitted)
 
 
-def _at_harmonics(spectra: Complex, harmonics: NDArray[np.intp], count: int, bin_width: float) -> Lines:
+def _at_harmonics(spectra: Complex, harmonics: NDArray[np.intp], count: int, bin_width: float) -> LineAmplitudes:
     """Return all harmonics of the period: bin ``count`` times the harmonic of spectra (bins, 3)."""
     far = np.arange(1, 4 * BINS * 2)
     side = far[far % count != 0][:BINS] if count > 1 else far[:0]
@@ -143,7 +143,7 @@ def _at_harmonics(spectra: Complex, harmonics: NDArray[np.intp], count: int, bin
         d = np.arange(1 - h * count, spectra.shape[0] - h * count)
         d = d[(d + h * count) % count != 0]
         groups.append((np.array([h]), d[np.argsort(np.abs(d), kind="stable")[: 2 * BINS]]))
-    found: list[Lines] = []
+    found: list[LineAmplitudes] = []
     for h, d in groups:
         if not h.size or d.size <= ORDER + 2:
             continue
@@ -155,13 +155,13 @@ def _at_harmonics(spectra: Complex, harmonics: NDArray[np.intp], count: int, bin
         dof = d.size - ORDER - 1
         cov = np.swapaxes(v, 1, 2) @ np.conj(v) / dof * (1.0 + float(solve[0] @ solve[0]))
         z = spectra[h * count] - poly[:, 0]
-        found.append(Lines(h * count * bin_width, z, cov, np.full(h.size, float(dof))))
+        found.append(LineAmplitudes(h * count * bin_width, z, cov, np.full(h.size, float(dof))))
     order = np.argsort(np.concatenate([p.f for p in found]))
     joined = [np.concatenate([getattr(p, n) for p in found])[order] for n in ("f", "z", "cov", "dof")]
-    return Lines(*joined)
+    return LineAmplitudes(*joined)
 
 
-def broadband_lines(record: LoopRecord, low: float = 0.0, high: float = np.inf) -> Lines:
+def broadband_lines(record: LoopRecord, low: float = 0.0, high: float = np.inf) -> LineAmplitudes:
     """Return responses to an excitation of any kind, r = 1 at each frequency, between two frequencies, Hz.
 
     The bands of neighbouring frequencies do not overlap.
@@ -182,9 +182,9 @@ def broadband_lines(record: LoopRecord, low: float = 0.0, high: float = np.inf) 
             found.append((k * width, *band, float(np.median(r)), float(np.sqrt(np.mean(r**2)))))
         k = max(k + 2 * half + 1, int((k + half + 1) / (1.0 - SHARE)))
     if not found:
-        return Lines(np.zeros(0), np.zeros((0, 3), complex), np.zeros((0, 3, 3), complex), np.zeros(0))
+        return LineAmplitudes(np.zeros(0), np.zeros((0, 3), complex), np.zeros((0, 3, 3), complex), np.zeros(0))
     f, z, cov, dof, middle, r = (np.array([p[i] for p in found]) for i in range(6))
-    return Lines(f, z, cov, dof).take((r > EXCITED * r.max()) & (middle > EDGE * r))
+    return LineAmplitudes(f, z, cov, dof).take((r > EXCITED * r.max()) & (middle > EDGE * r))
 
 
 def _band(spectra: Complex, k: int, half: int) -> tuple[Complex, Complex, float] | None:

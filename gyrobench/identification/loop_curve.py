@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import digamma, fdtrc
 
 from gyrobench.arrays import Array
-from gyrobench.identification.ratios import Response
+from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.record.frequency_response import Complex
 
 WINDOWS = (41, 29, 21, 15, 11, 8)  # points
@@ -82,7 +82,7 @@ class _Models:
     draws: Complex  # what theta may be off by, (n, 6, draws)
 
 
-def loop_curve(s: Response) -> LoopCurve:
+def loop_curve(s: MeasuredResponse) -> LoopCurve:
     """Return the curve through measured values of S; empty with fewer than the narrowest window."""
     sizes = [n for n in WINDOWS if n <= s.f.size]
     if not sizes:
@@ -121,7 +121,7 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
     return np.asarray(first[:, None] + np.arange(size))
 
 
-def _level(s: Response) -> Array:
+def _level(s: MeasuredResponse) -> Array:
     """Return the variance of S: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2

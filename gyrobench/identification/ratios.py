@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from gyrobench.arrays import Array
-from gyrobench.identification.line_spectrum import Lines
+from gyrobench.identification.line_spectrum import LineAmplitudes
 from gyrobench.identification.loop_record import PLANT_INPUT, PLANT_OUTPUT, REFERENCE
 from gyrobench.record.frequency_response import Complex
 
@@ -28,7 +28,7 @@ BEHIND = {PLANT_INPUT: (0.0, 1.0, 0.0), REFERENCE: (1.0, 0.0, -1.0), PLANT_OUTPU
 
 
 @dataclass(frozen=True)
-class Response:
+class MeasuredResponse:
     """A frequency response: values, their relative standard uncertainty u (of the gain, and of the phase in rad), and
     the circles that hold 95 % of gain and phase; radius inf: not determined.  dof: real degrees of freedom of u.
     """
@@ -58,7 +58,7 @@ class Response:
         return moved - half, moved + half
 
 
-def ratio(lines: Lines, a: tuple[float, ...], b: tuple[float, ...]) -> Response:
+def ratio(lines: LineAmplitudes, a: tuple[float, ...], b: tuple[float, ...]) -> MeasuredResponse:
     """Return a'z / b'z with its region."""
     above, below = lines.z @ np.array(a), lines.z @ np.array(b)
     cov = np.einsum("i,nij,kj->nk", np.array(a), lines.cov, np.array([a, b]))
@@ -74,10 +74,10 @@ def ratio(lines: Lines, a: tuple[float, ...], b: tuple[float, ...]) -> Response:
         center = (above * np.conj(below) - q2 * v_ab) / left
         square = np.abs(center) ** 2 - (np.abs(above) ** 2 - q2 * v_aa) / left
         radius = np.where(left > 0.0, np.sqrt(np.maximum(square, 0.0)), np.inf)
-    return Response(lines.f, g, u, dof, np.where(np.isfinite(center), center, 0.0), radius)
+    return MeasuredResponse(lines.f, g, u, dof, np.where(np.isfinite(center), center, 0.0), radius)
 
 
-def loop_responses(lines: Lines, at: str) -> dict[str, Response]:
+def loop_responses(lines: LineAmplitudes, at: str) -> dict[str, MeasuredResponse]:
     """Return L, S, T, P (the plant, y/u) and "D" = S - 1/2, whose largest size is 1 / disk margin."""
     x = np.array(BEHIND[at])
     r = np.array([1.0, 0.0, 0.0])

@@ -14,7 +14,7 @@ from scipy import optimize, signal
 import gyrobench as gb
 from gyrobench.identification.identification_page import page
 from gyrobench.identification.identify_loop import identify_record
-from gyrobench.identification.line_spectrum import Lines, find_period, misfit
+from gyrobench.identification.line_spectrum import LineAmplitudes, find_period, misfit
 from gyrobench.identification.loop_record import LoopRecord, read_loop
 from gyrobench.identification.ratios import ratio
 
@@ -165,7 +165,7 @@ def test_the_region_of_a_ratio() -> None:
     """
     cov = np.zeros((1, 3, 3), complex)
     cov[0, 1, 1], cov[0, 2, 2] = 0.02, 0.08
-    lines = Lines(np.ones(1), np.array([[1.0, 2.0, 4.0 + 0j]]), cov, np.array([1e9]))
+    lines = LineAmplitudes(np.ones(1), np.array([[1.0, 2.0, 4.0 + 0j]]), cov, np.array([1e9]))
     g = ratio(lines, (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
     q2 = 1.959964**2 / 2.0
     left = 4.0 - 0.02 * q2
@@ -173,7 +173,7 @@ def test_the_region_of_a_ratio() -> None:
     assert g.u[0] == pytest.approx(np.sqrt(0.02) / 2.0)
     assert g.center[0] == pytest.approx(8.0 / left)
     assert g.radius[0] ** 2 == pytest.approx((8.0 / left) ** 2 - (16.0 - 0.08 * q2) / left, rel=1e-6)
-    small = Lines(np.ones(1), np.array([[1.0, 0.1, 4.0 + 0j]]), cov, np.array([1e9]))
+    small = LineAmplitudes(np.ones(1), np.array([[1.0, 0.1, 4.0 + 0j]]), cov, np.array([1e9]))
     assert not ratio(small, (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)).determined[0]
 
 
