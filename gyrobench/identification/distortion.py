@@ -2,9 +2,9 @@
 
 An odd multisine excites odd harmonics alone, and not all of them.  What a linear loop shows at the others is noise;
 what is more at even ones comes from even nonlinearities (u2, backlash with an offset), at odd ones from odd ones
-(friction, saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them
-away: there the response is the best linear approximation for this excitation, and their level, read beside it, is part of its
-uncertainty.  Source: Pintelon 2012, 4.3 (best linear approximation, robust and fast method by detection lines).
+(friction, saturation).  Odd ones also fall on the excited harmonics, where no averaging over periods takes them away:
+there the response is the best linear approximation for this excitation, and their level, read beside it, is part of
+its uncertainty.  Source: Pintelon 2012, 4.3 (best linear approximation, robust and fast method by detection lines).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SIGNALS = ("input", "output")
 
 @dataclass(frozen=True)
 class Distortion:
-    """What harmonics of one kind ("odd", "even") hold beside noise.
+    """Content of the harmonics of one kind ("odd", "even") that are left out, beside noise.
 
     level: rms over that at the excited lines, of the signal where it is larger; floor: the same of the noise.  p: that
     noise alone gives so much.  f, size: each line's amplitude of the output, its own noise in it.

@@ -1,4 +1,4 @@
-"""What identification returns: responses, margins, nonlinearity, remarks; as text and as JSON."""
+"""The result of identification: responses, margins, nonlinearity, remarks; as text and as JSON."""
 
 from __future__ import annotations
 

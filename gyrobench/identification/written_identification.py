@@ -1,4 +1,4 @@
-"""An identified loop with its page: what identification returns."""
+"""An identified loop with its page: the result of identification."""
 
 from __future__ import annotations
 
