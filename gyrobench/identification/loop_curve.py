@@ -86,8 +86,8 @@ def loop_curve(s: MeasuredResponse) -> LoopCurve:
     """Return the curve through measured values of S; empty with fewer than the narrowest window."""
     sizes = [n for n in WINDOWS if n <= s.f.size]
     if not sizes:
-        none = np.zeros(0)
-        return LoopCurve(none, none + 0j, none, none + 0j, np.zeros((DRAWS, 0), complex), none > 0.0)
+        none, empty = np.zeros(0), np.zeros(0, complex)
+        return LoopCurve(none, empty, none, empty, np.zeros((DRAWS, 0), complex), none > 0.0)
     variance = _level(s)
     rng = np.random.default_rng(DRAWS)
     draw = (rng.standard_normal((s.f.size, DRAWS)) + 1j * rng.standard_normal((s.f.size, DRAWS))) * np.sqrt(0.5)
@@ -140,9 +140,9 @@ def _fits(d: Array, value: Complex, variance: Array, dof: Array, draw: Complex, 
     w = 1.0 / np.sqrt(variance)
     powers = d[:, :, None] ** np.arange(4 if not rational else 3)
     theta = np.zeros((d.shape[0], 6), complex)  # b0 b1 b2 b3 a1 a2
-    use = [0, 1, 2, 4, 5] if rational else [0, 1, 2, 3]
+    use = np.array([0, 1, 2, 4, 5] if rational else [0, 1, 2, 3])
     if not rational:
-        jac = powers.astype(complex)
+        jac: Complex = powers.astype(np.complex128)
         theta[:, use] = _solve(jac * w[:, :, None], value * w)
     else:
         under = np.ones_like(value)
@@ -158,25 +158,25 @@ def _fits(d: Array, value: Complex, variance: Array, dof: Array, draw: Complex, 
             under = _under(theta, d)
         jac = _jacobian(_over(theta, d) / under, under, powers)
     rest = np.abs((value - _over(theta, d) / _under(theta, d)) * w) ** 2
-    free = d.shape[1] - len(use)
+    free = d.shape[1] - use.size
     square = np.where(np.isfinite(rest.sum(axis=1)), rest.sum(axis=1), 1e300) / free
     p = fdtrc(2.0 * free, dof.sum(axis=1), square)
     jac = jac * w[:, :, None]
     cov, draws = np.zeros((d.shape[0], 6, 6), complex), np.zeros((d.shape[0], 6, DRAWS), complex)
     adjoint = np.conj(np.swapaxes(jac, 1, 2))
     inverse = _inverse(adjoint @ jac)
-    cov[np.ix_(np.arange(d.shape[0]), use, use)] = inverse
+    cov[:, use[:, None], use] = inverse
     draws[:, use] = inverse @ (adjoint @ draw)
     return _Models(theta, cov, scale, p, square, draws)
 
 
-def _solve(x: Complex, y: Complex) -> Complex:
+def _solve(x: Complex | Array, y: Complex) -> Complex:
     """Return the least-squares solutions (n, k) of x (n, m, k), y (n, m)."""
     adjoint = np.conj(np.swapaxes(x, 1, 2))
     return np.asarray((_inverse(adjoint @ x) @ (adjoint @ y[:, :, None]))[:, :, 0])
 
 
-def _inverse(square: Complex) -> Complex:
+def _inverse(square: Complex | Array) -> Complex:
     """Return the inverses of Hermitian matrices (n, k, k), of singular ones something large."""
     size = np.trace(square, axis1=1, axis2=2).real[:, None, None]
     return np.asarray(np.linalg.inv(square + (ROUNDING * size + 1e-300) * np.eye(square.shape[1])))
