@@ -74,7 +74,7 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         metavar="MAP",
-        help="Column map (.toml) of a --data file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
+        help="Column map (.toml) of a file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
     ),
 ]
 From = Annotated[
