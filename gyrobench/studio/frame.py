@@ -22,7 +22,7 @@ MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
-    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"),
+    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"), ("Learn", "/learn"),
 )  # fmt: skip
 DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
     None: (True, "Colours: as the system"),

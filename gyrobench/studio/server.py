@@ -21,6 +21,7 @@ from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
 from gyrobench.studio.gate import TOKEN, StudioGate, is_loopback, refuse_remote
 from gyrobench.studio.jobs import StudioJobs
+from gyrobench.studio.learn_page import add_learn_pages
 from gyrobench.studio.part_page import add_part_page
 from gyrobench.studio.run_page import add_run_pages
 from gyrobench.studio.system_page import add_system_page, wiring_of
@@ -113,6 +114,7 @@ def build(studio: Studio) -> FastAPI:
     add_data_page(studio)
     add_command_pages(studio)
     add_part_page(studio)
+    add_learn_pages(studio, app)
     ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=20)
     return app
 
