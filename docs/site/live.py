@@ -68,6 +68,8 @@ def live_page() -> str:
     lines += ["", "Lessons, each with a question, a closed formula beside the simulation, and an exercise:", ""]
     for item in lessons():
         if item.name in TAUGHT:
-            en, zh = (f'<a href="live/{item.name}-{code}.html">{item.texts(code)["title"]}</a>' for code in ("en", "zh"))
+            en, zh = (
+                f'<a href="live/{item.name}-{code}.html">{item.texts(code)["title"]}</a>' for code in ("en", "zh")
+            )
             lines.append(f"- {item.texts()['question']} {en}, {zh}")
     return "\n".join([*lines, ""])

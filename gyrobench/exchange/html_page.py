@@ -58,7 +58,8 @@ def export_page(
         code = compile_wasm(folder / "page.c")
     content = {**_content(chosen, source, lesson), "seed": seed, "wasm": base64.b64encode(code).decode()}
     text = (HERE / "page.html").read_text(encoding="utf-8")
-    for mark, files in (("/* page.css */", ["page.css"]), ("/* page.js */", ["page.js", *["lesson.js"] * bool(lesson)])):
+    scripts = ["page.js", "lesson.js"] if lesson else ["page.js"]
+    for mark, files in (("/* page.css */", ["page.css"]), ("/* page.js */", scripts)):
         text = text.replace(mark, "".join((HERE / f).read_text(encoding="utf-8") for f in files))
     data = json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     path.parent.mkdir(parents=True, exist_ok=True)

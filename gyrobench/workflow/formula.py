@@ -18,7 +18,8 @@ Values = np.ndarray[Any, np.dtype[np.float64]]
 FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
     "sin": (np.sin, "Math.sin"), "cos": (np.cos, "Math.cos"), "tan": (np.tan, "Math.tan"), "exp": (np.exp, "Math.exp"),
     "log": (np.log, "Math.log"), "sqrt": (np.sqrt, "Math.sqrt"), "atan": (np.arctan, "Math.atan"),
-    "acos": (np.arccos, "Math.acos"), "abs": (np.abs, "Math.abs"), "step": (lambda x: np.heaviside(x, 1.0), "((x) => Number(x >= 0))"),
+    "acos": (np.arccos, "Math.acos"), "abs": (np.abs, "Math.abs"),
+    "step": (lambda x: np.heaviside(x, 1.0), "((x) => Number(x >= 0))"),
 }  # fmt: skip
 CONSTANTS = {"pi": np.pi}
 SIGNS: dict[type[ast.operator], tuple[Callable[[Any, Any], Any], str]] = {

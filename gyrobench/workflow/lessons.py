@@ -127,7 +127,9 @@ def _read(file: Path) -> Lesson:
         symbols = set(made.symbols) | {"t"}
         for formula in (made.simulated, *made.theory):
             if lost := set(formula.names) - symbols:
-                raise UsageError(f"{file}: '{formula.text}' has {', '.join(sorted(lost))}, which [symbols] does not say")
+                raise UsageError(
+                    f"{file}: '{formula.text}' has {', '.join(sorted(lost))}, which [symbols] does not say"
+                )
         for code in {ENGLISH, *(k for k in ("zh",) if k in data)}:
             for name in TEXTS:
                 made.texts(code)[name]
