@@ -88,6 +88,7 @@ def run(
     from gyrobench.commands.arguments import parse_settings, parse_swaps, parse_time
     from gyrobench.report import FORMATS
     from gyrobench.report.language import reports_in
+    from gyrobench.system.suite import Suite
     from gyrobench.workflow.instruments import with_instrument
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
@@ -96,7 +97,10 @@ def run(
     time_step = parse_time("--step", step)
     title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
     test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
-    vars(test)["instrument"] = title
+    if not isinstance(test, Suite):
+        test.instrument = title
+    elif title and not test["instrument"]:
+        test.set("instrument", title)
     request = RunRequest(
         parts=parts,
         maps=maps,

@@ -1,8 +1,11 @@
-"""Compare this tree with a commit: ``python tests/benchmarks/against.py COMMIT [--systems NAME ...] [--rounds 3]``.
+"""Compare this tree with a commit: ``python tests/benchmarks/against.py [COMMIT] [--systems NAME ...] [--rounds 3]``.
+
+Without a commit: with the state whose figures the pages quote, the last commit of docs/figures.toml.
 
 - records: every standard system runs with seed 7 in both trees, by the command of each; columns are compared bit for
   bit.  reference.csv of every part is compared byte for byte.
-- speed: part_speed.py of each tree, in turn, so that a busy machine slows both; the least of the rounds counts.
+- speed: whole commands, by their processor time with that of their children, and part_speed.py, of each tree in turn,
+  so that a busy machine slows both; the least of the rounds counts.
 
 Exit code 1 when a column or a reference differs.  The commit is checked out into a folder of its own for the time.
 """
@@ -23,6 +26,13 @@ import pyarrow.parquet as pq
 
 ROOT = Path(__file__).parents[2]
 SEED = 7
+COMMANDS = {
+    "all native FMUs, built cold": ("build", "--all"),
+    "tumble, command to report": ("run", "tumble_single_axis", "--force"),
+    "platform_three_axis, command to report": ("run", "platform_three_axis", "--force"),
+    "servo_polar, command to report": ("run", "servo_polar", "--force"),
+    "list": ("list",),
+}
 
 
 class Tree:
@@ -49,6 +59,16 @@ class Tree:
         for file in sorted(folder.glob("*.parquet")):
             table = pq.read_table(file)
             found.update({f"{file.stem}.{n}": table.column(n).to_numpy() for n in table.column_names})
+        return found
+
+    def commands(self) -> dict[str, float]:
+        """Processor seconds of whole commands, in their own folder."""
+        found = {}
+        for what, words in COMMANDS.items():
+            out = () if words == ("list",) else ("--out", str(self.out / words[-2]))
+            before = sum(os.times()[2:4])
+            self.gyrobench(*words, *out)
+            found[what] = sum(os.times()[2:4]) - before
         return found
 
     def speed(self) -> dict[str, float]:
@@ -96,35 +116,48 @@ def compare_records(old: Tree, new: Tree, systems: list[str]) -> int:
 
 
 def compare_speed(old: Tree, new: Tree, rounds: int) -> None:
-    least: list[dict[str, float]] = [{}, {}]
-    for _ in range(rounds):
-        for best, tree in zip(least, (old, new), strict=True):
-            for part, us in tree.speed().items():
-                best[part] = min(us, best.get(part, us))
-    print(f"{'part':24s} before    now  ratio   (us a step of 1 ms)")
-    common = [p for p in least[0] if p in least[1]]
-    for part in common:
-        a, b = least[0][part], least[1][part]
-        print(f"{part:24s} {a:.4f} {b:.4f}  {b / a:.3f}")
-    a, b = (float(np.mean([best[p] for p in common])) for best in least)
-    print(f"{'mean':24s} {a:.4f} {b:.4f}  {b / a:.3f}")
+    measures = {"s of processor time": Tree.commands, "us a step of 1 ms": Tree.speed}
+    for unit, measure in measures.items():
+        least: list[dict[str, float]] = [{}, {}]
+        for _ in range(rounds):
+            for best, tree in zip(least, (old, new), strict=True):
+                for what, took in measure(tree).items():
+                    best[what] = min(took, best.get(what, took))
+        print(f"\n{unit:40s} before    now  ratio")
+        common = [p for p in least[0] if p in least[1]]
+        pairs = [(least[0][what], least[1][what]) for what in common]
+        if measure is Tree.speed:
+            common.append("mean")
+            pairs.append((float(np.mean([a for a, _ in pairs])), float(np.mean([b for _, b in pairs]))))
+        for what, (a, b) in zip(common, pairs, strict=True):
+            print(f"{what:40s} {a:7.4f} {b:7.4f}  {b / a:.3f}", flush=True)
+
+
+def last_quoted() -> str:
+    """Return the commit that wrote docs/figures.toml last."""
+    command = ["git", "log", "-1", "--format=%H", "--", "docs/figures.toml"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+    return found or sys.exit("no history here to compare with: name a commit in a clone")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("commit")
-    parser.add_argument("--systems", nargs="*", help="of these systems only; without a name: none")
+    parser.add_argument("commit", nargs="?", help="default: the state whose figures the pages quote")
+    parser.add_argument("--systems", nargs="*", help="of these systems only; without a name: speed alone")
     parser.add_argument("--rounds", type=int, default=3, help="of the measurement of speed; 0: none")
     given = parser.parse_args()
+    commit = given.commit or last_quoted()
+    print(f"before: {commit}")
     with tempfile.TemporaryDirectory() as place:
         other = Path(place) / "before"
-        subprocess.run(["git", "worktree", "add", "--detach", "-q", str(other), given.commit], cwd=ROOT, check=True)
+        subprocess.run(["git", "worktree", "add", "--detach", "-q", str(other), commit], cwd=ROOT, check=True)
         try:
             old, new = Tree(other, Path(place) / "a"), Tree(ROOT, Path(place) / "b")
             every = sorted(
                 f.parent.name for f in (other / "systems").glob("*/system.py") if "(Suite)" not in f.read_text()
             )
-            worse = compare_records(old, new, every if given.systems is None else given.systems)
+            systems = every if given.systems is None else given.systems
+            worse = compare_records(old, new, systems) if systems else 0
             if given.rounds:
                 compare_speed(old, new, given.rounds)
         finally:
