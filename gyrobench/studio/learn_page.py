@@ -15,6 +15,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from gyrobench.errors import GyrobenchError
 from gyrobench.report.language import ENGLISH
 from gyrobench.studio.frame import CopyLines, Studio, frame
+from gyrobench.studio.words import heading, say
 from gyrobench.workflow.lessons import Lesson, lesson, lessons, write_lesson
 
 
@@ -44,11 +45,11 @@ def add_learn_pages(studio: Studio, app: FastAPI) -> None:
     async def learn() -> None:
         every = await asyncio.to_thread(lessons, studio.bench)
         with frame(studio, "Learn"):
-            ui.html("<h1>Learn</h1>", sanitize=False)
-            ui.label("Each lesson is a simulation beside its closed formula, with sliders and an exercise.")
+            heading("Learn")
+            ui.label(say("Each lesson is a simulation beside its closed formula, with sliders and an exercise."))
             with ui.element("div").classes("gallery"):
                 for item in every:
-                    texts = item.texts()
+                    texts = item.texts(say.code)
                     with ui.link(target=f"/learn/{item.name}").classes("card"), ui.element("div").classes("text"):
                         ui.label(f"{item.number}. {texts['title']}").classes("title")
                         ui.label(texts["question"]).classes("summary")
@@ -57,15 +58,16 @@ def add_learn_pages(studio: Studio, app: FastAPI) -> None:
     async def one(name: str) -> None:
         with frame(studio, "Learn"):
             item = lesson(name, studio.bench)
-            await asyncio.to_thread(page_of, studio, item, ENGLISH)  # what stands against it is said here
-            title = escape(item.texts()["title"])
-            source = f"/lesson/{ENGLISH}/{item.name}"
+            await asyncio.to_thread(page_of, studio, item, say.code)  # what stands against it is said here
+            title = escape(item.texts(say.code)["title"])
+            source = f"/lesson/{say.code}/{item.name}"
             ui.html(f'<iframe class="report" src="{source}" title="{title}"></iframe>', sanitize=False).classes("full")
+            language = f" --language {say.code}" if say.code != ENGLISH else ""
             every = lessons(studio.bench)
             at = [other.name for other in every].index(item.name)
             with ui.element("div").classes("bar"):
                 for step in (at - 1, at + 1):
                     if 0 <= step < len(every):
                         other = every[step]
-                        ui.link(f"{other.number}. {other.texts()['title']}", f"/learn/{other.name}")
-            CopyLines().show(f"gyrobench learn {item.name}", "")
+                        ui.link(f"{other.number}. {other.texts(say.code)['title']}", f"/learn/{other.name}")
+            CopyLines().show(f"gyrobench learn {item.name}{language}", "")
