@@ -17,9 +17,9 @@ def learn(
     language: Annotated[str, typer.Option(metavar="CODE", help="Language of the page: en, zh.")] = "en",
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write, .html.")] = None,
 ) -> None:
-    """Write a lesson: a page with a question, sliders, a simulation beside its closed formula, an exercise.
+    """Write a lesson as a page that runs.
 
-    The page is one file; it runs in a browser, from disk, without network.
+    A question, sliders, a simulation beside its closed formula, an exercise.  The page is one file; it runs in a browser, from disk, without network.
 
     \b
     Examples:

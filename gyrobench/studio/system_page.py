@@ -18,6 +18,7 @@ from gyrobench.report import wiring_figure
 from gyrobench.studio.frame import CopyLines, Studio, frame, told
 from gyrobench.studio.request import JobRequest
 from gyrobench.studio.slot_fmu import drop_fmu
+from gyrobench.studio.time_line import TimeLine
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.configurable import Option
 from gyrobench.system.suite import Suite
@@ -305,8 +306,11 @@ def add_system_page(studio: Studio) -> None:
                             f'<img class="wiring" src="/wiring/{name}" alt="{say(f"Wiring of {name}")}">',
                             sanitize=False,
                         )
+                    line = TimeLine(test) if isinstance(test, System) and test.slots else None
                     lines = CopyLines()
                     choice = _Choice(test, lines)
+                    if line:
+                        choice.changed.append(lambda: line.show(choice.request.values))
                     choice.show()
                     _start(studio, choice)
             with left:
