@@ -19,7 +19,8 @@ def learn(
 ) -> None:
     """Write a lesson as a page that runs.
 
-    A question, sliders, a simulation beside its closed formula, an exercise.  The page is one file; it runs in a browser, from disk, without network.
+    A question, sliders, a simulation beside its closed formula, an exercise.  The page is one file; it runs in a
+    browser, from disk, without network.
 
     \b
     Examples:

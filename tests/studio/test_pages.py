@@ -328,3 +328,18 @@ def test_a_lesson_runs_in_its_page(page: Any, studio: tuple[str, Path]) -> None:
     assert page.locator(".code").first.text_content() == "gyrobench learn keyhole"
     page.goto(base_of(studio) + "/learn/keyhol")
     page.get_by_role("alert").get_by_text("no lesson 'keyhol'").wait_for()
+
+
+def test_the_plan_follows_the_options(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/tumble_single_axis")
+    page.locator(".plan").wait_for()
+    widths = "[...document.querySelectorAll('.phase')].map(e => e.getBoundingClientRect().width)"
+    before = page.evaluate(widths)
+    plan = gb.load("tumble_single_axis").system.plan()
+    shares = np.array([p.duration() for p in plan.phases]) / plan.duration()
+    np.testing.assert_allclose(np.array(before) / sum(before), shares, atol=0.01)
+    page.get_by_label("turns", exact=True).fill("3")
+    page.wait_for_function("document.querySelector('.keys').textContent.includes('15 h')")  # 2 x 3 turns of 2.4 h
+    page.get_by_label("turns", exact=True).fill("x")
+    page.wait_for_timeout(600)
+    assert page.evaluate("document.querySelectorAll('.phase').length") == 4, "what is no plan leaves the last one"

@@ -26,7 +26,21 @@ from gyrobench.workflow.gallery import PURPOSES
 
 FOLDER = Path(words.__file__).parent
 SAID = ("say", "heading", "spoken")
-STAY = {"gyrobench", "Python", "FMU", "PDF", "json", "result", "toml", "laboratory", "SLOT", "NAME", "VALUE", "set"}
+STAY = {
+    "min",
+    "gyrobench",
+    "Python",
+    "FMU",
+    "PDF",
+    "json",
+    "result",
+    "toml",
+    "laboratory",
+    "SLOT",
+    "NAME",
+    "VALUE",
+    "set",
+}
 
 
 @pytest.fixture
