@@ -9,6 +9,8 @@ from nicegui import ui
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.studio.words import say, spoken
+from gyrobench.system.loop_plan import LoopPhase
+from gyrobench.system.plan import Phase
 from gyrobench.system.system import System
 from gyrobench.workflow.progress_words import format_duration
 
@@ -29,7 +31,8 @@ class TimeLine:
         """Draw the plan with these options; what is no plan (yet) leaves the last one."""
         own = {name: text for name, text in values.items() if name in self.system.options}
         try:
-            phases = self.system.with_values(own).plan().phases
+            plan = self.system.with_values(own).plan()
+            phases: list[Phase | LoopPhase] = [*plan.phases]
         except (GyrobenchError, ValueError, ArithmeticError):
             return
         times = [max(0.0, p.duration()) for p in phases]
