@@ -14,6 +14,7 @@ from gyrobench.commands.options import (
     Coupling,
     Data,
     Engine,
+    FitTo,
     Force,
     From,
     FromRun,
@@ -140,15 +141,7 @@ def reduce(
     spec: Spec = None,
     strict: Strict = False,
     no_report: NoReport = False,
-    fit_to: Annotated[
-        str | None,
-        typer.Option(
-            "--fit-to",
-            metavar="PART",
-            help="drift_record: write the noise of the record as values of a gyro of the bench (floated_gyro), a file "
-            "for --set @FILE.",
-        ),
-    ] = None,
+    fit_to: FitTo = None,
     out: Out = None,
     force: Force = False,
     language: Language = "en",
@@ -209,13 +202,16 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     spec: Spec = None,
     strict: Strict = False,
+    fit_to: FitTo = None,
     language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Reduce the record of a run again and rewrite its report.
 
     \b
-    Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
+    Examples:
+      gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
+      gyrobench report reports/out/imu_positions/1a2b3c4d --fit-to imu_compensator
     """
     from gyrobench.commands import print_runs
     from gyrobench.report.language import reports_in
@@ -223,7 +219,7 @@ def report(
 
     test = load_saved_test(folder)
     with reports_in(language, test.name, Bench.find().folder):
-        exit_on_fail(print_runs.report(folder, test, spec, as_json), strict)
+        exit_on_fail(print_runs.report(folder, test, spec, as_json, fit_to), strict)
 
 
 @app.command()

@@ -12,6 +12,7 @@
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
     gb.sweep("tumble_single_axis", {"latitude": "0deg..80deg:9"}, seeds=20)   # a data frame, a row a run
     gb.tune("platform_single_axis", ["phase margin=40deg", "bandwidth>10Hz"], ["platform.J=±30%"])
+    gb.identify("loop.csv", at="plant input")["phase margin"].value          # of a laboratory's record of a loop
     gb.campaign("campaign.toml", out="folder")
     gb.site("folder").index                      # the page of a stored campaign
 
@@ -42,6 +43,7 @@ from gyrobench.workflow.run_comparison import Comparison, compare_results, read_
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
+    from gyrobench.identification.written_identification import Identification
     from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
@@ -56,6 +58,7 @@ __all__ = [
     "campaign",
     "compare",
     "design",
+    "identify",
     "load",
     "load_suite",
     "open_run",
@@ -218,3 +221,29 @@ def tune(
         test.system, want, over, structure, parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
         given={k: str(v) for k, v in given.items()}, loop=loop,
     )  # fmt: skip
+
+
+@checked
+def identify(
+    data: File,
+    *,
+    at: str = "",
+    period: str = "",
+    band: str | tuple[float, float] = "",
+    columns: File | None = None,
+) -> Identification:
+    """Return open loop, sensitivities, plant and margins of a laboratory's record of a loop, with intervals.
+
+    at: where the excitation enters, "plant input", "reference" or "plant output"; period: its period ("2s"); default:
+    what the file states or shows.  band: "0.5Hz..80Hz", or two frequencies in Hz.  columns: a column map.
+    ``responses["L"]`` has frequencies, values and intervals, ``["phase margin"]`` is a margin, ``notes`` say what is
+    missing or not linear, ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
+    GyrobenchError.
+    """
+    from gyrobench.identification.identify_loop import identify as identify_loop
+    from gyrobench.identification.identify_loop import parse_band
+
+    limits = parse_band(band) if isinstance(band, str) else band
+    return identify_loop(
+        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns)
+    )

@@ -142,6 +142,9 @@ class System(Configurable):
     reduction: ClassVar[str | type] = ""
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
+    #: part -> its slot, and the module beside system.py whose values_of(result) are parameter -> (value, standard
+    #: uncertainty, unit), SI: for --fit-to
+    fitted: ClassVar[Mapping[str, tuple[str, str]]] = {}
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
     #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
     takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
@@ -264,9 +267,18 @@ class System(Configurable):
         reduction: Any = self.reduction
         if not isinstance(reduction, str):
             return reduction
-        owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
-        module = importlib.import_module(f".{reduction}", owner.__module__)
+        module = self._beside("reduction", reduction)
         return getattr(module, "Reduction", module)
+
+    def _beside(self, declared: str, module: str) -> Any:
+        """Return a module beside the system.py of the class that declares something."""
+        owner = next(cls for cls in type(self).__mro__ if declared in vars(cls))
+        return importlib.import_module(f".{module}", owner.__module__)
+
+    def values_for(self, part: str, result: Result) -> tuple[str, Mapping[str, tuple[Any, Any, str]]]:
+        """Return the slot of a part of :attr:`fitted`, and the values that a result gives it.  Raises UsageError."""
+        slot, module = self.fitted[part]
+        return slot, self._beside("fitted", module).values_of(result)
 
     def findings(self, record: Record) -> Result:
         """Return what a record says, without limits and verdict: estimates, and the reasons against them.
