@@ -91,7 +91,7 @@ class Reduction(DriftReduction[AlignmentSetup]):
         truth = None if known is None or None in known.values() else {n: float(v) for n, v in known.items()}  # type: ignore[arg-type]
         latitude = float(o["latitude"])
         return AlignmentSetup.of(
-            run, latitude=latitude, longitude=float(o["longitude"]), jd=polaris.julian(str(o["date"])),
+            run, latitude=latitude, longitude=float(o["longitude"]), jd=polaris.julian(str(o["start"])),
             ut1_utc=float(o["ut1_utc"]), air=(float(o["pressure"]), float(o["air"])), truth=truth,
             site={"latitude / °": latitude / DEG, "longitude / °": float(o["longitude"]) / DEG},
         )  # fmt: skip

@@ -17,6 +17,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.units import DEG
 
 from . import polaris
+from .measured import MEASURED
 
 STAR, MIRROR, AXIS = 1.0, 2.0, 3.0
 FACE = "stand"
@@ -63,7 +64,7 @@ class StandAlignment(System):
             "45.75deg", "rad", "geographic latitude, north positive", -89 * DEG, 89 * DEG, sets="theodolite.latitude"
         ),
         "longitude": Option("126.63deg", "rad", "geographic longitude, east positive", -math.pi, 2.0 * math.pi),
-        "date": Option("2026-11-28T12:00", str, "UTC of the first sight, as 2026-11-28T12:00"),
+        "start": Option("2026-11-28T12:00", str, "UTC of the first sight, as 2026-11-28T12:00"),
         "ut1_utc": Option(0.0, "s", "UT1 less UTC of the day", -0.9, 0.9),
         "pressure": Option("1013hPa", "Pa", "pressure of the air", 0.0, 2e5, sets="theodolite.pressure"),
         "air": Option("283.15K", "K", "temperature of the air", 220.0, 330.0, sets="theodolite.temperature"),
@@ -79,6 +80,7 @@ class StandAlignment(System):
         "u_mirror": Option(0.0, "rad", "std. unc. of the mirror's normal against the axis, in azimuth", 0.0),
         "u_inclinometer": Option(0.0, "rad", "std. unc. of the inclinometer that turning does not show", 0.0),
     }  # fmt: skip
+    measured_data = MEASURED
     noises = ("theodolite.pointing", "theodolite.bubble")
     windows = Windows.of("sampler", level="sampler_level.mean")
     done = "sequencer.done"
@@ -99,16 +101,16 @@ class StandAlignment(System):
         return Plan(phases, {FACE: np.eye(3).tolist()})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        H, declination = polaris.hour_angle(polaris.julian(self["date"]), self["longitude"], self["ut1_utc"])
+        H, declination = polaris.hour_angle(polaris.julian(self["start"]), self["longitude"], self["ut1_utc"])
         place = {"theodolite.hour_angle": H, "theodolite.declination": declination}
         return {**self.plan().parameters(), **self.owned(), **place}
 
     def check(self) -> list[str]:
         problems = []
         try:
-            polaris.julian(self["date"])
+            polaris.julian(self["start"])
         except ValueError:
-            problems.append(f"date = {self['date']}: write it as 2026-11-28T12:00, in UTC")
+            problems.append(f"start = {self['start']}: write it as 2026-11-28T12:00, in UTC")
         if self["latitude"] < LOWEST:
             problems.append(
                 f"latitude = {math.degrees(self['latitude']):.4g}°: Polaris stands too low; from 8° north on"

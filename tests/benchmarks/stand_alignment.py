@@ -23,7 +23,7 @@ def drawn(rng: np.random.Generator) -> dict[str, object]:
         **{f"theodolite.{n}": float(rng.uniform(-30.0, 30.0)) * ARCSEC for n in names},
         "theodolite.lean": [float(x) * ARCSEC for x in rng.uniform(-10.0, 10.0, 2)],
         "theodolite.circle_zero": float(rng.uniform(-1.0, 1.0)), "longitude": float(rng.uniform(-3.0, 3.0)),
-        "latitude": math.radians(rng.uniform(12.0, 70.0)), "date": f"20{year}-{month:02d}-{day:02d}T{hour:02d}:00",
+        "latitude": math.radians(rng.uniform(12.0, 70.0)), "start": f"20{year}-{month:02d}-{day:02d}T{hour:02d}:00",
         "sets": int(rng.integers(2, 7)),
     }  # fmt: skip
 

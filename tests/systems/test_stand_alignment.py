@@ -85,7 +85,7 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     year, month, day, hour = (int(rng.integers(*limits)) for limits in ((20, 35), (1, 13), (1, 28), (0, 24)))
     return {
         "latitude": math.radians(rng.uniform(12.0, 70.0)), "longitude": float(rng.uniform(-3.0, 3.0)),
-        "date": f"20{year}-{month:02d}-{day:02d}T{hour:02d}:00",
+        "start": f"20{year}-{month:02d}-{day:02d}T{hour:02d}:00",
         "theodolite.azimuth": size(60.0), "theodolite.elevation": size(30.0), "theodolite.collimation": size(20.0),
         "theodolite.trunnion": size(20.0), "theodolite.circle_zero": float(rng.uniform(-1.0, 1.0)),
         "theodolite.lean": [size(10.0), size(10.0)], "theodolite.level_zero": size(20.0),
@@ -153,7 +153,7 @@ def test_effects_of_the_set_up(session: Session) -> None:
     per = dict.fromkeys(((s, n) for s in ("clock", "latitude") for n in FITTED), 0.0)
     per |= {(b.source, b.coefficient): b.sensitivity for b in budget}
     plain, names = shifted(record), FITTED[:4]
-    fast = shifted(record, date="2026-11-28T12:00:10")  # a clock 10 s fast
+    fast = shifted(record, start="2026-11-28T12:00:10")  # a clock 10 s fast
     south = shifted(record, latitude=LAT + 10.0 * ARCSEC)
     for name in names:
         assert fast[name] - plain[name] == pytest.approx(10.0 * per["clock", name], rel=0.02, abs=2e-3), name
@@ -172,7 +172,7 @@ def test_effects_of_the_set_up(session: Session) -> None:
     [
         ({"latitude": "5deg"}, "Polaris stands too low"),
         ({"latitude": "-40deg"}, "Polaris stands too low"),
-        ({"date": "28.11.2026"}, "write it as 2026-11-28T12:00"),
+        ({"start": "28.11.2026"}, "write it as 2026-11-28T12:00"),
     ],
 )
 def test_refusals(values: dict[str, Any], text: str) -> None:
@@ -194,6 +194,31 @@ def test_records_that_are_not_of_this_test() -> None:
         rows = {n: v for n, v in {**windows, **change}.items() if v is not None}
         with pytest.raises(ReductionError, match=text):
             R.reduce(rows, setup)
+
+
+# ------------------------------------------------------------------------------------------------ measured data
+HEAD = "# latitude = 45.75deg\n# longitude = 126.63deg\n# start = 2026-11-28T12:00\n# pressure = 1013hPa\n"
+
+
+def test_a_file_of_a_simulated_record_gives_the_same(session: Session, tmp_path: Path) -> None:
+    """Written as a laboratory writes it, in degrees and arc seconds; and what a file must say."""
+    record = session.run({"theodolite.azimuth": 1e-4, "theodolite.level_zero": 2e-5}, seed=5)
+    w = record.windows
+    rows = zip(
+        w["phase"], w["t_start"], w["t_end"], w["angle_start"], w["mean"] / DEG, w["level"] / ARCSEC, strict=True
+    )
+    lines = [f"{p:.0f},{a:.17g},{b:.17g},{k:.0f},{y:.17g},{v:.17g}" for p, a, b, k, y, v in rows]
+    table = "\n".join(["phase,t_start [s],t_end [s],target,mean [deg],level [arcsec]", *lines]) + "\n"
+    file = tmp_path / "sights.csv"
+    file.write_text(HEAD + table, "utf-8")
+    lab = load_system(NAME)
+    found, simulated = lab.reduce(lab.read_measured(file, {})), session.system.reduce(record)
+    for name in FITTED:
+        assert found[name].estimate == pytest.approx(simulated[name].estimate, abs=1e-6)
+        assert found[name].truth is None
+    file.write_text(HEAD.replace("# longitude = 126.63deg\n", "") + table, "utf-8")
+    with pytest.raises(gb.GyrobenchError, match="longitude"):
+        load_system(NAME).read_measured(file, {})
 
 
 # ------------------------------------------------------------------------------------------------ hand-over
