@@ -30,6 +30,7 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Group,
     Quantity,
+    Reason,
     Regression,
     RunDocument,
     Table,
@@ -51,6 +52,7 @@ FITTED = {
     "circle zero": ("azimuth of the zero of its circle", "deg", "circle_zero"),
     "inclinometer zero": ("zero of the inclinometer", "arcsec", "inclinometer_zero"),
 }
+LARGE = 120.0 * ARCSEC  # of the theodolite's errors, whose square is 0.07 arcsec
 ZERO = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # the fitted zero of the circle counts from a first value
 CLOCK = Source("clock", "clock", "s", "u_time", "positive where it is fast")
 PLACE = Source("star.place", "place of the star", "rad", "u_star", "each way", ("declination", "hour angle"))
@@ -183,8 +185,21 @@ class Reduction(DriftReduction[AlignmentSetup]):
                 "Apparent place of Polaris of the date, diurnal aberration in the azimuth, refraction in the altitude.",
             ],
             tables=[self._sights(found)],
+            reasons=self._large(found),
             random="noise of the sights",
         )
+
+    def _large(self, found: Findings) -> list[Reason]:
+        """Return that an error of the theodolite is so large that its square counts."""
+        sizes = {"collimation": found.est.beta[2], "trunnion": found.est.beta[3], "lean": np.max(np.abs(self.v))}
+        large = [f"{n} {abs(float(x)) / ARCSEC:.0f}″" for n, x in sizes.items() if abs(float(x)) > LARGE]
+        if not large:
+            return []
+        text = (
+            f"Errors of the theodolite are taken to first order; of {', '.join(large)} the squares are "
+            f"{max(abs(float(x)) for x in sizes.values()) ** 2 / ARCSEC:.2g}″ and not in u: adjust it."
+        )
+        return [Reason("theodolite.large_errors", text, ("pass",), ("about p × east", "trunnion", "collimation"))]
 
     def _sights(self, found: Findings) -> Table:
         """Return the star at the first and the last sight, the azimuth of the axis, and the level."""

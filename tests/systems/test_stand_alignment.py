@@ -167,6 +167,14 @@ def test_effects_of_the_set_up(session: Session) -> None:
     assert other["about p × east"] - plain["about p × east"] == pytest.approx(0.0, abs=0.1)
 
 
+def test_a_theodolite_out_of_adjustment_is_named(session: Session) -> None:
+    """Collimation of 3 arcmin: its square is 0.16 arcsec, more than u."""
+    found = session.system.reduce(session.run({"theodolite.collimation": 180.0 * ARCSEC}, seed=1))
+    (reason,) = [r for r in found.reasons if r.id == "theodolite.large_errors"]
+    assert "collimation 180″" in reason.text and "0.16″" in reason.text
+    assert not [r for r in session.system.reduce(session.run({}, seed=1)).reasons if r.id == "theodolite.large_errors"]
+
+
 @pytest.mark.parametrize(
     ("values", "text"),
     [
