@@ -59,7 +59,7 @@ class Theodolite(Component):
 
     reading = Output("rad", "horizontal circle, face right less half a turn; or the inclinometer")
     level = Output("rad", "plate level across the line of sight")
-    angle_read = Output("1", "the target")
+    angle_read = Output("rad", "the target, as an angle")
     in_position = Output("1", "1: sighted")
     altitude = Output("rad", "altitude of the line of sight, with refraction")
 

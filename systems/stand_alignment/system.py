@@ -29,7 +29,7 @@ SIGHTS = Socket(
         inp("target", "1", "1 star, 2 mirror, 3 axis; negative: face right"),
         out("reading", "rad", "horizontal circle, face right less half a turn; or the inclinometer"),
         out("level", "rad", "plate level across the line of sight"),
-        out("angle_read", "1", "the target"),
+        out("angle_read", "rad", "the target, as an angle"),
         out("in_position", "1", "1: sighted", whole=True),
     ),
 )
@@ -49,15 +49,15 @@ class StandAlignment(System):
         "sequencer": Slot("Sequencer", "sequencer"),
         "theodolite": Slot(SIGHTS, "theodolite"),
         "sampler": Slot("Sampler", "sampler"),
-        "sampler_level": Slot("Sampler", "sampler"),
+        "level_reader": Slot("Sampler", "sampler"),
     }
     wires = f"""
         sequencer -> theodolite: target
         theodolite -> sequencer: angle_read=angle in_position
         theodolite.reading -> sampler.x
-        theodolite.level -> sampler_level.x
+        theodolite.level -> level_reader.x
         {sampled("sampler", "theodolite: angle_read")}
-        {sampled("sampler_level", "theodolite: angle_read")}
+        {sampled("level_reader", "theodolite: angle_read")}
     """
     options = {
         "latitude": Option(
@@ -82,7 +82,7 @@ class StandAlignment(System):
     }  # fmt: skip
     measured_data = MEASURED
     noises = ("theodolite.pointing", "theodolite.bubble")
-    windows = Windows.of("sampler", level="sampler_level.mean")
+    windows = Windows.of("sampler", level="level_reader.mean")
     done = "sequencer.done"
     channels = ("theodolite.reading", "theodolite.level", "theodolite.altitude", "theodolite.angle_read")
     shown = ("theodolite.reading", "theodolite.level", "theodolite.altitude")
