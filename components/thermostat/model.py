@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Noise, Output, Parameter, State
 from gyrobench.component.blocks.surroundings import RoomAndField
-from gyrobench.component.math import Number, Vector, clip, vector
+from gyrobench.component.math import Number, clip, vector
 
 STAGES = 3
 
@@ -88,13 +88,13 @@ class Thermostat(RoomAndField):
                 )
         self.held = self.T[2]
 
-    def errors(self) -> Vector:
+    def errors(self) -> Number:
         """Return what the sensors say the shells are below their set points."""
         wrong = vector(self.sensor_error) + self.t * vector(self.sensor_ramp)
         noisy = vector([self.noise.sensor_1, self.noise.sensor_2, self.noise.sensor_3])
         return vector(self.set_point) - vector(self.T) - wrong - noisy
 
-    def wanted(self) -> Vector:
+    def wanted(self) -> Number:
         """Return the powers that the controllers ask for."""
         asked = vector(self.hold)
         e = self.errors()
