@@ -1,4 +1,4 @@
-"""What tests with an axis on the pole take of an alignment of it: measured errors of the set-up, as corrections."""
+"""Corrections that tests with an axis on the pole take of an alignment of it: measured errors of the set-up."""
 
 from __future__ import annotations
 
