@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tumbling
 
 import gyrobench as gb
 from gyrobench import frames
@@ -244,3 +245,28 @@ def test_the_axis_is_handed_over_to_the_tests(session: Session, tmp_path: Path) 
         assert float(east.split("(")[0]) == pytest.approx(-5.0, abs=0.5)
         assert float(across.split("(")[0]) == pytest.approx(20.0 * math.cos(LAT), abs=0.5)
         assert east.endswith(" arcsec") and 0.0 < float(east.split("(")[1].split(")")[0]) < 0.5
+
+
+def test_a_tumble_on_a_stand_off_the_pole_is_mended(session: Session) -> None:
+    """The stand of the alignment is that of the tumble: table.tilt about east and about p x east; signs end to end."""
+    azimuth, elevation = 60.0 * ARCSEC, -40.0 * ARCSEC
+    aligned = session.system.reduce(
+        session.run({"theodolite.azimuth": azimuth, "theodolite.elevation": elevation, "theodolite.pointing": 1e-9,
+                     "theodolite.bubble": 0.0}, seed=1)
+    )  # fmt: skip
+    system = load_system("tumble_single_axis")
+    given = dict(system.takes["stand_alignment"](aligned))
+    plan = {
+        **tumbling.SHORT,
+        **tumbling.quiet(tumbling.load()),
+        "gyro.white": 3e-9,
+        "nuisances": "none",
+        "latitude": LAT,
+    }
+    off = {"table.tilt[1]": elevation, "table.tilt[2]": azimuth * math.cos(LAT)}
+    with Session("tumble_single_axis") as tumble:
+        plain, wrong = (tumble.run({**plan, **more}, seed=1) for more in ({}, off))
+    right = wrong.run.replace(options={**wrong.run.options, **given})
+    found = [system.reduce(r) for r in (plain, wrong, Record(wrong.windows, wrong.channels, right))]
+    shift, left = ([r[n].estimate - found[0][n].estimate for n in tumbling.NAMES] for r in found[1:])
+    assert np.abs(shift).max() > 2e-3 and np.abs(left).max() < 0.03 * np.abs(shift).max()
