@@ -11,7 +11,7 @@ a T2 of their own, as the torquers are taken.  [SERVO-3LOOP, PLATFORM-3AXIS-DYN,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from gyrobench.system.families import loop_test as loop
@@ -80,11 +80,14 @@ def on_request() -> tuple[dict[str, OnRequest], dict[str, Any]]:
     return found, factors
 
 
-def design(parts: PartValues, crossover: float, track: float, motors: dict[str, float]) -> dict[str, Any]:
+def design(
+    parts: PartValues, crossover: float, track: float, start: Sequence[float], motors: dict[str, float]
+) -> dict[str, Any]:
     """Return the parameters of motors, gyros, rebalances and servos.
 
     crossover: of the rate loops, Hz, at the neutral inertia of each axis.  track: of the position loops, Hz; 0: none.
-    motors: of the platform, unless given.  Rate loop K_w k_t (1 + wi/s)/(J s); the current loop cancels L s + R.
+    start: joint angles (A order), which these hold.  motors: of the platform, unless given.  Rate loop
+    K_w k_t (1 + wi/s)/(J s); the current loop cancels L s + R.
     """
     wc = 2.0 * math.pi * crossover
     found: dict[str, Any] = {**parts.all_given({f"platform.{n}": [x] * 3 for n, x in motors.items()})}
@@ -100,6 +103,7 @@ def design(parts: PartValues, crossover: float, track: float, motors: dict[str, 
         integral = CORNER * wc
         K_w = wc * inertia[k] / k_t / abs(1.0 + integral / (1j * wc))
         law = {"K_u": 1.0, "K_w": K_w, "K_wi": K_w * integral, "K_p": 2.0 * math.pi * track, "i_max": LIMIT}
+        law["theta_wish"] = start[k]
         law |= {"K_c": 2.0 * math.pi * CURRENT * L, "K_ci": 2.0 * math.pi * CURRENT * R}
         found |= {f"{axis}.{n}?": x for n, x in law.items()}
     return found

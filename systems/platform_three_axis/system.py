@@ -26,6 +26,7 @@ SERVO = "servo_three_loop"
 #: the motors of a servo with a current loop: of the part as it is
 MOTOR = {"k_t": 1.0, "R": 2.0, "L": 4e-3, "k_e": 1.0}
 CURRENT_STEP = 2e-4  # s
+ANGLE_TEST, RATE_TEST = 2e-3, 0.02  # V, of the test sines: 0.2 mrad of a float, 20 mrad/s
 COMMAND = 1e-3  # rad/s, of the command step
 COMMANDS = commands("exciter.command")
 
@@ -154,7 +155,8 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         if self["sweeps"]:
             for k, axis in enumerate(AXES, 1):
                 tones = [fc * x for x in (0.3, 0.6, 0.9, 1.2, 2.0, 3.5)]
-                phases += sweep(f"loop {axis}", "test", tones, 2e-3, axis=k, settle=4.0, periods=20)
+                size = RATE_TEST if self.rates else ANGLE_TEST
+                phases += sweep(f"loop {axis}", "test", tones, size, axis=k, settle=4.0, periods=20)
         return [*phases, LoopPhase("drift", "hold", settle=3.0, dwell=self["hold"])]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
@@ -170,9 +172,10 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
 
     def servos(self, parts: PartValues) -> dict[str, Any]:
         """Return the parameters of rebalanced gyros and of servos with three loops."""
+        start = [self[n] for n in AXES]
         return {
             "commands.theta_f_max?": 80 * DEG,
-            **rate_loops.design(parts, self["crossover"], self["track"], MOTOR),
+            **rate_loops.design(parts, self["crossover"], self["track"], start, MOTOR),
         }
 
     def check(self) -> list[str]:
