@@ -17,7 +17,8 @@ commands
 
 The same splits the angle about the other axes that a commanded sine leaves.  White and slow drift of the gyros pass to
 the angle as commands, noise of a pickoff as the rate n s (tau s + 1) C/(K_sg H), noise of the current read of a
-rebalanced gyro as k n.  Of noise, what is left about mean and slope of a window of length D counts, x = pi f D:  1 - (sin x/x)^2 - 3 (sin x/x^2 - cos x/x)^2.
+rebalanced gyro as k n.  Of noise, what is left about mean and slope of a window of
+length D counts, x = pi f D:  1 - (sin x/x)^2 - 3 (sin x/x^2 - cos x/x)^2.
 
 A share is the covariance of the source with the whole over the variance of the whole: shares add up to 100 %, one that
 is negative cancels part of the others.
