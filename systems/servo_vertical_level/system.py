@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL
@@ -13,8 +15,10 @@ from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option, Slot
+from gyrobench.system.values import InvalidValueError
 from gyrobench.units import DPH
 
+from . import compensation
 from .measured import MEASURED
 
 METER = "torquing"  # the sampler of the compensating current
@@ -35,7 +39,8 @@ class ServoVerticalLevel(ServoTest):
     """The gyro holds the table with the input axis down or up (class 1) or level (class 2); the table rate less the
     Earth's is the drift, and attitudes compared give its coefficients: R, U_z, U_x by the three-term route.
 
-    With ``levelled`` a compensating current takes the Earth's rate out of the level attitudes, for long dwells.
+    With ``levelled`` a compensating current takes the Earth's rate out of the level attitudes, for long dwells; with
+    ``compensate`` one takes the drift of given coefficients out of all, and the drift is measured again.
 
     [TEST-SERVO-VERT, TEST-SERVO-LEVEL, SERVO-LEVELLED; Hu 1981, eq. 3-60..3-83]
     """
@@ -54,6 +59,7 @@ class ServoVerticalLevel(ServoTest):
             "cycles": Option(2, int, "times the attitudes are gone through", 1, 12),
             "dwell": Option(600.0, "s", "time in each attitude", 1e-3),
             "windows": Option(10, int, "windows in each dwell", 1, 200),
+            "compensate": Option("", str, "coefficients whose drift the torquer takes out, or the folder of a run"),
             "levelled": Option(False, bool, "compensating current in level attitudes: the table stays level for long"),
         }
         | TORQUER
@@ -79,7 +85,9 @@ class ServoVerticalLevel(ServoTest):
 
     def set(self, name: str, value: Any) -> None:
         super().set(name, value)
-        if name == "levelled" and self["levelled"]:
+        if name == "compensate" and Path(str(value)).is_dir():
+            super().set(name, compensation.of_folder(Path(str(value)), self.channel))
+        if self["levelled"] or self["compensate"]:
             self.request(METER)
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
@@ -101,16 +109,25 @@ class ServoVerticalLevel(ServoTest):
         holds = []
         common = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"] / self["windows"]}
         for name in self.attitudes() * self["cycles"]:
-            start = current = 0.0
+            start, by_torquer = 0.0, -self.compensated(name)
             if name in LEVEL:
                 half = self["settle"] + self["dwell"] / 2.0
-                current = self.earth(name) / self.torquer if self["levelled"] else 0.0
-                start = 0.0 if self["levelled"] else self.earth(name) * half
-                drifted = float(self.expected().rates(name)[0][0]) * half
+                if self["levelled"]:
+                    by_torquer += self.earth(name)
+                else:
+                    start = self.earth(name) * half
+                drifted = (float(self.expected().rates(name)[0][0]) - self.compensated(name)) * half
                 if abs(drifted) > DRIFTED or abs(start) + 2.0 * abs(drifted) > LIMIT:
                     start -= drifted
-            holds.append(Hold(name, start=start, current=current, **common))
+            holds.append(Hold(name, start=start, current=by_torquer / self.torquer, **common))
         return [h for h in holds if h.attitude in SERVO_ATTITUDES]
+
+    def compensated(self, name: str) -> float:
+        """Return the drift that the option compensate takes out of an attitude, rad/s."""
+        if not self["compensate"] or name not in SERVO_ATTITUDES:
+            return 0.0
+        put_in = compensation.coefficients(self["compensate"], self.channel)
+        return float(replace(self.expected(), drift=put_in).rates(name)[0][0])
 
     def earth(self, name: str) -> float:
         """Return the Earth rate along the input axis, rad/s."""
@@ -120,6 +137,10 @@ class ServoVerticalLevel(ServoTest):
         from .refusals import option_problems
 
         names = self.attitudes()
+        try:
+            compensation.coefficients(self["compensate"], self.channel)
+        except InvalidValueError as error:
+            return [str(error)]
         known = {n: 0.0 if self["levelled"] else self.earth(n) for n in names if n in LEVEL}
         return option_problems(names, known, self["settle"] + self["dwell"]) + super().check()
 
@@ -128,12 +149,11 @@ class ServoVerticalLevel(ServoTest):
 
         names = [n for n in self.attitudes() if n in LEVEL]
         rates = {n: float(self.expected().table_rate(n)[0]) for n in names}
-        if self["levelled"]:
-            rates = {n: rate + self.earth(n) for n, rate in rates.items()}
-            limit = parameters.get("cage.i_max", math.inf)
-            most = max((abs(self.earth(n)) / self.torquer for n in names), default=0.0)
-            if most > limit:
-                return [f"levelled: the Earth's rate asks for {most * 1e3:.3g} mA, cage.i_max = {limit * 1e3:.3g} mA"]
+        levelling = {n: self.earth(n) if self["levelled"] else 0.0 for n in names}
+        rates = {n: rate + levelling[n] - self.compensated(n) for n, rate in rates.items()}
+        limit, most = parameters.get("cage.i_max", math.inf), max((abs(h.current) for h in self.holds()), default=0.0)
+        if most > limit:
+            return [f"levelled, compensate: they ask for {most * 1e3:.3g} mA, cage.i_max = {limit * 1e3:.3g} mA"]
         problems = option_problems(names, rates, self["settle"] + self["dwell"], "the Earth and the drift turn")
         return super().check_parameters(parameters) + (problems if names else [])
 
