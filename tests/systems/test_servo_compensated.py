@@ -1,4 +1,4 @@
-"""Compensation of the systematic drift, tested again on the servo table: currents by hand, what is left, what is refused."""
+"""Compensation of the systematic drift, tested again on the servo table: currents by hand, what is left, refusals."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def tables(result: Any) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
 
 
 def test_currents_by_hand_and_nothing_is_left() -> None:
-    """k i = -omega_d: x down -(D_F + D_I g + D_II g2), x up -(D_F - D_I g + D_II g2), z down -(D_F + D_S g + D_SS g2)."""
+    """k i = -omega_d: x down -(D_F + D_I g + D_II g2), x up with -D_I, z down -(D_F + D_S g + D_SS g2)."""
     quiet = dict.fromkeys(load_system(NAME).noises, 0.0)
     record, result = compensated(TRUE, **quiet, nuisances="none")
     g = frames.normal_gravity(math.radians(45.75)) / frames.G0
@@ -77,17 +77,13 @@ def test_a_coefficient_that_does_not_repeat_is_left() -> None:
 
 def test_coefficients_of_a_run(tmp_path: Path) -> None:
     """Those of the gyro alone; combinations are left out, and a result of combinations alone is refused."""
-    found = [
-        {"name": "D_I", "estimate": 0.25, "unit": "°/h/g"},
-        {"name": "D_F + γ² D_II", "estimate": 1.0, "unit": "°/h"},
-    ]
+    found = [{"name": "D_I", "estimate": 0.25}, {"name": "D_F + γ² D_II", "estimate": 1.0}]
     (tmp_path / "result.json").write_text(json.dumps({"coefficients": found}))
     system = load_system(NAME)
     system.set("compensate", str(tmp_path))
     assert system["compensate"] == "D_I=0.25deg/h"
-    assert system.compensated("x down") == pytest.approx(
-        0.25 * DPH * frames.normal_gravity(math.radians(45.75)) / 9.80665
-    )
+    g = frames.normal_gravity(math.radians(45.75)) / frames.G0
+    assert system.compensated("x down") == pytest.approx(0.25 * DPH * g)
     (tmp_path / "result.json").write_text(json.dumps({"coefficients": found[1:]}))
     with pytest.raises(InvalidValueError, match="no coefficient of this gyro alone"):
         load_system(NAME).set("compensate", str(tmp_path))
