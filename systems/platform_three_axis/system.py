@@ -33,8 +33,10 @@ COMMANDS = commands("exciter.command")
 
 class PlatformThreeAxisSystem(ThreeAxisTest):
     """Three floated gyros on the inner element of three gimbals; their signals are distributed to the motors of the
-    gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.  loops = rate: the
-    gyros are rebalanced, their currents the rates, and each axis has a current, a rate and a position loop.
+    gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
+
+    loops = rate: the gyros are rebalanced, their currents the rates, and each axis has a current, a rate and a position
+    loop.
 
     [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL, SERVO-3LOOP; Xia 2008, section 1.3.2, ch. 5]
     """

@@ -39,6 +39,7 @@ class ServoVerticalLevel(ServoTest):
     """The gyro holds the table with the input axis down or up (class 1) or level (class 2); the table rate less the
     Earth's is the drift, and attitudes compared give its coefficients: R, U_z, U_x by the three-term route.
 
+
     With ``levelled`` a compensating current takes the Earth's rate out of the level attitudes, for long dwells; with
     ``compensate`` one takes the drift of given coefficients out of all, and the drift is measured again.
 
