@@ -88,7 +88,7 @@ def test_coefficients_of_a_run(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="no coefficient of this gyro alone"):
         load_system(NAME).set("compensate", str(tmp_path))
     (tmp_path / "result.json").unlink()
-    with pytest.raises(InvalidValueError, match="no result.json with coefficients"):
+    with pytest.raises(InvalidValueError, match="with coefficients; run its report"):
         load_system(NAME).set("compensate", str(tmp_path))
 
 
