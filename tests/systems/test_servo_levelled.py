@@ -57,7 +57,7 @@ def test_random_gyros(channel: str) -> None:
     [
         ([f"attitudes={NORTH}", "dwell=1500"], "1° either side of level allows"),
         ([f"attitudes={NORTH}", "dwell=1500", "levelled=true", "gyro.D_F=9deg/h"], "1° either side of level allows"),
-        ([f"attitudes={NORTH}", "levelled=true", "cage.i_max=0.1mA"], "levelled: the Earth's rate asks for 0.61 mA"),
+        ([f"attitudes={NORTH}", "levelled=true", "cage.i_max=0.1mA"], "levelled, compensate: they ask for 0.61 mA"),
     ],
 )
 def test_refused(command: Command, tmp_path: Path, sets: list[str], said: str) -> None:
