@@ -49,6 +49,7 @@ CASES = {
     "fixed_position": Case({"readings": 10, "dwell": 20.0, "settle": 3.0}),
     "open_loop_drift": Case({"pairs": 5, "wait": 6.0, "dwell": 0.1}, 5e-6, "the rate of a move is held over each step"),
     "accelerometer_multipoint": Case({}),
+    "position_sensitivity": Case({"cycles": 2, "dwell": 10.0}),
     "servo_polar": Case({**DAY50, "gyro.J": 2e-5}),
     "servo_vertical_level": Case({"dwell": 60.0, "settle": 2.0, **NO_CROSS}),
     "servo_two_axis": Case(day(50.0)),
