@@ -24,6 +24,7 @@ class RateTableVibrating(AxisTable):
 
     simulates = (each("read_gain", ("table.reading.gain",)), each("read_lag", ("table.reading.lag",)))
 
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     face = Rotation("mount: rows are the gyro axes in table axes")
     read_gain = Parameter(0.0, "1", "relative error of the reading of the rate", min=-0.5, max=0.5)
     read_lag = Parameter(0.0, "s", "time by which the reading of the rate is late", min=-1e-2, max=1e-2)

@@ -14,7 +14,9 @@ from .response import Figures, Response, fitted, logarithm
 
 FAR = 0.1  # error of the gain at low frequency from which on something else than the gyro is meant
 STEEP = 0.2  # of a slope of 1 or -1, and of a right angle, rad
-OFF = 5.0  # u: a point further from the curve
+SCATTER = 0.01  # least robust scatter of the residuals, over u, which an outlier widens where it is not stated
+OFF = 6.0  # u: a point further from the curve
+LEAD = 0.2  # rad, at the end of the pass band: more than any gyro, or a late reading of the table, makes
 BETTER = 0.1  # of chi2 that is left when two rows are exchanged back
 
 
@@ -43,7 +45,7 @@ def mistakes(r: Response, found: Figures) -> Iterator[Reason]:
     if abs(found.value[0] - 1.0) > FAR:
         yield Reason("response.factor", factor_sentence(float(found.value[0])), blocked, severity="doubt")
     late = r.phase[r.gain > r.gain[0] - 0.5 * math.log(2.0)]
-    if found.value[3] < -3.0 * found.u[3] and late[-1] > 0.2:
+    if late[-1] > LEAD:
         text = (
             "The gyro leads the table more and more with frequency, which no gyro does. Are the phases given with the "
             "opposite sign? A lag is negative."
@@ -55,7 +57,7 @@ def mistakes(r: Response, found: Figures) -> Iterator[Reason]:
 def _rows(r: Response, found: Figures) -> Iterator[Reason]:
     """Name two rows that are exchanged, or a point that is far off."""
     left = (np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)) / r.u
-    spread = max(1.0, 1.4826 * float(np.median(np.abs(left))))
+    spread = max(SCATTER, 1.4826 * float(np.median(np.abs(left))))
     off = np.hypot(*left) / spread
     worst = np.argsort(off)[::-1][:4]
     if off[worst[0]] < OFF:

@@ -3,8 +3,8 @@
     H(s) = K exp(-s T) / [(1 + s/a) ... (1 + 2 z s/b + (s/b)2) ...]                      0 to 5 poles
 
 by weighted least squares of ln H; the number of poles by the least Bayesian information criterion.  The figures are
-those of this curve: the first frequency with |H| = K/sqrt(2), the first with arg H = -90 degrees, the delay -d arg H / d w at
-frequency zero, the order -2 d ln |H| / d ln f at -3 dB, which is n of a Butterworth low-pass of order n.
+those of this curve: the first frequency with |H| = K/sqrt(2), the first with arg H = -90 degrees, the delay -d arg H /
+d w at frequency zero, the order -2 d ln |H| / d ln f at -3 dB, which is n of a Butterworth low-pass of order n.
 
 The uncertainty is that of the points, widened by sqrt(chi2 / degrees of freedom) where the curve does not fit them, and
 what one pole more changes beyond what noise explains.  [TEST-BANDWIDTH; Schwarz 1978]

@@ -110,7 +110,7 @@ class GyroBandwidth(System):
         way = self["rate"] / (2.0 * math.pi * self["lowest"])
         if way > WAY:
             problems.append(
-                f"rate = {self['rate'] / DEG:g} deg/s at {self['lowest']:g} Hz turns the table by {way / DEG:.3g} deg; at "
-                f"most {WAY / DEG:.3g} deg are allowed: a smaller rate or a larger lowest"
+                f"rate = {self['rate'] / DEG:g} deg/s at {self['lowest']:g} Hz turns the table by {way / DEG:.3g} deg; "
+                f"at most {WAY / DEG:.3g} deg are allowed: a smaller rate or a larger lowest"
             )
         return problems
