@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.loops.loop_curves import bode, curve
-from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.sources import TIME_BASE, Source
 from gyrobench.result import BudgetLine
@@ -65,7 +65,7 @@ class Reduction(MeasureReduction):
         return Account(
             method="Sines of table rate at one frequency after another; a curve of poles and a delay by weighted least "
             "squares [TEST-BANDWIDTH]",
-            sources=["TEST-BANDWIDTH; IEEE 1431; IEEE 952; IEEE 647; Schwarz 1978"],
+            sources=["TEST-BANDWIDTH; IEEE 1431; IEEE 952; IEEE 647"],
             equation="H(s) = K e^(-s T) \\/ product (1 + 2 zeta s\\/omega + s^2\\/omega^2)",
             conventions=[
                 "Gain and phase: rate indicated over rate of the table as read; a lag is negative.",
@@ -81,8 +81,7 @@ class Reduction(MeasureReduction):
             said = ["Bandwidth (−3 dB) {f_3dB}, equivalent order {order}.", *said]
         if math.isfinite(self.figures.value[2]):
             said.append("The gyro lags by 90° at {f_90}.")
-        self.said = tuple(said)
-        return super().summary()
+        return told(self.found.coefficients, *said)
 
     # ------------------------------------------------------------------ figures and their budget
     def _report(self) -> None:
@@ -205,7 +204,7 @@ class Reduction(MeasureReduction):
             found.warn("response.misfit", text)
         peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
         if peak > 0.5 * math.log(2.0):
-            at = float(self.response.f[int(np.argmax(self.response.gain))])
-            text = f"The gain rises to {20.0 * peak / math.log(10.0):.3g} dB at {at:.3g} Hz: a resonance. "
-            text += "Measure more frequencies there."
-            found.warn("response.resonance", text)
+            top = float(self.response.f[int(np.argmax(self.response.gain))])
+            rise = 20.0 * peak / math.log(10.0)
+            more = "Measure more frequencies there."
+            found.warn("response.resonance", f"The gain rises to {rise:.3g} dB at {top:.3g} Hz: a resonance. {more}")

@@ -15,12 +15,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import optimize
 
 from gyrobench.arrays import Array
 
+Complex = NDArray[np.complexfloating[Any, Any]]
 POLES = 5
 ROOT = math.sqrt(0.5)
 DENSE = 2000  # frequencies at which crossings are looked for
@@ -39,13 +42,13 @@ class Response:
     u: Array
 
     @classmethod
-    def of(cls, f: Array, value: Array, u: Array) -> Response:
+    def of(cls, f: Array, value: Complex, u: Array) -> Response:
         """Return the response of complex points; the phase is continuous, that of the lowest within half a turn."""
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
         return cls(f, np.log(np.abs(value)), np.unwrap(np.angle(value)), u)
 
-    def moved(self, change: Array) -> Response:
+    def moved(self, change: Complex) -> Response:
         """Return the response times exp(change), change complex (n,)."""
         return Response(self.f, self.gain + change.real, self.phase + change.imag, self.u)
 
