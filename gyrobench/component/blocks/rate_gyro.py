@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from gyrobench.component.blocks.mems import butterworth, sample_number, word
 from gyrobench.component.blocks.random_drift import Flicker, RateRandomWalk
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block
@@ -137,16 +138,15 @@ class FilteredRateGyro(RateGyro):
 
     def filter_rates(self, s: Vector) -> None:
         """Write the derivatives of the filter that is fed with s, rad/s."""
-        wn = 2.0 * pi * self.bandwidth
         for j in range(2):
             self.der.y[j] = self.v[j]
-            self.der.v[j] = wn * wn * (s[j] - self.y[j]) - sqrt(2.0) * wn * self.v[j]
+            self.der.v[j] = butterworth(s[j], self.y[j], self.v[j], self.bandwidth)
 
     def read_out(self) -> None:
         """Take the filtered rates as measured if a sample is due."""
         due = 1.0
         if self.period > 0.0:
-            count = floor(self.t / self.period + 1e-6)
+            count = sample_number(self.t, self.period)
             due = 1.0 if count > self.number else 0.0
             self.number = count
         if due > 0.5:
@@ -154,4 +154,4 @@ class FilteredRateGyro(RateGyro):
             self.limit(self.range_max)
             if self.resolution > 0.0:
                 for j in range(2):
-                    self.measured[j] = self.resolution * floor(self.measured[j] / self.resolution + 0.5)
+                    self.measured[j] = word(self.measured[j], self.resolution)
