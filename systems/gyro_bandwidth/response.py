@@ -33,7 +33,7 @@ WIDE = 1e3  # of the highest frequency: slower and faster poles than this are no
 
 
 @dataclass(frozen=True)
-class Response:
+class MeasuredResponse:
     """Frequencies f (Hz, rising), natural logarithm of the gain, unwrapped phase (rad), u of both (n,)."""
 
     f: Array
@@ -42,19 +42,19 @@ class Response:
     u: Array
 
     @classmethod
-    def of(cls, f: Array, value: Complex, u: Array) -> Response:
+    def of(cls, f: Array, value: Complex, u: Array) -> MeasuredResponse:
         """Return the response of complex points; the phase is continuous, that of the lowest within half a turn."""
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
         return cls(f, np.log(np.abs(value)), np.unwrap(np.angle(value)), u)
 
-    def moved(self, change: Complex) -> Response:
+    def moved(self, change: Complex) -> MeasuredResponse:
         """Return the response times exp(change), change complex (n,)."""
-        return Response(self.f, self.gain + change.real, self.phase + change.imag, self.u)
+        return MeasuredResponse(self.f, self.gain + change.real, self.phase + change.imag, self.u)
 
-    def at(self, factor: float) -> Response:
+    def at(self, factor: float) -> MeasuredResponse:
         """Return the response with all frequencies times a factor."""
-        return Response(self.f * factor, self.gain, self.phase, self.u)
+        return MeasuredResponse(self.f * factor, self.gain, self.phase, self.u)
 
 
 def logarithm(p: Array, f: Array) -> Array:
@@ -102,7 +102,7 @@ def _crossing(of: Logarithm, row: int, grid: Array, y: Array, level: float) -> f
 
 
 @dataclass(frozen=True)
-class Curve:
+class PoleCurve:
     """A fitted response with n poles: parameters p and their covariance, chi2, degrees of freedom, criterion."""
 
     poles: int
@@ -131,7 +131,7 @@ class Curve:
         return out
 
 
-def fitted(r: Response, poles: int) -> Curve | None:
+def fitted(r: MeasuredResponse, poles: int) -> PoleCurve | None:
     """Return the response with so many poles; None where there are too few points for it, or it does not converge."""
     free = poles + 2
     dof = 2 * r.f.size - free
@@ -170,7 +170,7 @@ def fitted(r: Response, poles: int) -> Curve | None:
     cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) / np.outer(scale, scale)
     units = np.array([1.0, 1.0 / top, *np.ones(poles)])
     chi2 = 2.0 * float(best.cost)
-    return Curve(
+    return PoleCurve(
         poles, best.x * units, cov * np.outer(units, units), chi2, dof, chi2 + free * math.log(2 * f.size), top
     )
 
@@ -189,7 +189,7 @@ class Figures:
     value: Array
     noise: Array
     shape: Array
-    curve: Curve
+    curve: PoleCurve
 
     @property
     def u(self) -> Array:
@@ -197,9 +197,9 @@ class Figures:
         return out
 
 
-def curves(r: Response) -> list[Curve]:
+def curves(r: MeasuredResponse) -> list[PoleCurve]:
     """Return the curves of 0 to POLES poles that can be fitted, up to two beyond the least criterion."""
-    found: list[Curve] = []
+    found: list[PoleCurve] = []
     for poles in range(POLES + 1):
         best = min(found, key=lambda c: c.criterion).poles if found else poles
         curve = fitted(r, poles) if poles <= best + 2 else None
@@ -207,7 +207,7 @@ def curves(r: Response) -> list[Curve]:
     return found
 
 
-def figures(r: Response, choose: Callable[[list[Curve]], Curve] | None = None) -> Figures | None:
+def figures(r: MeasuredResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | None = None) -> Figures | None:
     """Return the figures of a response; None where no curve can be fitted.  choose: not the least criterion."""
     every = curves(r)
     if not every:
