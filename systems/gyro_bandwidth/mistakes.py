@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
 from gyrobench.result import Reason
 
-from .response import Figures, MeasuredResponse, fitted, logarithm
+from .response import Figures, GyroResponse, fitted, logarithm
 
 FAR = 0.1  # error of the gain at low frequency from which on something else than the gyro is meant
 STEEP = 0.2  # of a slope of 1 or -1, and of a right angle, rad
@@ -20,7 +20,7 @@ LEAD = 0.2  # rad, at the end of the pass band: more than any gyro, or a late re
 BETTER = 0.1  # of chi2 that is left when two rows are exchanged back
 
 
-def mistakes(r: MeasuredResponse, found: Figures) -> Iterator[Reason]:
+def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
     """Yield why nothing may pass or fail, with the likely mistake."""
     blocked = ("pass", "fail")
     near = slice(0, min(4, r.f.size))
@@ -54,7 +54,7 @@ def mistakes(r: MeasuredResponse, found: Figures) -> Iterator[Reason]:
     yield from _rows(r, found)
 
 
-def _rows(r: MeasuredResponse, found: Figures) -> Iterator[Reason]:
+def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:
     """Name two rows that are exchanged, or a point that is far off."""
     left = (np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)) / r.u
     spread = max(SCATTER, 1.4826 * float(np.median(np.abs(left))))
@@ -65,7 +65,7 @@ def _rows(r: MeasuredResponse, found: Figures) -> Iterator[Reason]:
     for i, j in ((a, b) for k, a in enumerate(worst) for b in worst[k + 1 :]):
         gain, phase = r.gain.copy(), r.phase.copy()
         gain[[i, j]], phase[[i, j]] = gain[[j, i]], phase[[j, i]]
-        again = fitted(MeasuredResponse(r.f, gain, phase, r.u), found.curve.poles)
+        again = fitted(GyroResponse(r.f, gain, phase, r.u), found.curve.poles)
         if again is not None and again.chi2 < BETTER * found.curve.chi2:
             a, b = sorted((float(r.f[i]), float(r.f[j])))
             text = f"The points at {a:.4g} Hz and {b:.4g} Hz seem exchanged: the curve then fits. Check these rows."

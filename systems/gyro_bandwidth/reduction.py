@@ -23,7 +23,7 @@ from gyrobench.units import DEG
 
 from .mistakes import mistakes
 from .points import points_of
-from .response import MeasuredResponse, figures, logarithm
+from .response import GyroResponse, figures, logarithm
 from .truth import true_values
 
 READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
@@ -51,7 +51,7 @@ class Reduction(MeasureReduction):
 
     def measure(self) -> Account:
         points = points_of(self.record)
-        response = MeasuredResponse.of(points.f, points.value, points.u)
+        response = GyroResponse.of(points.f, points.value, points.u)
         found = figures(response)
         if found is None:
             raise ReductionError("no curve fits these points; more frequencies are needed")
@@ -134,7 +134,7 @@ class Reduction(MeasureReduction):
         caption = "Gain and phase at each frequency; u: of the gain, relative, and of the phase in rad"
         return Table("response.points", "Frequency response", caption, head, rows)
 
-    def _sources(self) -> list[tuple[Source, float, MeasuredResponse]]:
+    def _sources(self) -> list[tuple[Source, float, GyroResponse]]:
         """Return the sources, the step that is taken of each, and the response as an error of that size makes it."""
         r, w = self.response, 2.0 * np.pi * self.response.f
         one = np.ones(r.f.size)

@@ -33,7 +33,7 @@ WIDE = 1e3  # of the highest frequency: slower and faster poles than this are no
 
 
 @dataclass(frozen=True)
-class MeasuredResponse:
+class GyroResponse:
     """Frequencies f (Hz, rising), natural logarithm of the gain, unwrapped phase (rad), u of both (n,)."""
 
     f: Array
@@ -42,19 +42,19 @@ class MeasuredResponse:
     u: Array
 
     @classmethod
-    def of(cls, f: Array, value: Complex, u: Array) -> MeasuredResponse:
+    def of(cls, f: Array, value: Complex, u: Array) -> GyroResponse:
         """Return the response of complex points; the phase is continuous, that of the lowest within half a turn."""
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
         return cls(f, np.log(np.abs(value)), np.unwrap(np.angle(value)), u)
 
-    def moved(self, change: Complex) -> MeasuredResponse:
+    def moved(self, change: Complex) -> GyroResponse:
         """Return the response times exp(change), change complex (n,)."""
-        return MeasuredResponse(self.f, self.gain + change.real, self.phase + change.imag, self.u)
+        return GyroResponse(self.f, self.gain + change.real, self.phase + change.imag, self.u)
 
-    def at(self, factor: float) -> MeasuredResponse:
+    def at(self, factor: float) -> GyroResponse:
         """Return the response with all frequencies times a factor."""
-        return MeasuredResponse(self.f * factor, self.gain, self.phase, self.u)
+        return GyroResponse(self.f * factor, self.gain, self.phase, self.u)
 
 
 def logarithm(p: Array, f: Array) -> Array:
@@ -131,7 +131,7 @@ class PoleCurve:
         return out
 
 
-def fitted(r: MeasuredResponse, poles: int) -> PoleCurve | None:
+def fitted(r: GyroResponse, poles: int) -> PoleCurve | None:
     """Return the response with so many poles; None where there are too few points for it, or it does not converge."""
     free = poles + 2
     dof = 2 * r.f.size - free
@@ -197,7 +197,7 @@ class Figures:
         return out
 
 
-def curves(r: MeasuredResponse) -> list[PoleCurve]:
+def curves(r: GyroResponse) -> list[PoleCurve]:
     """Return the curves of 0 to POLES poles that can be fitted, up to two beyond the least criterion."""
     found: list[PoleCurve] = []
     for poles in range(POLES + 1):
@@ -207,7 +207,7 @@ def curves(r: MeasuredResponse) -> list[PoleCurve]:
     return found
 
 
-def figures(r: MeasuredResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | None = None) -> Figures | None:
+def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | None = None) -> Figures | None:
     """Return the figures of a response; None where no curve can be fitted.  choose: not the least criterion."""
     every = curves(r)
     if not every:

@@ -45,7 +45,7 @@ def butterworth(f: np.ndarray, order: int, bandwidth: float) -> np.ndarray:
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
 def test_a_butterworth_has_its_order(order: int) -> None:
     f = np.geomspace(1.0, 200.0, 25)
-    r = RESPONSE.figures(RESPONSE.MeasuredResponse.of(f, 0.98 * butterworth(f, order, 60.0), np.full(f.size, 1e-4)))
+    r = RESPONSE.figures(RESPONSE.GyroResponse.of(f, 0.98 * butterworth(f, order, 60.0), np.full(f.size, 1e-4)))
     K, f3, f90, _, n = r.value
     assert (K, f3, n) == pytest.approx((0.98, 60.0, order), rel=1e-5)
     b, a = signal.butter(order, 2.0 * math.pi * 60.0, analog=True)
@@ -69,7 +69,7 @@ def test_random_responses_come_back() -> None:
             return np.asarray(np.exp(-2j * np.pi * g * t) / (1.0 + 2.0 * z * x + x * x))
 
         noisy = true(f) * np.exp(3e-3 * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size)))
-        r = RESPONSE.figures(RESPONSE.MeasuredResponse.of(f, noisy, np.full(f.size, 3e-3)))
+        r = RESPONSE.figures(RESPONSE.GyroResponse.of(f, noisy, np.full(f.size, 3e-3)))
         dense = np.linspace(0.01, 200.0, 20_000)
         values = true(dense)
         gain, phase = np.abs(values), np.unwrap(np.angle(values))
