@@ -93,8 +93,8 @@ def instruments_of(
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
     for name, (short, _) in thermal_parameters.items():
-        if (values := parameters.get(f"{slot}.{name}")) is not None:
-            found |= {f"{short}_{a}": float(v) for a, v in zip(AXES, values, strict=True)}
+        if f"{slot}.{name}" in parameters:
+            found |= {f"{short}_{a}": float(v) for a, v in zip(AXES, parameters[f"{slot}.{name}"], strict=True)}
     return found | _own_accelerometers(parameters)
 
 

@@ -111,7 +111,7 @@ def quantity(channel: ImuInstrument, kind: str, ending: str, truth: Mapping[str,
 
 def parameters() -> dict[str, tuple[str, str]]:
     """Return parameter of imu and imu_compensator -> its coefficients without the axis, and its unit."""
-    found = {}
+    found: dict[str, tuple[str, str]] = {}
     for kind, word, unit, per_rate in (("g", "gyro", "rad/s", "rad/K"), ("a", "acc", "m/s2", "m/s/K")):
         ends = {"T": f"{unit}/K", "T2": f"{unit}/K2", "T3": f"{unit}/K3", "H": unit, "R": per_rate}
         found |= {f"{word}_{BIAS[e][0]}": (f"b{kind}{e}", u) for e, u in ends.items()}

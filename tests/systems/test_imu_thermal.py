@@ -147,11 +147,11 @@ def test_a_laboratory_reads_its_thermometer_in_degrees(tmp_path: Path) -> None:
     head = ",".join([n + u for n, u in zip(names, units, strict=True)] + ["temperature [degC]"])
     rows = np.column_stack([*(w[n] for n in names), w["temperature"] + 25.0])
     path = tmp_path / "lab.csv"
-    said = "# latitude = 40.10704566deg\n# gravity = 9.805m/s2\n# thermal = true\n# reference = 25degC\n# nuisances = none\n"
+    said = "# latitude = 40.10704566deg\n# gravity = 9.805m/s2\n# thermal = true\n# reference = 25degC\n"
     path.write_text(said + head + "\n" + "\n".join(",".join(f"{v:.15g}" for v in r) for r in rows.tolist()) + "\n")
     system = load_system("imu_positions")
     record = system.read_measured(path, {})
-    found = {c.name: c for c in system.reduce(record).coefficients}
+    found = {c.name: c for c in reduction.Reduction.of_record(record).coefficients}
     for name in ("baT_x", "bgT_y", "SaT_z"):
         c, si = found[name], tables.SCALES[found[name].unit]
         assert abs(c.estimate * si - truth[name]) < 4.5 * c.u * si
