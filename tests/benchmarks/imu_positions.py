@@ -30,7 +30,8 @@ from scipy import stats
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-sys.path[:0] = [str(Path(__file__).parents[1] / room) for room in ("support", "systems")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from imu_world import EARTH, EDGES, FACES, Unit, World, handled, own_axes, plan, poses
 
 from gyrobench.system.system import load_system
@@ -99,7 +100,7 @@ def of_file(head: str, time_of: Any, gyro: Any, acc: Any) -> Any:
 
 
 def of_set_up(rng: Rng, stated: bool = True) -> tuple[Any, dict[str, float]]:
-    """A table and a mount that are off by what is stated: 20 arcsec level, azimuth, right angle, case; 30 ug gravity."""
+    """A table and a mount that are off by what is stated: 20" level, azimuth, right angle, case; 30 ug gravity."""
     arcsec = math.pi / 648000.0
     size = 20.0 * arcsec
     level, azimuth, square = rng.normal(size=3) * size
