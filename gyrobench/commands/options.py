@@ -25,6 +25,15 @@ Set = Annotated[
         autocompletion=complete_setting,
     ),
 ]
+FromRun = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--from-run",
+        metavar="RUN",
+        help="Take values of the result of another test, where this one says how (accelerometer_four: the first "
+        "harmonic of a table_position_test); --set goes before them.  Repeatable.",
+    ),
+]
 Part = Annotated[
     list[str] | None,
     typer.Option(
@@ -65,7 +74,7 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         metavar="MAP",
-        help="Column map (.toml) of a --data file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
+        help="Column map (.toml) of a file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
     ),
 ]
 From = Annotated[

@@ -17,6 +17,7 @@ from gyrobench.commands.options import (
     FitTo,
     Force,
     From,
+    FromRun,
     Json,
     Language,
     Map,
@@ -46,6 +47,7 @@ def run(
             metavar="NAME", help="Data sheet of a rate gyro (instruments/NAME.toml, or a file) for the slot gyro."
         ),
     ] = None,
+    from_run: FromRun = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the noise; default 1.", min=0)] = None,
     engine: Annotated[
         Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
@@ -90,6 +92,8 @@ def run(
     from gyrobench.report import FORMATS
     from gyrobench.report.language import reports_in
     from gyrobench.system.suite import Suite
+    from gyrobench.workflow.handover import handed_over
+    from gyrobench.workflow.inputs import load_test
     from gyrobench.workflow.instruments import with_instrument
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
@@ -97,7 +101,8 @@ def run(
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
     title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
-    test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
+    taken = handed_over(load_test(system), from_run) if from_run else {}
+    test = load_with_values(system, {**sheet, **taken, **parse_settings(values)}, time_step, coupling.value)
     if not isinstance(test, Suite):
         test.instrument = title
     elif title and not test["instrument"]:
@@ -127,6 +132,7 @@ def reduce(
     columns: Columns = None,
     source: From = None,
     values: Set = None,
+    from_run: FromRun = None,
     part: Part = None,
     mapping: Map = None,
     template: Annotated[
@@ -157,6 +163,7 @@ def reduce(
     from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.report import FORMATS
     from gyrobench.report.language import reports_in
+    from gyrobench.workflow.handover import handed_over
     from gyrobench.workflow.inputs import load_test
     from gyrobench.workflow.run_execution import RunRequest
 
@@ -168,6 +175,7 @@ def reduce(
         return
     formats = ("json",) if no_report else FORMATS
     parts, maps = parse_swaps(part, mapping)
+    taken = handed_over(test, from_run) if from_run else {}
     if source is not None:
         if data or fit_to or columns or certificate:
             raise UsageError(
@@ -176,11 +184,12 @@ def reduce(
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
         with reports_in(language, test.name, Bench.find().folder):
-            exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
+            given = taken | parse_settings(values)
+            exit_on_fail(print_runs.reduce_result(request, test, source, given, as_json), strict)
         return
     if parts or maps:
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
-    given = parse_settings(values)
+    given = taken | parse_settings(values)
     with reports_in(language, test.name, Bench.find().folder):
         verdict = print_runs.reduce(
             test, data or [], given, spec, out, force, as_json, formats, fit_to, columns, certificate

@@ -146,6 +146,8 @@ class System(Configurable):
     #: uncertainty, unit), SI: for --fit-to
     fitted: ClassVar[Mapping[str, tuple[str, str]]] = {}
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
+    #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
+    takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
@@ -359,8 +361,8 @@ class System(Configurable):
 
 
 def _without(wires: str, lines: str) -> str:
-    gone = [x.split() for x in lines.splitlines()]
-    return "\n".join(x for x in wires.splitlines() if x.split() not in gone)
+    gone = [line.split() for line in lines.splitlines()]
+    return "\n".join(x for x in wires.splitlines() if not x.split() or x.split() not in gone)
 
 
 def load_system(name: str, bench: Path | None = None) -> System:
