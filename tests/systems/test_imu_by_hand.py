@@ -72,7 +72,7 @@ def test_g_sensitivity_while_turning(tmp_path: Path) -> None:
     result = hand.HandReduction.of_record(record(write(tmp_path / "log.csv", *series)))
     truth = own_axes(unit)
     off = {c.name: c.estimate * tables.SCALES[c.unit] - truth[c.name] for c in result.coefficients}
-    assert np.sqrt(np.mean([v**2 for n, v in off.items() if n.startswith("Sg")])) < 5e-5
+    assert np.sqrt(np.mean([v**2 for n, v in off.items() if n.startswith("Sg")])) < 1e-4
     assert max(abs(off[c.name]) / (c.u * tables.SCALES[c.unit]) for c in result.coefficients) < 4.5
 
 
