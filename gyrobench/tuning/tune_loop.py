@@ -31,6 +31,7 @@ from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.sight_jitter import SightModel, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
 from gyrobench.tuning.written_loop import TunedLoop
@@ -64,7 +65,7 @@ def tune(
     loop: name of the loop, of a system that has several; the others stay as they are.
     Raises UsageError, TuningError, and what a session raises.
     """
-    wishes, shape = parse_wishes(want), ControllerStructure(structure)
+    wishes, shape = parse_wishes(want), structure_of(structure)
     ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
     began = time.perf_counter()
@@ -83,7 +84,10 @@ def tune(
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
-    controller = problem.controller(x)
+    try:
+        controller = problem.controller(x)
+    except ArithmeticError as error:
+        raise TuningError(f"{system.name}: no controller of structure {structure} was found: {error}") from None
     seconds = time.perf_counter() - began
     f = frequencies(problem.plants, problem.box, wishes, DENSE)
     held = HeldController(controller, now.step)
@@ -158,6 +162,7 @@ class _Loop:
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
         at = points(self.ranges)
         models = self.plants(at)
+        shape = shape.of(models[0])
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
@@ -306,8 +311,13 @@ def _settings(
         f"{slot}.form": 1,
         f"{slot}.num": num,
         f"{slot}.den": den,
-        **({f"{slot}.conditioned": 1} if direct else {}),
+        **({f"{slot}.conditioned": 1} if direct and minimum_phase(controller) else {}),
     }
+
+
+def minimum_phase(controller: Controller) -> bool:
+    """Return whether the zeros of a controller are stable: else its states cannot follow a limited voltage."""
+    return bool(np.all(np.roots(np.trim_zeros(np.array(controller.num), "b")[::-1]).real < 0.0))
 
 
 def _part_of_any() -> str:
