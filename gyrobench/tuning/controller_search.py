@@ -169,7 +169,7 @@ def _simplex(problem: TuningProblem, x: Array, size: float, most: int = SIMPLEX)
         refused, x, method="Nelder-Mead",
         options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-3, "fatol": 1e-4},
     )  # fmt: skip
-    return np.clip(found.x, low, high)
+    return np.asarray(np.clip(found.x, low, high), float)
 
 
 def _places(structure: ControllerStructure) -> list[tuple[str, int]]:

@@ -166,10 +166,11 @@ def proof_of(
     effort = np.abs(G / (1.0 + L))
     found = None
     for share in SMALLER:
-        plan, load = loop_plan(
-            system, chosen, lambda x, share=share: share * DRIVEN * v_max / float(np.interp(x, f, effort)), ports.axis,
-            sight.ride if sight else "",
-        )  # fmt: skip
+
+        def size(x: float, most: float = share * DRIVEN * v_max) -> float:
+            return most / float(np.interp(x, f, effort))
+
+        plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "")
         record = _run(session, settings, at, plan, step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), seed)
         tried = _read(record, at, f, L, wishes, load, ports, sight)
         if found is None or not (tried.limits or tried.why_not):

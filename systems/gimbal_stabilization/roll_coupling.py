@@ -21,6 +21,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.component.blocks.gimbal import ordered_matrix
+from gyrobench.component.math import vector
 from gyrobench.reduction.loops.loop_measures import Gate
 
 
@@ -46,8 +47,7 @@ def roll_coupling(gate: Gate, p: Mapping[str, Any], base: tuple[str, str, str], 
     w1, w2 = c3 * rates[0] + s3 * rates[1], c3 * rates[1] - s3 * rates[0]
     dp, dq, w = angle - angle.mean(), outer - outer.mean(), w2 / c
     A, B = (
-        np.diag(np.asarray(ordered_matrix(float(inner), np.asarray(p[f"platform.{n}"], float))))
-        for n in ("I_outer", "I_inner")
+        np.diag(np.asarray(ordered_matrix(float(inner), vector(p[f"platform.{n}"])))) for n in ("I_outer", "I_inner")
     )
     dt = float(gate.t[1] - gate.t[0])
 
