@@ -131,7 +131,7 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
     )  # fmt: skip
     best = polished(corners, evolved.x)
     for size in SIZES[:1] if quick else SIZES:
-        tried = polished(corners, _simplex(corners, best, size))
+        tried = polished(corners, simplex_from(corners, best, size))
         best = max(best, tried, key=corners.worst)
     problem.evaluations += nominal.evaluations + corners.evaluations
     return polished(problem, best)
@@ -145,13 +145,13 @@ def _computed(problem: TuningProblem) -> Array:
     corners = problem.of(problem.corners)
     spread = low + qmc.Sobol(len(low), scramble=True, seed=1).random(COSTLY) * (high - low)
     worst = np.array([corners.worst(x) for x in spread])
-    ends = [_simplex(corners, spread[k], 0.15, COSTLY) for k in np.argsort(-worst)[:2]]
+    ends = [simplex_from(corners, spread[k], 0.15, COSTLY) for k in np.argsort(-worst)[:2]]
     best = polished(corners, max(ends, key=corners.worst), 8)
     problem.evaluations += corners.evaluations
     return best
 
 
-def _simplex(problem: TuningProblem, x: Array, size: float, most: int = SIMPLEX) -> Array:
+def simplex_from(problem: TuningProblem, x: Array, size: float, most: int = SIMPLEX) -> Array:
     """Return the end of the simplex method from x; size: of the first simplex, share of the box; most: evaluations."""
     from scipy.optimize import minimize
 

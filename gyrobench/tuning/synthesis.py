@@ -3,7 +3,7 @@
     lqg     P (s + w_i)/s:  u = -F x',  F of  min E int y2 + rho u2,  x' by the Kalman filter for noise at the input
             rho = |P|2 at the crossover that is asked for, filter as fast as `recovery` times that (LTR: the more, the
             more L is that of the regulator alone)
-    hinf    min || (W1 S, W2 K S, W3 T) ||:  W1 = (s/M + w)/(s + 1e-4 w),  W2 = effort / |P(jw)|,
+    hinf    min || (W1 S, W2 K S, W3 T) ||:  W1 = (s/M + w)/(s + floor w),  W2 = effort / |P(jw)|,
             W3 = x/(1 + x/100), x = s/(rolloff w)
 
 A search chooses the few numbers of these weights.  The plant is the nominal one of the communication step, in the
@@ -39,7 +39,7 @@ LARGEST = 1e4  # norm from which the search for the least one begins
 ACCURACY = 1e-3  # of it
 RANGES = {
     "lqg": ((-1.5, -0.2), (0.0, 2.0)),  # w_i, recovery
-    "hinf": ((0.08, 0.8), (-3.0, 0.5), (0.0, 2.0)),  # M, effort, rolloff
+    "hinf": ((0.08, 0.8), (-4.0, -1.0), (-5.0, 0.0), (0.0, 2.0)),  # M, floor, effort, rolloff
 }
 ALIASES = {"mixsyn": "hinf"}
 
@@ -151,7 +151,9 @@ def mixed_sensitivity(
     return StateSpace(np.asarray(a), np.asarray(b), np.asarray(c), float(d[0, 0])), float(gamma)
 
 
-def h_infinity(plant: StateSpace, w: float, M: float, effort: float, rolloff: float) -> tuple[StateSpace, float]:
+def h_infinity(
+    plant: StateSpace, w: float, M: float, floor: float, effort: float, rolloff: float
+) -> tuple[StateSpace, float]:  # fmt: skip
     """Return the controller for the weights of the module, and gamma."""
     moved = StateSpace(plant.a - SHIFT * w * np.eye(len(plant.a)), plant.b, plant.c, plant.d)
     size = abs(plant.response(1j * w))
@@ -159,7 +161,7 @@ def h_infinity(plant: StateSpace, w: float, M: float, effort: float, rolloff: fl
         raise SynthesisError("the plant has no gain at the crossover")
     corner = rolloff * w
     weights = [
-        (np.array([1.0 / M, w]), np.array([1.0, 1e-4 * w])),
+        (np.array([1.0 / M, w]), np.array([1.0, floor * w])),
         (np.array([effort / size]), np.array([1.0])),
         (np.array([1.0 / corner, 0.0]), np.array([0.01 / corner, 1.0])),
     ]
@@ -186,16 +188,22 @@ class SynthesizedStructure(ControllerStructure):
         """Return the controller for a crossover near w, rad/s.  Raises SynthesisError."""
         assert self.plant is not None
         plant = reduced(w_plane(self.plant), PLANT, SLOW * w)
+        size = abs(plant.response(1j * w))
+        if not size > 0.0:
+            raise SynthesisError("the plant has no gain at the crossover")
+        # with the crossover at 1 rad/s and a gain of 1 there: Riccati equations want numbers of one size
+        unit = reduced(StateSpace(plant.a / w, plant.b / w, plant.c / size, plant.d / size), PLANT, SLOW)
         if self.name == "lqg":
-            integral, recovery = w * numbers[0], numbers[1]
-            k = reduced(lqg(plant, w, integral, recovery), HIGHEST - 1, SLOW * w)
-            num, den = transfer_function(k)
-            num, den = np.polymul(num, [1.0, integral]), np.polymul(den, [1.0, 0.0])
-            values = {"w": w, "integral": integral, "recovery": recovery}
+            integral, recovery = numbers
+            found = reduced(lqg(unit, 1.0, integral, recovery), HIGHEST - 1, SLOW)
+            values = {"w": w, "integral": w * integral, "recovery": recovery}
         else:
-            k, gamma = h_infinity(plant, w, *numbers)
-            num, den = transfer_function(reduced(k, HIGHEST, SLOW * w))
-            values = dict(zip(("w", "M", "effort", "rolloff", "gamma"), (w, *numbers, gamma), strict=True))
+            found, gamma = h_infinity(unit, 1.0, *numbers)
+            found = reduced(found, HIGHEST, SLOW)
+            values = dict(zip(("w", "M", "floor", "effort", "rolloff", "gamma"), (w, *numbers, gamma), strict=True))
+        num, den = transfer_function(StateSpace(w * found.a, w * found.b, found.c / size, found.d / size))
+        if self.name == "lqg":
+            num, den = np.polymul(num, [1.0, w * integral]), np.polymul(den, [1.0, 0.0])
         return rounded(num[::-1], den[::-1], {**values, "order": float(len(den) - 1)})
 
 

@@ -32,6 +32,7 @@ from gyrobench.tuning.sight_jitter import SightModel, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
+from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
 from gyrobench.tuning.written_loop import TunedLoop
@@ -58,14 +59,17 @@ def tune(
     seed: int = 1,
     given: Mapping[str, Any] | None = None,
     loop: str = "",
+    pareto: Sequence[str] = (),
 ) -> TunedLoop:
     """Return the controller of a structure with the largest worst ratio of got to wanted over the spread, proven.
 
     want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
     loop: name of the loop, of a system that has several; the others stay as they are.
+    pareto: names of two wishes whose trade is wanted.
     Raises UsageError, TuningError, and what a session raises.
     """
     wishes, shape = parse_wishes(want), structure_of(structure)
+    pair = traded(pareto, wishes)
     ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
     began = time.perf_counter()
@@ -84,6 +88,7 @@ def tune(
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
+        exchanged = trade(problem, x, pair) if pair else None
     try:
         controller = problem.controller(x)
     except ArithmeticError as error:
@@ -124,7 +129,7 @@ def tune(
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=(*_slips(sources), *_notes(proofs)),
-        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "",
+        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
 
 
