@@ -203,7 +203,8 @@ class SynthesizedStructure(ControllerStructure):
             values = dict(zip(("w", "M", "floor", "effort", "rolloff", "gamma"), (w, *numbers, gamma), strict=True))
         num, den = transfer_function(StateSpace(w * found.a, w * found.b, found.c / size, found.d / size))
         if self.name == "lqg":
-            num, den = np.polymul(num, [1.0, w * integral]), np.polymul(den, [1.0, 0.0])
+            corner: Array = np.array([1.0, w * integral])
+            num, den = np.asarray(np.polymul(num, corner), float), np.append(den, 0.0)
         return rounded(num[::-1], den[::-1], {**values, "order": float(len(den) - 1)})
 
 

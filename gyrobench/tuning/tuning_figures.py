@@ -198,7 +198,7 @@ def _number(wish: Wish, value: float) -> tuple[float, str]:
 
 def trade(t: Trade) -> str:
     """Return one wish over the other, and where both are fulfilled."""
-    fig, axes = figure(WIDE * 0.6, 62)
+    fig, axes = figure(HALF, 78)
     ax = axes[0, 0]
     points = [p for p in t.points if math.isfinite(p.first) and math.isfinite(p.second)]
     xy = np.array([[_number(w, v)[0] for w, v in zip(t.wishes, (p.first, p.second), strict=True)] for p in points])

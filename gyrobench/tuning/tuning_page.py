@@ -102,7 +102,7 @@ def _trade(trade: Trade) -> list[Any]:
     ]  # fmt: skip
     caption = "Best of one wish for what is left of the other, worst case of the linear models over the spread."
     return [
-        *pictures(Picture("trade", draw.trade(trade), caption, f"trade of {a.name} and {b.name}")),
+        *pictures(Picture("trade", draw.trade(trade), caption, f"trade of {a.name} and {b.name}", half=True)),
         PageTable(columns(a.name, b.name, "other wishes"), rows, "The points of the figure."),
     ]
 

@@ -107,7 +107,7 @@ def test_the_w_plane_is_the_plant_and_its_reduction_keeps_the_integrator() -> No
     plant = servo(4)
     full = w_plane(plant)
     few = reduced(full, 4, 0.5)
-    for f in (0.01, 1.0, 30.0, 100.0):
+    for f in (0.01, 1.0, 10.0, 30.0):
         s = 2j / STEP * math.tan(math.pi * f * STEP)
         assert full.response(s) == pytest.approx(plant.response(np.array([f]))[0], rel=1e-9)
         assert few.response(s) == pytest.approx(full.response(s), rel=0.03)
