@@ -99,7 +99,11 @@ class ServoTest(ChannelTest, TableTest):
     {sampled()}
     """
     on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=ON_STAND)
-    bodies = ""  # the stand turns the site, phase by phase
+    bodies = """
+        stand: mounts stand
+        table: stand, base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table, faces sequencer
+    """
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
         | PHYSICAL_FORM
