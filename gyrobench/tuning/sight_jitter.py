@@ -81,6 +81,12 @@ class SightWays:
         """Return the jitter, rad rms."""
         return math.sqrt(sum(x * x for x in self.sources(G).values()))
 
+    def voltage(self, G: Complex) -> float:
+        """Return what the controller gives to the motor for base and noise together, V rms."""
+        answer = G[self.use] / (1.0 - G[self.use] * self.back)
+        seen = sum((np.abs(u) ** 2 * s for _, u, s in self.base), self.noise)
+        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * seen, self.f)))
+
     def floor(self) -> float:
         """Return the jitter, rad rms, below which no linear controller of this loop comes, causal or not.
 

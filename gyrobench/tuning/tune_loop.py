@@ -19,6 +19,7 @@ from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
+from gyrobench.record.frequency_response import Complex
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
@@ -28,7 +29,7 @@ from gyrobench.tuning.plant import HeldController, Plant, plants
 from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
-from gyrobench.tuning.sight_jitter import SightModel, sight_models
+from gyrobench.tuning.sight_jitter import SightModel, SightWays, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
@@ -41,6 +42,7 @@ ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes a
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
 HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
+PEAK = 3.0  # of a random voltage over its rms
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
@@ -128,7 +130,8 @@ def tune(
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
-        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=(*_slips(sources), *_notes(proofs)),
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
+        notes=(*_slips(sources), *_driven(ways, responses, nominal, ports.slot), *_notes(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
 
@@ -222,6 +225,18 @@ def _slips(sources: LineOfSight | None) -> list[str]:
     return [
         "dry friction slips in the ride: margins are searched without it, the jitter with viscous friction that makes "
         "torques as large there; its reversals are in the co-simulation alone"
+    ]
+
+
+def _driven(ways: Sequence[SightWays], G: Complex, nominal: Mapping[str, Any], slot: str) -> list[str]:
+    """Return that base and noise alone take the motor to its limit, where they do."""
+    limit = min(float(np.min(nominal.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
+    volts = max((w.voltage(G) for w in ways), default=0.0)
+    if PEAK * volts < limit:
+        return []
+    return [
+        f"base and noise take {volts:.2g} V rms by the linear model, and the motor's limit is {limit:.3g} V: their "
+        "peaks are cut, and the jitter is more than the linear model says"
     ]
 
 

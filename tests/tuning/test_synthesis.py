@@ -172,6 +172,15 @@ def test_no_controller_is_below_the_floor() -> None:
     assert ways.rms(-(S / n).astype(complex)) >= by_hand
 
 
+def test_the_voltage_of_noise_and_base() -> None:
+    """No way back: the controller's gain times the root of the integral of all densities, 3 sqrt(2e-4 x 99)."""
+    f = np.linspace(1.0, 100.0, 500)
+    one = np.ones(f.size, complex)
+    none = (0 * one, 0 * one, 0 * f)
+    ways = SightWays(np.ones(f.size, bool), f, ((one, one, 1e-4 + 0 * f), none, none), one, 0 * one, 1e-4 + 0 * f)
+    assert ways.voltage(3.0 * one) == pytest.approx(3.0 * math.sqrt(2e-4 * 99.0), rel=1e-9)
+
+
 def test_the_integral_of_bode_is_zero_and_named() -> None:
     """A stable loop with a delay of a step: what ln |S| takes below 0 it gives back above it, within 1 %."""
     plant = servo(2)
