@@ -178,7 +178,7 @@ def test_the_voltage_of_noise_and_base() -> None:
     one = np.ones(f.size, complex)
     none = (0 * one, 0 * one, 0 * f)
     ways = SightWays(np.ones(f.size, bool), f, ((one, one, 1e-4 + 0 * f), none, none), one, 0 * one, 1e-4 + 0 * f)
-    assert ways.voltage(3.0 * one) == pytest.approx(3.0 * math.sqrt(2e-4 * 99.0), rel=1e-9)
+    assert ways.voltage(one + one + one) == pytest.approx(3.0 * math.sqrt(2e-4 * 99.0), rel=1e-9)
 
 
 def test_the_integral_of_bode_is_zero_and_named() -> None:
