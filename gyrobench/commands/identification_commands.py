@@ -31,6 +31,18 @@ def identify(
         str, typer.Option("--band", metavar="LOW..HIGH", help="Frequencies to look at, such as 0.5Hz..80Hz.")
     ] = "",
     columns: Columns = None,
+    fit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fit",
+            metavar="NAME[=VALUE]",
+            help="Physical parameter of the plant to find, or with its value known: J, viscous, k_t, k_e, R, L, delay, mode; "
+            "held: the input is held between samples.  Repeatable.",
+        ),
+    ] = None,
+    twin: Annotated[
+        Path | None, typer.Option("--twin", metavar="FILE", help="Write the parameters as values for --set @FILE.")
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -44,13 +56,18 @@ def identify(
     \b
     Example: gyrobench identify loop.csv --at "plant input" --out identified
     """
+    from gyrobench.bench import UsageError, display_path
+    from gyrobench.files import write_whole
     from gyrobench.identification.identify_loop import identify as identify_loop
     from gyrobench.identification.identify_loop import parse_band
 
-    found = identify_loop(file, at=at, period=period, band=parse_band(band), columns=columns)
+    if twin is not None and not fit:
+        raise UsageError("--twin: what is to be found? Name the parameters, such as --fit J --fit viscous")
+    found = identify_loop(file, at=at, period=period, band=parse_band(band), columns=columns, fit=fit or [])
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
+    if twin is not None and found.fit is not None:
+        write_whole(twin, found.fit.toml(found.record.name).encode())
+        echo(display_path(twin), err=True)
     if out is not None:
-        from gyrobench.bench import display_path
-
         for path in found.write(out).values():
             echo(display_path(path), err=True)

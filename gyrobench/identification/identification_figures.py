@@ -45,9 +45,19 @@ def plant(t: LoopIdentification) -> str:
     """Return gain and phase of the plant over frequency."""
     fig, axes = figure(WIDE * 0.8, 96, nrows=2, sharex=True)
     unit, factor = t.plant_unit
-    _bode(axes, t.responses["P"], t.responses["P"].determined, factor)
+    turn = _bode(axes, t.responses["P"], t.responses["P"].determined, factor)
+    if t.fit is not None:
+        size, phase = decibel(factor * np.abs(t.fit.value)), np.degrees(np.unwrap(np.angle(t.fit.value)))
+        measured = np.interp(t.fit.f, t.f[t.responses["P"].determined], turn)
+        phase = phase + 360.0 * np.round(np.median((measured - phase) / 360.0))
+        for ax, y in zip(axes[:, 0], (size, phase), strict=True):
+            ax.semilogx(
+                t.fit.f, y, color=VERMILION, linewidth=1.0, zorder=5, label="model" if ax is axes[0, 0] else None
+            )
+        fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
     axes[0, 0].set_ylabel(f"|P| / dB re {unit}")
     axes[1, 0].set_xlabel(axis_label("frequency", "Hz"))
+    _plain(axes[1, 0].xaxis)
     return svg(fig, "plant")
 
 

@@ -14,6 +14,8 @@ from gyrobench.bench import Bench
 from gyrobench.identification import identification_figures as draw
 from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.loop_record import PLANT_INPUT, PLANT_OUTPUT
+from gyrobench.identification.plant_fit import shown_values
+from gyrobench.identification.plant_model import PARAMETERS
 from gyrobench.report import FORMATS
 from gyrobench.report.page_model import (
     BulletList,
@@ -105,7 +107,20 @@ def _sensitivities(t: LoopIdentification) -> list[Any]:
 
 def _plant(t: LoopIdentification) -> list[Any]:
     caption = "Plant P: output over input, both as they answer to the excitation, with 95 % coverage intervals."
-    return pictures(Picture("plant", draw.plant(t), caption, "Bode plot of the plant"))
+    return [*_parameters(t), *pictures(Picture("plant", draw.plant(t), caption, "Bode plot of the plant"))]
+
+
+def _parameters(t: LoopIdentification) -> list[Any]:
+    if t.fit is None:
+        return []
+    rows = [
+        Row([text_cell(name, "strong"), text_cell(PARAMETERS[name][1]), text_cell(value), text_cell(interval)])
+        for name, value, interval in shown_values(t.fit)
+    ]
+    heads = columns("parameter", "", "value", "95 %", wide=[""])
+    caption = "Physical parameters of the plant, by weighted least squares over all frequencies."
+    sentence = f"{t.fit.sentence[:1].upper()}{t.fit.sentence[1:]}."
+    return [PageTable(heads, rows, caption), BulletList([sentence], warn=True) if t.fit.lacks else Text(sentence)]
 
 
 def _distortion(t: LoopIdentification) -> list[Any]:

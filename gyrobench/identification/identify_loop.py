@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from gyrobench.identification.line_spectrum import (
 from gyrobench.identification.loop_curve import loop_curve
 from gyrobench.identification.loop_margins import margins
 from gyrobench.identification.loop_record import LoopRecord, read_loop
+from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.ratios import loop_responses
 from gyrobench.identification.written_identification import Identification
 from gyrobench.record.csv_reader import DataError
@@ -50,17 +52,24 @@ def identify(
     period: str = "",
     band: tuple[float, float] = (0.0, math.inf),
     columns: Path | None = None,
+    fit: Sequence[str] = (),
 ) -> Identification:
     """Return responses and margins of the loop of a file.
 
     at: where the excitation enters, period: its period; both replace what the file states.  band: frequencies, Hz.
-    columns: a column map.  Raises UsageError and DataError.
+    columns: a column map.  fit: parameters of the plant to find ("J") or known ("k_t=0.4N.m/A").  Raises UsageError and
+    DataError.
     """
     begin = time.perf_counter()
     file = Bench.find().existing(Path(data))
     if not file.exists():
         raise UsageError(f"{file}: no such file of measured data")
-    found = identify_record(read_loop(file, at, period, columns), band)
+    record = read_loop(file, at, period, columns)
+    if fit:
+        parse_fit(fit)  # what is asked for wrongly is said first
+    found = identify_record(record, band)
+    if fit:
+        found = replace(found, fit=fit_plant(record, found.responses["P"], fit))
     return replace(found, seconds=time.perf_counter() - begin)
 
 

@@ -88,7 +88,7 @@ def loop_curve(s: MeasuredResponse) -> LoopCurve:
     if not sizes:
         none, empty = np.zeros(0), np.zeros(0, complex)
         return LoopCurve(none, empty, none, empty, np.zeros((DRAWS, 0), complex), none > 0.0)
-    variance = _level(s)
+    variance = noise_level(s)
     rng = np.random.default_rng(DRAWS)
     draw = (rng.standard_normal((s.f.size, DRAWS)) + 1j * rng.standard_normal((s.f.size, DRAWS))) * np.sqrt(0.5)
     tried: list[list[_Models]] = []  # of each window the cubic and the fraction
@@ -121,8 +121,8 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
     return np.asarray(first[:, None] + np.arange(size))
 
 
-def _level(s: MeasuredResponse) -> Array:
-    """Return the variance of S: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
+def noise_level(s: MeasuredResponse) -> Array:
+    """Return the variance of a response: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2
     least = (SMALLEST * np.abs(s.value).max()) ** 2

@@ -227,11 +227,14 @@ def identify(
     period: str = "",
     band: str | tuple[float, float] = "",
     columns: File | None = None,
+    fit: Sequence[str] = (),
 ) -> Identification:
     """Return open loop, sensitivities, plant and margins of a laboratory's record of a loop, with intervals.
 
     at: where the excitation enters, "plant input", "reference" or "plant output"; period: its period ("2s"); default:
     what the file states or shows.  band: "0.5Hz..80Hz", or two frequencies in Hz.  columns: a column map.
+    fit: physical parameters of the plant, to find ("J", "mode") or known ("k_t=0.4N.m/A"); ``fit.values``,
+    ``fit.interval("J")``, ``fit.toml(name)`` for ``--set @FILE``.
     ``responses["L"]`` has frequencies, values and intervals, ``["phase margin"]`` is a margin, ``notes`` say what is
     missing or not linear, ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
     GyrobenchError.
@@ -241,5 +244,10 @@ def identify(
 
     limits = parse_band(band) if isinstance(band, str) else band
     return identify_loop(
-        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns)
+        Path(data),
+        at=at,
+        period=period,
+        band=limits,
+        columns=None if columns is None else Path(columns),
+        fit=fit,
     )
