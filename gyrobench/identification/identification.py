@@ -17,6 +17,7 @@ from gyrobench.identification.loop_margins import Margin
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_fit import PlantFit, shown_values
 from gyrobench.identification.ratios import MeasuredResponse
+from gyrobench.identification.wanted_margins import MarginVerdict
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class LoopIdentification:
 
     periods: how many were used, each of ``period``, s; 0, 0 for an excitation without.
     excited_output: amplitude of the output at each frequency, SI.  fit: physical parameters of the plant, if asked for.
+    dependent: why margins are those of one amplitude, else "".  verdicts: of margins that were wanted.
     """
 
     record: LoopRecord = field(repr=False)
@@ -36,7 +38,9 @@ class LoopIdentification:
     curve: LoopCurve = field(repr=False)
     notes: list[str]
     excited_output: Array = field(repr=False)
+    dependent: str = ""
     fit: PlantFit | None = None
+    verdicts: list[MarginVerdict] = field(default_factory=list)
     seconds: float = 0.0
 
     def __getitem__(self, name: str) -> Margin:
@@ -95,6 +99,10 @@ class LoopIdentification:
                 {"kind": d.kind, "lines": d.count, "level": d.level, "noise": d.floor, "p": d.p, "signal": d.signal}
                 for d in self.distortions
             ],
+            "wanted": [
+                {"name": v.wanted.name, "limit": v.wanted.limit, "verdict": v.verdict, "why": v.why}
+                for v in self.verdicts
+            ],
             "plant": self.fit.as_dict() if self.fit else None,
             "notes": list(self.notes),
             "seconds": self.seconds,
@@ -108,6 +116,7 @@ class LoopIdentification:
             for m in self.margins
         ]
         lines += _aligned([["", "", "95 %", ""], *rows]) if rows else []
+        lines += ["", *(f"  {v}" for v in self.verdicts)] if self.verdicts else []
         if self.fit:
             lines += ["", "plant:", *_aligned([["", "", "95 %"], *shown_values(self.fit)])]
             lines += [f"  {self.fit.sentence}"]

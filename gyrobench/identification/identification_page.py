@@ -54,7 +54,7 @@ def page(t: LoopIdentification) -> Page:
     ]
     with styled():
         sections = [
-            Section("Margins", "margins", [_margins(t), *_notes(t), *_near(t)]),
+            Section("Margins", "margins", [_margins(t), *_verdicts(t), *_notes(t), *_near(t)]),
             Section("Open loop", "open-loop-section", _open_loop(t)),
             Section("Sensitivities", "sensitivities-section", _sensitivities(t)),
             Section("Plant", "plant-section", _plant(t)),
@@ -80,6 +80,15 @@ def _margins(t: LoopIdentification) -> Any:
                          text_cell(f"{m.f:.4g} Hz")]))  # fmt: skip
     caption = "Margins of the loop with their 95 % coverage intervals, and the frequency at which each is."
     return PageTable(columns("measure", "value", "95 %", "at", wide=["measure"]), rows, caption)
+
+
+def _verdicts(t: LoopIdentification) -> list[Any]:
+    if not t.verdicts:
+        return []
+    rows = [Row([text_cell(minus(str(v.wanted)), "strong"), text_cell(v.verdict, v.verdict), text_cell(v.why)])
+            for v in t.verdicts]  # fmt: skip
+    caption = "What is wanted: it passes where the whole interval does, unless the loop depends on its amplitude."
+    return [PageTable(columns("wanted", "verdict", "", wide=[""]), rows, caption)]
 
 
 def _notes(t: LoopIdentification) -> list[Any]:

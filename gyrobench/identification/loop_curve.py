@@ -122,7 +122,7 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
 
 
 def noise_level(s: MeasuredResponse) -> Array:
-    """Return the variance of a response: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
+    """Return the variance of a response: its logarithm on parabolas, less the mean of that of chi-squared."""
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2
     least = (SMALLEST * np.abs(s.value).max()) ** 2

@@ -8,6 +8,7 @@ Source: Pintelon 2012, 4.3 (random grid), 5.2 (crest factor); Schroeder 1970; Va
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,15 +58,18 @@ class Multisine:
         return path
 
     def __str__(self) -> str:
-        f = self.lines / (self.signal.size * self.step)
+        period = self.signal.size * self.step
+        f = self.lines / period
         size, top = (units.format_quantity(float(f"{x:.4g}"), self.unit) for x in (self.rms, np.abs(self.signal).max()))
         return (
-            f"{self.lines.size} odd lines from {f[0]:.4g} Hz to {f[-1]:.4g} Hz, period {self.signal.size * self.step:.6g} s, "
-            f"rms {size}, peak {top}, crest factor {self.crest:.3g}"
+            f"{self.lines.size} odd lines from {f[0]:.4g} Hz to {f[-1]:.4g} Hz, period {period:.6g} s, rms {size}, "
+            f"peak {top}, crest factor {self.crest:.3g}"
         )
 
 
-def multisine(low: float, high: float, period: float, rate: float, peak: float, unit: str = "1", seed: int = 1) -> Multisine:
+def multisine(
+    low: float, high: float, period: float, rate: float, peak: float, unit: str = "1", seed: int = 1
+) -> Multisine:
     """Return an odd multisine between two frequencies, Hz; period: s; rate: samples a second; peak: SI.
 
     Raises UsageError for what cannot be had.
@@ -85,8 +89,8 @@ def multisine(low: float, high: float, period: float, rate: float, peak: float, 
     lines = np.concatenate([*(np.delete(g, rng.integers(GROUP)) for g in groups), rest]).astype(np.intp)
     if lines.size < LEAST:
         raise UsageError(
-            f"multisine: {lines.size} odd lines from {low:g} Hz to {high:g} Hz; at least {LEAST} are needed: a period of "
-            f"{2.0 * LEAST * GROUP / (GROUP - 1) / (high - low):.3g} s and more gives them"
+            f"multisine: {lines.size} odd lines from {low:g} Hz to {high:g} Hz; at least {LEAST} are needed: a period "
+            f"of {2.0 * LEAST * GROUP / (GROUP - 1) / (high - low):.3g} s and more gives them"
         )
     starts = [np.pi * np.arange(lines.size) ** 2 / lines.size, *(2.0 * np.pi * rng.random((STARTS, lines.size)))]
     best = min((_flattened(samples, lines, np.exp(1j * p)) for p in starts), key=lambda x: np.abs(x).max() / x.std())
@@ -106,3 +110,18 @@ def _flattened(samples: int, lines: NDArray[np.intp], turn: NDArray[np.complex12
         clipped = np.fft.rfft(np.clip(x, -share * top, share * top))[lines]
         turn = clipped / np.abs(clipped)
     return best
+
+
+def parse_multisine(band: str, peak: str, period: str, rate: str, seed: int = 1) -> Multisine:
+    """Return a multisine of texts with units.  Raises UsageError."""
+    low, dots, high = band.partition("..")
+    number = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", peak)
+    unit = number[2] if number and number[2] else "1"
+    try:
+        if not dots:
+            raise units.UnitError(f"{band}: write LOW..HIGH, such as 0.5Hz..80Hz")
+        limits = units.parse_quantity(low, "Hz"), units.parse_quantity(high, "Hz")
+        seconds, samples = units.parse_quantity(period, "s"), units.parse_quantity(rate, "Hz")
+        return multisine(*limits, seconds, samples, units.parse_quantity(peak, unit), unit, seed)
+    except units.UnitError as error:
+        raise UsageError(f"multisine: {error}") from None

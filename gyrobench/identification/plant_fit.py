@@ -83,8 +83,9 @@ class PlantFit:
             return f"the model describes the plant (p = {self.p:.2g})"
         off, at = self.worst
         return (
-            f"lack of fit: the model is off by {off:.2g} dB at {at:.4g} Hz, more than the noise; the intervals are wider by "
-            f"{math.sqrt(self.square):.2g}, and may not hold the truth. A mode, a delay or a held input may be missing"
+            f"lack of fit: the model is off by {off:.2g} dB at {at:.4g} Hz, more than the noise; the intervals are "
+            f"{math.sqrt(self.square):.2g} times wider and may not hold the truth. A mode, a delay or a held input may "
+            "be missing"
         )
 
     def as_dict(self) -> dict[str, object]:
@@ -125,7 +126,9 @@ def shown_values(fit: PlantFit) -> list[list[str]]:
 
 def parse_fit(texts: Sequence[str]) -> tuple[list[str], dict[str, float], bool]:
     """Return the parameters to find, those that are known, and whether the input is held.  Raises UsageError."""
-    free, known, held = [], {}, False
+    free: list[str] = []
+    known: dict[str, float] = {}
+    held = False
     for text in texts:
         name, given, value = (x.strip() for x in text.partition("="))
         names = MODE if name == "mode" else (name,)
@@ -154,15 +157,15 @@ def _model(record: LoopRecord, free: Sequence[str], known: Mapping[str, float], 
     output = unit_of(record.shown["output"], tuple(OUTPUTS))
     if not drive or not output:
         raise UsageError(
-            f"--fit: the plant leads from [{record.shown[column]}] to [{record.shown['output']}]; a platform leads from "
-            "N.m, A or V to rad/s or rad"
+            f"--fit: the plant leads from [{record.shown[column]}] to [{record.shown['output']}]; a platform "
+            "leads from N.m, A or V to rad/s or rad"
         )
     given = {*free, *known}
     lacking = [n for n in ("J", "viscous", *NEEDED[drive]) if n not in given]
     if lacking:
         raise UsageError(
-            f"--fit: with an input in {drive} {', '.join(lacking)} must be named, to be found (--fit {lacking[0]}) or known "
-            f"(--fit {lacking[0]}=...{PARAMETERS[lacking[0]][0]})"
+            f"--fit: with an input in {drive} {', '.join(lacking)} must be named, to be found (--fit {lacking[0]}) or "
+            f"known (--fit {lacking[0]}=...{PARAMETERS[lacking[0]][0]})"
         )
     if extra := [n for n in OF_PLATFORM if n in given and n not in ("J", "viscous", *NEEDED[drive])]:
         raise UsageError(f"--fit: with an input in {drive} {', '.join(extra)} has no effect; leave it out")
@@ -173,43 +176,96 @@ def _model(record: LoopRecord, free: Sequence[str], known: Mapping[str, float], 
     return PlantModel(drive, OUTPUTS[output], record.step if held else 0.0)
 
 
-def _found(
-    model: PlantModel, known: Mapping[str, float], free: Sequence[str], f: Array, value: Complex, sigma: Array
-) -> tuple[PlantModel, Array]:
-    """Return the model with its sign, and the coordinates of the best fit.
+@dataclass(frozen=True)
+class _PlantProblem:
+    """Parameters ``names`` of a model, the others ``known``, and the response that it should have.
+
+    Coordinates are logarithms, but of SIGNED parameters.
+    """
+
+    model: PlantModel
+    known: Mapping[str, float]
+    names: Sequence[str]
+    f: Array
+    value: Complex
+
+    def coordinates(self, values: Mapping[str, float]) -> Array:
+        return np.array([values[n] if n in SIGNED else math.log(values[n]) for n in self.names])
+
+    def values(self, x: Array) -> dict[str, float]:
+        bounded = [
+            float(v) if n in SIGNED else math.exp(min(max(v, -60.0), 60.0)) for n, v in zip(self.names, x, strict=True)
+        ]
+        return dict(zip(self.names, bounded, strict=True))
+
+    def response(self, x: Array) -> Complex:
+        return self.model.response({**self.known, **self.values(x)}, self.f)
+
+    def rest(self, x: Array, sigma: Array | None) -> Array:
+        """Return the residuals over their noise; where sigma is None those of the logarithms."""
+        g = self.response(x)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            z = (g - self.value) / sigma if sigma is not None else np.log(g / self.value)
+        z = np.where(np.isfinite(z), z, 1e6)
+        return np.concatenate([z.real, z.imag])
+
+    def square(self, x: Array, sigma: Array | None) -> float:
+        """Return the sum of squares of the residuals."""
+        return float(np.sum(self.rest(x, sigma) ** 2))
+
+    def solved(self, x: Array, sigma: Array | None) -> Array:
+        """Return the coordinates of the nearest least squares; robust ones without sigma."""
+        found = least_squares(
+            lambda y: self.rest(y, sigma), x, x_scale=[1e-3 if n == "delay" else 1.0 for n in self.names],
+            loss="soft_l1" if sigma is None else "linear", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200,
+        )  # fmt: skip
+        return np.asarray(found.x)
+
+    def sensitivity(self, x: Array, sigma: Array) -> Array:
+        """Return the derivatives of the residuals by the coordinates, by central differences."""
+        columns = []
+        for k, name in enumerate(self.names):
+            step = np.zeros(x.size)
+            step[k] = 1e-8 if name == "delay" else 1e-6
+            z = (self.response(x + step) - self.response(x - step)) / (2.0 * step[k]) / sigma
+            columns.append(np.concatenate([z.real, z.imag]))
+        return np.stack(columns, axis=1)
+
+
+def _found(problem: _PlantProblem, sigma: Array) -> tuple[_PlantProblem, Array]:
+    """Return the problem with the sign of its plant, and the coordinates of the best fit.
 
     A rigid platform is fitted first, on logarithms, with either sign; then a mode is looked for at many frequencies.
     """
-    rigid = [n for n in free if n not in MODE]
-    base = {n: v for n, v in known.items() if n not in MODE} if "mode_f" in free else known
-    guess = _rough(model, known, f, value)
+    rigid, known, f = [n for n in problem.names if n not in MODE], problem.known, problem.f
+    searched = "mode_f" in problem.names
+    base = {n: v for n, v in known.items() if n not in MODE} if searched else known
+    guess = _rough(problem)
     fits = []
     for sign in (1.0, -1.0):
-        signed = replace(model, sign=sign)
-        x = _solved(signed, base, rigid, _coordinates(rigid, guess), f, value, None)
-        fits.append((_square(signed, base, rigid, x, f, value, None), signed, x))
-    _, model, x = min(fits, key=lambda m: m[0])
-    values = _values(rigid, x)
-    if "mode_f" not in free:
-        return model, _solved(model, known, free, x, f, value, sigma)
+        stiff = replace(problem, model=replace(problem.model, sign=sign), known=base, names=rigid)
+        x = stiff.solved(stiff.coordinates(guess), None)
+        fits.append((stiff.square(x, None), stiff, x))
+    _, stiff, x = min(fits, key=lambda m: m[0])
+    problem = replace(problem, model=stiff.model)
+    if not searched:
+        return problem, problem.solved(x, sigma)
+    values = {**stiff.values(x), **known}
     tries = []
     for at in np.geomspace(f[0], f[-1], FREQUENCIES + 2)[1:-1]:
         for damping in (0.01, 0.05):
             for share in (0.3, 0.1, -0.1):
                 mode = {"mode_f": float(at), "mode_damping": damping, "mode_share": share}
-                start = _coordinates(free, {**values, **mode, **known})
-                tries.append((_square(model, known, free, start, f, value, None), start))
+                start = problem.coordinates({**values, **mode, **known})
+                tries.append((problem.square(start, None), start))
     tries.sort(key=lambda t: t[0])
-    ends = []
-    for _, start in tries[:TRIES]:
-        close = _solved(model, known, free, start, f, value, None)
-        end = _solved(model, known, free, close, f, value, sigma)
-        ends.append((_square(model, known, free, end, f, value, sigma), end))
-    return model, min(ends, key=lambda t: t[0])[1]
+    ends = [problem.solved(problem.solved(start, None), sigma) for _, start in tries[:TRIES]]
+    return problem, min(ends, key=lambda x: problem.square(x, sigma))
 
 
-def _rough(model: PlantModel, known: Mapping[str, float], f: Array, value: Complex) -> dict[str, float]:
+def _rough(problem: _PlantProblem) -> dict[str, float]:
     """Return values from which to search, of an inertia that has the gain in the middle of the frequencies."""
+    model, known, f, value = problem.model, problem.known, problem.f, problem.value
     k = f.size // 2
     turn = abs(value[k]) * (2.0 * np.pi * f[k]) ** (1 + model.integrations)
     R = known.get("R", 1.0)
@@ -217,69 +273,6 @@ def _rough(model: PlantModel, known: Mapping[str, float], f: Array, value: Compl
     J = known.get("J", (1.0 if model.input == "N.m" else known.get("k_t", 1.0)) / over / turn)
     k_t = known.get("k_t", J * turn * over)
     return {"J": J, "viscous": J * np.pi * f[0], "k_t": k_t, "k_e": k_t, "R": R, "L": 1e-3 * R, "delay": 1e-3}
-
-
-def _coordinates(names: Sequence[str], values: Mapping[str, float]) -> Array:
-    return np.array([values[n] if n in SIGNED else math.log(values[n]) for n in names])
-
-
-def _values(names: Sequence[str], x: Array) -> dict[str, float]:
-    return {
-        n: float(v) if n in SIGNED else math.exp(float(np.clip(v, -60.0, 60.0))) for n, v in zip(names, x, strict=True)
-    }
-
-
-def _rest(
-    model: PlantModel,
-    known: Mapping[str, float],
-    names: Sequence[str],
-    x: Array,
-    f: Array,
-    value: Complex,
-    sigma: Array | None,
-) -> Array:
-    """Return the residuals over their noise; of logarithms without noise, bounded, where sigma is None."""
-    g = model.response({**known, **_values(names, x)}, f)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z = (g - value) / sigma if sigma is not None else np.log(g / value)
-    z = np.where(np.isfinite(z), z, 1e6)
-    return np.concatenate([z.real, z.imag])
-
-
-def _square(*of: object) -> float:
-    return float(np.sum(_rest(*of) ** 2))  # type: ignore[arg-type]
-
-
-def _solved(
-    model: PlantModel,
-    known: Mapping[str, float],
-    names: Sequence[str],
-    x: Array,
-    f: Array,
-    value: Complex,
-    sigma: Array | None,
-) -> Array:
-    loss = "soft_l1" if sigma is None else "linear"
-    steps = np.array([1e-3 if n == "delay" else 1.0 for n in names])
-    found = least_squares(
-        lambda y: _rest(model, known, names, y, f, value, sigma), x, x_scale=steps, loss=loss, xtol=1e-12, ftol=1e-12,
-        gtol=1e-12, max_nfev=200,
-    )  # fmt: skip
-    return np.asarray(found.x)
-
-
-def _sensitivity(
-    model: PlantModel, known: Mapping[str, float], names: Sequence[str], x: Array, f: Array, sigma: Array
-) -> Array:
-    """Return the derivatives of the residuals by the coordinates, by central differences."""
-    columns = []
-    for k in range(x.size):
-        step = np.zeros(x.size)
-        step[k] = 1e-6 if names[k] != "delay" else 1e-8
-        up, down = (model.response({**known, **_values(names, x + s * step)}, f) for s in (1.0, -1.0))
-        z = (up - down) / (2.0 * step[k]) / sigma
-        columns.append(np.concatenate([z.real, z.imag]))
-    return np.stack(columns, axis=1)
 
 
 def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str]) -> PlantFit:
@@ -292,8 +285,8 @@ def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str])
         raise DataError(record.name, [said])
     kept = MeasuredResponse(*(getattr(plant, n)[good] for n in ("f", "value", "u", "dof", "center", "radius")))
     f, value, sigma = kept.f, kept.value, np.sqrt(noise_level(kept) / 2.0)
-    model, x = _found(model, known, free, f, value, sigma)
-    by = _sensitivity(model, known, free, x, f, sigma)
+    problem, x = _found(_PlantProblem(model, known, free, f, value), sigma)
+    by = problem.sensitivity(x, sigma)
     size = np.linalg.norm(by, axis=0)
     singular, right = np.linalg.svd(by / np.where(size > 0.0, size, 1.0))[1:]
     if not np.all(size > 0.0) or singular[-1] < ALIKE * singular[0]:
@@ -303,12 +296,14 @@ def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str])
             f"(--fit {alike[0]}=...{PARAMETERS[alike[0]][0]})"
         )
     spare = 2 * f.size - len(free)
-    square = _square(model, known, free, x, f, value, sigma) / spare
+    square = problem.square(x, sigma) / spare
     p = float(fdtrc(spare, float(kept.dof.sum()), square))
-    values = _values(free, x)
+    values = problem.values(x)
     scale = np.array([1.0 if n in SIGNED else values[n] for n in free])
-    covariance = np.linalg.inv(by.T @ by) * np.outer(scale, scale) * (max(square, 1.0) if p < LACK else 1.0)
-    g = model.response({**known, **values}, f)
+    covariance = (
+        np.asarray(np.linalg.inv(by.T @ by), float) * np.outer(scale, scale) * (max(square, 1.0) if p < LACK else 1.0)
+    )
+    g = problem.response(x)
     k = int(np.argmax(np.abs((value - g) / sigma)))
     worst = 20.0 * math.log10(1.0 + abs(value[k] / g[k] - 1.0)), float(f[k])
-    return PlantFit(values, covariance, known, model, square, p, worst, f, g)
+    return PlantFit(values, covariance, known, problem.model, square, p, worst, f, g)
