@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy import signal
+from scipy.interpolate import CubicSpline
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from friction_loops import random_friction
@@ -25,10 +26,11 @@ from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
 
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.loop_record import LoopRecord
+from gyrobench.identification.plant_fit import fit_plant
 
 BAND = (1.0, 150.0)  # Hz
 PERIOD = 4000  # samples
-UNITS = {"excitation": "1", "input": "1", "output": "1"}
+UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
 
 
 class Count:
@@ -53,6 +55,17 @@ class Count:
             self.held[f"{name}, phase"] += int(np.sum(((below <= turn) & (turn <= above))[good]))
             for part in ("gain", "phase"):
                 self.all[f"{name}, {part}"] += int(good.sum())
+
+    def parameters(self, record, found, truth) -> None:
+        fit = fit_plant(record, found.responses["P"], ["J", "viscous", "delay", "mode", "held"])
+        self.all["model describes the plant"] += 1
+        self.held["model describes the plant"] += not fit.lacks
+        for name, value in truth.items():
+            low, high = fit.interval(name)
+            self.all[name] += 1
+            self.held[name] += low <= value <= high
+            self.errors[name].append(fit.values[name] / value - 1.0)
+            self.U[name].append(0.5 * (high - low) / abs(value))
 
     def margins(self, found, truth) -> None:
         self.seconds.append(found.seconds)
@@ -107,7 +120,30 @@ def linear(runs: int, kind: str, noise: float, first: int) -> Count:
         L, P = loop.responses(found.f)
         counted.responses(found, {"L": L, "S": 1.0 / (1.0 + L), "T": L / (1.0 + L), "P": P})
         counted.margins(found, margins_of(loop, found.f[0], found.f[-1]))
+        if kind == "multisine":
+            counted.parameters(record, found, loop.truth)
     return counted
+
+
+def margins_at(f: np.ndarray, S: np.ndarray, low: float, high: float) -> dict[str, float]:
+    """Return margins of S at odd lines of a period, splines between them."""
+    known = (f >= 0.9 * low) & (f <= 1.1 * high) & (np.abs(S) > 0.0)
+    curve = CubicSpline(np.log(f[known]), np.column_stack([S[known].real, S[known].imag]))
+    x = np.linspace(np.log(low), np.log(high), 20000)
+    s = curve(x) @ np.array([1.0, 1j])
+    L = 1.0 / s - 1.0
+    size, turn = np.log(np.abs(L)), np.angle(-L)
+    found = {"disk margin": 1.0 / float(np.abs(s - 0.5).max()), "peak S": float(np.abs(s).max()),
+             "peak T": float(np.abs(1.0 - s).max())}  # fmt: skip
+    crossed = np.flatnonzero((size[1:] > 0.0) != (size[:-1] > 0.0))
+    if crossed.size:
+        k = crossed[np.argmin(np.abs(turn[crossed]))]
+        found |= {"phase margin": float(turn[k]), "crossover": float(np.exp(x[k]))}
+        found["delay margin"] = min(float(turn[k] % (2 * np.pi) / (2 * np.pi * np.exp(x[k]))) for k in crossed)
+    turned = np.flatnonzero(((turn[1:] > 0.0) != (turn[:-1] > 0.0)) & (np.abs(turn[1:]) < 1.0))
+    if up := [float(1.0 / np.abs(L[k])) for k in turned if np.abs(L[k]) < 1.0]:
+        found["gain margin"] = min(up)
+    return found
 
 
 def friction(runs: int, noise: float, first: int, periods: int = 6, realizations: int = 60) -> Count:
@@ -133,7 +169,7 @@ def friction(runs: int, noise: float, first: int, periods: int = 6, realizations
         counted.responses(found, {"L": 1.0 / s - 1.0, "S": s, "T": 1.0 - s})
         counted.all["odd distortion seen"] += 1
         counted.held["odd distortion seen"] += any(d.kind == "odd" and d.significant for d in found.distortions)
-        counted.margins(found, {})
+        counted.margins(found, margins_at(np.fft.rfftfreq(samples, H), S[:, k], found.f[0], found.f[-1]))
     return counted
 
 
