@@ -3,7 +3,7 @@
 Odd harmonics of 1/period between two frequencies, of one amplitude; of each group of four one is left out, at random,
 so that distortion shows there.  Phases: Schroeder's or random ones, then the time signal is clipped again and again and
 the amplitudes are restored, until the peak does not fall any more; the best of several starts.
-Source: Pintelon 2012, 4.3 (random grid), 5.2 (crest factor); Schroeder 1970; Van der Ouderaa 1988.
+Source: Pintelon 2012, 4.3 (random grid), 5.2 (crest factor); Schroeder 1970; Ouderaa 1988.
 """
 
 from __future__ import annotations

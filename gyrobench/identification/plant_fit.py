@@ -41,7 +41,7 @@ LACK = 0.01
 LARGEST_U = 0.3
 ALIKE = 1e-7  # smallest over largest singular value of the sensitivities: below it two parameters act alike
 FREQUENCIES = 60  # at which a mode is looked for
-TRIES = 3  # of the best of them
+TRIES = 5  # of the best of them
 SPARE = 6  # numbers more than parameters
 
 
@@ -106,7 +106,10 @@ class PlantFit:
         lines = [f"# plant of {source}" + (": the model does not describe it (lack of fit)" if self.lacks else "")]
         others = [n for n in every if n not in OF_PLATFORM]
         lines += [f"# {n} = {every[n]:.6g} {PARAMETERS[n][0]}" for n in others]
-        lines += ["[platform]", *(f'{n} = "{every[n]:.9g}{PARAMETERS[n][0]}"' for n in OF_PLATFORM if n in every)]
+        lines += [
+            "[platform]",
+            *(f'{n} = "{max(every[n], 0.0):.9g}{PARAMETERS[n][0]}"' for n in OF_PLATFORM if n in every),
+        ]
         return "\n".join(lines) + "\n"
 
 
@@ -192,6 +195,13 @@ class _PlantProblem:
     def coordinates(self, values: Mapping[str, float]) -> Array:
         return np.array([values[n] if n in SIGNED else math.log(values[n]) for n in self.names])
 
+    def sizes(self, x: Array) -> Array:
+        """Return how large changes of the coordinates are that matter."""
+        least = {"delay": 1e-4, "mode_share": 0.01}
+        return np.array(
+            [max(abs(v), least.get(n, 1e-12)) if n in SIGNED else 1.0 for n, v in zip(self.names, x, strict=True)]
+        )
+
     def values(self, x: Array) -> dict[str, float]:
         bounded = [
             float(v) if n in SIGNED else math.exp(min(max(v, -60.0), 60.0)) for n, v in zip(self.names, x, strict=True)
@@ -216,7 +226,7 @@ class _PlantProblem:
     def solved(self, x: Array, sigma: Array | None) -> Array:
         """Return the coordinates of the nearest least squares; robust ones without sigma."""
         found = least_squares(
-            lambda y: self.rest(y, sigma), x, x_scale=[1e-3 if n == "delay" else 1.0 for n in self.names],
+            lambda y: self.rest(y, sigma), x, x_scale=self.sizes(x),
             loss="soft_l1" if sigma is None else "linear", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200,
         )  # fmt: skip
         return np.asarray(found.x)
@@ -224,9 +234,9 @@ class _PlantProblem:
     def sensitivity(self, x: Array, sigma: Array) -> Array:
         """Return the derivatives of the residuals by the coordinates, by central differences."""
         columns = []
-        for k, name in enumerate(self.names):
+        for k, size in enumerate(self.sizes(x)):
             step = np.zeros(x.size)
-            step[k] = 1e-8 if name == "delay" else 1e-6
+            step[k] = 1e-6 * size
             z = (self.response(x + step) - self.response(x - step)) / (2.0 * step[k]) / sigma
             columns.append(np.concatenate([z.real, z.imag]))
         return np.stack(columns, axis=1)
@@ -253,11 +263,10 @@ def _found(problem: _PlantProblem, sigma: Array) -> tuple[_PlantProblem, Array]:
     values = {**stiff.values(x), **known}
     tries = []
     for at in np.geomspace(f[0], f[-1], FREQUENCIES + 2)[1:-1]:
-        for damping in (0.01, 0.05):
-            for share in (0.3, 0.1, -0.1):
-                mode = {"mode_f": float(at), "mode_damping": damping, "mode_share": share}
-                start = problem.coordinates({**values, **mode, **known})
-                tries.append((problem.square(start, None), start))
+        modes = [{"mode_f": float(at), "mode_damping": damping, "mode_share": share}
+                 for damping in (0.01, 0.05) for share in (0.3, 0.1, -0.1)]  # fmt: skip
+        starts = [problem.coordinates({**values, **mode, **known}) for mode in modes]
+        tries.append(min(((problem.square(x, None), x) for x in starts), key=lambda t: t[0]))
     tries.sort(key=lambda t: t[0])
     ends = [problem.solved(problem.solved(start, None), sigma) for _, start in tries[:TRIES]]
     return problem, min(ends, key=lambda x: problem.square(x, sigma))
@@ -291,8 +300,9 @@ def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str])
     singular, right = np.linalg.svd(by / np.where(size > 0.0, size, 1.0))[1:]
     if not np.all(size > 0.0) or singular[-1] < ALIKE * singular[0]:
         alike = [n for n, s in zip(free, np.abs(right[-1]), strict=True) if s > 0.1]
+        why = "act alike in this record and cannot be told apart" if len(alike) > 1 else "has no effect in this record"
         raise UsageError(
-            f"--fit: {' and '.join(alike)} act alike in this record and cannot be told apart; state one of them "
+            f"--fit: {' and '.join(alike)} {why}; state {'one of them' if len(alike) > 1 else 'it'} "
             f"(--fit {alike[0]}=...{PARAMETERS[alike[0]][0]})"
         )
     spare = 2 * f.size - len(free)

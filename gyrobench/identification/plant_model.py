@@ -38,9 +38,10 @@ PARAMETERS: dict[str, tuple[str, str]] = {
 }
 MODE = ("mode_f", "mode_damping", "mode_share")
 OF_PLATFORM = ("J", "viscous", "k_t", "k_e", "R", "L")  # that a part of the bench has
-SIGNED = ("mode_share", "delay")
+SIGNED = ("mode_share", "delay", "viscous", "k_e", "L")  # the noise may make these negative
 NEEDED = {"N.m": (), "A": ("k_t",), "V": ("k_t", "k_e", "R", "L")}
 OUTPUTS = {"rad/s": 0, "rad": 1}
+LARGEST = 50.0  # of an exponent
 SMALL = 1e-9  # rad/s: two equal poles are told apart by so much
 
 
@@ -79,8 +80,9 @@ class PlantModel:
         poles = np.roots(den)
         poles = np.where(np.abs(poles) < SMALL, -SMALL, poles)
         residues = np.polyval(num, poles) / np.polyval(np.polyder(den), poles)
-        grown = np.exp(poles * self.held)
-        return np.asarray(np.sum(residues * np.expm1(poles * self.held) / poles / (z[:, None] - grown), axis=1))
+        turned = poles * self.held
+        turned = np.where(turned.real > LARGEST, LARGEST, turned)  # on the way of a search alone
+        return np.asarray(np.sum(residues * np.expm1(turned) / poles / (z[:, None] - np.exp(turned)), axis=1))
 
 
 def unit_of(text: str, among: tuple[str, ...]) -> str:
