@@ -36,6 +36,7 @@ from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
 from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.suite import Suite
+from gyrobench.workflow.handover import handed_over
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.instruments import with_instrument
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
@@ -79,14 +80,16 @@ def load(
     maps: Mapping[str, File] | None = None,
     coupling: str = "sequential",
     instrument: str = "",
+    from_run: Sequence[File] = (),
     **options: Any,
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
     mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.  Raises
-    errors of type GyrobenchError; UsageError for a suite.
+    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.
+    from_run: folders of runs of other tests whose results give values of this one; values and options go before them.
+    Raises errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
@@ -98,7 +101,8 @@ def load(
     title, sheet = with_instrument(instrument, swaps) if instrument else ("", {})
     test.instrument = title
     experiment = Experiment(test, swaps, maps or {})
-    for key, value in {**sheet, **(values or {}), **options}.items():
+    taken = handed_over(test, [Path(run) for run in from_run]) if from_run else {}
+    for key, value in {**sheet, **taken, **(values or {}), **options}.items():
         experiment.set(key, value)
     return experiment
 
