@@ -8,10 +8,10 @@ About each frequency f0, over a window of its neighbours, d = f - f0:
 by weighted least squares (Levy, Sanathanan, then Gauss-Newton).  L = 1/S - 1 and T = 1 - S are of the same form, so one
 curve serves all margins.  The widest window that passes the test of its residuals against the stated noise is found,
 the cubic before the fraction; one NARROWER times as far down the list is used, whose bias then is well below its
-uncertainty.  Residuals above the stated noise widen the uncertainty (Birge's ratio).  Where no window
-passes (hardly any noise, or points too far apart) the best of all is taken, and where its uncertainty is large the loop
-is not resolved there.  Source: Pintelon 2012, 7.2 and 9.8 (local models, Sanathanan's
-iteration); McKelvey 2012 (local rational models).
+uncertainty.  Residuals above the stated noise widen the uncertainty (Birge's ratio).  Where no window passes (hardly
+any noise, or points too far apart) the least uncertain one is taken, and where its uncertainty is large the loop is not
+resolved there.  Source: Pintelon 2012, 7.2 and 9.8 (local models, Sanathanan's iteration); McKelvey 2012 (local
+rational models).
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def loop_curve(s: MeasuredResponse) -> LoopCurve:
         d = s.f[idx] - s.f[:, None]
         every += [_fits(d, s.value[idx], variance[idx], s.dof[idx], draw[idx], rational) for rational in (False, True)]
     p, rows = np.stack([m.p for m in every]), np.arange(s.f.size)
-    use, forced = _chosen(p)
+    widened = np.stack([m.cov[:, 0, 0].real * np.maximum(m.square, 1.0) for m in every])
+    use, forced = _chosen(p, widened)
     theta, cov, scale, draws = (
         np.stack([getattr(m, n) for m in every])[use, rows] for n in ("theta", "cov", "scale", "draws")
     )
@@ -118,12 +119,15 @@ def loop_curve(s: MeasuredResponse) -> LoopCurve:
     return _dense(s.f, theta, cov, scale, draws, resolved)
 
 
-def _chosen(p: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return which model is used at each frequency, and where none passes; p: (models, n), cubic, fraction in turn."""
+def _chosen(p: Array, widened: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return which model is used at each frequency, and where none passes.
+
+    p, widened: (models, n), cubic and fraction in turn; of the residuals, and the variance widened by them.
+    """
     passes = p > PASSES
     forced = ~np.any(passes, axis=0)
     window, rational = np.divmod(np.argmax(passes, axis=0), 2)
-    use = np.argmax(p, axis=0)
+    use = np.argmin(np.where(np.isfinite(widened), widened, np.inf), axis=0)
     left = ~forced
     for narrower in range(NARROWER, -1, -1):
         model = 2 * np.minimum(window + narrower, p.shape[0] // 2 - 1) + rational
