@@ -1,4 +1,4 @@
-"""Whether a loop is the same at two amplitudes: its curves of S compared, with their uncertainties.
+"""Comparison of a loop at two amplitudes: its curves of S, with their uncertainties.
 
 A linear loop gives the same response at any amplitude.  Dry friction, backlash and saturation do not: the describing
 function, and with it every margin, belongs to one amplitude (Pintelon 2012, 4.2).
