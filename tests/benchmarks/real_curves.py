@@ -2,10 +2,10 @@
 
     python tests/benchmarks/real_curves.py FOLDER [--write]
 
-FOLDER: deviations_*.csv with sensor, axis, tau, deviation and its 95 % interval, the rate in the first line.  A curve is
-fitted by the terms of the noise model, sampled at that rate: of white noise, angle noise, flicker, random walk, ramp,
-Gauss-Markov processes and oscillators that one is added which lowers chi squared most, all parameters anew, while it
-lowers it by more than PRICE for each of its parameters; at most as many parameters as three less than points.  The
+FOLDER: deviations_*.csv with sensor, axis, tau, deviation and its 95 % interval, the rate in the first line.  A curve
+is fitted by the terms of the noise model, sampled at that rate: of white noise, angle noise, flicker, random walk,
+ramp, Gauss-Markov processes and oscillators that one is added which lowers chi squared most, all parameters anew, while
+it lowers it by more than PRICE for each of its parameters; at most as many parameters as three less than points.  The
 record is not there: octaves do not tell the frequency of an oscillator, nor a filter from a fast process.
 """
 
@@ -131,8 +131,9 @@ class Curve:
 
     def more(self, at: tuple[float, Model, Array]) -> list[tuple[float, Model, Array]]:
         """Return the fits with a term more, the best first."""
-        found = [self.best_of(at[1], at[2], term) for term in (ANGLE, FLICKER, WALK, RAMP, MARKOV, SWING)
-                 if (term in (MARKOV, SWING) or term not in at[1]) and at[2].size + term.size <= self.m.size - 3]  # fmt: skip
+        left = self.m.size - 3 - at[2].size
+        terms = [t for t in (ANGLE, FLICKER, WALK, RAMP, MARKOV, SWING) if t in (MARKOV, SWING) or t not in at[1]]
+        found = [self.best_of(at[1], at[2], t) for t in terms if t.size <= left]
         return sorted((f for f in found if math.isfinite(f[0])), key=self.worth)
 
     def pruned(self, at: tuple[float, Model, Array]) -> tuple[float, Model, Array]:

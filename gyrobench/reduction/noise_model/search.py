@@ -16,7 +16,7 @@ from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-WIDEST = 0.25  # information of a parameter that the record does not tell: its volume is that of the prior, some 5, no more
+WIDEST = 0.25  # information of a parameter that the record does not tell: its volume is the prior's, some 5
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
