@@ -97,9 +97,8 @@ def real_records(folder: Path, part: str) -> None:
             implied = np.sqrt(of_five(own.tau) @ five)
             agreed.append(float(np.mean(((own.low <= implied) & (implied <= own.high))[k])))
             print(f"| {file.stem} {name} | {100.0 * agreed[-1]:.1f} |", flush=True)
-    print(
-        f"five terms: 95 % inside for {sum(a >= ENOUGH for a in agreed)} of {len(agreed)}, median {np.median(agreed):.2f}"
-    )
+    enough = sum(a >= ENOUGH for a in agreed)
+    print(f"five terms: 95 % inside for {enough} of {len(agreed)}, median {np.median(agreed):.2f}")
 
 
 if __name__ == "__main__":
