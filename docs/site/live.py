@@ -1,4 +1,4 @@
-"""Systems that run in the pages of the site: exported as web pages, and the page that lists them."""
+"""Systems and lessons that run in the pages of the site: exported as web pages, and the page that lists them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import gyrobench as gb
+from gyrobench.workflow.lessons import lessons
 
 #: system -> parameters with a slider, and what to look for
 LIVE = {
@@ -27,18 +28,24 @@ LIVE = {
     "vertical_gyro": (("gyro.H",), "Erection to the vertical: a larger H takes longer and is moved less."),
 }
 PAGE = "live.md"
+#: lessons of the site
+TAUGHT = ("drift", "tumble", "random_walk", "stiffness", "keyhole")
 
 
 def export_live(folder: Path) -> list[str]:
     """Export the systems into a folder, a page each; return the problems."""
     folder.mkdir(parents=True, exist_ok=True)
-    problems = []
+    commands = {}
     for name, (sliders, _) in LIVE.items():
         exposed = [word for slider in sliders for word in ("--expose", slider)]
-        out = str(folder / f"{name}.html")
-        command = [sys.executable, "-m", "gyrobench", "export", name, "--to", "html", *exposed, "--out", out]
+        commands[name] = ["export", name, "--to", "html", *exposed]
+    for name in TAUGHT:
+        commands |= {f"{name}-{code}": ["learn", name, "--language", code] for code in ("en", "zh")}
+    problems = []
+    for file, words in commands.items():
+        command = [sys.executable, "-m", "gyrobench", *words, "--out", str(folder / f"{file}.html")]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
-        problems += [f"{name}: {done.stderr.strip()}"] if done.returncode else []
+        problems += [f"{file}: {done.stderr.strip()}"] if done.returncode else []
     return problems
 
 
@@ -58,4 +65,11 @@ def live_page() -> str:
         title = gb.load(name).system.title
         link = f'<a href="live/{name}.html">{title}</a>'
         lines.append(f"| {link} | {', '.join(f'`{s}`' for s in sliders)} | {words} |")
+    lines += ["", "Lessons, each with a question, a closed formula beside the simulation, and an exercise:", ""]
+    for item in lessons():
+        if item.name in TAUGHT:
+            en, zh = (
+                f'<a href="live/{item.name}-{code}.html">{item.texts(code)["title"]}</a>' for code in ("en", "zh")
+            )
+            lines.append(f"- {item.texts()['question']} {en}, {zh}")
     return "\n".join([*lines, ""])

@@ -17,6 +17,9 @@ def studio(
     ] = None,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
     read_only: Annotated[bool, typer.Option("--read-only", help="Show runs and systems; start nothing.")] = False,
+    language: Annotated[
+        str, typer.Option(metavar="CODE", help="Language of the pages at first: en, zh; a button changes it.")
+    ] = "en",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address; open no browser.")] = False,
     allow_remote: Annotated[
         str | None,
@@ -49,4 +52,4 @@ def studio(
 
             webbrowser.open(address)
 
-    serve(host, port, read_only, allow_remote, opened)
+    serve(host, port, read_only, allow_remote, opened, language)

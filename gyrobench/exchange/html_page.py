@@ -39,8 +39,11 @@ def export_page(
     seed: int = 1,
     bench: Path | None = None,
     expose: Iterable[str] = (),
+    lesson: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Write the page; return notes for the user.
+
+    lesson: what the page says beside the system, and what of it is shown (:mod:`gyrobench.workflow.lessons`).
 
     expose: parameters that get a slider, "slot.parameter" or options; the default set is that of an FMU.
     Raises what :func:`~gyrobench.exchange.system_fmu.linked_source` raises, and CompilerError without ziglang.
@@ -53,13 +56,16 @@ def export_page(
             (folder / file).write_text(text, encoding="utf-8")
         (folder / "page.c").write_text((HERE / "page.c").read_text(encoding="utf-8"), encoding="utf-8")
         code = compile_wasm(folder / "page.c")
-    content = {**_content(chosen, source), "seed": seed, "wasm": base64.b64encode(code).decode()}
+    content = {**_content(chosen, source, lesson), "seed": seed, "wasm": base64.b64encode(code).decode()}
     text = (HERE / "page.html").read_text(encoding="utf-8")
-    for mark, file in (("/* page.css */", "page.css"), ("/* page.js */", "page.js")):
-        text = text.replace(mark, (HERE / file).read_text(encoding="utf-8"))
+    scripts = ["page.js", "lesson.js"] if lesson else ["page.js"]
+    for mark, files in (("/* page.css */", ["page.css"]), ("/* page.js */", scripts)):
+        text = text.replace(mark, "".join((HERE / f).read_text(encoding="utf-8") for f in files))
     data = json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, text.replace("{title}", _escaped(chosen.title)).replace("{content}", data).encode())
+    text = text.replace("{language}", lesson["language"] if lesson else "en")
+    title = lesson["title"] if lesson else chosen.title
+    write_whole(path, text.replace("{title}", _escaped(title)).replace("{content}", data).encode())
     return linked.notes
 
 
@@ -67,9 +73,9 @@ def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;")
 
 
-def _content(system: System, source: SystemSource) -> dict[str, Any]:
-    end = stop_time(system)
-    every = max(1, math.ceil(end / system.step / ROWS))
+def _content(system: System, source: SystemSource, lesson: Mapping[str, Any] | None) -> dict[str, Any]:
+    end, rows = (lesson["end"], lesson["rows"]) if lesson else (stop_time(system), ROWS)
+    every = max(1, math.ceil(end / system.step / rows))
     outputs = [_named(e) for e in source.section("output")]
     return {
         "name": system.name,
@@ -84,6 +90,7 @@ def _content(system: System, source: SystemSource) -> dict[str, Any]:
         "outputs": outputs,
         "charts": _charts(system, [o["name"] for o in outputs]),
         "fast": units.FAST,
+        **({"lesson": lesson} if lesson else {}),
     }
 
 

@@ -15,6 +15,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.signal_view import SignalPyramid
 from gyrobench.report.channel_figure import scaled
 from gyrobench.studio.job_process import stored
+from gyrobench.studio.words import say, spoken
 
 POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
@@ -83,7 +84,7 @@ def panels(titles: Sequence[str], begin: float, end: float) -> dict[str, Any]:
             for text, t in zip(titles, top, strict=True)
         ],
         "xAxis": [
-            {"type": "value", "gridIndex": k, "min": begin, "max": end, "name": "time in s" if k == last else "",
+            {"type": "value", "gridIndex": k, "min": begin, "max": end, "name": say("time in s") if k == last else "",
              "nameLocation": "middle", "nameGap": 24, "axisLabel": {"show": k == last, "color": TEXT},
              "splitLine": {"lineStyle": {"color": GRID}}}
             for k in range(len(titles))
@@ -103,7 +104,7 @@ class LiveChart:
 
     def __init__(self, file: Path) -> None:
         self.file, self.read = file, 0
-        self.chart = ui.echart({"series": []}).classes("chart").props('role=img aria-label="Signals so far"')
+        self.chart = ui.echart({"series": []}).classes("chart").props("role=img").props(spoken("Signals so far"))
         self.chart.set_visibility(False)
 
     def look(self) -> None:
@@ -140,7 +141,7 @@ class SignalChart:
         self.begin = min((s.span[0] for s in records.values() if len(s.time)), default=0.0)
         self.end = max((s.span[1] for s in records.values() if len(s.time)), default=0.0)
         self.view = (self.begin, self.end)
-        self.chart = ui.echart({"series": []}).classes("chart").props('role=img aria-label="Signals over time"')
+        self.chart = ui.echart({"series": []}).classes("chart").props("role=img").props(spoken("Signals over time"))
         self.chart.on("chart:datazoom", self._zoomed, ["batch", "start", "end"], throttle=0.25, leading_events=False)
 
     async def show(self, names: Sequence[str]) -> None:
@@ -157,7 +158,7 @@ class SignalChart:
         """Return the options of the chart: a panel for each unit, the series of a view of each signal."""
         units = list(dict.fromkeys(self._unit(n) for n in self.names))
         scales = {u: self._scale(u) for u in units}
-        chart = panels([f"in {scales[u][1] or '1'}" for u in units], self.begin, self.end)
+        chart = panels([say(f"in {scales[u][1] or '1'}") for u in units], self.begin, self.end)
         axes = list(range(len(units)))
         chart["dataZoom"] = [
             {"type": "inside", "xAxisIndex": axes, "filterMode": "none"},

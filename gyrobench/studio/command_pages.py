@@ -17,6 +17,7 @@ from gyrobench.report.laboratory import FILE, Laboratory, laboratory_of, read_la
 from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem, told
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
+from gyrobench.studio.words import heading, say
 from gyrobench.system.system import System
 from gyrobench.tuning.tune_loop import tunable
 from gyrobench.workflow.inputs import load_test
@@ -130,20 +131,22 @@ def systems_of(studio: Studio, form: CommandForm) -> dict[str, str]:
         runs = not isinstance(test, System) or bool(test.slots)
         designs = form is not DESIGN or not isinstance(test, System) or bool(test.protocol)
         if runs and designs and (able is None or name in able):
-            found[name] = f"{test.title} ({name})"
+            found[name] = f"{say(test.title, name)} ({name})"
     return found
 
 
 def _field(f: FormField, studio: Studio) -> Any:
     if f.kind == "choice":
         choices = f.choices or ("", *studio.bench.specifications())
-        return ui.select(list(choices), value=choices[0], label=f.label).props("dense outlined").classes("full")
+        return ui.select(list(choices), value=choices[0], label=say(f.label)).props("dense outlined").classes("full")
     if f.kind == "number":
-        return ui.number(f.label, min=0, precision=0, placeholder=f.example).props("dense outlined").classes("full")
+        return (
+            ui.number(say(f.label), min=0, precision=0, placeholder=f.example).props("dense outlined").classes("full")
+        )
     if f.kind == "text":
-        return ui.input(f.label, placeholder=f.example).props("dense outlined").classes("full")
+        return ui.input(say(f.label), placeholder=f.example).props("dense outlined").classes("full")
     made = (
-        ui.textarea(f"{f.label}, one a line", placeholder=f.example)
+        ui.textarea(say(f"{f.label}, one a line"), placeholder=f.example)
         .props("dense outlined autogrow stack-label")
         .classes("full")
     )
@@ -155,17 +158,17 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
     async def form_page(system: str = "") -> None:
         systems = await asyncio.to_thread(systems_of, studio, form)
         with frame(studio, form.name):
-            ui.html(f"<h1>{escape(form.name)}</h1>", sanitize=False)
-            ui.label(form.text)
+            heading(form.name)
+            ui.label(say(form.text))
             with ui.element("div").classes("two"):
                 with ui.element("div").classes("form"):
                     first = system if system in systems else next(iter(systems), None)
-                    chosen = ui.select(systems, value=first, label="System", with_input=True)
+                    chosen = ui.select(systems, value=first, label=say("System"), with_input=True)
                     chosen.props("dense outlined").classes("full")
                     fields = {f.option: _field(f, studio) for f in form.fields}
                 with ui.element("div").classes("aside"):
                     lines = CopyLines()
-                    go = ui.button("Start", icon="play_arrow").mark("start")
+                    go = ui.button(say("Start"), icon="play_arrow").mark("start")
                     go.set_visibility(not studio.read_only)
 
             def asked() -> CommandRequest:
@@ -201,9 +204,9 @@ def _profile_fields(there: Laboratory | None) -> dict[str, Any]:
     made: dict[str, Any] = {}
     for key, (label, many) in PROFILE.items():
         value = getattr(there, key, "") or ""
-        made[key] = ui.textarea(label, value="\n".join(value)) if many else ui.input(label, value=value)
+        made[key] = ui.textarea(say(label), value="\n".join(value)) if many else ui.input(say(label), value=value)
     signs = "\n".join(f"{s.role}: {s.name}" for s in there.signatories) if there else ""
-    made["signatories"] = ui.textarea(SIGNATORIES, value=signs)
+    made["signatories"] = ui.textarea(say(SIGNATORIES), value=signs)
     for field in made.values():
         field.props("dense outlined autogrow stack-label").classes("full")
     return made
@@ -237,7 +240,7 @@ def _add_laboratory_page(studio: Studio) -> None:
         file = studio.bench.home / FILE
         entries = await asyncio.to_thread(list_runs, studio.bench.out)
         with frame(studio, "Laboratory"):
-            ui.html("<h1>Laboratory</h1>", sanitize=False)
+            heading("Laboratory")
             there = None
             try:
                 there = read_laboratory(file) if file.is_file() else None
@@ -245,21 +248,25 @@ def _add_laboratory_page(studio: Studio) -> None:
                 show_problem(error)
             with ui.element("div").classes("two"):
                 with ui.element("div").classes("form"):
-                    ui.html("<h2>Profile</h2>", sanitize=False)
-                    ui.label("Certificates say this of the laboratory; it is kept in laboratory.toml.").classes("soft")
+                    heading("Profile", 2)
+                    ui.label(say("Certificates say this of the laboratory; it is kept in laboratory.toml.")).classes(
+                        "soft"
+                    )
                     fields = _profile_fields(there)
-                    save = ui.button("Save", icon="save").mark("save")
+                    save = ui.button(say("Save"), icon="save").mark("save")
                 with ui.element("div").classes("form"):
-                    ui.html("<h2>Certificate</h2>", sanitize=False)
+                    heading("Certificate", 2)
                     names = {
-                        r.place: f"{r.title or r.system}, {r.instrument or r.place}"
+                        r.place: f"{say(r.title or r.system, r.system)}, {r.instrument or r.place}"
                         for r in entries[:LISTED]
                         if r.report
                     }
-                    runs = ui.select(names, multiple=True, label="Run of an instrument, runs of a lot", with_input=True)
+                    runs = ui.select(
+                        names, multiple=True, label=say("Run of an instrument, runs of a lot"), with_input=True
+                    )
                     runs.props("dense outlined use-chips").classes("full")
-                    number = ui.input("Number of the certificate").props("dense outlined").classes("full")
-                    make = ui.button("Make the certificate", icon="workspace_premium").mark("certify")
+                    number = ui.input(say("Number of the certificate")).props("dense outlined").classes("full")
+                    make = ui.button(say("Make the certificate"), icon="workspace_premium").mark("certify")
                     lines = CopyLines()
             for button in (save, make):
                 button.set_visibility(not studio.read_only)
@@ -274,7 +281,7 @@ def _add_laboratory_page(studio: Studio) -> None:
                 if file.is_file() and there is None:
                     raise UsageError(f"{display_path(file)} cannot be read; mend or remove it, it is not written over")
                 write_laboratory(_profile(fields, file), file)
-                ui.notify(f"Saved: {display_path(file)}")
+                ui.notify(say(f"Saved: {display_path(file)}"))
 
             def certify() -> None:
                 asked = certificate_request(studio, runs.value or [], number.value or "")

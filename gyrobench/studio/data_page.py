@@ -22,6 +22,7 @@ from gyrobench.record.column_map import cells_of_file
 from gyrobench.record.column_proposal import FileColumn
 from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, told
 from gyrobench.studio.request import JobRequest
+from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.system import System
 from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
 from gyrobench.workflow.inputs import load_test
@@ -59,7 +60,7 @@ def tests_of_data(studio: Studio) -> dict[str, str]:
         except Exception:  # it says what is wrong with it in the gallery
             continue
         if isinstance(test, System) and test.measured_data is not None:
-            found[name] = f"{test.title} ({name})"
+            found[name] = f"{say(test.title, name)} ({name})"
     return found
 
 
@@ -134,7 +135,7 @@ def _preview(mapping: _Mapping) -> None:
             break
     decimal = "comma" if layout.decimal == "," else "point"
     said = [layout.encoding, f"separator {layout.delimiter!r}", f"decimal {decimal}", f"{layout.skip} lines above"]
-    ui.label(", ".join(said)).classes("soft")
+    ui.label(say(", ".join(said))).classes("soft")
     with ui.element("div").classes("scroll"), ui.element("table").classes("runs"):
         for k, row in enumerate(rows):
             with ui.element("tr"):
@@ -152,17 +153,17 @@ def _columns(mapping: _Mapping) -> None:
         with ui.element("div").classes("setting mapped"):
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
-                ui.label(f"as {wanted}" if wanted not in ("", "1") else "").classes("range")
+                ui.label(say(f"as {wanted}") if wanted not in ("", "1") else "").classes("range")
             with ui.element("div").classes("bar"):
                 held = mapping.proposal.found.get(name)
                 at = columns.index(held) if held in columns else -1
-                menu = ui.select({-1: NOT, **names}, value=at).props("dense outlined")
-                menu.props["aria-label"] = f"column for {name}"
+                menu = ui.select({-1: say(NOT), **names}, value=at).props("dense outlined")
+                menu.props(spoken(f"column for {name}"))
                 check = _unit_check(mapping, name)
-                unit = ui.input(value=held.unit if held else "", placeholder="unit", validation=check)
+                unit = ui.input(value=held.unit if held else "", placeholder=say("unit"), validation=check)
                 unit.props("dense outlined hide-bottom-space debounce=250").classes("narrow")
-                unit.props["aria-label"] = f"unit of {name}"
-                sign = ui.checkbox("reversed").props("dense")
+                unit.props(spoken(f"unit of {name}"))
+                sign = ui.checkbox(say("reversed")).props("dense")
         _follow(mapping, name, menu, unit, sign)
 
 
@@ -201,7 +202,7 @@ def _stated(mapping: _Mapping) -> None:
         with ui.element("div").classes("setting"):
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
-                ui.label(option.doc if option else "")
+                content(option.doc if option else "", mapping.proposal.test.name)
             value = ui.input(placeholder=example).props("dense outlined debounce=250")
             value.props["aria-label"] = name
             value.on_value_change(lambda e, n=name: take(n, e.value or ""))
@@ -213,33 +214,33 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
         with ui.element("div") as left:
             pass
         with ui.element("div").classes("aside"):
-            faults = ui.element("section").classes("rows").props('role=status aria-label="What is wrong"')
+            faults = ui.element("section").classes("rows").props("role=status").props(spoken("What is wrong"))
             with ui.element("div").classes("bar"):
-                check = ui.button("Check the file", icon="rule")
-                go = ui.button("Reduce", icon="play_arrow")
+                check = ui.button(say("Check the file"), icon="rule")
+                go = ui.button(say("Reduce"), icon="play_arrow")
             mapping = _Mapping(proposal, CopyLines())
-            with ui.expansion("Column map").classes("full"):
+            with ui.expansion(say("Column map")).classes("full"):
                 text = ui.label().classes("code")
     with left:
-        ui.html("<h2>File</h2>", sanitize=False)
+        heading("File", 2)
         _preview(mapping)
-        ui.html("<h2>Columns</h2>", sanitize=False)
-        ui.label("Check columns, units and signs: names do not tell them all.").classes("soft")
+        heading("Columns", 2)
+        ui.label(say("Check columns, units and signs: names do not tell them all.")).classes("soft")
         _columns(mapping)
-        ui.html("<h2>What the test needs to know</h2>", sanitize=False)
+        heading("What the test needs to know", 2)
         _stated(mapping)
 
-    def say(lines: list[str], head: str) -> None:
+    def listed(lines: list[str], head: str) -> None:
         faults.clear()
         with faults:
-            ui.label(head).classes("small-head")
+            ui.label(say(head)).classes("small-head")
             for line in lines:
-                ui.label(visible(line)).classes("problem")
+                content(visible(line)).classes("problem")
 
     def lacks() -> None:
         written, problems = mapping.text()
         text.set_text(written)
-        say(problems, "The map still lacks:" if problems else "Every column has its place and its unit.")
+        listed(problems, "The map still lacks:" if problems else "Every column has its place and its unit.")
 
     async def examine() -> None:
         try:
@@ -247,9 +248,9 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
             assert isinstance(test, System)
             found = await asyncio.to_thread(find_faults, test, proposal.file, request.values, mapping.map_file)
         except Exception as error:
-            say([user_message(error)], "The file cannot be read so:")
+            listed([user_message(error)], "The file cannot be read so:")
             return
-        say(found, f"{len(found)} faults:" if found else "Nothing is wrong with the file: it can be reduced.")
+        listed(found, f"{len(found)} faults:" if found else "Nothing is wrong with the file: it can be reduced.")
 
     def reduce() -> None:
         ui.navigate.to(f"/job/{studio.jobs.submit(mapping.write())}")
@@ -267,10 +268,10 @@ def add_data_page(studio: Studio) -> None:
     async def data_page(file: str = "", test: str = "") -> None:
         tests = await asyncio.to_thread(tests_of_data, studio)
         with frame(studio, "Data"):
-            ui.html("<h1>Measured data</h1>", sanitize=False)
+            heading("Measured data")
             if studio.read_only:
                 raise UsageError("the studio is read-only: no file is taken")
-            chosen = ui.select(tests, value=test if test in tests else None, label="Test", with_input=True)
+            chosen = ui.select(tests, value=test if test in tests else None, label=say("Test"), with_input=True)
             chosen.props("dense outlined").classes("full")
             there = inside(studio.bench.out / FILES, file) if file else None
 
@@ -288,6 +289,6 @@ def add_data_page(studio: Studio) -> None:
             if there is None:
                 return
             if test not in tests:
-                ui.label(f"{there.name}: choose the test that it is of.").classes("soft")
+                ui.label(say(f"{there.name}: choose the test that it is of.")).classes("soft")
                 return
             _mapped(studio, await asyncio.to_thread(propose_columns, there, test))

@@ -9,20 +9,21 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from nicegui import ui
+from nicegui import app, ui
 from nicegui.events import Handler, UploadEventArguments
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.reading import visible
 from gyrobench.studio.gate import UPLOAD
 from gyrobench.studio.jobs import StudioJobs
+from gyrobench.studio.words import NAMES, content, say, spoken
 from gyrobench.workflow.user_errors import user_message
 
 MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
-    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"),
+    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"), ("Learn", "/learn"),
 )  # fmt: skip
 DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
     None: (True, "Colours: as the system"),
@@ -68,27 +69,38 @@ def address(page: str, place: str) -> str:
 @contextlib.contextmanager
 def frame(studio: Studio, title: str) -> Iterator[None]:
     """Head and body of a page; what goes wrong inside is shown there."""
-    ui.page_title(f"{title}: gyrobench")
+    app.config.language = "zh-CN" if say.code == "zh" else "en-US"  # of what the front end says by itself
+    ui.page_title(f"{say(title)}: gyrobench")
     ui.add_css(STYLE)
-    ui.add_head_html('<script>document.documentElement.lang = "en";</script>')
+    ui.add_head_html(f'<script>document.documentElement.lang = "{say.html}";</script>')
     ui.colors(primary=MARK)
     mode = ui.dark_mode(studio.dark)
 
     def change() -> None:
         studio.dark = DARK[studio.dark][0]
         mode.set_value(studio.dark)
-        button.props(f'title="{DARK[studio.dark][1]}" aria-label="{DARK[studio.dark][1]}"')
+        named_colours()
 
-    ui.html('<a class="skip" href="#content">To the content</a>', sanitize=False)
+    def named_colours() -> None:
+        text = DARK[studio.dark][1]
+        button.props(f'title="{say(text)}"').props(spoken(text))
+
+    def switch() -> None:
+        say.use(say.other)
+        ui.navigate.reload()
+
+    ui.html(f'<a class="skip" href="#content">{say("To the content")}</a>', sanitize=False)
     with ui.element("header").classes("head"):
         ui.link("gyrobench", "/").classes("brand")
-        with ui.element("nav").props('aria-label="Pages"'):
+        with ui.element("nav").props(spoken("Pages")):
             for name, target in PAGES:
-                ui.link(name, target).classes("here" if name == title else "")
+                ui.link(say(name), target).classes("here" if name == title else "")
         if studio.read_only:
-            ui.label("read-only").classes("tag")
+            ui.label(say("read-only")).classes("tag")
+        other = ui.button(NAMES.get(say.other, say.other), on_click=switch).props("flat dense").mark("language")
+        other.props(f'lang="{say.other}"')
         button = ui.button(icon="contrast", on_click=change).props("flat dense round")
-        button.props(f'title="{DARK[studio.dark][1]}" aria-label="{DARK[studio.dark][1]}"')
+        named_colours()
     with ui.element("div").props("id=content").classes("content"):
         try:
             yield
@@ -98,7 +110,7 @@ def frame(studio: Studio, title: str) -> Iterator[None]:
 
 def show_problem(error: BaseException) -> None:
     """Show the message of an error, as the command prints it."""
-    ui.label(visible(user_message(error))).classes("problem").props("role=alert")
+    content(visible(user_message(error))).classes("problem").props("role=alert")
 
 
 def told(action: Callable[[], None]) -> Callable[[], None]:
@@ -108,7 +120,9 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
         try:
             action()
         except Exception as error:
-            ui.notify(visible(user_message(error)), type="negative", multi_line=True, close_button="Close", timeout=0)
+            ui.notify(
+                visible(user_message(error)), type="negative", multi_line=True, close_button=say("Close"), timeout=0
+            )
 
     return guarded
 
@@ -119,11 +133,11 @@ def dropped(text: str, taken: Handler[UploadEventArguments], label: str, accept:
     label: by which it is called aloud.  accept: ".fmu", "" for any file.
     """
     drop = ui.upload(on_upload=taken, auto_upload=True).props(f"flat bordered max-file-size={UPLOAD - 4096}")
-    drop.props(f'accept="{accept}"' if accept else "").classes("full").props["aria-label"] = label
+    drop.props(f'accept="{accept}"' if accept else "").classes("full").props["aria-label"] = say(label)
     drop.add_slot(
         "header",
-        f"""<div class="pick"><label>{escape(text)}<q-uploader-add-trigger /></label>
-        <q-btn flat dense round icon="attach_file" aria-label="{escape(label)}: choose a file" @click="props.pickFiles"
+        f"""<div class="pick"><label>{escape(say(text))}<q-uploader-add-trigger /></label>
+        <q-btn flat dense round icon="attach_file" {spoken(f"{label}: choose a file")} @click="props.pickFiles"
         /></div>""",
     )
 
@@ -135,18 +149,18 @@ class CopyLines:
         self.text = {"In the shell": "", "In Python": ""}
         self.shown: dict[str, ui.label] = {}
         self.boxes: dict[str, ui.element] = {}
-        with ui.element("section").classes("lines").props('aria-label="The same as a command and in Python"'):
+        with ui.element("section").classes("lines").props(spoken("The same as a command and in Python")):
             for name in self.text:
                 with ui.element("div").classes("line") as self.boxes[name]:
                     with ui.element("div").classes("line-head"):
-                        ui.label(name).classes("small-head")
+                        ui.label(say(name)).classes("small-head")
                         copy = ui.button(icon="content_copy", on_click=lambda n=name: self._copy(n))
-                        copy.props(f'flat dense round size=sm title="Copy" aria-label="Copy: {name}"')
+                        copy.props(f'flat dense round size=sm title="{say("Copy")}"').props(spoken(f"Copy: {name}"))
                     self.shown[name] = ui.label().classes("code").props("tabindex=0")
 
     def _copy(self, name: str) -> None:
         ui.clipboard.write(self.text[name])
-        ui.notify("Copied")
+        ui.notify(say("Copied"))
 
     def show(self, command: str, python: str) -> None:
         """Show other lines."""

@@ -12,6 +12,7 @@ from nicegui import ui
 from gyrobench.arrays import Array
 from gyrobench.frames import pole
 from gyrobench.record.record import Record
+from gyrobench.studio.words import say, spoken
 from gyrobench.system.moving_bodies import MovingBody, attitudes
 
 AXES = ("#d03030", "#1f8f3a", "#2f6fd0")  # x, y, z of every body
@@ -43,6 +44,11 @@ TURN = """(() => {
 })()"""
 
 
+LEGEND = (
+    "Axes of each body: red x or I, green y or O, blue z or S. E, N, U, the pole and gravity are fixed. Not to scale."
+)
+
+
 class MovingPicture:
     """A scene with a slider for the time; ``groups``: body -> what turns with it.
 
@@ -59,20 +65,19 @@ class MovingPicture:
         if not self.names:
             return
         with ui.element("div").classes("bar"):
-            self.button = ui.button(icon="play_arrow", on_click=self._play).props('flat round aria-label="Play"')
+            self.button = ui.button(icon="play_arrow", on_click=self._play).props("flat round").props(spoken("Play"))
             last = max(1, len(self.time) - 1)
             self.slider = ui.slider(min=0, max=last, value=0, step=1).classes("time")
-            self.slider.props('aria-label="time"')
+            self.slider.props(spoken("time"))
             self.label = ui.label().classes("soft")
         self.scene = ui.scene(width=900, height=520, grid=False, background_color="#20262d" if dark else "#f2f4f6")
-        self.scene.classes("scene").props('role=img aria-label="Moving picture"')
+        self.scene.classes("scene").props("role=img").props(spoken("Moving picture"))
         with self.scene:
             self._ground(record.run.parameters)
             for depth, name in enumerate(self.names):
                 self.groups[name] = self._body(depth, name)
         self.scene.move_camera(x=1.7, y=-2.2, z=1.3, look_at_z=0.0, duration=0.0)
-        legend = ", ".join(f"{c} {n}" for c, n in (("red", "x or I"), ("green", "y or O"), ("blue", "z or S")))
-        ui.label(f"Axes of each body: {legend}. E, N, U, the pole and gravity are fixed. Not to scale.").classes("soft")
+        ui.label(say(LEGEND)).classes("soft")
         self.slider.on_value_change(lambda e: self.show(int(e.value)))
         self.timer = ui.timer(TICK, self._step, active=False)
         self.show(0)
@@ -107,7 +112,7 @@ class MovingPicture:
         if isinstance(latitude, int | float):
             end = (1.9 * pole(float(latitude))).tolist()
             scene.line([0, 0, 0], end).material("#c09000")
-            scene.text("pole", "color: #b08000; font-size: 14px").move(*[1.05 * x for x in end])
+            scene.text(say("pole"), "color: #b08000; font-size: 14px").move(*[1.05 * x for x in end])
         scene.line([0, 0, 0], [0, 0, -1.5]).material("#777777")
         scene.text("g", "color: #888888; font-size: 14px").move(0, 0, -1.6)
 

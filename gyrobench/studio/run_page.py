@@ -19,6 +19,7 @@ from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
 from gyrobench.studio.request import CommandRequest, comparison_command, comparison_python, first_shown
+from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.inputs import load_test
@@ -63,15 +64,15 @@ def _add_job_page(studio: Studio) -> None:
             with ui.element("div").classes("bar"):
                 state = ui.label().classes("tag").props("role=status").mark("state")
                 words = ui.label().classes("soft")
-            bar = ui.linear_progress(0.0, show_value=False).props('aria-label="progress"')
+            bar = ui.linear_progress(0.0, show_value=False).props(spoken("progress"))
             bar.set_visibility(not command)
             message, notes = ui.label().classes("problem"), ui.label().classes("printed" if command else "notes")
             with ui.element("div").classes("bar"):
-                stop = ui.button("Stop", icon="stop", on_click=told(lambda: studio.jobs.stop(key))).mark("stop")
-                again = ui.button("Resume", icon="play_arrow", on_click=told(lambda: _resume(studio, key))).mark(
+                stop = ui.button(say("Stop"), icon="stop", on_click=told(lambda: studio.jobs.stop(key))).mark("stop")
+                again = ui.button(say("Resume"), icon="play_arrow", on_click=told(lambda: _resume(studio, key))).mark(
                     "resume"
                 )
-                done = ui.link("Its pages" if command else "Report and signals", "#").mark("result")
+                done = ui.link(say("Its pages" if command else "Report and signals"), "#").mark("result")
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
@@ -81,7 +82,7 @@ def _add_job_page(studio: Studio) -> None:
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
                 message.set_text(
-                    visible(now.report.message) or ("its process was ended" if now.state == "lost" else "")
+                    visible(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
                 )
                 message.set_visibility(bool(message.text))
                 notes.set_text("\n".join(map(visible, now.report.notes)))
@@ -103,10 +104,10 @@ def _add_job_page(studio: Studio) -> None:
 
 
 def _show_state(job: StudioJob, state: ui.label, words: ui.label, bar: ui.linear_progress) -> None:
-    state.set_text(job.state)
+    state.set_text(say(job.state))
     state.classes(replace=f"tag {job.state}")
     report = job.report
-    words.set_text(f"{report.label}: {report.words}" if report.label and job.active else "")
+    words.set_text(say(f"{report.label}: {report.words}") if report.label and job.active else "")
     bar.set_value(1.0 if job.state == "done" else report.fraction)
 
 
@@ -136,7 +137,7 @@ def _add_run_page(studio: Studio) -> None:
                 return
             with ui.tabs().props("no-caps align=left dense") as tabs:
                 names = ["Report", "Signals", "Moving picture", "As a command"]
-                made = {n: ui.tab(n) for n in names}
+                made = {n: ui.tab(n, say(n)) for n in names}
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
                     report_frame(folder, place)
@@ -163,14 +164,14 @@ def _add_run_page(studio: Studio) -> None:
 
 
 def _head(document: RunDocument | SuiteDocument, place: str, entry: RunEntry | None) -> None:
-    ui.html(f"<h1>{escape(document.title or document.system)}</h1>", sanitize=False)
+    ui.html(f"<h1>{escape(say(document.title or document.system, document.system))}</h1>", sanitize=False)
     with ui.element("div").classes("bar"):
         if entry is not None and entry.verdict:
-            ui.label(entry.verdict).classes(f"tag {entry.verdict.split()[0]}").mark("verdict")
+            ui.label(say(entry.verdict)).classes(f"tag {entry.verdict.split()[0]}").mark("verdict")
         if not document.complete:
-            ui.label("incomplete").classes("tag incomplete")
+            ui.label(say("incomplete")).classes("tag incomplete")
         ui.label(place).classes("soft")
-        ui.link("The system", f"/system/{quote(document.system)}")
+        ui.link(say("The system"), f"/system/{quote(document.system)}")
         for name, text in (("report.pdf", "PDF"), ("result.json", "result.json")):
             ui.link(text, f"/files/{quote(place)}/{name}", new_tab=True)
 
@@ -178,28 +179,28 @@ def _head(document: RunDocument | SuiteDocument, place: str, entry: RunEntry | N
 def report_frame(folder: Path, place: str, name: str = "report.html") -> None:
     """Add the report as it is; its scripts run without a way to the studio."""
     if not (folder / name).is_file():
-        ui.label("There is no report: the run has no reduction, or it did not come to its end.").classes("soft")
+        ui.label(say("There is no report: the run has no reduction, or it did not come to its end.")).classes("soft")
         return
     source = f"/files/{quote(place)}/{name}"
     ui.html(
-        f'<iframe class="report" src="{source}" title="Report" sandbox="allow-scripts allow-popups"></iframe>',
+        f'<iframe class="report" src="{source}" title="{say("Report")}" sandbox="allow-scripts allow-popups"></iframe>',
         sanitize=False,
     ).classes("full")
 
 
 def _tests(document: SuiteDocument, place: str) -> None:
-    ui.html("<h2>Tests of the suite</h2>", sanitize=False)
+    heading("Tests of the suite", 2)
     with ui.element("div").classes("bar"):
         for name, test in document.tests.items():
             ui.link(name, address("run", f"{place}/{test.folder}"))
 
 
 async def _signals(folder: Path, document: RunDocument) -> None:
-    wait = ui.label("The record is being read.").classes("soft").props("role=status")
+    wait = ui.label(say("The record is being read.")).classes("soft").props("role=status")
     signals = await asyncio.to_thread(signals_of, folder)
     wait.delete()
     if not signals.names or not len(signals.time):
-        ui.label("The record holds no signals over time.").classes("soft")
+        ui.label(say("The record holds no signals over time.")).classes("soft")
         return
     first = first_shown(signals.names, _shown_by_report(document.system))
     await _chosen({folder.name: signals}, signals.names, first)
@@ -213,7 +214,7 @@ async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
         bodies = []
     shown = MovingPicture(signals.record, bodies, studio.dark) if len(signals.time) else None
     if shown is None or not shown.names:
-        ui.label("The record holds no angle of a body that moves.").classes("soft")
+        ui.label(say("The record holds no angle of a body that moves.")).classes("soft")
 
 
 def _shown_by_report(name: str) -> list[Any]:
@@ -228,12 +229,12 @@ def _add_runs_page(studio: Studio) -> None:
     @ui.page("/runs", response_timeout=60)
     async def runs_page() -> None:
         with frame(studio, "Runs"):
-            ui.html("<h1>Runs</h1>", sanitize=False)
+            heading("Runs")
             active = ui.element("div").classes("rows")
             entries = await asyncio.to_thread(list_runs, studio.bench.out)
             with ui.element("div").classes("bar"):
-                search = ui.input("Filter").props("dense outlined clearable").mark("filter")
-                compare = ui.button("Compare", icon="compare_arrows").mark("compare")
+                search = ui.input(say("Filter")).props("dense outlined clearable").mark("filter")
+                compare = ui.button(say("Compare"), icon="compare_arrows").mark("compare")
                 count = ui.label().classes("soft")
             chosen: dict[str, ui.checkbox] = {}
             rows = _table(entries, chosen)
@@ -244,7 +245,7 @@ def _add_runs_page(studio: Studio) -> None:
                 for (_, row), there in zip(rows, shown, strict=True):
                     row.set_visibility(there)
                 count.set_text(
-                    f"{sum(shown)} of {len(entries)} runs; tick two or more to compare, the oldest is the baseline"
+                    say(f"{sum(shown)} of {len(entries)} runs; tick two or more to compare, the oldest is the baseline")
                 )
 
             def go() -> None:
@@ -265,24 +266,24 @@ def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> list[tupl
         with ui.element("thead"), ui.element("tr"):
             for text in ("", "Run", "Test", "Verdict", "Date", "Changed"):
                 with ui.element("th"):
-                    ui.label(text)
+                    ui.label(say(text))
         with ui.element("tbody"):
             for r in entries[:LISTED]:
                 with ui.element("tr") as row:
                     with ui.element("td"):
-                        chosen[r.place] = ui.checkbox().props(f'dense aria-label="choose {escape(r.place)}"')
+                        chosen[r.place] = ui.checkbox().props("dense").props(spoken(f"choose {r.place}"))
                     with ui.element("td"):
                         ui.link(r.place, address("run", r.place))
                     with ui.element("td"):
-                        ui.label(r.title or r.system)
+                        content(r.title or r.system, r.system)
                     with ui.element("td"):
                         state = r.verdict or ("measured" if r.measured else "")
                         state = state if r.complete else "incomplete"
-                        ui.label(state).classes(f"tag {state.split()[0]}" if state else "")
+                        ui.label(say(state)).classes(f"tag {state.split()[0]}" if state else "")
                     with ui.element("td"):
                         ui.label(r.date[:16].replace("T", " "))
                     with ui.element("td"):
-                        seed = [f"seed {r.seed}"] if r.seed is not None else []
+                        seed = [say(f"seed {r.seed}")] if r.seed is not None else []
                         ui.label(", ".join([*seed, *r.changed[:8]])).classes("soft")
                 rows.append((f"{r.place} {r.title} {r.verdict} {r.date} {' '.join(r.changed)}".lower(), row))
     return rows
@@ -302,7 +303,7 @@ def _watch(studio: Studio, place: ui.element) -> None:
         with place:
             for j in jobs:
                 with ui.element("div").classes("bar"):
-                    ui.label(j.state).classes("tag")
+                    ui.label(say(j.state)).classes("tag")
                     ui.link(j.request.system, f"/job/{j.key}")
                     ui.label(f"{100.0 * j.report.fraction:.0f} %").classes("soft")
 
@@ -316,11 +317,11 @@ def _add_comparison_page(studio: Studio) -> None:
     async def comparison_page(client: Any = None) -> None:
         asked = ui.context.client.request.query_params.getlist("run")
         with frame(studio, "Compare"):
-            ui.html("<h1>Comparison</h1>", sanitize=False)
+            heading("Comparison")
             folders = [inside(studio.bench.out, p) for p in asked]
             found = await asyncio.to_thread(compare_folders, folders)
             if found.note:
-                ui.label(found.note).classes("soft")
+                content(found.note).classes("soft")
             shown = [display_path(f) for f in folders]
             target = comparison_folder(folders)
             if not studio.read_only:
@@ -329,7 +330,7 @@ def _add_comparison_page(studio: Studio) -> None:
                 for place in asked:
                     ui.link(place, address("run", place))
             with ui.tabs().props("no-caps align=left dense") as tabs:
-                made = {n: ui.tab(n) for n in ("Report", "Signals", "As a command")}
+                made = {n: ui.tab(n, say(n)) for n in ("Report", "Signals", "As a command")}
             with ui.tab_panels(tabs, value=made["Report"], animated=False, keep_alive=True).classes("full"):
                 with ui.tab_panel(made["Report"]):
                     if target.is_dir():
@@ -355,7 +356,7 @@ async def _overlay(folders: list[Path]) -> None:
     records = {n: await asyncio.to_thread(signals_of, f) for n, f in zip(names, folders, strict=True)}
     common = [n for n in next(iter(records.values())).names if all(n in s.names for s in records.values())]
     if not common:
-        ui.label("The runs have no signal in common.").classes("soft")
+        ui.label(say("The runs have no signal in common.")).classes("soft")
         return
     document = await asyncio.to_thread(read_run, folders[0])
     await _chosen(records, common, first_shown(common, _shown_by_report(document.system))[:2])
@@ -363,9 +364,9 @@ async def _overlay(folders: list[Path]) -> None:
 
 async def _chosen(records: dict[str, RecordSignals], names: list[str], first: list[str]) -> None:
     """Add a menu of signals and their chart."""
-    menu = ui.select(names, value=first, multiple=True, label="Signals", with_input=True)
-    menu.props('dense outlined use-chips aria-label="Signals"').classes("full")
-    ui.label(HOW).classes("soft")
+    menu = ui.select(names, value=first, multiple=True, label=say("Signals"), with_input=True)
+    menu.props("dense outlined use-chips").props(spoken("Signals")).classes("full")
+    ui.label(say(HOW)).classes("soft")
     chart = SignalChart(records)
     menu.on_value_change(lambda e: chart.show(e.value or []))
     await chart.show(first)

@@ -16,15 +16,18 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock
+from gyrobench.report.language import ENGLISH
 from gyrobench.studio.command_pages import add_command_pages, served
 from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
 from gyrobench.studio.gate import TOKEN, StudioGate, is_loopback, refuse_remote
 from gyrobench.studio.jobs import StudioJobs
+from gyrobench.studio.learn_page import add_learn_pages
 from gyrobench.studio.part_page import add_part_page
 from gyrobench.studio.run_page import add_run_pages
 from gyrobench.studio.system_page import add_system_page, wiring_of
 from gyrobench.studio.systems_page import add_systems_page
+from gyrobench.studio.words import say
 from gyrobench.workflow.gallery import gallery, picture_of
 
 PORT = 8765
@@ -113,19 +116,23 @@ def build(studio: Studio) -> FastAPI:
     add_data_page(studio)
     add_command_pages(studio)
     add_part_page(studio)
+    add_learn_pages(studio, app)
     ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=20)
     return app
 
 
 def serve(
-    host: str, port: int | None, read_only: bool, remote: str | None, opened: Callable[[str], object] = print
-) -> None:
+    host: str, port: int | None, read_only: bool, remote: str | None, opened: Callable[[str], object] = print,
+    language: str = ENGLISH,
+) -> None:  # fmt: skip
     """Serve the studio until it is interrupted.
 
-    opened: called with the first address, once the studio answers there.  Raises UsageError for an address that others
-    reach, unless ``remote`` says under which name, and where another studio has this bench open.
+    opened: called with the first address, once the studio answers there.  language: of the pages at first.
+    Raises UsageError for an address that others reach, unless ``remote`` says under which name, and where another
+    studio has this bench open.
     """
     refuse_remote(host, remote)
+    say.use(language)
     bench = Bench.find()
     studio = Studio(bench, StudioJobs(bench, read_only=read_only), read_only)
     with contextlib.ExitStack() as stack:

@@ -18,6 +18,8 @@ from gyrobench.report import wiring_figure
 from gyrobench.studio.frame import CopyLines, Studio, frame, told
 from gyrobench.studio.request import JobRequest
 from gyrobench.studio.slot_fmu import drop_fmu
+from gyrobench.studio.time_line import TimeLine
+from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.configurable import Option
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -116,13 +118,13 @@ def _row(
     with ui.element("div").classes("setting") as row:
         with ui.element("div").classes("about"):
             ui.label(name).classes("option")
-            ui.label(doc)
+            content(doc, choice.test.name)
             kind = _unit(unit)
-            ui.label("; ".join(x for x in (kind if kind != "1" else "", limits) if x)).classes("range")
+            ui.label("; ".join(x for x in (say(kind) if kind != "1" else "", limits) if x)).classes("range")
         shown = _shown(default, unit)
         given = choice.request.values.get(name, "")
         field = ui.input(placeholder=shown, value=given, validation=lambda text: choice.set(name, text, check))
-        field.props(f'dense outlined hide-bottom-space aria-label="{escape(name)}" debounce=250')
+        field.props("dense outlined hide-bottom-space debounce=250").props(f'aria-label="{escape(name)}"')
     return f"{name} {doc}".lower(), row
 
 
@@ -141,8 +143,8 @@ def _parameter_check(name: str, d: Declaration) -> Callable[[str], Any]:
 
 def _searched_options(choice: _Choice) -> None:
     """Add the options, and a field that narrows them."""
-    ui.html("<h2>Options</h2>", sanitize=False)
-    search = ui.input("Search the options").props("dense outlined clearable").classes("full")
+    heading("Options", 2)
+    search = ui.input(say("Search the options")).props("dense outlined clearable").classes("full")
     with ui.element("div").classes("rows"):
         rows = _options(choice)
 
@@ -167,7 +169,7 @@ def _parameters(studio: Studio, choice: _Choice, system: System, slot: str) -> l
     """Add the rows of the parameters of the part in a slot; return them as :func:`_row` does."""
     part = part_of(studio.bench, choice.request.parts.get(slot, system.all_slots()[slot].part))
     if part is None:
-        ui.label("An FMU of another tool: set its parameters by --set SLOT.NAME=VALUE.").classes("soft")
+        ui.label(say("An FMU of another tool: set its parameters by --set SLOT.NAME=VALUE.")).classes("soft")
         return []
     owned = system.owned()
     rows = []
@@ -180,13 +182,13 @@ def _parameters(studio: Studio, choice: _Choice, system: System, slot: str) -> l
             doc = f"{d.doc} (set by an option of the system)" if full in owned else d.doc
             rows.append(_row(choice, full, doc, unit, start, limits, _parameter_check(full, d)))
     if not rows:
-        ui.label("no parameters").classes("soft")
+        ui.label(say("no parameters")).classes("soft")
     return rows
 
 
 def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, list[str]]) -> None:
     """Add a menu for each slot, and below it what can be set of its part."""
-    search = ui.input("Search the parameters of all parts").props("dense outlined clearable").classes("full")
+    search = ui.input(say("Search the parameters of all parts")).props("dense outlined clearable").classes("full")
     drawn: dict[str, list[tuple[str, ui.element]]] = {}
     opened: dict[str, ui.expansion] = {}
     bodies: dict[str, ui.element] = {}
@@ -225,12 +227,14 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 ui.label(slot).classes("option")
                 name = declared.socket if isinstance(declared.socket, str) else declared.socket.name
                 here = "" if slot in system.slots else ", on request"
-                ui.label(f"socket {name}{here}").classes("range")
-                about = ui.link("Equations, ports, limits", f"/part/{declared.part}", new_tab=True)
-                about.props["aria-label"] = f"equations of {slot}"
-            menu = ui.select(fitting[slot], value=declared.part).props(f'dense outlined aria-label="part in {slot}"')
+                ui.label(say(f"socket {name}{here}")).classes("range")
+                about = ui.link(say("Equations, ports, limits"), f"/part/{declared.part}", new_tab=True)
+                about.props(spoken(f"equations of {slot}"))
+            menu = (
+                ui.select(fitting[slot], value=declared.part).props("dense outlined").props(spoken(f"part in {slot}"))
+            )
             menu.mark(f"slot {slot}")
-        with ui.expansion(f"Parameters of {slot}").props("dense").classes("full") as expansion:
+        with ui.expansion(say(f"Parameters of {slot}")).props("dense").classes("full") as expansion:
             bodies[slot] = ui.element("div").classes("rows")
             if not studio.read_only:
                 drop_fmu(studio, system.name, slot, partial(foreign, slot, menu))
@@ -252,8 +256,12 @@ def _start(studio: Studio, choice: _Choice) -> None:
     """Add seed, specification and the button that runs the system."""
     specs = [NONE, *studio.bench.specifications()]
     with ui.element("div").classes("bar"):
-        seed = ui.number("Seed of the noise", min=0, precision=0, placeholder="1").props("dense outlined clearable")
-        spec = ui.select(specs, value=NONE, label="Acceptance specification").props("dense outlined")
+        seed = ui.number(say("Seed of the noise"), min=0, precision=0, placeholder="1").props(
+            "dense outlined clearable"
+        )
+        spec = ui.select(
+            {s: say(s) if s == NONE else s for s in specs}, value=NONE, label=say("Acceptance specification")
+        ).props("dense outlined")
         for field in (seed, spec):
             field.on_value_change(lambda: choice.about(seed.value, spec.value))
 
@@ -263,9 +271,9 @@ def _start(studio: Studio, choice: _Choice) -> None:
         ui.navigate.to(f"/job/{studio.jobs.submit(choice.request)}")
 
     if not studio.read_only:
-        ui.button("Run", icon="play_arrow", on_click=told(go)).mark("run")
+        ui.button(say("Run"), icon="play_arrow", on_click=told(go)).mark("run")
     if isinstance(choice.test, System) and not choice.test.slots:
-        ui.label("This system has nothing to run: it reduces measured data.").classes("soft")
+        ui.label(say("This system has nothing to run: it reduces measured data.")).classes("soft")
 
 
 def add_system_page(studio: Studio) -> None:
@@ -285,23 +293,29 @@ def add_system_page(studio: Studio) -> None:
                 raise error
             return
         with frame(studio, test.title or name):
-            ui.html(f"<h1>{escape(test.title or name)}</h1>", sanitize=False)
+            ui.html(f"<h1>{escape(say(test.title or name, name))}</h1>", sanitize=False)
             doc = (type(test).__doc__ or "").strip().partition("\n\n")[0]
-            ui.label(" ".join(doc.split()))
+            content(" ".join(doc.split()).partition(" [")[0], name)
             ui.label(", ".join([test.name, *test.spec])).classes("soft")
             with ui.element("div").classes("two"):
                 with ui.element("div") as left:
                     pass
                 with ui.element("div").classes("aside"):
                     if not isinstance(test, Suite):
-                        ui.html(f'<img class="wiring" src="/wiring/{name}" alt="Wiring of {name}">', sanitize=False)
+                        ui.html(
+                            f'<img class="wiring" src="/wiring/{name}" alt="{say(f"Wiring of {name}")}">',
+                            sanitize=False,
+                        )
+                    line = TimeLine(test) if isinstance(test, System) and test.slots else None
                     lines = CopyLines()
                     choice = _Choice(test, lines)
+                    if line:
+                        choice.changed.append(lambda: line.show(choice.request.values))
                     choice.show()
                     _start(studio, choice)
             with left:
                 _searched_options(choice)
                 if isinstance(test, System) and test.slots:
-                    ui.html("<h2>Parts</h2>", sanitize=False)
+                    heading("Parts", 2)
                     with ui.element("div").classes("rows"):
                         _slots(studio, choice, test, fitting)

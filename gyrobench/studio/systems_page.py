@@ -7,6 +7,7 @@ import asyncio
 from nicegui import ui
 
 from gyrobench.studio.frame import Studio, frame
+from gyrobench.studio.words import content, heading, say
 from gyrobench.workflow.gallery import PURPOSES, GalleryEntry, gallery
 
 
@@ -14,17 +15,18 @@ def _card(entry: GalleryEntry) -> ui.link:
     with ui.link(target=f"/system/{entry.name}").classes("card") as card:
         ui.html(f'<img src="/picture/{entry.name}" alt="" loading="lazy">', sanitize=False)
         with ui.element("div").classes("text"):
-            ui.label(entry.title).classes("title")
+            content(entry.title, entry.name).classes("title")
             ui.label(entry.name).classes("name")
             if entry.problem:
-                ui.label(entry.problem).classes("problem")
+                content(entry.problem).classes("problem")
             else:
-                ui.label(entry.summary).classes("summary")
+                content(entry.summary, entry.name).classes("summary")
     return card
 
 
 def _found(entry: GalleryEntry, purpose: str, words: list[str]) -> bool:
-    text = f"{entry.name} {entry.title} {entry.summary}".lower()
+    said = f"{say(entry.title, entry.name)} {say(entry.summary, entry.name)}"
+    text = f"{entry.name} {entry.title} {entry.summary} {said}".lower()
     return purpose in ("All", *entry.purposes) and all(word in text for word in words)
 
 
@@ -35,11 +37,13 @@ def add_systems_page(studio: Studio) -> None:
     async def systems() -> None:
         entries = await asyncio.to_thread(gallery, studio.bench)
         with frame(studio, "Systems"):
-            ui.html("<h1>Systems</h1>", sanitize=False)
-            ui.label("A system is a test method or a loop: parts in slots, wired, run and reduced to a report.")
+            heading("Systems")
+            ui.label(say("A system is a test method or a loop: parts in slots, wired, run and reduced to a report."))
             with ui.element("div").classes("bar"):
-                purpose = ui.toggle(["All", *PURPOSES], value="All", on_change=lambda: show()).props("no-caps")
-                search = ui.input("Search", on_change=lambda: show()).props("dense outlined clearable")
+                purpose = ui.toggle(
+                    {p: say(p) for p in ("All", *PURPOSES)}, value="All", on_change=lambda: show()
+                ).props("no-caps")
+                search = ui.input(say("Search"), on_change=lambda: show()).props("dense outlined clearable")
                 count = ui.label().classes("soft")
             with ui.element("div").classes("gallery"):
                 cards = [(entry, _card(entry)) for entry in entries]
@@ -49,6 +53,6 @@ def add_systems_page(studio: Studio) -> None:
                 shown = [_found(entry, purpose.value, words) for entry, _ in cards]
                 for (_, card), there in zip(cards, shown, strict=True):
                     card.set_visibility(there)
-                count.set_text(f"{sum(shown)} of {len(shown)}")
+                count.set_text(say(f"{sum(shown)} of {len(shown)}"))
 
             show()

@@ -9,7 +9,8 @@
 A line is a body: what it stands on ("ENU" where none of the bodies is named), then turns, each about an axis of the
 body as it is turned so far, passive and right-handed (CONV-GIMBALS): "x CHANNEL" by an angle of the record, or by a
 parameter of a part where no channel has this name; "base PARAMETER", a matrix whose rows are its axes on what it stands
-on; "faces SLOT", the mounts of the plan of this sequencer, phase by phase.
+on; "faces SLOT", the mounts of the plan of this sequencer, phase by phase; "mounts SLOT",
+those of a stand that turns the whole table, in east, north, up.
 
 Not modelled: what the record does not hold (wobble of an axis, bending), and where the bodies are.
 """
@@ -22,12 +23,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gyrobench import frames
 from gyrobench.arrays import AnyArray, Array
 from gyrobench.record.record import Record
 from gyrobench.system.values import nest
 
 ROOT = "ENU"
-TURN = re.compile(r"(x|y|z|base|faces)\s+([\w.]+(?:\[\d+\])?)")
+TURN = re.compile(r"(x|y|z|base|faces|mounts)\s+([\w.]+(?:\[\d+\])?)")
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,9 @@ def parse_bodies(text: str) -> list[MovingBody]:
         on = words.pop(0) if words and words[0] in {*known, ROOT} else ROOT
         turns = [TURN.fullmatch(w) for w in words]
         if not (name and colon) or name in {*known, ROOT} or not all(turns):
-            raise ValueError(f"bodies: '{line}': write NAME: [BODY,] x|y|z CHANNEL, base PARAMETER or faces SLOT, ...")
+            raise ValueError(
+                f"bodies: '{line}': write NAME: [BODY,] x|y|z CHANNEL, base PARAMETER, faces or mounts SLOT"
+            )
         found.append(MovingBody(name, on, tuple((m[1], m[2]) for m in turns if m)))
     return found
 
@@ -77,6 +81,8 @@ def _turn(kind: str, name: str, record: Record, at: AnyArray) -> Array | None:
     """Return the passive rotations of a turn, an array that broadcasts to (rows, 3, 3); None where it is not known."""
     if kind == "faces":
         return _faces(name, record, at)
+    if kind == "mounts":
+        return _mounts(name, record, at)
     if kind == "base":
         base = record.run.parameters.get(name)
         return None if base is None else np.asarray(base, dtype=float).reshape(3, 3)
@@ -107,15 +113,41 @@ def passive(axis: int, angle: Array) -> Array:
 
 
 def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
-    """Return the mounts of the plan at rows of the channels: a phase lasts until the end of its last window."""
+    """Return the mounts of the plan at rows of the channels."""
     parameters = nest(record.run.parameters)
     faces, order = parameters.get(f"{slot}.faces"), parameters.get(f"{slot}.face_of")
-    if not faces or not order or not {"phase", "t_end"} <= set(record.windows) or not len(record.windows["phase"]):
+    phases = _phases(record, at)
+    if not faces or not order or phases is None:
         return None
     mounts = np.asarray(faces, dtype=float).reshape(-1, 3, 3)
+    found: Array = mounts[np.asarray(order, dtype=int)[phases - 1] - 1]
+    return found
+
+
+def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
+    """Return the axes of what stands on a stand at rows of the channels: the phase is the number of its mount."""
+    parameters = nest(record.run.parameters)
+    numbers, latitude = parameters.get(f"{slot}.mounts"), parameters.get(f"{slot}.latitude")
+    phases = _phases(record, at)
+    if not numbers or latitude is None or phases is None:
+        return None
+    pole = frames.pole(float(latitude))
+    directions = np.array([frames.E, frames.N, frames.U, pole, np.cross(frames.E, pole)])
+    chosen = np.asarray(numbers, dtype=int)  # of x and y, negative: the opposite direction
+    x, y = (np.sign(n)[:, None] * directions[np.abs(n) - 1] for n in chosen.T)
+    held = np.stack([x, y, np.cross(x, y)], axis=1) @ np.reshape(parameters[f"{slot}.base"], (3, 3)).T
+    for axis, angle in enumerate(parameters[f"{slot}.misalignment"]):
+        held = passive(axis, np.asarray([angle])) @ held
+    found: Array = held[phases - 1]
+    return found
+
+
+def _phases(record: Record, at: AnyArray) -> AnyArray | None:
+    """Return the phase of each row of the channels, which lasts until the end of its last window; None without any."""
+    if not {"phase", "t_end"} <= set(record.windows) or not len(record.windows["phase"]):
+        return None
     phases = np.asarray(record.windows["phase"], dtype=int)
     ends = np.asarray(record.windows["t_end"], dtype=float)
     rows = np.minimum(np.searchsorted(ends, np.asarray(record.channels["time"], dtype=float)[at]), len(ends) - 1)
-    which = np.asarray(order, dtype=int)[phases[rows] - 1] - 1
-    found: Array = mounts[which]
+    found: AnyArray = phases[rows]
     return found

@@ -1,4 +1,4 @@
-"""Compare this tree with a commit: ``python tests/benchmarks/against.py [COMMIT] [--systems NAME ...] [--rounds 3]``.
+"""Compare this tree with a commit: ``python tests/benchmarks/against.py [commit] [--systems NAME ...] [--rounds 3]``.
 
 Without a commit: with the state whose figures the pages quote, the last commit of docs/figures.toml.
 

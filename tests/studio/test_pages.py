@@ -238,7 +238,17 @@ def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
 
 def test_every_page_fits_a_telephone(page: Any, studio: tuple[str, Path]) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
-    for path in ("/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/campaign", "/laboratory"):
+    for path in (
+        "/",
+        "/system/fixed_position",
+        "/data",
+        "/runs",
+        "/tune",
+        "/design",
+        "/campaign",
+        "/laboratory",
+        "/learn",
+    ):
         page.goto(base_of(studio) + path)
         page.locator("h1").wait_for()
         page.wait_for_timeout(300)
@@ -296,6 +306,7 @@ def test_no_page_shuts_anyone_out(browser: Any, studio: tuple[str, Path], scheme
     found = []
     for path in (
         "/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/campaign", "/laboratory", "/part/cage",
+        "/learn",
     ):  # fmt: skip
         page.goto(base_of(studio) + path)
         page.locator("h1").first.wait_for()
@@ -304,3 +315,31 @@ def test_no_page_shuts_anyone_out(browser: Any, studio: tuple[str, Path], scheme
         found += [(path, v["id"], v["nodes"][0]["html"]) for v in violations if v["impact"] in ("serious", "critical")]
     context.close()
     assert found == []
+
+
+def test_a_lesson_runs_in_its_page(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/learn")
+    page.get_by_text("Why 1/cos makes a keyhole").click()
+    lesson = page.frame_locator("iframe.report")
+    lesson.get_by_text("End at 19 s.").wait_for()
+    lesson.get_by_label("Your answer, with its unit").fill("80.4 deg")
+    lesson.get_by_role("button", name="Check").click()
+    lesson.get_by_text("Right.").wait_for()
+    assert page.locator(".code").first.text_content() == "gyrobench learn keyhole"
+    page.goto(base_of(studio) + "/learn/keyhol")
+    page.get_by_role("alert").get_by_text("no lesson 'keyhol'").wait_for()
+
+
+def test_the_plan_follows_the_options(page: Any, studio: tuple[str, Path]) -> None:
+    page.goto(base_of(studio) + "/system/tumble_single_axis")
+    page.locator(".plan").wait_for()
+    widths = "[...document.querySelectorAll('.phase')].map(e => e.getBoundingClientRect().width)"
+    before = page.evaluate(widths)
+    plan = gb.load("tumble_single_axis").system.plan()
+    shares = np.array([p.duration() for p in plan.phases]) / plan.duration()
+    np.testing.assert_allclose(np.array(before) / sum(before), shares, atol=0.01)
+    page.get_by_label("turns", exact=True).fill("3")
+    page.wait_for_function("document.querySelector('.keys').textContent.includes('15 h')")  # 2 x 3 turns of 2.4 h
+    page.get_by_label("turns", exact=True).fill("x")
+    page.wait_for_timeout(600)
+    assert page.evaluate("document.querySelectorAll('.phase').length") == 4, "what is no plan leaves the last one"

@@ -10,6 +10,7 @@ import pytest
 import gyrobench as gb
 from gyrobench import frames
 from gyrobench.arrays import Array
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.system.moving_bodies import attitudes, parse_bodies, passive
@@ -24,6 +25,8 @@ SHORT: dict[str, dict[str, Any]] = {
     "pickoff_scale_factor": {},
     "rebalance_loop_test": {},
     "torquer_scale_factor": {},
+    "servo_polar": {"mounts": "S N", "time": "200s", "turns": 0, "dwell": "60s", "window": "20s"},
+    "servo_vertical_level": {"attitudes": "all", "cycles": 1, "dwell": "100s", "windows": 8},
 }
 
 
@@ -32,7 +35,11 @@ def run(name: str, values: dict[str, Any], *channels: str) -> Record:
     test = gb.load(name, values)
     test.system.channels = (*test.system.channels, *channels)
     test.system.channel_period = min(0.1, test.system.channel_period)
-    return test.run().record
+    try:
+        return test.run(check_step=False).record
+    except GyrobenchError as error:  # too short for its reduction
+        found: Record = error.record  # type: ignore[attr-defined]
+        return found
 
 
 def vector(record: Record, name: str) -> Array:

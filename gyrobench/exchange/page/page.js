@@ -10,7 +10,13 @@ const colour = (i) => PALETTES[Number(dark.matches)][i % 6];
 const PREFIXES = { "-9": "n", "-6": "µ", "-3": "m", 3: "k", 6: "M" };
 const SLICE = 30; // ms of steps between two looks at the buttons
 const width = content.outputs.length + 1; // of a row: the time and the outputs
+const lesson = content.lesson; // its texts, formulas and exercise; undefined: the system alone
 let engine, instance, rows, count = 0, before = null, token = 0;
+
+/** A text of the page in its language; {n}, {n2} and {v} take what follows. */
+function say(text, n, n2) {
+  return (lesson?.words[text] ?? text).replace(/\{n2\}/, n2).replace(/\{[nv]\}/, n);
+}
 
 // ---------------------------------------------------------------------------------------- the system
 function text(pointer) {
@@ -32,7 +38,8 @@ const table = () => new Float64Array(engine.memory.buffer, rows, (content.rows +
 /** Run from the beginning in slices of a frame; a second call ends the first. */
 async function run() {
   const mine = ++token;
-  if (count > 1) before = { data: table().slice(0, count * width), count };
+  if (count > 1) before = { data: table().slice(0, count * width), count, letters: lesson && lesson.letters };
+  if (lesson) lesson.letters = letters();
   engine.renew(instance);
   content.parameters.forEach((p) => engine.set(instance, p.reference, p.value * p.factor));
   count = 0;
@@ -60,14 +67,14 @@ async function run() {
     slice = Math.max(1, Math.round(took > 0 ? Math.min(4 * slice, (slice * SLICE) / took) : 4 * slice));
     if (performance.now() < next) continue;
     at("progress").value = (count - 1) / content.rows;
-    at("state").textContent = `${quantity(time())} of at most ${quantity(content.rows * content.every * content.step)}`;
+    at("state").textContent = say("{n} of {n2}", quantity(time()), quantity(content.rows * content.every * content.step));
     const drawn = performance.now();
     draw();
     next = performance.now() + Math.max(4 * SLICE, 5 * (performance.now() - drawn)); // the run has most of the time
   }
   at("progress").value = 1;
   document.body.dataset.milliseconds = spent;
-  finish(failed ? text(engine.reason(instance)) : `End of the plan at ${quantity(time())}.`, failed);
+  finish(failed ? text(engine.reason(instance)) : say("End at {n}.", quantity(time())), failed);
 }
 
 const time = () => table()[(count - 1) * width];
@@ -81,7 +88,7 @@ function finish(message, failed) {
 
 // --------------------------------------------------------------------------------------- parameters
 function quantity(seconds) {
-  return seconds >= 7200 ? `${(seconds / 3600).toPrecision(3)} h` : seconds >= 120 ? `${(seconds / 60).toPrecision(3)} min` : `${Number(seconds.toPrecision(4))} s`;
+  return seconds >= 7200 ? say("{n} h", (seconds / 3600).toPrecision(3)) : seconds >= 120 ? say("{n} min", (seconds / 60).toPrecision(3)) : say("{n} s", Number(seconds.toPrecision(4)));
 }
 
 function allowed(p, x) {
@@ -95,8 +102,8 @@ function control(p, i) {
   box.className = "parameter";
   box.innerHTML = `<label for="p${i}"></label><small></small><div><input type="range" tabindex="-1" aria-hidden="true"><input type="number" id="p${i}" step="any"></div>`;
   const [slider, field] = box.querySelectorAll("input");
-  box.querySelector("label").textContent = p.shown === "1" ? p.name : `${p.name} / ${p.shown}`;
-  box.querySelector("small").textContent = p.doc;
+  box.querySelector("label").textContent = p.shown === "1" ? p.label ?? p.name : `${p.label ?? p.name} / ${p.shown}`;
+  box.querySelector("small").textContent = p.label ? p.name : p.doc;
   Object.assign(slider, { min: p.low, max: p.high, step: p.kind === "float" ? (p.high - p.low) / 200 : 1 });
   p.show = (x) => {
     p.value = x;
@@ -106,7 +113,7 @@ function control(p, i) {
   };
   const take = (x) => {
     if (!allowed(p, x)) {
-      at("state").textContent = `${p.name}: ${x} is not allowed`;
+      at("state").textContent = say("{v} is not allowed", `${p.label ?? p.name}: ${x}`);
       at("state").className = "failed";
       return p.show(p.value);
     }
@@ -141,7 +148,7 @@ function ticks(low, high, most) {
 const plain = (x) => (x === 0 ? "0" : String(Number(x.toPrecision(6))).replace("-", "−"));
 
 /** A band from the smallest to the largest value of each pixel, and a line through their means. */
-function line(pen, data, rowCount, column, x, y) {
+function line(pen, { data, count: rowCount, width }, column, x, y) {
   const columns = [];
   for (let i = 0; i < rowCount; i++) {
     const px = Math.round(x(data[i * width])), v = data[i * width + column], last = columns.at(-1);
@@ -159,26 +166,25 @@ function line(pen, data, rowCount, column, x, y) {
   pen.stroke();
 }
 
-function chart(canvas, indices) {
+/** Draw columns of sets of rows ({data, count, width, alpha}, the time first); return the unit at the axis. */
+function plot(canvas, sets, indices, scaled) {
   const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
+  if (!w) return undefined; // folded away
   canvas.width = w * ratio;
   canvas.height = h * ratio;
   const pen = canvas.getContext("2d"), style = getComputedStyle(document.body);
   pen.scale(ratio, ratio);
-  const data = count ? table() : new Float64Array(0);
-  const sets = [[data, count, 1], ...(before ? [[before.data, before.count, 0.35]] : [])];
   let low = Infinity, high = -Infinity, last = 0;
-  for (const [d, n] of sets) {
-    if (n) last = Math.max(last, d[(n - 1) * width]);
+  for (const { data, count: n, width } of sets) {
+    if (n) last = Math.max(last, data[(n - 1) * width]);
     for (let i = 0; i < n; i++) for (const k of indices) {
-      const v = d[i * width + 1 + k];
+      const v = data[i * width + 1 + k];
       if (v < low) low = v;
       if (v > high) high = v;
     }
   }
-  if (!(high >= low)) return;
-  const first = content.outputs[indices[0]];
-  const [factor, unit] = scale(first.unit, first.shown, Math.max(Math.abs(low), Math.abs(high)));
+  if (!(high >= low)) return undefined;
+  const [factor, unit] = scaled(Math.max(Math.abs(low), Math.abs(high)));
   const margin = high > low ? 0.06 * (high - low) : Math.abs(high) || 1;
   [low, high] = [factor * (low - margin), factor * (high + margin)];
   const hours = last > 7200, per = hours ? 3600 : 1, left = 74, bottom = h - 34, top = 8, right = w - 10;
@@ -197,23 +203,32 @@ function chart(canvas, indices) {
   pen.textBaseline = "top";
   const marks = last ? ticks(0, last / per, Math.max(2, w / 110)) : [0];
   for (const t of marks) pen.fillText(plain(t), x(t * per), bottom + 5);
-  pen.fillText(`time / ${hours ? "h" : "s"}`, (left + right) / 2, bottom + 19);
+  pen.fillText(`${say("time")} / ${hours ? "h" : "s"}`, (left + right) / 2, bottom + 19);
   pen.lineWidth = 1.3;
   pen.lineJoin = "round";
-  for (const [d, n, alpha] of sets.reverse()) {
-    pen.globalAlpha = alpha;
+  for (const set of sets.toReversed()) {
+    pen.globalAlpha = set.alpha;
     indices.forEach((k, i) => {
-      pen.strokeStyle = alpha < 1 ? style.getPropertyValue("--soft") : colour(i);
-      line(pen, d, n, k + 1, x, y);
+      pen.strokeStyle = set.alpha < 1 ? style.getPropertyValue("--soft") : colour(i);
+      pen.setLineDash(set.dashed && k > 0 ? [7, 4] : []);
+      line(pen, set, k + 1, x, y);
     });
   }
   return unit;
 }
 
+function chart(canvas, indices) {
+  const first = content.outputs[indices[0]], now = { data: count ? table() : new Float64Array(0), count, width, alpha: 1 };
+  const sets = [now, ...(before ? [{ ...before, width, alpha: 0.35 }] : [])];
+  return plot(canvas, sets, indices, (largest) => scale(first.unit, first.shown, largest));
+}
+
+const charts = lesson ? [null, ...content.charts] : content.charts; // of a lesson its own curve comes first
+
 function draw() {
   document.querySelectorAll("[data-colour]").forEach((key) => (key.style.color = colour(Number(key.dataset.colour))));
   document.querySelectorAll("figure").forEach((figure, k) => {
-    const unit = chart(figure.querySelector("canvas"), content.charts[k]);
+    const canvas = figure.querySelector("canvas"), unit = lesson && k === 0 ? lessonChart(canvas) : chart(canvas, charts[k]);
     if (unit !== undefined) figure.querySelector(".unit").textContent = unit === "1" ? "" : ` / ${unit}`;
   });
 }
@@ -232,7 +247,7 @@ function figureOf(indices) {
     key.textContent = `― ${o.name}  `;
     caption.append(key);
   });
-  caption.append(named[0].doc);
+  if (!lesson || lesson.language === "en") caption.append(named[0].doc);
   return figure;
 }
 
@@ -246,13 +261,15 @@ function save() {
   link.click();
 }
 
-at("about").textContent = `gyrobench ${content.version}, system ${content.name}, step ${content.step} s, seed ${content.seed}; a row every ${quantity(content.every * content.step)}. Band: smallest to largest of a pixel's rows; line: their mean; grey: the run before.`;
-at("parts").textContent = `Parts: ${content.parts.map(([slot, part]) => (slot === part ? slot : `${slot}: ${part}`)).join(", ")}.`;
-content.parameters.forEach((p, i) => at("parameters").append(control(p, i)));
-content.charts.forEach((c) => at("curves").append(figureOf(c)));
+if (!lesson) at("about").textContent = `gyrobench ${content.version}, system ${content.name}, step ${content.step} s, seed ${content.seed}; a row every ${quantity(content.every * content.step)}. Band: smallest to largest of a pixel's rows; line: their mean; grey: the run before.`;
+at("parts").textContent = `${lesson ? `gyrobench ${content.version}, ${content.name}. ` : ""}${say("Parts: {v}.", content.parts.map(([slot, part]) => (slot === part ? slot : `${slot}: ${part}`)).join(", "))}`;
+if (lesson) teach();
+const shownParameters = lesson ? Object.keys(lesson.sliders).map((n) => content.parameters.find((p) => p.name === n)) : content.parameters;
+shownParameters.forEach((p, i) => at("parameters").append(control(p, i)));
+content.charts.forEach((c) => at(lesson ? "signals" : "curves").append(figureOf(c)));
 at("run").addEventListener("click", run);
 at("save").addEventListener("click", save);
-at("defaults").addEventListener("click", () => { content.parameters.forEach((p) => p.show(p.start)); run(); });
+at("defaults").addEventListener("click", () => { shownParameters.forEach((p) => p.show(p.start)); run(); });
 addEventListener("resize", draw);
 dark.addEventListener("change", draw);
 load().then(run, (error) => finish(String(error), true));

@@ -1,0 +1,45 @@
+"""The command learn: lessons, and the page of one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.commands.app import app, echo
+
+
+@app.command()
+def learn(
+    name: Annotated[str | None, typer.Argument(metavar="[LESSON]", help="Lesson; without it all are listed.")] = None,
+    language: Annotated[str, typer.Option(metavar="CODE", help="Language of the page: en, zh.")] = "en",
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write, .html.")] = None,
+) -> None:
+    """Write a lesson as a page that runs.
+
+    A question, sliders, a simulation beside its closed formula, an exercise.  The page is one file; it runs in a
+    browser, from disk, without network.
+
+    \b
+    Examples:
+      gyrobench learn
+      gyrobench learn keyhole
+      gyrobench learn drift --language zh --out drift.html
+    """
+    from gyrobench.workflow.lessons import lesson, lessons, write_lesson
+
+    home = Bench.find()
+    if name is None:
+        if out is not None:
+            raise UsageError("--out: name the lesson that is written")
+        for each in lessons(home):
+            texts = each.texts(language)
+            echo(f"{each.number:2d}  {each.name:13s} {texts['title']}\n    {texts['question']}")
+        return
+    if out is not None and out.suffix != ".html":
+        raise UsageError(f"--out {out}: a page ends in .html")
+    path = out or home.products / f"lesson-{name}.html"
+    write_lesson(lesson(name, home), path, language, home)
+    echo(display_path(path))

@@ -1,0 +1,73 @@
+"""The language of the studio: its labels by the catalogue that reports use, with the texts of the face beside.
+
+Code writes English.  ``zh.toml`` in this folder has the labels, ``systems/NAME/zh.toml`` titles and summaries; what a
+system or a part says of its options and parameters stays English and is marked as such (lang="en").
+"""
+
+from __future__ import annotations
+
+import functools
+from html import escape
+from pathlib import Path
+
+from nicegui import ui
+
+from gyrobench.report.language import ENGLISH, Language, catalogue, check_code, codes, system_folder
+
+HERE = Path(__file__).parent
+NAMES = {"en": "English", "zh": "中文"}
+
+
+class _Words:
+    """Labels in the language in use, that of the whole studio: ``say("Run")``."""
+
+    code = ENGLISH
+
+    def use(self, code: str) -> None:
+        """Choose a language.  Raises UsageError for one that there is not."""
+        self.code = check_code(code)
+
+    @property
+    def html(self) -> str:
+        """The language as a page states it."""
+        return catalogue(self.code).html if self.code != ENGLISH else ENGLISH
+
+    @property
+    def other(self) -> str:
+        """The language that follows in the switch."""
+        every = codes()
+        return every[(every.index(self.code) + 1) % len(every)]
+
+    def __call__(self, text: str, system: str = "") -> str:
+        """Return a text in the language; one that the catalogue lacks stays."""
+        return self.find(text, system) or text
+
+    def find(self, text: str, system: str = "") -> str | None:
+        """Return a text in the language, None where the catalogue lacks it.  system: whose texts are looked at, too."""
+        return text if self.code == ENGLISH else _found(self.code, system, text)
+
+
+@functools.lru_cache(maxsize=8192)
+def _found(code: str, system: str, text: str) -> str | None:
+    folder = system_folder(system) if system else None
+    return Language(catalogue(code, HERE, *filter(None, [folder]))).find(text)
+
+
+say = _Words()
+
+
+def content(text: str, system: str = "") -> ui.label:
+    """Add a label of what a system or a part says; where it stays English the page says so."""
+    found = say.find(text, system)
+    label = ui.label(text if found is None else found)
+    return label.props('lang="en"') if found is None else label
+
+
+def spoken(text: str) -> str:
+    """Return the property that names an element aloud, in the language."""
+    return f'aria-label="{escape(say(text))}"'
+
+
+def heading(text: str, level: int = 1) -> ui.html:
+    """Add a heading in the language."""
+    return ui.html(f"<h{level}>{escape(say(text))}</h{level}>", sanitize=False)

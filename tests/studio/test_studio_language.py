@@ -1,0 +1,139 @@
+"""The studio in Chinese: every label of every page, the switch, and what stays English is marked as English."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studio_pages import CHROMIUM, LIMIT, NONE, base_of
+
+import gyrobench as gb
+from gyrobench.report.language import PLACEHOLDER, WORD, catalogue
+from gyrobench.studio import words
+from gyrobench.studio.command_pages import DESIGN, PROFILE, SIGNATORIES, SWEEP, TUNE
+from gyrobench.studio.data_page import NOT
+from gyrobench.studio.frame import DARK, PAGES
+from gyrobench.studio.jobs import ENDED
+from gyrobench.studio.picture import LEGEND
+from gyrobench.studio.run_page import HOW
+from gyrobench.workflow.gallery import PURPOSES
+
+FOLDER = Path(words.__file__).parent
+SAID = ("say", "heading", "spoken")
+STAY = {
+    "min",
+    "gyrobench",
+    "Python",
+    "FMU",
+    "PDF",
+    "json",
+    "result",
+    "toml",
+    "laboratory",
+    "SLOT",
+    "NAME",
+    "VALUE",
+    "set",
+}
+
+
+@pytest.fixture
+def chinese() -> Iterator[None]:
+    words.say.use("zh")
+    yield
+    words.say.use("en")
+
+
+def literals() -> set[str]:
+    """Texts that the code hands over to be said, names and numbers in them as 7."""
+    found = {HOW, LEGEND, SIGNATORIES, NOT, *PURPOSES, *(name for name, _ in PAGES), *(t for _, t in DARK.values())}
+    found |= {label for label, _ in PROFILE.values()} | {*ENDED, "waiting", "starting", "running"}
+    for form in (TUNE, DESIGN, SWEEP):
+        found |= {form.name, form.text, *(f.label for f in form.fields)}
+    for file in FOLDER.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in SAID and node.args:
+                text = node.args[0]
+                if isinstance(text, ast.Constant):
+                    found.add(str(text.value))
+                elif isinstance(text, ast.JoinedStr):
+                    found.add("".join(str(v.value) if isinstance(v, ast.Constant) else "7" for v in text.values))
+    return found
+
+
+def test_every_label_has_its_line(chinese: None) -> None:
+    every = literals()
+    assert len(every) > 120
+    assert [text for text in sorted(every) if words.say.find(text) is None] == []
+
+
+def test_no_english_word_is_left_in_a_line() -> None:
+    chinese = catalogue("zh", FOLDER)
+    own = {e: s for e, s in chinese.texts.items() if catalogue("zh").texts.get(e) != s}
+    assert len(own) > 100
+    for english, said in own.items():
+        assert sorted(PLACEHOLDER.findall(english)) == sorted(PLACEHOLDER.findall(said)), english
+        left = set(WORD.findall(PLACEHOLDER.sub("1", said))) - STAY - chinese.names
+        assert not left, f"{said}: {left}"
+
+
+#: texts of a page, of what it shows and of what it reads aloud; not what it marks as English, code or a name
+TEXTS = """() => {
+  const found = [];
+  const names = '.code, .option, .name, .brand, .range, .notes, .printed, td a, td .soft, .setting .q-field';
+  const own = (e) => e.closest(`[lang=en], ${names}, script, style, svg, i`);
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  for (let n = walk.nextNode(); n; n = walk.nextNode()) if (!own(n.parentElement)) found.push(n.textContent);
+  for (const e of document.querySelectorAll('[aria-label], [title]')) {
+    if (!own(e)) found.push(e.getAttribute('aria-label') ?? '', e.getAttribute('title') ?? '');
+  }
+  return found.filter((t) => /[A-Za-z]/.test(t));
+}"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason=NONE)
+def test_no_english_label_on_a_page_in_chinese(browser: Any, tmp_path: Path) -> None:
+    """In Chinese from the start; the switch leads to English and back."""
+    slots = set(gb.load("fixed_position").system.all_slots())
+    out = tmp_path / "reports" / "out" / "fixed_position"
+    for seed in (1, 2):
+        gb.load("fixed_position", {"dwell": "60s"}).run(seed, check_step=False).report(out / f"run{seed}")
+    command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0", "--language", "zh"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        address = re.search(r"http://\S+", process.stdout.readline())
+        assert address
+        context = browser.new_context(viewport={"width": 390, "height": 844})
+        page = context.new_page()
+        page.set_default_timeout(LIMIT)
+        page.goto(address[0])
+        base, left = base_of((address[0], tmp_path)), {}
+        for path in (
+            "/", "/system/fixed_position", "/data", "/data?test=drift_record", "/runs", "/tune", "/design", "/campaign",
+            "/laboratory", "/learn", "/run/fixed_position/run1",
+            "/compare?run=fixed_position/run1&run=fixed_position/run2",
+        ):  # fmt: skip
+            page.goto(base + path)
+            page.locator("h1").first.wait_for()
+            page.wait_for_timeout(500)
+            assert page.evaluate("document.documentElement.lang") == "zh-CN"
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+            found = {w for text in page.evaluate(TEXTS) for w in WORD.findall(text)}
+            left[path] = found - STAY - slots - {"English", "reports", "out", "run"}
+        assert {path: found for path, found in left.items() if found} == {}
+        page.goto(base + "/runs")
+        page.get_by_role("button", name="English").click()
+        page.get_by_role("heading", name="Runs").wait_for()
+        assert page.evaluate("document.documentElement.lang").startswith("en")
+        page.get_by_role("button", name="中文").click()
+        page.get_by_role("heading", name="运行记录").wait_for()
+    finally:
+        process.terminate()
+        process.wait(20)
