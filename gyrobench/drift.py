@@ -70,6 +70,11 @@ def name_2dof(channel: str, name: str) -> str:
     return f"D{channel}_" + ("".join(sorted(_OWN[channel][a] for a in _axes(name))) or "0")
 
 
+def sign_2dof(channel: str, name: str) -> int:
+    """Return the sign of the coefficient ``name`` in a channel: the output axis of the y channel is -x."""
+    return -1 if channel == "y" and name.count("O") == 1 else 1
+
+
 #: channel -> coefficient names in the order of NAMES
 NAMES_2DOF = {c: tuple(name_2dof(c, n) for n in NAMES) for c in ("x", "y")}
 
@@ -285,7 +290,7 @@ def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer:
         for key in PHYSICAL:
             name = "".join(own.get(letter, letter) for letter in key)
             if name in physical:
-                given[key] = physical[name] * (-1 if channel == "y" and key.count("O") == 1 else 1)
+                given[key] = physical[name] * sign_2dof(channel, key)
                 used.add(name)
         if "K_SS" in given and "K_II" not in given and f"K_{own['O']}{own['O']}" in physical:
             del given["K_SS"]  # K_zz was meant for the other channel
@@ -297,7 +302,7 @@ def from_physical_2dof(H: float, m: float, physical: Mapping[str, float], outer:
             axes = "I, O, S = " + ("x, y, z" if channel == "x" else "y, -x, z")
             raise ValueError(f"{channel} channel ({axes}): {e}") from e
         for n, v in coefficients.items():
-            out[name_2dof(channel, n)] = v * (-1 if channel == "y" and n.count("O") == 1 else 1)
+            out[name_2dof(channel, n)] = v * sign_2dof(channel, n)
     unknown = sorted(physical.keys() - used)
     if unknown:
         raise ValueError(f"physical quantity '{unknown[0]}' unknown for a two-degree-of-freedom gyro")

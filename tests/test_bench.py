@@ -184,8 +184,9 @@ BELOW = {*ROOMS}
 ROOMS["workflow"] = BELOW
 ROOMS["design"] = BELOW
 ROOMS["tuning"] = BELOW
+ROOMS["identification"] = BELOW
 ROOMS["campaign"] = BELOW | {"workflow"}
-ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "campaign"}
+ROOMS["library"] = BELOW | {"workflow", "design", "tuning", "identification", "campaign"}
 #: the face in the browser; that of the shell is in FACES, and neither imports the other
 ROOMS["studio"] = BELOW | {"workflow", "library", "tuning"}
 #: rooms inside a room -> rooms beside them that they may import

@@ -26,12 +26,12 @@ class GroundMotion(Place):
     (`local`, 5 Hz), independent of each other.
 
     Refused: a motion given by displacement and acceleration both, tilts that can exceed 0.01 rad.
-    Not modelled: rotation that belongs to the waves (give it as tilt), propagation, response of pier and isolation,
+    Not modelled: rotation that belongs to the waves (give it as tilt), propagation, soil, foundation,
     change of the gravity with the displacement (3e-6 per metre).
     Source: Hu 1981, section 5.6, Tables 5-4..5-6.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     period = Parameter([1.0] * LINES, "s", "periods of the motions", above=0.0)
     phase = Parameter([0.0] * LINES, "rad", "their phases at t = 0")
@@ -53,6 +53,8 @@ class GroundMotion(Place):
 
     a = Output("m/s2", "acceleration of the ground, ENU", shape=(3,))
     tilt = Output("rad", "tilt of the ground about E, N, U", shape=(3,))
+    tilt_rate = Output("rad/s", "derivative of the tilt", shape=(3,))
+    tilt_acceleration = Output("rad/s2", "derivative of that", shape=(3,))
     alpha = Output("rad/s2", "derivative of omega", shape=(3,))
 
     last = Discrete(0.0, "1", "number of the last motion that is given")
@@ -113,3 +115,5 @@ class GroundMotion(Place):
         self.alpha = bend - cross(turning, earth)
         self.a = motion
         self.tilt = turned
+        self.tilt_rate = turning
+        self.tilt_acceleration = bend

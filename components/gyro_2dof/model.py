@@ -15,7 +15,7 @@ class Gyro2dof(Component):
 
         psi_x' = -omega_x + omega_z psi_y + omega_dx + k_y i_y (1 + k2_y i_y + k3_y i_y2)
         psi_y' = -omega_y - omega_z psi_x + omega_dy + k_x i_x (1 + k2_x i_x + k3_x i_x2)
-        u_x = -K_sg_x psi_x + noise,  u_y = -K_sg_y psi_y + noise,  limited to +-u_max
+        u_x = -K_sg_x (psi_x - null_x) + noise,  u_y = -K_sg_y (psi_y - null_y) + noise,  limited to +-u_max
 
     Wiring rule: the torquer that nulls u_x acts about y and is fed by i_y, that of u_y is fed by i_x.  u is the angle
     of the case against the rotor (K psi of GYRO-DYN-2DOF with its sign turned), so that a rebalance or a servo of
@@ -33,6 +33,10 @@ class Gyro2dof(Component):
     gimbal, so the two differ (u_zy and u_zx of Hu 1981).  `terms_x`, `terms_y` say which model is meant; a coefficient
     outside it must be 0.  x channel: 8 = 0, x, z, xx, zz, xy, yz, xz; 9 = 8 + y; 10 = 9 + yy.  y channel: the same with
     x and y exchanged.  Gauss-Markov and noise as in floated_gyro, each channel its own.
+
+    Springs of a flexure, or the gas of a bearing, precess a rotor that stands off its null      [GYRO-POSITION]
+
+        psi_x' = ... + K_q psi_y - K_phi psi_x        psi_y' = ... - K_q psi_x - K_phi psi_y
 
     Ageing, temperature and translation of the float, T = age + time, as in floated_gyro (dT_j: temperature difference
     between the ends along j, v_j: velocity of the float against the case)          [GYRO-COEFF-TIME-TEMP, 2-39..2-42]
@@ -67,20 +71,24 @@ class Gyro2dof(Component):
     M_react = torque of the gyro on its mount, case axes: dampers and torquers about x and y, and the constraint
     H q sin(beta) about the z axis of the outer gimbal.  The run ends where |beta| reaches `stop`.
 
-    Not modelled: small angles with full = 0; with full = 1 change of J_x with beta, inertia about z, coupling of the
-    base's acceleration through the inertias; torquer axis error, the share of omega_z in the angular momentum,
-    how the float comes to move (v_float), vibration, hysteresis, warm-up.
-    Source: Hu 1981, ch. 2 and 3 (wiring rule of 3.6); the dynamics are our own minimal model (GYRO-DYN-2DOF);
+    Not modelled: small angles with full = 0; springs that differ between the axes; with full = 1 change of J_x with
+    beta, inertia about z, coupling of the base's acceleration through the inertias; torquer axis error, the share of
+    omega_z in the angular momentum, how the float comes to move (v_float), vibration, hysteresis, warm-up.
+    Source: Hu 1981, ch. 2 and 3 (wiring rule of 3.6), eq. 5-68; the dynamics are our own minimal model (GYRO-DYN-2DOF);
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.5.0"
+    version = "1.6.0"
     nonlinear = "full"
     integrator = "midpoint"
 
     K_sg_x = Parameter(10.0, "V/rad", "gain of the x pickoff", above=0.0)
     K_sg_y = Parameter(10.0, "V/rad", "gain of the y pickoff", above=0.0)
     u_max = Parameter(0.1, "V", "saturation of the pickoffs", above=0.0)
+    null_x = Parameter(0.0, "rad", "angle of the rotor about x at which the x pickoff reads 0")
+    null_y = Parameter(0.0, "rad", "angle of the rotor about y at which the y pickoff reads 0")
+    K_q = Parameter(0.0, "1/s", "quadrature stiffness: drift about one axis by the angle about the other")
+    K_phi = Parameter(0.0, "1/s", "in-phase stiffness: drift about an axis by the angle about it", min=0.0)
     k_x = Parameter(17.227e3 * DEG_H, "rad/s/A", "scale factor of the torquer about x (17.227 deg/h/mA)", above=0.0)
     k_y = Parameter(17.180e3 * DEG_H, "rad/s/A", "scale factor of the torquer about y (17.180 deg/h/mA)", above=0.0)
     k2_x = Parameter(0.0, "1/A", "nonlinearity of the torquer about x, relative, even in the rate")
@@ -211,6 +219,8 @@ class Gyro2dof(Component):
             self.full and self.J_x == 0.0,
             "full = 1 (gimbals at full size) needs nutation: J_x and J_y above 0 kg.m2",
         )
+        springs = self.K_q != 0.0 or self.K_phi > 0.0
+        self.refuse(self.full and springs, "K_q and K_phi are of small angles: they must be 0 with full = 1")
         self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the inner gimbal must stop before pi/2 (gimbal lock)")
         self.per_h = 1.0 / self.H
         self.wanders = 0.0
@@ -239,10 +249,13 @@ class Gyro2dof(Component):
         return vector([x, y])
 
     def precession(self, drift: Vector) -> Vector:
-        """Return the rates of the rotor under drift and torquers; each torquer acts about the other axis."""
+        """Return the rates of the rotor under drift, torquers (each acts about the other axis) and springs."""
         T = self.temperature
         about_x = drift[0] + torquer_rate(self.k_y * (1.0 + self.k_T_y * T), self.k2_y, self.k3_y, self.i_y)
         about_y = drift[1] + torquer_rate(self.k_x * (1.0 + self.k_T_x * T), self.k2_x, self.k3_x, self.i_x)
+        if self.K_q != 0.0 or self.K_phi > 0.0:
+            about_x = about_x + self.K_q * self.psi_y - self.K_phi * self.psi_x
+            about_y = about_y - self.K_q * self.psi_x - self.K_phi * self.psi_y
         return vector([about_x, about_y])
 
     def flow(self) -> None:
@@ -285,8 +298,8 @@ class Gyro2dof(Component):
         drift = self.drift_rates()
         self.drift_x = drift[0]
         self.drift_y = drift[1]
-        unlimited_x = -self.K_sg_x * self.psi_x + self.noise.pickoff_x
-        unlimited_y = -self.K_sg_y * self.psi_y + self.noise.pickoff_y
+        unlimited_x = -self.K_sg_x * (self.psi_x - self.null_x) + self.noise.pickoff_x
+        unlimited_y = -self.K_sg_y * (self.psi_y - self.null_y) + self.noise.pickoff_y
         self.u_x = clip(unlimited_x, -self.u_max, self.u_max)
         self.u_y = clip(unlimited_y, -self.u_max, self.u_max)
         self.saturated = 1.0 if self.u_x != unlimited_x or self.u_y != unlimited_y else 0.0

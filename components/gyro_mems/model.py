@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-from gyrobench.component import Discrete, Noise, Output, Parameter, State, sampled
-from gyrobench.component.blocks.rate_gyro import RateGyro
-from gyrobench.component.math import Vector, clip, floor, pi, sqrt, vector
-
-DEG = pi / 180.0
+from gyrobench.component import Discrete, Noise, Parameter, sampled
+from gyrobench.component.blocks.rate_gyro import DEG, FilteredRateGyro
+from gyrobench.component.math import Vector, clip, sqrt, vector
 
 
-class GyroMems(RateGyro):
+class GyroMems(FilteredRateGyro):
     """Two-axis rate gyro as a data sheet describes it: noise, bias instability, filter, range, word.  [GYRO-MEMS]
 
         s_j = scaled rate along row j of axes + cubic w3 + hysteresis z + drift_j + white,  z: a play within -1 ... 1
@@ -28,18 +26,9 @@ class GyroMems(RateGyro):
     hysteresis = Parameter(0.0, "rad/s", "reading of a rate that rose, less the mean of both ways", min=0.0)
     hysteresis_width = Parameter(DEG, "rad/s", "rate change that goes through the hysteresis (1 deg/s)", above=0.0)
     white = Noise(0.035 * DEG, "rad/s/sqrt(Hz)", "white noise density N (0.05 deg/s/sqrt(Hz) one-sided)", samples=2)
-    bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
-    range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
-    period = Parameter(0.0, "s", "time between two output samples; 0: every step", min=0.0)
-    resolution = Parameter(0.0, "rad/s", "step of the output word; 0: none", min=0.0)
 
-    density = Output("rad/s/sqrt(Hz)", "density N of the white noise (angle random walk)")
-
-    y = State([0.0, 0.0], "rad/s", "filtered rate")
-    v = State([0.0, 0.0], "rad/s2", "its derivative")
     way = Discrete([0.0, 0.0], "1", "-1 ... 1: how far through the hysteresis")
     before = Discrete([0.0, 0.0], "rad/s", "rate of the step before")
-    number = Discrete(-1.0, "1", "number of the output sample")
 
     def start(self) -> None:
         for j in range(2):
@@ -59,11 +48,7 @@ class GyroMems(RateGyro):
         return vector(out)
 
     def flow(self) -> None:
-        wn = 2.0 * pi * self.bandwidth
-        s = self.sensed() + self.noise.white
-        for j in range(2):
-            self.der.y[j] = self.v[j]
-            self.der.v[j] = wn * wn * (s[j] - self.y[j]) - sqrt(2.0) * wn * self.v[j]
+        self.filter_rates(self.sensed() + self.noise.white)
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -71,17 +56,7 @@ class GyroMems(RateGyro):
             now = vector(self.axes[j]) @ (self.mount @ self.omega)
             self.way[j] = clip(self.way[j] + 2.0 * (now - self.before[j]) / self.hysteresis_width, -1.0, 1.0)
             self.before[j] = now
-        due = 1.0
-        if self.period > 0.0:
-            count = floor(self.t / self.period + 1e-6)
-            due = 1.0 if count > self.number else 0.0
-            self.number = count
-        if due > 0.5:
-            self.measured = self.y
-            self.limit(self.range_max)
-            if self.resolution > 0.0:
-                for j in range(2):
-                    self.measured[j] = self.resolution * floor(self.measured[j] / self.resolution + 0.5)
+        self.read_out()
 
     def outputs(self) -> None:
         self.density = self.white

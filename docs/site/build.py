@@ -30,7 +30,14 @@ CONTENTS = {
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "instruments/README", "reports/README", "fmus/README"],
     "Python API": ["api/gyrobench", "api/*"],
-    "Figures": ["docs/speed", "docs/validation", "docs/real_records", "tests/benchmarks/README", "tests/spec/README"],
+    "Figures": [
+        "docs/speed",
+        "docs/validation",
+        "docs/worked_examples",
+        "docs/real_records",
+        "tests/benchmarks/README",
+        "tests/spec/README",
+    ],
     "Project": ["CONTRIBUTING", "docs/architecture", "CHANGELOG", "docs/licences", "docs/README"],
 }
 

@@ -14,7 +14,9 @@ from gyrobench.commands.app import app
 from gyrobench.reading import visible
 from gyrobench.workflow.user_errors import exit_code, user_message
 
-for module in ("bench", "run", "campaign", "tuning", "exchange", "learn", "studio"):  # in the order of the help
+for module in (
+    "bench", "run", "campaign", "tuning", "identification", "exchange", "learn", "studio",
+):  # in the order of the help  # fmt: skip
     importlib.import_module(f"gyrobench.commands.{module}_commands")
 
 

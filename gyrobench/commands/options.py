@@ -25,6 +25,15 @@ Set = Annotated[
         autocompletion=complete_setting,
     ),
 ]
+FromRun = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--from-run",
+        metavar="RUN",
+        help="Take values of the result of another test, where this one says how (accelerometer_four: the first "
+        "harmonic of a table_position_test); --set goes before them.  Repeatable.",
+    ),
+]
 Part = Annotated[
     list[str] | None,
     typer.Option(
@@ -65,7 +74,7 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         metavar="MAP",
-        help="Column map (.toml) of a --data file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
+        help="Column map (.toml) of a file of another layout; gyrobench fit FILE --system SYSTEM writes one.",
     ),
 ]
 From = Annotated[
@@ -75,6 +84,15 @@ From = Annotated[
         metavar="FILE|FOLDER",
         help="A run of the exported system in another tool: CSV, .npy (FMPy), .mat, Parquet, or the folder of "
         "libcosim's CSV files; values by --set, --part and --map as at the export.",
+    ),
+]
+FitTo = Annotated[
+    str | None,
+    typer.Option(
+        "--fit-to",
+        metavar="PART",
+        help="Write values of the result for a part, files for --set @FILE.toml, and of JSON and C: the noise of a "
+        "drift_record for a gyro (floated_gyro), the errors that imu_positions found for imu_compensator.",
     ),
 ]
 WithCertificate = Annotated[

@@ -33,13 +33,33 @@ def run(request: RunRequest, test: System | Suite, as_json: bool = False) -> str
     return _print_outcome(execute_run(request, test, FEEDBACK), as_json)
 
 
-def report(folder: Path, test: System | Suite, spec: str | None, as_json: bool = False) -> str:
-    """Reduce a saved run again, print its result and return the verdict."""
+def report(
+    folder: Path, test: System | Suite, spec: str | None, as_json: bool = False, fit_to: str | None = None
+) -> str:
+    """Reduce a saved run again, print its result and return the verdict.  fit_to: as of :func:`reduce`."""
+    if fit_to:
+        from gyrobench.workflow.fitted_values import refuse_unfitted
+
+        refuse_unfitted(test, fit_to)
     if isinstance(test, Suite):
         from gyrobench.workflow.suite_report import report_saved_suite
 
         return _print_outcome(report_saved_suite(folder, test, spec), as_json)
-    return _print_outcome(reduce_saved_run(folder, test, find_specification(spec)), as_json)
+    outcome = reduce_saved_run(folder, test, find_specification(spec))
+    verdict = _print_outcome(outcome, as_json)
+    _print_fitted(test, outcome, fit_to)
+    return verdict
+
+
+def _print_fitted(test: System, outcome: RunOutcome, fit_to: str | None) -> None:
+    """Write the values of a result for a part beside its report, where they are asked for, and print where."""
+    if not fit_to or outcome.result is None or outcome.folder is None:
+        return
+    from gyrobench.workflow.fitted_values import write_fitted
+
+    files = write_fitted(test, outcome.result, outcome.record, fit_to, outcome.folder)
+    shown = ", ".join(display_path(f) for f in files)
+    console.print_note(f"values for {fit_to}: {shown}; gyrobench run SYSTEM --set @FILE.toml")
 
 
 def reduce(
@@ -57,10 +77,11 @@ def reduce(
 ) -> str:
     """Reduce a laboratory's file, or the runs of a suite; print the result and return the verdict.
 
-    fit_to: gyro of the bench that is to have the noise of the record.  columns: column map of the file.  certificate:
-    write that, too, by the profile of the laboratory, which is looked for first.
+    fit_to: part that gets values of the result (workflow.fitted_values).  columns: column map of the file.
+    certificate: write that, too, by the profile of the laboratory, which is looked for first.
     """
     from gyrobench.workflow.certificate import find_laboratory, write_certificate
+    from gyrobench.workflow.fitted_values import refuse_unfitted
 
     if certificate:
         find_laboratory()
@@ -68,7 +89,7 @@ def reduce(
         from gyrobench.workflow.suite_report import reduce_runs
 
         if fit_to:
-            raise UsageError(f"--fit-to {fit_to}: {test.name} is a suite; only drift_record gives noise coefficients")
+            refuse_unfitted(test, fit_to)
         if columns:
             raise UsageError(f"--columns {columns}: {test.name} compares runs; reduce each record by its own test")
         if not data:
@@ -78,7 +99,6 @@ def reduce(
         verdict = _print_outcome(compared, as_json)
         _print_paths(write_certificate([compared.folder]) if certificate and compared.folder else [], as_json)
         return verdict
-    from gyrobench.workflow.gyro_values import channels_of, write_gyro_values
     from gyrobench.workflow.measured_run import reduce_measured
 
     if not data:
@@ -86,15 +106,12 @@ def reduce(
     if len(data) > 1:
         raise UsageError(f"{test.name} reduces one record at a time; --data was given {len(data)} times")
     if fit_to:
-        channels_of(fit_to)  # refuses another part before the work
+        refuse_unfitted(test, fit_to)
     outcome = reduce_measured(
         test, data[0], values, spec, out, force, formats=formats, feedback=FEEDBACK, columns=columns
     )
     verdict = _print_outcome(outcome, as_json)
-    if fit_to and outcome.result is not None and outcome.folder is not None:
-        file = outcome.folder / f"{fit_to}.toml"
-        write_gyro_values(outcome.result, outcome.record, fit_to, file)
-        console.print_note(f"noise of the record for {fit_to}: {display_path(file)}; gyrobench run SYSTEM --set @FILE")
+    _print_fitted(test, outcome, fit_to)
     _print_paths(write_certificate([outcome.folder]) if certificate and outcome.folder else [], as_json)
     return verdict
 

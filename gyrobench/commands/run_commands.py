@@ -14,8 +14,10 @@ from gyrobench.commands.options import (
     Coupling,
     Data,
     Engine,
+    FitTo,
     Force,
     From,
+    FromRun,
     Json,
     Language,
     Map,
@@ -45,6 +47,7 @@ def run(
             metavar="NAME", help="Data sheet of a rate gyro (instruments/NAME.toml, or a file) for the slot gyro."
         ),
     ] = None,
+    from_run: FromRun = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the noise; default 1.", min=0)] = None,
     engine: Annotated[
         Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
@@ -89,6 +92,8 @@ def run(
     from gyrobench.report import FORMATS
     from gyrobench.report.language import reports_in
     from gyrobench.system.suite import Suite
+    from gyrobench.workflow.handover import handed_over
+    from gyrobench.workflow.inputs import load_test
     from gyrobench.workflow.instruments import with_instrument
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
@@ -96,7 +101,8 @@ def run(
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
     title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
-    test = load_with_values(system, {**sheet, **parse_settings(values)}, time_step, coupling.value)
+    taken = handed_over(load_test(system), from_run) if from_run else {}
+    test = load_with_values(system, {**sheet, **taken, **parse_settings(values)}, time_step, coupling.value)
     if not isinstance(test, Suite):
         test.instrument = title
     elif title and not test["instrument"]:
@@ -126,6 +132,7 @@ def reduce(
     columns: Columns = None,
     source: From = None,
     values: Set = None,
+    from_run: FromRun = None,
     part: Part = None,
     mapping: Map = None,
     template: Annotated[
@@ -134,15 +141,7 @@ def reduce(
     spec: Spec = None,
     strict: Strict = False,
     no_report: NoReport = False,
-    fit_to: Annotated[
-        str | None,
-        typer.Option(
-            "--fit-to",
-            metavar="PART",
-            help="drift_record: write the noise of the record as values of a gyro of the bench (floated_gyro), a file "
-            "for --set @FILE.",
-        ),
-    ] = None,
+    fit_to: FitTo = None,
     out: Out = None,
     force: Force = False,
     language: Language = "en",
@@ -164,6 +163,7 @@ def reduce(
     from gyrobench.commands.arguments import parse_settings, parse_swaps
     from gyrobench.report import FORMATS
     from gyrobench.report.language import reports_in
+    from gyrobench.workflow.handover import handed_over
     from gyrobench.workflow.inputs import load_test
     from gyrobench.workflow.run_execution import RunRequest
 
@@ -175,6 +175,7 @@ def reduce(
         return
     formats = ("json",) if no_report else FORMATS
     parts, maps = parse_swaps(part, mapping)
+    taken = handed_over(test, from_run) if from_run else {}
     if source is not None:
         if data or fit_to or columns or certificate:
             raise UsageError(
@@ -183,11 +184,12 @@ def reduce(
             )
         request = RunRequest(parts, maps, engine="reference", out=out, force=force, spec=spec, formats=formats)
         with reports_in(language, test.name, Bench.find().folder):
-            exit_on_fail(print_runs.reduce_result(request, test, source, parse_settings(values), as_json), strict)
+            given = taken | parse_settings(values)
+            exit_on_fail(print_runs.reduce_result(request, test, source, given, as_json), strict)
         return
     if parts or maps:
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
-    given = parse_settings(values)
+    given = taken | parse_settings(values)
     with reports_in(language, test.name, Bench.find().folder):
         verdict = print_runs.reduce(
             test, data or [], given, spec, out, force, as_json, formats, fit_to, columns, certificate
@@ -200,13 +202,16 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     spec: Spec = None,
     strict: Strict = False,
+    fit_to: FitTo = None,
     language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Reduce the record of a run again and rewrite its report.
 
     \b
-    Example: gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
+    Examples:
+      gyrobench report reports/out/tumble_single_axis/1a2b3c4d --spec floated_gyro
+      gyrobench report reports/out/imu_positions/1a2b3c4d --fit-to imu_compensator
     """
     from gyrobench.commands import print_runs
     from gyrobench.report.language import reports_in
@@ -214,7 +219,7 @@ def report(
 
     test = load_saved_test(folder)
     with reports_in(language, test.name, Bench.find().folder):
-        exit_on_fail(print_runs.report(folder, test, spec, as_json), strict)
+        exit_on_fail(print_runs.report(folder, test, spec, as_json, fit_to), strict)
 
 
 @app.command()

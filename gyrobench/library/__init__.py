@@ -12,6 +12,7 @@
     gb.load("tumble_single_axis", parts={"gyro": "vendor.fmu"}, maps={"gyro": "vendor.toml"})
     gb.sweep("tumble_single_axis", {"latitude": "0deg..80deg:9"}, seeds=20)   # a data frame, a row a run
     gb.tune("platform_single_axis", ["phase margin=40deg", "bandwidth>10Hz"], ["platform.J=±30%"])
+    gb.identify("loop.csv", at="plant input")["phase margin"].value          # of a laboratory's record of a loop
     gb.campaign("campaign.toml", out="folder")
     gb.site("folder").index                      # the page of a stored campaign
 
@@ -35,12 +36,14 @@ from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
 from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.suite import Suite
+from gyrobench.workflow.handover import handed_over
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.instruments import with_instrument
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
+    from gyrobench.identification.written_identification import Identification
     from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
@@ -55,6 +58,7 @@ __all__ = [
     "campaign",
     "compare",
     "design",
+    "identify",
     "load",
     "load_suite",
     "open_run",
@@ -74,14 +78,16 @@ def load(
     maps: Mapping[str, File] | None = None,
     coupling: str = "sequential",
     instrument: str = "",
+    from_run: Sequence[File] = (),
     **options: Any,
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
     mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.  Raises
-    errors of type GyrobenchError; UsageError for a suite.
+    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.
+    from_run: folders of runs of other tests whose results give values of this one; values and options go before them.
+    Raises errors of type GyrobenchError; UsageError for a suite.
     """
     test = load_test(str(name))
     if isinstance(test, Suite):
@@ -93,7 +99,8 @@ def load(
     title, sheet = with_instrument(instrument, swaps) if instrument else ("", {})
     test.instrument = title
     experiment = Experiment(test, swaps, maps or {})
-    for key, value in {**sheet, **(values or {}), **options}.items():
+    taken = handed_over(test, [Path(run) for run in from_run]) if from_run else {}
+    for key, value in {**sheet, **taken, **(values or {}), **options}.items():
         experiment.set(key, value)
     return experiment
 
@@ -214,3 +221,29 @@ def tune(
         test.system, want, over, structure, parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
         given={k: str(v) for k, v in given.items()}, loop=loop,
     )  # fmt: skip
+
+
+@checked
+def identify(
+    data: File,
+    *,
+    at: str = "",
+    period: str = "",
+    band: str | tuple[float, float] = "",
+    columns: File | None = None,
+) -> Identification:
+    """Return open loop, sensitivities, plant and margins of a laboratory's record of a loop, with intervals.
+
+    at: where the excitation enters, "plant input", "reference" or "plant output"; period: its period ("2s"); default:
+    what the file states or shows.  band: "0.5Hz..80Hz", or two frequencies in Hz.  columns: a column map.
+    ``responses["L"]`` has frequencies, values and intervals, ``["phase margin"]`` is a margin, ``notes`` say what is
+    missing or not linear, ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
+    GyrobenchError.
+    """
+    from gyrobench.identification.identify_loop import identify as identify_loop
+    from gyrobench.identification.identify_loop import parse_band
+
+    limits = parse_band(band) if isinstance(band, str) else band
+    return identify_loop(
+        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns)
+    )

@@ -91,7 +91,7 @@ class OnRequest:
     """Slots that a system has only where they are asked for: a part is put into the first, or a parameter of it is set.
 
     Without them the system is the one it was: no FMU, no wire, no column more.  columns: further ones of the windows.
-    instead_of: the line of the system's wires that theirs replace.
+    instead_of: the lines of the system's wires that theirs replace.
     """
 
     slots: Mapping[str, Slot]
@@ -142,7 +142,12 @@ class System(Configurable):
     reduction: ClassVar[str | type] = ""
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
+    #: part -> its slot, and the module beside system.py whose values_of(result) are parameter -> (value, standard
+    #: uncertainty, unit), SI: for --fit-to
+    fitted: ClassVar[Mapping[str, tuple[str, str]]] = {}
     noises: ClassVar[tuple[str, ...]] = ()  # "slot.parameter": with all of them 0 the run has no noise
+    #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
+    takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
     assumed: ClassVar[
         tuple[str, ...]
@@ -262,9 +267,18 @@ class System(Configurable):
         reduction: Any = self.reduction
         if not isinstance(reduction, str):
             return reduction
-        owner = next(cls for cls in type(self).__mro__ if "reduction" in vars(cls))
-        module = importlib.import_module(f".{reduction}", owner.__module__)
+        module = self._beside("reduction", reduction)
         return getattr(module, "Reduction", module)
+
+    def _beside(self, declared: str, module: str) -> Any:
+        """Return a module beside the system.py of the class that declares something."""
+        owner = next(cls for cls in type(self).__mro__ if declared in vars(cls))
+        return importlib.import_module(f".{module}", owner.__module__)
+
+    def values_for(self, part: str, result: Result) -> tuple[str, Mapping[str, tuple[Any, Any, str]]]:
+        """Return the slot of a part of :attr:`fitted`, and the values that a result gives it.  Raises UsageError."""
+        slot, module = self.fitted[part]
+        return slot, self._beside("fitted", module).values_of(result)
 
     def findings(self, record: Record) -> Result:
         """Return what a record says, without limits and verdict: estimates, and the reasons against them.
@@ -346,8 +360,9 @@ class System(Configurable):
         return found
 
 
-def _without(wires: str, line: str) -> str:
-    return "\n".join(x for x in wires.splitlines() if not line or x.split() != line.split())
+def _without(wires: str, lines: str) -> str:
+    gone = [line.split() for line in lines.splitlines()]
+    return "\n".join(x for x in wires.splitlines() if not x.split() or x.split() not in gone)
 
 
 def load_system(name: str, bench: Path | None = None) -> System:

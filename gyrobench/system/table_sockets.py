@@ -50,6 +50,24 @@ TABLES: tuple[Socket, ...] = (
         ),
     ),
     Socket(
+        "Foundation",
+        "what a table stands on: motion of the ground in, motion of the table's base out",
+        (
+            inp("g", "m/s2", "local gravity", optional=True),
+            inp("a", "m/s2", "acceleration of the ground, ENU", 3),
+            inp("tilt", "rad", "tilt of the ground about E, N, U", 3),
+            inp("tilt_rate", "rad/s", "its derivative", 3),
+            inp("tilt_acceleration", "rad/s2", "derivative of that", 3),
+            inp("omega", "rad/s", "inertial rate of the ground in its axes", 3),
+            inp("alpha", "rad/s2", "its derivative", 3, optional=True),
+            out("f_block", "m/s2", "specific force on it, in its axes", 3),
+            out("omega_block", "rad/s", "its inertial rate, in its axes", 3),
+            out("alpha_block", "rad/s2", "derivative of that", 3),
+            out("a_block", "m/s2", "its acceleration, ENU", 3),
+            out("tilt_block", "rad", "its tilt about E, N, U", 3),
+        ),
+    ),
+    Socket(
         "AngleReader",
         "angle sensor of a table axis: angle in, cumulative counts out",
         (

@@ -2,9 +2,10 @@
 
     maximize  min over wishes i and points k of  ratio_ik(numbers)        all loops stable
 
-A coarse look over the whole box (Sobol), then from the best, far apart: the simplex method, and sequential quadratic
+A coarse look over the whole box (Sobol), also with notches at the modes and with some factors that do nothing; from
+the best, far apart, differential evolution; from its best the simplex method, large and small, and sequential linear
 programming of t <= ln ratio_ik, which finds the ridge where several wishes bind at once.  The points of the spread are
-the corners and some inside; what is worse between them is added, and the search goes on (scipy, no randomness).
+the corners and some inside; what is worse between them is added, and the search goes on (scipy; the same each time).
 """
 
 from __future__ import annotations
@@ -23,10 +24,16 @@ from gyrobench.tuning.structures import BLOCKS, Controller, ControllerStructure
 from gyrobench.tuning.wishes import JITTER, Wish
 
 LOOK = 512  # controllers of the coarse look
-STARTS = 4  # of the simplex
-SIMPLEX = 220  # evaluations of one
+CROWD = 48  # controllers of the differential evolution
+APART = 0.1  # of the box, that these are at first
+GENERATIONS, FEWEST = 50, 8  # of it, and the fewest
+CHEAP = 8  # corners of a spread beyond which there are less
+SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of the box
+SIMPLEX = 150  # evaluations of one
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
 ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
+ACROSS = np.linspace(-3.0, 3.0, 31)  # of a resonance, in half widths, for its frequencies
+SHARP = 0.002  # damping of the sharpest resonance that the frequencies follow
 CAP = np.log(100.0)  # more than that is no better
 
 
@@ -92,49 +99,78 @@ def with_jitter(wishes: Sequence[Wish], got: Array, ways: Sequence[SightWays], r
     return got
 
 
-def search(problem: TuningProblem) -> Array:
-    """Return the decades of the best controller that was found."""
-    from scipy.optimize import minimize
+def search(problem: TuningProblem, quick: bool = False) -> Array:
+    """Return the decades of the best controller that was found.  quick: with a sixth of the work, for one wish."""
+    from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
     low, high = problem.box.T
     nominal, corners = problem.of(1), problem.of(problem.corners)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
     spread = low + cube * (high - low)
-    looked = [(nominal.worst(x), x) for x in (*spread, *_notched(problem, spread[: LOOK // 2]))]
-    starts: list[Array] = []
-    for _, x in sorted(looked, key=lambda p: -p[0]):
-        if all(np.linalg.norm((x - s) / (high - low)) > 0.25 for s in starts):
-            starts.append(x)
-        if len(starts) == STARTS:
+    notched = _notched(problem, spread[: LOOK // 2])
+    looked = np.vstack([spread, notched, _neutral(problem, notched if len(notched) else spread[: LOOK // 2])])
+    worst = np.array([nominal.worst(x) for x in looked])
+    first: list[Array] = []
+    for k in np.argsort(-worst):
+        if all(np.linalg.norm((looked[k] - s) / (high - low)) > APART for s in first):
+            first.append(looked[k])
+        if len(first) == CROWD:
             break
+    generations = FEWEST if quick else max(FEWEST, int(GENERATIONS * min(1.0, CHEAP / problem.corners)))
+    evolved = differential_evolution(
+        lambda x: -corners.worst(x), [*zip(low, high, strict=True)], init=np.array(first), maxiter=generations,
+        strategy="currenttobest1bin", mutation=(0.4, 0.9), recombination=0.9, polish=False, tol=0.0, seed=1,
+    )  # fmt: skip
+    best = polished(corners, evolved.x)
+    for size in SIZES[:1] if quick else SIZES:
+        tried = polished(corners, _simplex(corners, best, size))
+        best = max(best, tried, key=corners.worst)
+    problem.evaluations += nominal.evaluations + corners.evaluations
+    return polished(problem, best)
+
+
+def _simplex(problem: TuningProblem, x: Array, size: float) -> Array:
+    """Return the end of the simplex method from x; size: of the first simplex, share of the box."""
+    from scipy.optimize import minimize
+
+    low, high = problem.box.T
 
     def refused(x: Array) -> float:
         inside = np.clip(x, low, high)
-        return -corners.worst(inside) + float(np.sum(np.abs(x - inside)))
+        return -problem.worst(inside) + float(np.sum(np.abs(x - inside)))
 
-    ends = []
-    for x in starts:
-        simplex = np.clip(np.vstack([x, x + 0.12 * np.diag(high - low)]), low, high)
-        for k in range(len(x)):
-            if np.allclose(simplex[k + 1], x):
-                simplex[k + 1, k] -= 0.12 * (high - low)[k]
-        found = minimize(
-            refused, x, method="Nelder-Mead",
-            options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
-        )  # fmt: skip
-        ends.append(np.clip(found.x, low, high))
-    ends.sort(key=lambda x: -problem.worst(x))
-    best = max((polished(problem, x) for x in ends[:2]), key=problem.worst)
-    problem.evaluations += nominal.evaluations + corners.evaluations
-    return best
+    simplex = np.clip(np.vstack([x, x + size * np.diag(high - low)]), low, high)
+    for k in range(len(x)):
+        if np.allclose(simplex[k + 1], x):
+            simplex[k + 1, k] -= size * (high - low)[k]
+    found = minimize(
+        refused, x, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
+    )  # fmt: skip
+    return np.asarray(np.clip(found.x, low, high), float)
+
+
+def _places(structure: ControllerStructure) -> list[tuple[str, int]]:
+    """Return each factor with the place of its first number in a controller's decades."""
+    at = [1 + sum(len(BLOCKS[b].ranges) for b in structure.blocks[:k]) for k in range(len(structure.blocks))]
+    return [*zip(structure.blocks, at, strict=True)]
+
+
+def _neutral(problem: TuningProblem, spread: Array) -> Array:
+    """Return controllers some of whose factors do nothing: a structure is never worse than one with less in it."""
+    moved = spread.copy()
+    rows = np.arange(len(moved))
+    for j, (block, at) in enumerate(_places(problem.structure)):
+        number, decade = BLOCKS[block].neutral
+        moved[(rows >> j) % 2 == 1, at + number] = decade
+    return moved
 
 
 def _notched(problem: TuningProblem, spread: Array) -> Array:
     """Return the controllers with their notches at the modes of the plant, where both are: few of a box have that."""
-    structure, modes = problem.structure, problem.plants[0].modes()
-    at = [1 + sum(len(BLOCKS[b].ranges) for b in structure.blocks[:k]) for k, b in enumerate(structure.blocks)]
-    places = [p for p, b in zip(at, structure.blocks, strict=True) if b == "notch"]
+    modes = problem.plants[0].modes()
+    places = [at for block, at in _places(problem.structure) if block == "notch"]
     moved = spread.copy()
     for place, mode in zip(places, modes, strict=False):
         low, high = problem.box[place]
@@ -192,11 +228,14 @@ def box(structure: ControllerStructure, wishes: Sequence[Wish], wanted: float | 
 
 def frequencies(plants: Sequence[Plant], decades: Array, wishes: Sequence[Wish], count: int = 400) -> Array:
     """Return the grid for the loops of these plants."""
-    modes = [abs(m) / (2.0 * np.pi) for p in plants for m in p.modes()]
-    apart: list[float] = []
-    for m in sorted(modes):
-        if not apart or m > 1.1 * apart[-1]:
+    modes = sorted((m for p in plants for m in p.modes()), key=abs)
+    apart: list[complex] = []
+    for m in modes:
+        if not apart or abs(m) > 1.1 * abs(apart[-1]):
             apart.append(m)
     low = float(10.0 ** decades[0, 0] / (2.0 * np.pi))
-    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), apart[:6], count)
-    return np.unique(np.concatenate([found, [w.f for w in wishes if w.f]]))
+    hertz = [abs(m) / (2.0 * np.pi) for m in apart[:6]]
+    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), hertz, count)
+    # a resonance that a search pushes under 1 must not rise between two frequencies
+    peaks = [np.exp(max(-m.real / abs(m), SHARP) * ACROSS) * x for m, x in zip(apart, hertz, strict=False)]
+    return np.unique(np.concatenate([found, *(p[p < found[-1]] for p in peaks), [w.f for w in wishes if w.f]]))

@@ -53,7 +53,7 @@ def reasons_of(
 def _alone(problem: TuningProblem, result: WishResult) -> str:
     """Return what the structure gives where only this wish, and stability, counts."""
     one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f, sights=problem.sights)
-    best = max(result.ratio, float(np.exp(one.worst(search(one)))))
+    best = max(result.ratio, float(np.exp(one.worst(search(one, quick=True)))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)
     return f"{result.wish.name} alone: {much}" + ("" if best >= 1.0 else ", too little by itself")

@@ -25,9 +25,13 @@ Ratio = tuple[Polynomial, Polynomial]
 
 @dataclass(frozen=True)
 class ControllerFactor:
-    """A factor of a controller.  ranges: decades of each number; build(w, numbers) -> num, den, values by name."""
+    """A factor of a controller.  ranges: decades of each number; build(w, numbers) -> num, den, values by name.
+
+    neutral: a number and its decade with which the factor does nothing, or next to nothing.
+    """
 
     ranges: tuple[tuple[float, float], ...]
+    neutral: tuple[int, float]
     build: Callable[[float, Sequence[float]], tuple[Ratio, dict[str, float]]]
 
 
@@ -61,11 +65,11 @@ def _rolloff(w: float, x: Sequence[float]) -> tuple[Ratio, dict[str, float]]:
 
 
 BLOCKS = {
-    "lag": ControllerFactor(((-2.0, 0.0), (0.0, 3.0)), _lag),
-    "lead": ControllerFactor(((-0.7, 1.0), (0.0, 2.3)), _lead),
-    "pi": ControllerFactor(((-1.5, 0.0),), _pi),
-    "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), _notch),
-    "rolloff": ControllerFactor(((0.0, 2.0),), _rolloff),
+    "lag": ControllerFactor(((-2.0, 0.0), (0.0, 3.0)), (1, 0.0), _lag),
+    "lead": ControllerFactor(((-0.7, 1.0), (0.0, 2.3)), (1, 0.0), _lead),
+    "pi": ControllerFactor(((-1.5, 0.0),), (0, -1.5), _pi),
+    "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), (2, 0.0), _notch),
+    "rolloff": ControllerFactor(((0.0, 2.0),), (0, 2.0), _rolloff),
 }
 NAMES = {"lead-lag": ["lag", "lead", "pi"]}
 

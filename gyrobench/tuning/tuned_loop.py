@@ -194,6 +194,8 @@ def _lines(t: LoopTuning) -> list[str]:
 
 def margin_text(w: ProvenWish) -> str:
     """Return the expanded uncertainty of a measured wish as text."""
+    if w.bound:
+        return " or more (as far as sines above the noise reach)"
     if not math.isfinite(w.value) or not w.U > 0.0:
         return ""
     match w.wish.unit:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
 from . import geometry
+from .head import first_harmonic
 from .measured import MEASURED
 
 TURN = 2.0 * math.pi
@@ -74,6 +76,7 @@ class AccelerometerFour(TableTest):
     }
     noises = (*(f"accelerometer_{i}.white" for i in geometry.SENSORS), "table.repeat")
     assumed = ("table.base",)
+    takes: ClassVar[Mapping[str, Any]] = {"table_position_test": first_harmonic}
     measured_data = MEASURED
     windows = Windows.of("sampler", **{f"mean_{i}": f"sampler_{i}.mean" for i in geometry.SENSORS[1:]})
     channels = (*(f"accelerometer_{i}.U" for i in geometry.SENSORS), "table.angle")

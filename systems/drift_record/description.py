@@ -18,7 +18,6 @@ from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.quantization import folded
-from gyrobench.reduction.setup.run_metadata import reads_rate
 from gyrobench.result import Reason, Table
 from gyrobench.units import ARCSEC
 
@@ -78,7 +77,8 @@ def _column_rows(name: str, units: ChannelUnits, series: Mapping[str, Any]) -> t
 def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     """Return what sampling did to the rate, and what of the file was left out."""
     if run.series is None:
-        read = "rate" if reads_rate(run) else "current"
+        reading = run.options.get("reading", "current")
+        read = {"force": "specific force"}.get(str(reading), str(reading))
         return [f"A sample is the mean of the {read} over a window, as an integrating meter reads it."]
     unused = run.series.get("unused", [])
     out = [

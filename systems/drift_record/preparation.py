@@ -13,7 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
-from gyrobench.reduction.series.channel_units import RATE, ChannelUnits, units_of
+from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, units_of
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
@@ -91,12 +91,18 @@ def columns_of(record: Record) -> Columns:
         return Columns(start - start[0], rates, others, named, step, units=units, inseparable=left)
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
-    k = run_metadata.rate_per_reading(run)
     site = run_metadata.Location.of(run)
-    input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
-    rate = input_rate - k * np.asarray(w["mean"], dtype=float)
     step = float(np.mean(np.asarray(w["t_end"]) - np.asarray(w["t_start"])))
     others = {n: np.asarray(v, dtype=float) for n, v in w.items() if n not in OWN}
+    grid = step * np.arange(float(len(w["mean"])))
+    if run.options.get("reading") == "force":
+        known = float(attitude_of(run)[0] @ frames.U) * site.gravity
+        said = [f"Specific force of the axis x, mean of a window, less that of gravity along it, {known:.6g} m/s²."]
+        bias = {"bias": np.asarray(w["mean"], dtype=float) - known}
+        return Columns(grid, bias, others, run.window_units, step, said, {"bias": FORCE})
+    k = run_metadata.rate_per_reading(run)
+    input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
+    rate = input_rate - k * np.asarray(w["mean"], dtype=float)
     earth = f"Earth rate along the input axis {input_rate / DPH:.6g} °/h."
     said = [
         f"Drift rate ω_IA less the mean rate of a window, axis x: the sign of a precession. {earth}"
@@ -104,7 +110,7 @@ def columns_of(record: Record) -> Columns:
         else "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
         f"k = {k * 1e-3 / DPH:.6g} °/h/mA, {earth}"
     ]
-    return Columns(step * np.arange(float(rate.size)), {"drift": rate}, others, run.window_units, step, said)
+    return Columns(grid, {"drift": rate}, others, run.window_units, step, said)
 
 
 def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True, wild: bool = True) -> Prepared:
@@ -145,6 +151,8 @@ GIVEN = {"B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
 
 #: the same of the axis x of a rate gyro
 GIVEN_X = {"B": "flicker_x", "K": "walk_x"}
+#: and of that of accelerometers
+GIVEN_FORCE = {"N": "white", "B": "x_flicker", "K": "x_walk"}
 
 
 def truth_of(record: Record) -> dict[str, float]:
@@ -155,6 +163,9 @@ def truth_of(record: Record) -> dict[str, float]:
     """
     run = record.run
     p: dict[str, Any] = dict(run.parameters)
+    if run.options.get("reading") == "force":
+        out = {term: float(p[n]) for term, name in GIVEN_FORCE.items() if (n := f"accelerometers.{name}") in p}
+        return out or ({"N": float(p["accelerometers.white_x"])} if "accelerometers.white_x" in p else {})
     if run_metadata.reads_rate(run):
         out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN_X.items() if f"gyro.{name}" in p}
         if "gyro.density" in record.channels:

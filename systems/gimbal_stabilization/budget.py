@@ -6,6 +6,7 @@ a test signal where a loop is opened.
     vibration of the base     T_base / s       on the rates of the base that were recorded
     acceleration              T_torque u x     on its acceleration; unbalance u, at the mean joint angles
     dry friction, cogging     T_torque         on the torques that the recorded joint angles make
+    roll times joint angle    S / s, T_torque  on the rate and the torque of second order (roll_coupling)
     noise of the gyro         T_test F / cos   F its filter; 1/cos of the outer axis alone; by its density
 
 The linear model takes a contact for a spring and cogging for its slope.  Where the joints move by more than
@@ -14,7 +15,7 @@ come from the joint angles; where they do not, friction is part of the way of th
 not independent: sources add segment by segment with their phases, and each has its share of the sum; a negative share
 cancels part of the others.  The noise of the gyro adds by squares.
 
-Not modelled: limits; a roll of the base times a joint angle (second order).
+Not modelled: limits; third order in the angles.
 """
 
 from __future__ import annotations
@@ -34,10 +35,14 @@ from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.margins import excitation_response
 
+from .roll_coupling import roll_coupling
+
 PAIR = (0, 1)  # pitch, yaw
 EXCITED = (1, 3)  # their elements of the exciter
 LOS = ("platform.los[1]", "platform.los[2]")
 THETA = ("platform.theta[1]", "platform.theta[2]")
+BASE = ("vibration.omega[1]", "vibration.omega[2]", "vibration.omega[3]")
+INSIDE = ("pitch.e", "yaw.e")  # behind the summing points of the loops
 TORQUES = ("cogging", "cogging_order", "friction", "stiction")
 GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
 
@@ -46,13 +51,15 @@ GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
 class Ride:
     """What was recorded in the ride: spectra of the line of sight, transforms of what moves it, whether joints slide.
 
-    base, force: (axis x, y, z) of (segments, frequencies), rates and accelerations; torques: source -> of pitch, yaw.
+    base, force: (axis x, y, z) of (segments, frequencies), rates and accelerations; torques: source -> of pitch, yaw;
+    second: rate of the line of sight and torque at the outer gimbal, of second order.
     """
 
     los: tuple[Spectra, Spectra]
     base: list[Complex]
     force: list[Complex]
     torques: Mapping[str, list[Complex]]
+    second: tuple[Complex, Complex]
     slides: bool
     angles: tuple[float, float]  # mean joint angles, rad
 
@@ -80,11 +87,13 @@ def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float) -> Ride | None:
         if of["cogging"]:
             wave = -of["cogging"] * np.sin(of["cogging_order"] * theta[k])
             made.setdefault("cogging", [none, none])[k] = wave
+    second = roll_coupling(gate, p, BASE, THETA)
     return Ride(
         (los[0], los[1]),
-        [cut(gate[f"vibration.omega[{k}]"]) for k in (1, 2, 3)],
+        [cut(gate[name]) for name in BASE],
         [cut(gate[f"vibration.f[{k}]"]) for k in (1, 2, 3)],
         {name: [cut(m) for m in pair] for name, pair in made.items()},
+        (cut(second.rate), cut(second.torque)),
         slides,
         (float(theta[0].mean()), float(theta[1].mean())),
     )
@@ -125,17 +134,20 @@ class Ways:
             return np.asarray(np.moveaxis(np.array(rows), 2, 0))
 
         self.f = f
-        self.torque = to(LOS, "torque", EXCITED)
-        self.test = to(LOS, "test", EXCITED)
-        self.base = to(LOS, "motion", (1, 2, 3))
         stiff = stiffness(p, f, slides)
-        if not np.any(stiff):
-            return
-        joints = to(THETA, "torque", EXCITED)
-        back = self.torque @ stiff @ np.linalg.inv(np.eye(2) - joints @ stiff)
-        self.test = self.test + back @ to(THETA, "test", EXCITED)
-        self.base = self.base + back @ to(THETA, "motion", (1, 2, 3))
-        self.torque = self.torque + back @ joints
+        free = np.any(stiff)
+        back = stiff @ np.linalg.inv(np.eye(2) - to(THETA, "torque", EXCITED) @ stiff) if free else stiff
+
+        def way(names: tuple[str, ...], kind: str, axes: tuple[int, ...]) -> Complex:
+            """Return responses without these stiffnesses."""
+            found = to(names, kind, axes)
+            return found + to(names, "torque", EXCITED) @ back @ to(THETA, kind, axes) if free else found
+
+        self.torque = way(LOS, "torque", EXCITED)
+        self.test = way(LOS, "test", EXCITED)
+        self.base = way(LOS, "motion", (1, 2, 3))
+        # a rate of the line of sight that no torque makes: the loop leaves S of it, its angle is S / s
+        self.rate = np.diagonal(way(INSIDE, "test", EXCITED), axis1=1, axis2=2) / (2j * np.pi * f[:, None])
 
 
 def stiffness(p: Mapping[str, Any], f: Array, slides: bool) -> Complex:
@@ -217,6 +229,10 @@ def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[s
     for name, pair in ride.torques.items():
         for k in PAIR:
             add(name, ways.torque[:, :, k], pair[k])
+    outer = 1 - int(p["platform.form"])
+    along = np.eye(2)[outer]
+    add("roll times joint angle", ways.rate[:, outer, None] * along, ride.second[0])
+    add("roll times joint angle", (ways.torque * at_the_body(p, f)[:, None, :])[:, :, outer], ride.second[1])
     whole = sum(moved.values(), np.zeros((), complex))
     sources = {
         name: JitterSource(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))

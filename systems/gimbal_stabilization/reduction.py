@@ -25,6 +25,7 @@ EDGES = (3.0, 10.0, 30.0, 100.0)  # Hz, of the bands
 POINTS = 250  # of a figure
 WRONG = 0.2  # relative: a jitter that differs more from the linear prediction is explained
 NOISY = 0.25  # relative u of a ratio beyond which its dB say nothing
+ASKEW = 0.1  # tangent of the inner joint angle from which a roll of the base is warned of
 DECIBEL = 20.0 / math.log(10.0)
 SMALL = 0.1  # %, share of the variance below which a source has no row
 
@@ -79,6 +80,12 @@ class Reduction(LoopReduction):
         """Measure the angle of the line of sight over that of the base, about x and z."""
         found = self.found
         for name, k, angle in (("x", 1, LOS[0]), ("z", 3, LOS[1])):
+            still = [g for g in found.of("motion", k, "sine") if swing(g, f"motion.angle[{k}]") < 0.5 * g.amplitude]
+            if still:
+                meaning = f"line of sight over base, sines about {name}"
+                none = "the part in motion takes no test sines: the base did not swing"
+                found.measure(f"isolation {name} {still[0].f:g} Hz", meaning, "dB", None, no_value=none)
+                continue
             points = found.ratio(
                 f"line of sight over base about {name}", "motion", k, angle, f"motion.angle[{k}]",
                 caption=f"Transmissibility: angle of the line of sight over that of the base about {name}.",
@@ -182,7 +189,24 @@ class Reduction(LoopReduction):
             )
             self.found.warn("budget.not_linear", text)
         largest = max(share, key=lambda n: share[n])
+        if largest.startswith("vibration"):
+            self._rolls(share[largest], largest)
         return f", {share[largest]:.0f} % of its variance by {largest}"
+
+    def _rolls(self, share: float, source: str) -> None:
+        """Warn where the inner joint stands askew, so that a roll reaches the line of sight past every bearing."""
+        p = self.run.parameters
+        inner = int(p["platform.form"])
+        tan = abs(math.tan(float(np.asarray(p["platform.theta_0"], float)[inner])))
+        if tan > ASKEW:
+            axis, other = tuple(AXES)[inner], tuple(AXES)[1 - inner]
+            text = (
+                f"{share:.0f} % of the variance of the jitter is {source}. With {axis} at an angle, a roll of the "
+                f"outer gimbal turns the line of sight whatever the bearings: the {other} motor must follow it with "
+                f"{tan:.2g} times its rate, and what the loop leaves of that is jitter. It is the largest where the "
+                "inner joint stands farthest from 0: a wider loop or a third axis, of roll, makes it less."
+            )
+            self.found.warn("roll.askew", text)
 
     def _stuck(self) -> bool:
         return any(np.any(np.asarray(self.run.parameters.get(f"platform.{n}", 0.0))) for n in ("friction", "stiction"))
@@ -218,6 +242,12 @@ class Reduction(LoopReduction):
                 "sight little or not at all: its motion about the outer axis is not stabilized."
             )
             self.found.warn("keyhole", text)
+
+
+def swing(gate: Gate, name: str) -> float:
+    """Return the amplitude of a channel at the frequency of a phase."""
+    y = gate[name]
+    return 2.0 * abs(complex(np.mean((y - y.mean()) * np.exp(-2j * np.pi * gate.f * gate.t))))
 
 
 def _averaged(x: Array, y: Array) -> tuple[list[float], list[float]]:

@@ -53,7 +53,7 @@ class GimbalStabilization(LoopTest):
         "decoupler": Slot("LosDecoupler", "decoupler_los"),
         **{axis: loop.stabilizer("stabilizer_lti", "rate") for axis in AXES},
     }
-    wires = loop.MOVED + LoopTest.wires + """
+    wires = loop.MOVED + loop.FLOWN + LoopTest.wires + """
         exciter.phase -> vibration.phase
         motion -> vibration: omega=omega_b alpha=alpha_b f=f_b
         vibration -> platform: omega=omega_b alpha=alpha_b f=f_b

@@ -12,10 +12,15 @@ from gyrobench.frames import G0
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.result import Coefficient
-from gyrobench.units import DPH
+from gyrobench.units import ARCSEC, DPH
 
 UG = 1e-6 * G0  # m/s2
 AXES = "xyz"
+#: printed unit -> SI, of all coefficients of the test
+SCALES = {
+    "ppm": 1e-6, "″": ARCSEC, "°/h": DPH, "°/h/g": DPH, "µg": UG, "counts": 1.0, "counts/(rad/s)": 1.0,
+    "counts/(m/s²)": 1.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,8 +79,8 @@ BY_NAME = {c.name: c for c in CHANNELS}
 _PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba": "acc_bias", "Sa": "acc_scale"}
 
 
-def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
-    """Return the coefficients of the simulated part, SI; None where it has none."""
+def instruments_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
+    """Return the coefficients of the simulated instruments, SI; None where they have none."""
     found: dict[str, float] = {}
     for short, long in _PARAMETERS.items():
         if f"{slot}.{long}" not in parameters:
@@ -85,7 +90,18 @@ def truth_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, floa
             row = np.atleast_1d(values[i]) if values.ndim == 1 else values[i]
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
-    return found
+    return found | _own_accelerometers(parameters)
+
+
+def _own_accelerometers(parameters: Mapping[str, Any], slot: str = "accelerometers") -> dict[str, float]:
+    """Return the coefficients of accelerometers that stand in their own slot, SI; {} where there are none."""
+    if f"{slot}.bias" not in parameters:
+        return {}
+    bias, scale = (np.asarray(parameters[f"{slot}.{n}"], dtype=float) for n in ("bias", "scale"))
+    axes = np.reshape(np.asarray(parameters.get(f"{slot}.axes", np.eye(3)), dtype=float), (3, 3))
+    matrix = (1.0 + scale[:, None]) * axes - np.eye(3)
+    found = {f"ba_{a}": float(b) for a, b in zip(AXES, bias, strict=True)}
+    return found | {f"Sa_{a}{b}": float(matrix[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}
 
 
 def overview(every: Sequence[Coefficient]) -> list[str]:

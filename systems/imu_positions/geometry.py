@@ -25,7 +25,8 @@ from gyrobench.reduction.estimation import regression
 
 AXES = ("outer", "inner")
 ANGLES = ("outer_start", "outer_end", "inner_start", "inner_end")  # columns of a record
-POSITIONS = (6, 12, 18, 26)
+POSITIONS = (6, 12, 18, 20, 24, 26, 36)
+BOTH_WAYS = {24: 12, 36: 18}  # positions -> directions, each reached in both ways
 TURN = 2.0 * math.pi
 STILL = 1e-4  # rad that the table may move in a window at rest (20 arcsec: encoders jitter)
 NODES = 8  # of a Gauss-Legendre rule over a quarter of a turn: exact to rounding for sines of a few turns
@@ -33,8 +34,15 @@ EXCITED = math.radians(0.5)  # rad/s, least root mean square of a rate that show
 LIMIT = 300.0  # of the condition of a design with scaled columns
 
 
-def directions(count: int) -> list[tuple[int, ...]]:
-    """Return directions of the plate that point up: its 6 faces, 12 edges, both (18), or these with 8 corners (26)."""
+def directions(count: int) -> list[tuple[float, ...]]:
+    """Return directions of the plate that point up: its 6 faces, 12 edges, both (18), these with 8 corners (26), or the
+    20 vertices of a dodecahedron: the corners, and (0, 1/p, p) with signs and turned round, p = (1 + sqrt 5)/2.
+    """
+    if count == 20:
+        golden = (1.0 + math.sqrt(5.0)) / 2.0
+        corners = list(itertools.product((1.0, -1.0), repeat=3))
+        others = [(0.0, a / golden, b * golden) for a, b in itertools.product((1.0, -1.0), repeat=2)]
+        return corners + [o[-k:] + o[:-k] for k in range(3) for o in others]
     wanted = {6: (1,), 12: (2,), 18: (1, 2), 26: (1, 2, 3)}[count]
     every = [d for d in itertools.product((0, 1, -1), repeat=3) if any(d)]
     return sorted((d for d in every if sum(map(abs, d)) in wanted), key=lambda d: sum(map(abs, d)))
@@ -45,6 +53,19 @@ def angles_of(direction: Sequence[float]) -> tuple[float, float]:
     u = np.asarray(direction, dtype=float) / float(np.linalg.norm(direction))
     x = math.asin(float(np.clip(u[1], -1.0, 1.0)))
     return x, 0.0 if abs(u[1]) > 1.0 - 1e-12 else math.atan2(-float(u[0]), float(u[2]))
+
+
+def places(count: int) -> list[tuple[float, float]]:
+    """Return outer and inner angle of each of so many positions.
+
+    A direction is turned upwards in two ways, (x, y) and (180° - x, y + 180°): the case is then turned by half a turn
+    about the vertical, and the level Earth rate in it has the other sign.  24 and 36 positions are 12 and 18 directions
+    in both.
+    """
+    once = [angles_of(d) for d in directions(BOTH_WAYS.get(count, count))]
+    if count not in BOTH_WAYS:
+        return once
+    return [*once, *((math.pi - x, y + math.pi) for x, y in once)]
 
 
 @dataclass(frozen=True)

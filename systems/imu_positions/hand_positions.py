@@ -17,12 +17,14 @@ from gyrobench.record.record import Record
 
 from . import norms, turns
 from .budget import ImuSetup
-from .channels import AXES, CHANNELS, truth_of
+from .channels import AXES, CHANNELS
+from .compensation import truth_of
 from .norms import Triad
 from .turns import Turn
 
 COLUMNS = ("phase", "t_start", "t_end", *(f"mean_{c.name}" for c in CHANNELS))
 SAMPLES = tuple(f"imu.rate[{k}]" for k in (1, 2, 3))
+COMPENSATED = tuple(f"compensator.omega[{k}]" for k in (1, 2, 3))  # in their place, where there are any
 ROUNDS = 3  # of turns and heading
 LEAST_TURNS = 6  # two data each for nine unknowns
 GAP = 5.5  # steps between two samples from which on a turn is not integrated
@@ -45,10 +47,11 @@ class HandSetup(ImuSetup):
         for kind in "ag":
             unit = run.window_units.get(f"mean_{kind}x", "") if run.measured else ""
             counts += kind if unit == "1" else ""
-        there = all(n in record.channels for n in ("time", *SAMPLES))
+        names = COMPENSATED if COMPENSATED[0] in record.channels else SAMPLES
+        there = all(n in record.channels for n in ("time", *names))
         samples = None
         if there:
-            read = np.column_stack([np.asarray(record.channels[n], dtype=float) for n in SAMPLES])
+            read = np.column_stack([np.asarray(record.channels[n], dtype=float) for n in names])
             samples = np.asarray(record.channels["time"], dtype=float), read
         rest = frozenset(row.phase for row in run.plan if row.mode == "index")
         truth = None if run.measured else truth_of(run.parameters)

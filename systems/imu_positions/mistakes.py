@@ -19,6 +19,7 @@ from gyrobench.reduction.diagnosis import handling_candidates as common
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 
 from .channels import AXES, CHANNELS
+from .geometry import STILL
 
 SOUND = 0.25  # of the elements of a matrix, largest departure from the unit matrix that may be the instrument
 DEG = math.pi / 180.0
@@ -118,3 +119,33 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
     yield from common.wrong_hemisphere(record)
     yield from common.shifted(record, means, "the readings")
     yield from common.exchanged_rows(record, common.BOTH, "positions")
+    yield from forgotten(record)
+
+
+def forgotten(record: Record) -> Iterator[HandlingCandidate]:
+    """Yield each position at rest as one that was forgotten: the case stayed where it was, or all that follow were read
+    one position further on, and the last was not read.
+    """
+    w = record.windows
+    phase = np.asarray(w["phase"]).astype(int)
+    outer, inner = (np.abs(np.asarray(w[f"{n}_end"], dtype=float) - w[f"{n}_start"]) for n in ("outer", "inner"))
+    moved = {int(p) for p in phase[np.maximum(outer, inner) > STILL]}
+    still = [int(p) for p in dict.fromkeys(phase.tolist()) if p not in moved]
+    at = {p: {n: float(np.asarray(w[n])[phase == p][0]) for n in common.BOTH} for p in still}
+
+    def standing(places: dict[int, int]) -> dict[str, Array]:
+        out = {n: np.asarray(w[n], dtype=float).copy() for n in common.BOTH}
+        for p, source in places.items():
+            for n in common.BOTH:
+                out[n][phase == p] = at[source][n]
+        return out
+
+    for k, p in enumerate(still[1:], 1):
+        stayed = common.changed(record, **standing({p: still[k - 1]}))
+        yield HandlingCandidate(f"position {p} forgotten (the case stayed in position {still[k - 1]})", stayed)
+    for k, p in enumerate(still[:-1]):
+        columns = {**w, **standing(dict(zip(still[k:-1], still[k + 1 :], strict=True)))}
+        kept = phase != still[-1]
+        rows = {n: np.asarray(v)[kept] for n, v in columns.items()}
+        words = f"position {p} forgotten (from it on the next ones were read)"
+        yield HandlingCandidate(words, Record(rows, {}, record.run))

@@ -12,6 +12,7 @@ from gyrobench.system.visits import Visit, nearest_turn
 from . import geometry
 from .geometry import TURN
 
+INDEX_RATE, ACCELERATION = 0.5, 0.5  # rad/s, rad/s2
 CASE = "case"
 FACES = {CASE: ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}
 #: axis of the case -> axis of the table that turns it, and the inner angle at which it does
@@ -34,9 +35,14 @@ class Times:
         return self.rate > 0.0 and self.turns > 0
 
 
+def move_time(angle: float) -> float:
+    """Return the time of a move by this angle (rad), s."""
+    return angle / INDEX_RATE + INDEX_RATE / ACCELERATION if angle > 0.0 else 0.0
+
+
 def positions(count: int, dwell: float) -> list[Visit]:
     """Return the positions of the standard plan, angles in rad."""
-    return [Visit(geometry.angles_of(d), dwell) for d in geometry.directions(count)]
+    return [Visit(place, dwell) for place in geometry.places(count)]
 
 
 def plan(visits: Sequence[Visit], times: Times) -> Plan:

@@ -44,7 +44,8 @@ from gyrobench.units import DPH
 
 from . import geometry, mistakes, tables
 from .budget import GYRO_SCALE, ImuSetup, Kinematics
-from .channels import BY_NAME, CHANNELS, UG, overview, truth_of
+from .channels import BY_NAME, CHANNELS, UG, overview
+from .compensation import truth_of
 from .hand import UNKNOWN, HandReduction
 from .log import UP_DOWN
 from .updown import UpDownReduction
@@ -230,6 +231,10 @@ class Reduction(ChannelTests[ImuSetup]):
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
         return tables.tables(coefficients)
+
+    def result(self) -> DriftTestResult:
+        found = super().result()
+        return replace(found, tables=[*found.tables, tables.by_position(self.windows, self.kinematics.motion, found)])
 
 
 def _places(force: Array) -> Array:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SETTLE, SITE, type_b
-from gyrobench.system.families.table_test import TableTest, sampled
+from gyrobench.system.families.table_test import TableTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
-from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, parse_visits
 
-from . import geometry, norms, plans
+from . import geometry, instruments, norms, plans
 from .channels import CHANNELS
 from .hand import UNKNOWN
 from .measured import MEASURED
@@ -30,7 +31,22 @@ IMU = Socket(
         out("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
     ),
 )
-INDEX_RATE, ACCELERATION = [0.5, 0.5], [0.5, 0.5]  # rad/s, rad/s2
+COMPENSATOR = Socket(
+    "ImuCompensator",
+    "takes known errors off the readings of an inertial measurement unit",
+    (
+        inp("rate", "rad/s", "rates that the gyros x, y, z read", 3),
+        inp("f_read", "m/s2", "specific force that the accelerometers x, y, z read", 3),
+        out("omega", "rad/s", "inertial rate, axes of the case", 3),
+        out("f", "m/s2", "specific force, axes of the case", 3),
+    ),
+)
+#: noises of the accelerometers of the bench
+ACCELEROMETER_NOISES = tuple(
+    f"accelerometers.{n}"
+    for n in ("turn_on", "white", *(f"{a}_{m}" for a in "xyz" for m in ("flicker", "walk")),
+              *(f"white_{a}" for a in "xyz"))
+)  # fmt: skip
 
 
 class ImuPositions(TableTest):
@@ -44,6 +60,7 @@ class ImuPositions(TableTest):
     title = "Multi-position and rate test of an inertial measurement unit"
     spec = ("IMU-POSITIONS", "IMU-HAND", "IMU-UPDOWN")
     reduction = "reduction"
+    protocol = "design"
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
@@ -51,20 +68,23 @@ class ImuPositions(TableTest):
         "imu": Slot(IMU, "imu"),
         **{f"sampler_{c.name}": Slot("Sampler", "sampler") for c in CHANNELS},
     }
-    # every sampler averages one channel; the first brings the outer angle, the second the inner one
-    wires = "\n".join([
-        "site -> table: f=f_local omega=omega_local",
-        "sequencer -> table: mode=mode_x mode=mode_y target=target_x target_y face",
-        "table -> sequencer: angle_x_read=angle in_position",
-        "table -> imu: omega f",
-        *(sampled(f"sampler_{c.name}", f"table: angle_{'y' if k == 1 else 'x'}_read") for k, c in enumerate(CHANNELS)),
-        *(f"imu.{c.output}[{c.axis + 1}] -> sampler_{c.name}.x" for c in CHANNELS),
-    ])  # fmt: skip
+    wires = instruments.wires()
+    on_request: ClassVar[Mapping[str, OnRequest]] = {
+        instruments.ACCELEROMETERS: OnRequest(
+            {instruments.ACCELEROMETERS: Slot("Accelerometers", "accelerometer_mems")}, "",
+            channels=tuple(f"accelerometers.f_read[{k}]" for k in (1, 2, 3)),
+        ),
+        instruments.COMPENSATOR: OnRequest(
+            {instruments.COMPENSATOR: Slot(COMPENSATOR, "imu_compensator")}, "",
+            channels=tuple(f"compensator.{n}[{k}]" for n in ("omega", "f") for k in (1, 2, 3)),
+        ),
+    }  # fmt: skip
+    fitted: ClassVar[Mapping[str, tuple[str, str]]] = {"imu_compensator": (instruments.COMPENSATOR, "compensation")}
     options = (
         SITE
         | {
             "attitudes": Option("table", str, "table (read by it), unknown (gravity and turns), up_down (of a file)"),
-            "positions": Option(12, int, "directions of the case that point up: 6, 12, 18 or 26"),
+            "positions": Option(12, int, "positions: 6, 12, 18, 20, 24, 26 or 36"),
             "visits": Option("", str, "positions in place of these, '30deg 45deg 120s; ...': both angles, dwell"),
             "dwell": Option(60.0, "s", "averaging time in each position"),
             "windows": Option(4, int, "averages a position", 1, 100),
@@ -109,6 +129,16 @@ class ImuPositions(TableTest):
         """Every step where the turns between the positions are integrated."""
         return self.step if self["attitudes"] == UNKNOWN else 10.0
 
+    def request(self, slot: str) -> None:
+        """Add the slots asked for, and read what comes last: the compensator, accelerometers of their own, the unit."""
+        there = slot in self.slots
+        super().request(slot)
+        if slot in self.on_request and not there:
+            vars(self)["wires"] = instruments.wires(self.slots)
+        if slot == instruments.ACCELEROMETERS and not there:
+            more = (*self.noises, *ACCELEROMETER_NOISES), (*self.assumed, "accelerometers.mount")
+            vars(self).update(noises=more[0], assumed=more[1])
+
     def times(self) -> plans.Times:
         """Return dwells and turns.  Raises InvalidValueError."""
         axes = self["rate_axes"]
@@ -130,7 +160,11 @@ class ImuPositions(TableTest):
         return plans.plan(self.visits(), self.times())
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**super().parameters(parts), "table.index_rate": INDEX_RATE, "table.acceleration": ACCELERATION}
+        return {
+            **super().parameters(parts),
+            "table.index_rate": [plans.INDEX_RATE] * 2,
+            "table.acceleration": [plans.ACCELERATION] * 2,
+        }
 
     def check(self) -> list[str]:
         if self["attitudes"] not in ("table", UNKNOWN):

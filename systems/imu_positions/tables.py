@@ -9,20 +9,19 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.result import Coefficient, Table
+from gyrobench.result import Coefficient, DriftTestResult, Table
 from gyrobench.units import factor
+
+from .channels import CHANNELS, SCALES
+from .geometry import Motion
 
 AXES = "xyz"
 TRIADS = {"g": ("gyros", "rad/s"), "a": ("accelerometers", "m/s²")}
-SCALE = {
-    "ppm": 1e-6, "″": factor("arcsec"), "°/h": factor("deg/h"), "°/h/g": factor("deg/h"), "µg": factor("ug"),
-    "counts": 1.0, "counts/(rad/s)": 1.0, "counts/(m/s²)": 1.0,
-}  # fmt: skip
 
 
 def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
     """Return the corrections and the angles between the axes of each triad, as far as the record determines them."""
-    by_name = {c.name: c for c in coefficients if c.unit in SCALE}
+    by_name = {c.name: c for c in coefficients if c.unit in SCALES}
     corrections: list[list[Any]] = []
     angles: list[list[Any]] = []
     for kind, (words, unit) in TRIADS.items():
@@ -33,7 +32,7 @@ def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
         for i, a in enumerate(AXES):
             bias = by_name[f"b{kind}_{a}"]
             counts = bias.unit == "counts"
-            value = bias.estimate * SCALE[bias.unit]
+            value = bias.estimate * SCALES[bias.unit]
             corrections.append([words, a, *(float(x) for x in inverse[i]), value, "counts" if counts else unit])
         angles += _angles(kind, words, matrix, by_name)
     caption = (
@@ -49,6 +48,27 @@ def tables(coefficients: Sequence[Coefficient]) -> list[Table]:
     return out
 
 
+def by_position(windows: Mapping[str, Any], motion: Motion, found: DriftTestResult) -> Table:
+    """Return what is left of the mean reading of each instrument in each phase."""
+    phase = np.asarray(windows["phase"]).astype(int)
+    left = {s.label: (np.rint(s.x), np.asarray(s.residual)) for s in found.series}
+    rows: list[list[Any]] = []
+    for p in np.unique(phase):
+        k = int(np.flatnonzero(phase == p)[0])
+        turned = [math.degrees((end[k] - start[k]) / motion.length[k]) for start, end in (motion.outer, motion.inner)]
+        at = [math.degrees(start[k]) for start, _ in (motion.outer, motion.inner)]
+        rest = bool(motion.at_rest[k])
+        means = [
+            float(np.mean(r[x == p])) if np.any(x == p) else None
+            for x, r in (left[f"{c.name}: {c.words}"] for c in CHANNELS)
+        ]
+        rows.append([int(p), *(at if rest else [None, None]), 0.0 if rest else max(turned, key=abs), *means])
+    head = ["phase", "outer / °", "inner / °", "rate / (°/s)"]
+    head += [f"{c.name} / {'(°/h)' if c.gyro else 'µg'}" for c in CHANNELS]
+    caption = "Mean of the readings of a phase less the fit; one that stands out is a position that was mistaken"
+    return Table("imu.positions", "Residuals by position", caption, head, rows)
+
+
 def _matrix(kind: str, by_name: Mapping[str, Coefficient]) -> Array:
     """Return readings over inputs (3, 3), SI or counts."""
     matrix = np.eye(3)
@@ -56,11 +76,11 @@ def _matrix(kind: str, by_name: Mapping[str, Coefficient]) -> Array:
         scale, counts = by_name.get(f"S{kind}_{a}{a}"), by_name.get(f"k{kind}_{a}")
         for j, b in enumerate(AXES):
             if (c := by_name.get(f"S{kind}_{a}{b}")) is not None and i != j:
-                matrix[i, j] = c.estimate * SCALE[c.unit]
+                matrix[i, j] = c.estimate * SCALES[c.unit]
         if counts is not None:
             matrix[i] *= counts.estimate
         elif scale is not None:
-            matrix[i, i] += scale.estimate * SCALE[scale.unit]
+            matrix[i, i] += scale.estimate * SCALES[scale.unit]
     return matrix
 
 

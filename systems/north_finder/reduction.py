@@ -24,6 +24,7 @@ from scipy import special
 from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -364,7 +365,9 @@ def setup_of(record: Record) -> NorthFinderSetup:
         time=float(windows["t_end"][-1]) - (float(windows["t_start"][0]) if run.measured else 0.0),
         settle=float(o.get("settle", 0.0)),
         density=float(o.get("density", 0.0)) or float(run.parameters.get("gyro.white_y", 0.0)),
-        unbiased=run.type_b == "none" or not np.any(run.parameters.get("gyro.bias", 1.0)),
+        unbiased=run.type_b == "none" or (
+            not np.any(run.parameters.get("gyro.bias", 1.0)) and bias_is_all(run.parameters)
+        ),
     )  # fmt: skip
 
 
@@ -379,6 +382,6 @@ def _truth(run: RunDocument) -> dict[str, float] | None:
         return None
     site, p = Location.of(run), run.parameters
     truth = {"ψ": float(run.options["heading"]), "A": site.earth_rate * math.cos(site.latitude)}
-    if "gyro.bias" in p and not np.any(np.asarray(p.get("gyro.ramp", 0.0))):
+    if "gyro.bias" in p and bias_is_all(p) and not np.any(np.asarray(p.get("gyro.ramp", 0.0))):
         truth["b"] = float(np.asarray(p["gyro.bias"])[1])
     return truth

@@ -7,7 +7,7 @@ where the angles are gone over twice in opposite order; otherwise the drift is b
 a square wave: what changes slowly looks like S, and r takes most of it.  The float sees the table rate by the cosine of
 its angle, b' = (H/C) cos(b) alpha', so that its angle is gd(H/C alpha), the Gudermannian function: c = gd(g alpha)/g,
 g = H/C, which falls short of alpha by a sixth of the cube (6e-6 of 20 arcmin).  The line of Hu 1981, beside it, takes
-c = alpha.
+c = alpha.  The rotor of a two-degree-of-freedom gyro whose other axis is locked keeps its direction: c = alpha, g = 1.
 [TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
 
 Not modelled: drift that changes otherwise during the test is noise; an angle of the float at table angle 0.
@@ -24,6 +24,7 @@ import numpy as np
 from gyrobench import drift as drift_model
 from gyrobench import frames, units
 from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.drift import channels
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.fit_result import with_values
@@ -56,6 +57,7 @@ from gyrobench.reduction.toolkit import (
     truth_of,
     window_problems,
 )
+from gyrobench.system.families.servo_channel import own_name
 from gyrobench.units import ARCSEC, DPH
 
 from .levels import Levels
@@ -80,11 +82,12 @@ SHORT = (
 @dataclass(frozen=True)
 class PickoffSetup(Setup):
     """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_gain,
-    u_angle, u_voltage: relative.
+    u_angle, u_voltage: relative.  channel: of a two-degree-of-freedom gyro, x or y; its gain is 1.
     """
 
     gain: float
     drift: float
+    channel: str = ""
     earth_rate: float = frames.EARTH_RATE
     u_gain: float = 0.0
     u_angle: float = 0.0
@@ -95,8 +98,12 @@ class PickoffSetup(Setup):
     u_mount: float = 0.0
 
 
-def float_angle(angle: Array, gain: float) -> Array:
-    """Return what an angle of the case (rad) is to a free float of the gain H/C, over the gain: gd(gain angle)/gain."""
+def float_angle(angle: Array, gain: float, channel: str = "") -> Array:
+    """Return what an angle of the case (rad) is to a free float of the gain H/C, over the gain: gd(gain angle)/gain; to
+    the rotor of a two-degree-of-freedom gyro it is that angle.
+    """
+    if channel:
+        return angle
     out: Array = 2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain
     return out
 
@@ -125,7 +132,7 @@ class Reduction(DriftReduction[PickoffSetup]):
     def regression(self) -> Regression:
         t, dt = self.t, self.dt
         self.both = abs(float(np.corrcoef(self.angle, t)[0, 1])) < TOLD_APART
-        self.seen, self.centre = float_angle(self.angle, self.setup.gain), (t[0] + t[-1]) / 2.0
+        self.seen, self.centre = float_angle(self.angle, self.setup.gain, self.setup.channel), (t[0] + t[-1]) / 2.0
         # differences from reading to reading: the float's random drift adds up, so that the levels are not independent
         steps = (np.diff(self.seen) / dt)[:, None]
         middle = (t[1:] + t[:-1]) / 2.0 - self.centre
@@ -167,7 +174,7 @@ class Reduction(DriftReduction[PickoffSetup]):
             return found.error(dX=dX)
 
         def misread(n: int) -> Array:  # readings that are too large by sin n angle, and by cos n angle
-            wrong = (float_angle(angle + SMALL * f(n * angle), s.gain) for f in (np.sin, np.cos))
+            wrong = (float_angle(angle + SMALL * f(n * angle), s.gain, s.channel) for f in (np.sin, np.cos))
             return np.array([stretched(np.diff(w - self.seen) / self.dt / SMALL) for w in wrong])
 
         earth = found.error(slope * s.earth_rate)
@@ -207,11 +214,11 @@ class Reduction(DriftReduction[PickoffSetup]):
             method="Line through the pickoff voltage over the angle of the table, float free; slope from the "
             "differences of the readings [TEST-PICKOFF]",
             sources=["TEST-PICKOFF, PICKOFF; Hu 1981, appendix 1 of chapter 3", "GYRO-DYN-1; Hu 1981, eq. 2-50..2-56"],
-            equation=f"u = u_0 + S c(alpha){drifting}"
-            ', quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
+            equation=f"u = u_0 + S alpha{drifting}"
+            if self.setup.channel
+            else f'u = u_0 + S c(alpha){drifting}, quad c = g^(-1) "gd"(g alpha), quad S = K_"sg" g, quad g = H\\/C',
             conventions=[
-                "Table angle right-handed about the input axis; the float follows it with the gain H/C "
-                f"= {self.setup.gain:.9g}, so that S = K_sg H/C.",
+                self._follows(),
                 "The table axis is at right angles to the pole and sees no Earth rate.",
                 "The zero holds whatever angle the free float had taken before the test.",
                 *(["Drift in precession sign; a drifting float turns against it, u = −S ω_d t."] if self.both else []),
@@ -226,10 +233,23 @@ class Reduction(DriftReduction[PickoffSetup]):
             random="pickoff noise and random drift",
         )
 
+    def _follows(self) -> str:
+        """Return what the float or the rotor makes of the table angle."""
+        if c := self.setup.channel:
+            other = "y" if c == "x" else "x"
+            return (
+                f"Table angle right-handed about the {c} axis; the rotor keeps its direction, u_{c} is the angle of "
+                f"the case against it and S = K_sg. The {other} axis is locked by its rebalance loop."
+            )
+        return (
+            "Table angle right-handed about the input axis; the float follows it with the gain H/C "
+            f"= {self.setup.gain:.9g}, so that S = K_sg H/C."
+        )
+
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         """Return the result with zero, straightness and the readings."""
         dense = np.linspace(self.angle.min(), self.angle.max(), 61)
-        drawn = self.levels.series(dense, float_angle(dense, self.setup.gain))
+        drawn = self.levels.series(dense, float_angle(dense, self.setup.gain, self.setup.channel))
         return replace(with_values(result, self.levels.coefficients()), series=[drawn, *result.series])
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
@@ -248,39 +268,49 @@ reduce = Reduction.reduce
 def setup_of(record: Record) -> PickoffSetup:
     """Return the setup that the run.json of a record describes: options and the parameters of the gyro."""
     run, options = record.run, record.run.options
-    site = Location.of(run)
-    known = truth_of(run, ("H", "C", "K_sg"))
-    gain = float(options.get("gain") or 0.0)
+    site, channel = Location.of(run), str(options.get("channel", ""))
+    gain = 1.0 if channel else float(options.get("gain") or 0.0)
     truth: dict[str, float] | None = None
-    if known is not None and set(known) == {"H", "C", "K_sg"}:
-        own = known["H"] / known["C"]
+    own, K_sg = _of_gyro(run, channel)
+    if own and K_sg:
         gain = gain or own
-        truth = {"S": known["K_sg"] * own, "K_sg": known["K_sg"]}
-        static = truth_of(run, drift_model.NAMES)
+        truth = {"S": K_sg * own, "K_sg": K_sg}
+        static = channels.truth_in(run, channel)
         time = float(record.windows["t_end"][-1] - record.windows["t_start"][0])  # with the moves, unlike the plan's
-        if static is not None and not _random_drift_lasts(run, time):
+        if static is not None and not _random_drift_lasts(run, time, channel):
             # output axis on the pole, spin axis on east x pole: X = 0, Y = -g sin, Z = -g cos of the latitude
             xyz = np.array([0.0, -site.g * math.sin(site.latitude), -site.g * math.cos(site.latitude)])
             row = drift_model.regressors(xyz, tuple(static))
             truth["drift"] = float(sum(r * v for r, v in zip(row, static.values(), strict=True)))
     if not gain:
         raise ReductionError("gain H/C unknown: the gyro has no parameters H and C; give the option gain")
-    return PickoffSetup.of(
+    setup = PickoffSetup.of(
         run,
         gain=gain,
         drift=float(options["drift"]),
+        channel=channel,
         earth_rate=site.earth_rate,
         truth=truth,
         site={} if run.measured else site.shown(),
     )
+    return replace(setup, errors=channels.errors_in(setup.errors, channel))
 
 
-def _random_drift_lasts(run: RunDocument, time: float) -> bool:
+def _of_gyro(run: RunDocument, channel: str) -> tuple[float, float]:
+    """Return gain and pickoff gain (V/rad) of the simulated gyro; 0 where it does not tell them."""
+    K_sg = float(run.parameters.get(f"gyro.{own_name(channel, 'K_sg')}") or 0.0)
+    if channel:
+        return 1.0, K_sg
+    known = truth_of(run, ("H", "C")) or {}
+    return (known["H"] / known["C"] if len(known) == 2 else 0.0), K_sg
+
+
+def _random_drift_lasts(run: RunDocument, time: float, channel: str = "") -> bool:
     """True for a simulated gyro with random drift that is slower than any in the interval and not small beside its
     white noise: it is in the estimate, and the parameters are not its truth.
     """
-    noise = truth_of(run, ("turn_on", "markov", "markov_tau", "white")) or {}
-    lasts = noise.get("markov_tau", 0.0) > noise_model.LONGEST * time
-    flicker, walk = (float(run.parameters.get(f"gyro.{n}") or 0.0) for n in ("flicker", "walk"))
-    slow = math.hypot(noise.get("turn_on", 0.0), noise.get("markov", 0.0) * lasts, flicker, walk * math.sqrt(time))
-    return slow > NEGLIGIBLE * noise.get("white", 0.0) / math.sqrt(time)
+    names = ("turn_on", "markov", "markov_tau", "white", "flicker", "walk")
+    noise = {n: float(run.parameters.get(f"gyro.{own_name(channel, n)}") or 0.0) for n in names}
+    lasts = noise["markov_tau"] > noise_model.LONGEST * time
+    slow = math.hypot(noise["turn_on"], noise["markov"] * lasts, noise["flicker"], noise["walk"] * math.sqrt(time))
+    return slow > NEGLIGIBLE * noise["white"] / math.sqrt(time)

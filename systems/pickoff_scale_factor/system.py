@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
-from gyrobench.system.families.table_test import FACE, ON_TABLE, OpenLoopTest
+from gyrobench.system.families.servo_channel import CHANNEL, ChannelTest
+from gyrobench.system.families.table_test import FACE, OpenLoopTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
@@ -21,9 +22,10 @@ from .refusals import drift_problems, points_problems, range_problems
 TABLE = {"acceleration": 0.1, "index_rate": 0.1}  # of the table, if it does not say (rad/s2, rad/s)
 
 
-class PickoffScaleFactor(OpenLoopTest):
+class PickoffScaleFactor(ChannelTest, OpenLoopTest):
     """The gyro is open loop with its input axis along the table axis, at right angles to the pole.  The table steps
-    quickly through angles within the range of the pickoff; the slope of its voltage is the scale factor.
+    quickly through angles within the range of the pickoff; the slope of its voltage is the scale factor.  Of a
+    two-degree-of-freedom gyro a rebalance loop locks the other axis.
 
     [TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
     """
@@ -32,9 +34,11 @@ class PickoffScaleFactor(OpenLoopTest):
     spec = ("TEST-PICKOFF", "GYRO-DYN-1")
     reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
+    axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (
         SITE
         | CORRECTIONS
+        | CHANNEL
         | {
             "range": Option("20arcmin", "rad", "the table goes from -range to +range", 0.0),
             "points": Option(11, int, "angles", 2, 49),
@@ -78,7 +82,7 @@ class PickoffScaleFactor(OpenLoopTest):
                   dwell=self["dwell"], window=self["dwell"])
             for a in self.angles()
         ]  # fmt: skip
-        return Plan(phases, {FACE: ON_TABLE})
+        return Plan(phases, {FACE: self.face})
 
     def duration(self, acceleration: float = TABLE["acceleration"], index_rate: float = TABLE["index_rate"]) -> float:
         """Return the time from the first reading to the last with the ways between them, s."""
@@ -92,6 +96,8 @@ class PickoffScaleFactor(OpenLoopTest):
         problems = points_problems(self["points"]) + super().check()
         if not self["range"] > 0.0:
             problems.append("range = 0: the table does not move")
+        if self.channel and (self["gain"] or self["u_gain"]):
+            problems.append("gain, u_gain: of a floated gyro; the rotor of this one keeps its direction, its gain is 1")
         return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
@@ -99,8 +105,9 @@ class PickoffScaleFactor(OpenLoopTest):
         problems += frames.equatorial_problems(parameters.get("table.base", self.base()), self["latitude"])
         moves = {k: float(parameters.get(f"table.{k}", v)) for k, v in TABLE.items()}
         problems += drift_problems(self["drift"], self.duration(**moves), 2.0 * self["range"])
-        known = [parameters.get(f"gyro.{n}") for n in ("u_max", "K_sg", "H", "C")]
+        names = ("u_max", f"K_sg_{self.channel}") if self.channel else ("u_max", "K_sg", "H", "C")
+        known = [parameters.get(f"gyro.{n}") for n in names]
         if None not in known:
-            u_max, k_sg, h, c = (float(v) for v in known)  # type: ignore[arg-type]
+            u_max, k_sg, h, c = (*(float(v) for v in known), 1.0, 1.0)[:4]  # type: ignore[arg-type]
             problems += range_problems(self["range"], u_max / (k_sg * h / c))
         return problems

@@ -24,6 +24,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -236,14 +237,17 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
     locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
     band = float(p.get("gyro.dead_band", 0.0)) or locks
     out = {"threshold": band / math.sqrt(0.75)} if band else {}
-    if not any(p.get(f"gyro.{n}") for n in ("turn_on", "flicker_x", "walk_x")):  # which are part of the bias
-        out["b"] = float(np.ravel(p["gyro.bias"])[0])
-    if p.get("gyro.closed", 1.0) < 0.5:  # a sine of the rate
+    if "gyro.readout_mismatch" in p:  # a whole-angle gyro, whose drift goes round with the pattern
+        return None
+    seen = math.cos(float(np.ravel(p.get("gyro.phase_error", 0.0))[0]))  # of a vibrating gyro
+    if bias_is_all(p):
+        out["b"] = float(np.ravel(p["gyro.bias"])[0]) * seen
+    if p.get("gyro.closed", 1.0) < 0.5:  # fibre: a sine of the rate; vibrating: its modes
         return out
     out["h"] = float(p.get("gyro.hysteresis", 0.0))
     if not band:
         reset = float(p.get("gyro.reset_error", 0.0))
-        out["a"] = float(p.get("gyro.asymmetry", 0.0))
-        out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) / (1.0 - reset) - 1.0
+        out["a"] = float(p.get("gyro.asymmetry", 0.0)) * seen
+        out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) * seen / (1.0 - reset) - 1.0
         out["c"] = float(p.get("gyro.cubic", 0.0)) * float(run.options["full_scale"]) ** 2
     return out

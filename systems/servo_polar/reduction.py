@@ -124,7 +124,7 @@ class Reduction(HeldTest[PolarSetup]):
             raise ReductionError([*error.problems, advice]) from None
 
     def derived(self, found: Findings) -> Findings:
-        return self.model.report(found, self.reported)
+        return super().derived(self.model.report(found, self.reported))
 
     def _group(self, p: int) -> Group:
         """Return drift against table angle in the turns, against time in a dwell."""
@@ -159,13 +159,14 @@ class Reduction(HeldTest[PolarSetup]):
             ],
             equation=self.equation(model.names),
             conventions=(
-                *servo_regression.CONVENTIONS,
+                *servo_regression.conventions(s.channel),
                 "Harmonics: a cosine, b sine of θ; Hu 1981 has them the other way.",
             ),
             no_closed=self.no_closed,
             closed_caption="From the same windows; the formulas: harmonics of each mount, means of the dwells",
             tables=[
-                servo_regression.book_table(found, {n: model.words(n, book=True) for n in model.fitted}),
+                servo_regression.book_table(found, {n: model.words(n, book=True) for n in model.fitted}, s.channel),
+                *self.locked_tables(),
                 *self.turns.table(),
                 *self._turn_differences(found),
                 *self.composite_tables(self.statistics),
@@ -174,8 +175,8 @@ class Reduction(HeldTest[PolarSetup]):
             harmonics=self.turns.harmonics(self.fits),
             repeatability=self.turns.repeatability(),
             reasons=[
-                *(Reason("mounts.unseen", text) for text in refusals.unseen(s.route, s.mounts, s.terms)),
-                *drift_terms.left_out(s.truth, names, drift.NAMES, f"{s.terms}-term"),
+                *(Reason("mounts.unseen", t) for t in refusals.unseen(s.route, s.mounts, s.terms, s.channel)),
+                *self.named(drift_terms.left_out(s.truth, names, drift.NAMES, f"{s.terms}-term")),
             ],
         )
 

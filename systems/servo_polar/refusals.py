@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR, on_servo_table
-from gyrobench.reduction.drift import servo_regression
+from gyrobench.reduction.drift import channels, servo_regression
 from gyrobench.reduction.estimation import regression
 from gyrobench.reduction.setup.run_metadata import Location
+from gyrobench.system.families.servo_channel import own_name
 from gyrobench.units import DPH
 
 from .model import ROUTES, PolarModel
@@ -76,32 +77,39 @@ def option_problems(options: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def model_problems(parameters: Mapping[str, Any]) -> list[str]:
+def model_problems(parameters: Mapping[str, Any], channel: str = "") -> list[str]:
     """Return what the simulated gyro has and the model has not."""
-    square = parameters.get("gyro.D_OO", 0.0) / DPH
+    own = own_name(channel, "D_OO")
+    square = parameters.get(f"gyro.{own}", 0.0) / DPH
     if square:
+        others = channels.words("D_F, D_II and D_SS", channel)
         return [
-            f"gyro.D_OO = {square:g} °/h/g²: at constant |g| it cannot be told from D_F, D_II and D_SS, and the "
+            f"gyro.{own} = {square:g} °/h/g²: at constant |g| it cannot be told from {others}, and the "
             "model of Hu 1981 has no such term; set it to 0"
         ]
     return []
 
 
-def unseen(route: str, mounts: Sequence[str], which: int) -> list[str]:
-    """Return what the plan cannot see, said before the run."""
+def unseen(route: str, mounts: Sequence[str], which: int, channel: str = "") -> list[str]:
+    """Return what the plan cannot see, said before the run; channel: of a two-degree-of-freedom gyro."""
     found = []
+    F, II, SS = ("R", "K_zx", "K_xz") if not channel else (own_name(channel, n) for n in ("D_F", "D_II", "D_SS"))
     if which == 4:
-        found.append("Four terms: the other coefficients stay in the residuals and bias D_F (low grades only).")
+        constant = own_name(channel, "D_F")
+        found.append(f"Four terms: the other coefficients stay in the residuals and bias {constant} (low grades only).")
     model = PolarModel.of(route, mounts, which)
-    together = [model.words(n) for n in model.fitted if model.mixed[n]]
+    together = [channels.words(model.words(n), channel) for n in model.fitted if model.mixed[n]]
     if len(set(mounts)) == 1:
         found.append(
             f"One mount ({mounts[0]}) tells only combinations: {'; '.join(together)}. Both mounts separate them."
         )
     elif together:
-        found.append("R and K_zx appear only as R + γ² sin²φ K_zx: two dwells with the input axis east separate them.")
+        found.append(
+            f"{F} and {II} appear only as {F} + γ² sin²φ {II}: two dwells with the input axis east separate them."
+        )
     elif model.equal:
-        found.append("R and K_zx are told apart by assuming K_zx = K_xz; an error of that goes into both.")
+        same = "−" if channel else ""  # K_zx = -D_II, K_xz = +D_SS
+        found.append(f"{F} and {II} are told apart by assuming {II} = {same}{SS}; an error of that goes into both.")
     return found
 
 

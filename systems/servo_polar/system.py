@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES
+from gyrobench.system.families.servo_channel import own_name
 from gyrobench.system.families.servo_test import Hold, ServoTest
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option
@@ -30,6 +31,7 @@ class ServoPolar(ServoTest):
     spec = ("TEST-SERVO-POLAR", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
     reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
+    axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (
         ServoTest.options
         | {
@@ -79,7 +81,8 @@ class ServoPolar(ServoTest):
         found = super().parameters(parts)
         if live.SLOT not in self.slots:
             return found
-        told = {"tau": "gyro.markov_tau", "rms": "gyro.markov", "white": "gyro.white"}
+        told = {"tau": "markov_tau", "rms": "markov", "white": "white"}
+        told = {name: f"gyro.{own_name(self.channel, own)}" for name, own in told.items()}
         found |= {f"{live.SLOT}.{name}?": parts[source] for name, source in told.items() if source in parts}
         if "table.quantum" in parts:
             found[f"{live.SLOT}.sigma?"] = float(parts["table.quantum"]) / math.sqrt(12.0)
@@ -93,9 +96,9 @@ class ServoPolar(ServoTest):
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         from .refusals import model_problems
 
-        return super().check_parameters(parameters) + model_problems(parameters)
+        return super().check_parameters(parameters) + model_problems(parameters, self.channel)
 
     def warnings(self) -> list[str]:
         from .refusals import unseen
 
-        return unseen(self["route"], self.mounts(), self["terms"])
+        return unseen(self["route"], self.mounts(), self["terms"], self.channel)

@@ -18,18 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.drift.channels import BOOK
 
-#: the coefficients of Hu 1981 of a line -> ours, and its sign against ours  [CROSS-MAP]
-BOOK = {
-    "x": {
-        "R_x": ("Dx_0", -1), "U_z": ("Dx_x", -1), "U_x": ("Dx_z", 1), "K_zz − K_xx": ("Dx_xz", -1),
-        "K_zx": ("Dx_xx", -1), "K_xz": ("Dx_zz", 1), "K_zy": ("Dx_xy", -1), "K_xy": ("Dx_yz", 1),
-    },
-    "y": {
-        "R_y": ("Dy_0", 1), "U_z": ("Dy_y", -1), "U_y": ("Dy_z", 1), "K_yy − K_zz": ("Dy_yz", 1),
-        "K_zy": ("Dy_yy", -1), "K_yz": ("Dy_zz", 1), "K_zx": ("Dy_xy", -1), "K_yx": ("Dy_xz", 1),
-    },
-}  # fmt: skip
 #: the ninth, empirical term of each line, which Hu 1981 leaves out: ours
 EMPIRICAL = {"x": "Dx_y", "y": "Dy_x"}
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from gyrobench import drift
 from gyrobench.reduction.diagnosis import handling_candidates
-from gyrobench.reduction.drift import drift_terms, servo_regression
+from gyrobench.reduction.drift import channels, drift_terms, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
@@ -242,13 +242,7 @@ def _book_table(found: Mapping[str, Findings]) -> Table:
     """Return the estimates in the names of Hu 1981: torque sign in the first line of 3-95, precession sign in the
     second.
     """
-    rows: list[list[Any]] = []
-    for c, fit in found.items():
-        at = {q.name: k for k, q in enumerate(fit.quantities)}
-        for symbol, (ours, sign) in closed.BOOK[c].items():
-            q, k = fit.quantities[at[ours]], at[ours]
-            value, u = float(fit.value[k]) / q.scale, float(fit.u[k]) / q.scale
-            rows.append([f"{symbol}, {c}", sign * value, u, q.unit, ours, "+" if sign > 0 else "−"])
+    rows = [[f"{row[0]}, {c}", *row[1:]] for c, fit in found.items() for row in channels.book_rows(fit, c)]
     caption = "Of the lines −α̇ (x) and β̇ (y) of 3-95; last column: sign against this report"
     head = ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"]
     return Table("notation.book", "Notation of Hu 1981", caption, head, rows)
@@ -260,7 +254,7 @@ def _shared_table(found: Mapping[str, Findings]) -> Table:
     for symbol in ("K_zx", "K_zy"):
         pair = []
         for c, fit in found.items():
-            ours, sign = closed.BOOK[c][symbol]
+            ours, sign = channels.BOOK[c][symbol]
             k = [q.name for q in fit.quantities].index(ours)
             pair.append((sign * float(fit.value[k]) / DPH, float(fit.u[k]) / DPH))
         (a, ua), (b, ub) = pair

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.servo_channel import FREE
 from gyrobench.system.families.servo_test import CAPTURE_RATE, INDEX_RATE, stand_parameters
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
@@ -21,8 +22,6 @@ from .geometry import MOUNTS
 FACE = "gyro x, y, z along X, Y, Z at 0, 0"
 #: (Y, Z, X) in (X, Y, Z), (Z, X, Y) in (Y, Z, X) and (x, y, z) in (Z, X, Y): the same matrix three times
 NEXT = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-#: what a servo table is told of a free rotor, which neither lags nor pulls at the table: H/C = 1, hardly any inertia
-FREE = {"H_g": 1e-6, "C_g": 1e-6, "J_g": 1e-12, "network": 1}
 
 COUPLING = Socket(
     "AxisCoupling",

@@ -103,15 +103,16 @@ class Reduction(HeldTest[HeldSetup]):
                 "RED-RATE (shared readings), RED-GLS; Hu 1981, eq. 4-1..4-11, 4-79..4-88, corrected by ER1, ER23",
             ],
             equation=self.equation(self.seen.names),
-            conventions=servo_regression.CONVENTIONS,
+            conventions=servo_regression.conventions(self.setup.channel),
             no_closed="" if self.book else formulas,
             closed_caption="From the same windows; the formulas take every attitude as at angle 0",
             tables=[
                 self._attitudes_table(found.est.residual),
-                servo_regression.book_table(found, self._book_words()),
+                servo_regression.book_table(found, self._book_words(), self.setup.channel),
+                *self.locked_tables(),
                 *self.composite_tables(self.composites(self.y)),
             ],
-            reasons=self._unseen(),
+            reasons=self.named(self._unseen()),
         )
 
     def _unseen(self) -> list[Reason]:

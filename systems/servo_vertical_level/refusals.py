@@ -74,7 +74,7 @@ def seen(attitudes: Sequence[str]) -> Seen:
 
 
 def unseen(attitudes: Sequence[str]) -> list[str]:
-    """Return what cannot be seen, said before the run."""
+    """Return what cannot be seen, said before the run, in the names of a floated gyro."""
     known = [n for n in attitudes if n in SERVO_ATTITUDES]
     if not known:
         return []

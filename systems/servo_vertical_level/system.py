@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench.attitudes import LEVEL, SERVO_ATTITUDES, VERTICAL
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES
@@ -37,6 +37,7 @@ class ServoVerticalLevel(ServoTest):
     spec = ("TEST-SERVO-VERT", "TEST-SERVO-LEVEL", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
     reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
+    axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (
         ServoTest.options
         | CORRECTIONS
@@ -94,6 +95,8 @@ class ServoVerticalLevel(ServoTest):
         return super().check_parameters(parameters) + (problems if names else [])
 
     def warnings(self) -> list[str]:
+        from gyrobench.reduction.drift.channels import words
+
         from .refusals import unseen
 
-        return unseen(self.attitudes())
+        return [words(text, self.channel) for text in unseen(self.attitudes())]

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench.system.families.option_groups import VERTICAL_AXIS
-from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
+from gyrobench.system.families.servo_channel import gyro_on_table
+from gyrobench.system.families.servo_test import GYRO_SERVO
 from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TABLE
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gyrobench import units
+from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.toolkit import (
     Account,
@@ -39,9 +40,9 @@ from gyrobench.reduction.toolkit import (
     window_problems,
 )
 from gyrobench.result import BudgetLine
-from gyrobench.units import ARCSEC, DPH
+from gyrobench.units import ARCSEC, DPH, G0
 
-from . import budgets, set_up
+from . import budgets, isolation, set_up
 from .budgets import ERU, ErrorLine
 
 NEEDED = 0.1 * 1e-8 * ERU  # drift rate that a cause may have
@@ -91,6 +92,13 @@ class Reduction(DriftReduction[EnvironmentSetup]):
         k = number(run, "k", "gyro.k", "torquer scale factor")
         truth = None if run.measured else true_values(run.parameters, Location.of(run).g)
         return EnvironmentSetup.of(run, k=k, options=run.options, seed=run.seed or 1, truth=truth)
+
+    @classmethod
+    def from_record(cls, record: Record) -> DriftTestResult:
+        """Return what a record says, with what a foundation leaves where the table stands on one."""
+        result = super().from_record(record)
+        left = isolation.tables(record, G0 * Location.of(record.run).g)
+        return replace(result, tables=[*result.tables, *left]) if left else result
 
     def problems(self) -> list[str]:
         problems = window_problems(self.windows)

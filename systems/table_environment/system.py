@@ -13,8 +13,9 @@ from gyrobench.system.families.table_test import sampled, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import OnRequest, Option, Slot, Windows
+from gyrobench.units import ARCSEC, G0
 
-from . import budgets
+from . import budgets, isolation
 from .budgets import ERU
 
 ATTITUDE = "E U"  # input axis east, output axis up, spin axis south
@@ -31,6 +32,24 @@ SENSOR = {
 }
 
 
+#: wires that lead past a foundation, and those through it
+DIRECT = """
+    site -> table: f=f_local omega=omega_local
+    site -> table: alpha=alpha_local
+    site.omega[1] -> sampler_rate.x
+    site.tilt[1] -> sampler_east.x
+    site.tilt[2] -> sampler_north.x
+"""
+ABOVE = """
+    site -> foundation: g a tilt tilt_rate tilt_acceleration omega alpha
+    foundation -> table: f_block=f_local omega_block=omega_local alpha_block=alpha_local
+    foundation.omega_block[1] -> sampler_rate.x
+    foundation.tilt_block[1] -> sampler_east.x
+    foundation.tilt_block[2] -> sampler_north.x
+"""
+MOVED = tuple(f"{name}[{k}]" for name in ("site.a", "foundation.a_block", "foundation.tilt_block") for k in (1, 2, 3))
+
+
 class TableEnvironment(RebalanceTest):
     """A gyro in torque rebalance stands still on a table whose ground tilts slowly, whose room warms and in whose coil
     a field swings; the drift is resolved into what each of them does.  Beside it the budgets of surroundings, alignment
@@ -40,9 +59,11 @@ class TableEnvironment(RebalanceTest):
     """
 
     title = "Surroundings of a table"
-    spec = ("ENV-DISTURBANCE", "ALIGN-ERRORS", "ERROR-BUDGET")
+    spec = ("ENV-DISTURBANCE", "ENV-FOUNDATION", "ALIGN-ERRORS", "ERROR-BUDGET")
     reduction = "reduction"
-    on_request: ClassVar[Mapping[str, OnRequest]] = {}  # the slot is always there
+    on_request: ClassVar[Mapping[str, OnRequest]] = {
+        "foundation": OnRequest({"foundation": Slot("Foundation", "foundation_passive")}, ABOVE, {}, MOVED, DIRECT)
+    }
     slots = {
         **RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog"),
         "site": Slot("Site", "ground_motion"),
@@ -154,7 +175,27 @@ class TableEnvironment(RebalanceTest):
         return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
-        problems = super().check_parameters(parameters)
+        problems = super().check_parameters(parameters) + self._travel_problems(parameters)
         if not (self["k"] or parameters.get("gyro.k")):
             problems.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
         return problems
+
+    def _travel_problems(self, parameters: Mapping[str, Any]) -> list[str]:
+        """Return that the tilts of this test would drive an active foundation to its stops, and what would not."""
+        p = isolation.parameters(parameters)
+        if not {"corner", "travel"} <= p.keys():
+            return []
+        tilts = zip((3.0, 4.3), ("[1,1]", "[2,2]"), strict=True)
+        way = max(
+            abs(float(parameters.get(f"site.tilt_amplitude{k}", self["tilting"])))
+            * float(abs(isolation.follows(n / self["dwell"], p, G0)))
+            for n, k in tilts
+        )
+        if 2.0 * way <= p["travel"]:
+            return []
+        most = math.floor(self["tilting"] / ARCSEC * p["travel"] / (2.0 * way))
+        return [
+            f"tilting = {self['tilting'] / ARCSEC:.3g}″: the servo of an active foundation follows a tilt of the "
+            f"ground, here by {way:.2g} m and twice that at the start, beyond its travel of {p['travel']:g} m; "
+            f"give --set tilting={most}arcsec, or a longer dwell"
+        ]

@@ -8,7 +8,7 @@ from typing import Any
 
 from gyrobench.system.families.loop_test import LoopTest, data_sheet, hold, torquer
 from gyrobench.system.families.option_groups import VERTICAL_AXIS
-from gyrobench.system.families.servo_test import gyro_on_table
+from gyrobench.system.families.servo_channel import gyro_on_table
 from gyrobench.system.families.table_test import SDF_NOISES
 from gyrobench.system.loop_plan import LoopPhase, sweep
 from gyrobench.system.part_values import PartValues

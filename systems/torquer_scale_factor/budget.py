@@ -13,12 +13,15 @@ Not in the budget: e in the polynomial of the drift over the angle, second order
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.drift.channels import errors_in
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.sources import (
@@ -40,9 +43,10 @@ ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
 @dataclass(frozen=True, kw_only=True)
 class TorquerSetup(Setup):
     """u_current, u_time: relative; of a table of rates these two count alone.  truth: printed name -> value in the
-    printed unit.
+    printed unit.  channel: along the table axis, of a two-degree-of-freedom gyro.
     """
 
+    channel: str = ""
     earth_rate: float = frames.EARTH_RATE
     u_current: float = 0.0
     u_zero: float = 0.0
@@ -51,6 +55,11 @@ class TorquerSetup(Setup):
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_time: float = 0.0
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        made = super().of(run, channel=str(run.options.get("channel", "")), **own)
+        return replace(made, errors=errors_in(made.errors, made.channel))
 
 
 def effects(found: Findings, currents: int, start: Array, end: Array, setup: TorquerSetup) -> Sequence[Effect]:

@@ -43,6 +43,7 @@ from gyrobench.reduction.toolkit import (
     told,
 )
 from gyrobench.result import BudgetLine, Series, Test
+from gyrobench.system.families.servo_channel import OTHER, own_name
 
 from . import marks, row_checks
 from .budget import AMMETER, RANGES, TorquerSetup
@@ -96,7 +97,7 @@ class Reduction:
         if wrong := row_checks.problems(rows):
             raise ReductionError(wrong)
         currents = np.asarray(rows["current"])
-        truth = truth_of(run.parameters, currents)
+        truth = truth_of(run.parameters, currents, str(run.options.get("channel", "")))
         setup = TorquerSetup.of(run, earth_rate=site.earth_rate, truth=truth, site=site.shown())
         return cls(rows, setup, precession(record.windows, marks.senses(run.plan), currents, setup)).result()
 
@@ -156,6 +157,7 @@ class Reduction:
             conventions=[
                 "Positive current makes positive precession: K = ω/i (A3-5 of Hu 1981 prints a minus that its own "
                 "table does not have).",
+                *self._torquer(),
                 "Currents and rates are magnitudes; the drift is positive when the positive sense is the faster one.",
                 noise
                 if self.fit is None
@@ -185,6 +187,16 @@ class Reduction:
             simulated=self.setup.truth is not None,
             site=self.setup.shown,
         )
+
+    def _torquer(self) -> list[str]:
+        """Return which torquer of a two-degree-of-freedom gyro was measured."""
+        if not (c := self.setup.channel):
+            return []
+        other = OTHER[c]
+        return [
+            f"The torquer about {other}, which precesses the gyro about {c}, the table axis; the {other} axis is "
+            f"locked by its rebalance loop through the torquer about {c}."
+        ]
 
     def _series(self) -> Series:
         dense, e = np.linspace(0.0, 1.0, 101), self.e
@@ -261,14 +273,15 @@ class Reduction:
 reduce = Reduction.reduce
 
 
-def truth_of(parameters: Mapping[str, Any], currents: Array) -> dict[str, float] | None:
+def truth_of(parameters: Mapping[str, Any], currents: Array, channel: str = "") -> dict[str, float] | None:
     """Return what a simulated torquer k i (1 + k2 i + k3 i2) makes of the reported values.
 
     k2 is even and goes into the half difference.  The drift has no one value: it changes with the range.
     """
-    if "gyro.k" not in parameters:
+    own = [f"gyro.{own_name(channel, n)}" for n in ("k", "k3")]
+    if own[0] not in parameters:
         return None
-    k, k3, error = (float(parameters.get(n, 0.0)) for n in ("gyro.k", "gyro.k3", "source.error"))
+    k, k3, error = (float(parameters.get(n, 0.0)) for n in (*own, "source.error"))
     k, full = k / (1.0 + error), float(currents.max()) / (1.0 + error)
     cubic = k3 * full**2
     truth = {

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
-from gyrobench.system.families.servo_test import GYRO_SERVO, gyro_on_table
-from gyrobench.system.families.table_test import FACE, ON_TABLE, SDF_NOISES, TableTest, on_table
+from gyrobench.system.families.servo_channel import CHANNEL, ChannelTest, gyro_on_table
+from gyrobench.system.families.servo_test import GYRO_SERVO
+from gyrobench.system.families.table_test import FACE, SDF_NOISES, TableTest, on_table
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot
@@ -20,9 +21,10 @@ CAPTURE = "capture, no current"
 STEADY = 1.0  # s after the current has changed
 
 
-class TorquerScaleFactor(TableTest):
+class TorquerScaleFactor(ChannelTest, TableTest):
     """The gyro holds a servo table on the axis its torquer precesses about; the table rate over the current is the
-    scale factor, its spread over the currents the linearity.
+    scale factor, its spread over the currents the linearity.  Of a two-degree-of-freedom gyro a rebalance loop locks
+    the axis across the table's.
 
     [TEST-TORQUER; Hu 1981, eq. A3-1..A3-6]
     """
@@ -34,6 +36,7 @@ class TorquerScaleFactor(TableTest):
         table=Slot("ServoTable", "table_servo"), source=Slot("CurrentSource", "current_source"),
         gyro=Slot("SdfGyro", "floated_gyro"),
     )  # fmt: skip
+    axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     # in servo mode the table has no target: the sequencer's target is the current
     wires = f"""
         {TableTest.wires}
@@ -46,6 +49,7 @@ class TorquerScaleFactor(TableTest):
     options = (
         SITE
         | CORRECTIONS
+        | CHANNEL
         | {
             "currents": Option("1 5 10 20 40 60 80 100", str, "magnitudes of the currents, mA"),
             "range": Option("10deg", "rad", "angle turned with each current up to 20 mA", 0.0),
@@ -91,13 +95,13 @@ class TorquerScaleFactor(TableTest):
                     Phase(label, "servo", FACE, i, settle=ramp + STEADY, dwell=dwell, travel=way, window=dwell / n)
                 )
                 before = i
-        return Plan(phases, {FACE: ON_TABLE})
+        return Plan(phases, {FACE: self.face})
 
     def base(self) -> Array:
         return frames.equatorial_base(self["latitude"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {**super().parameters(parts), **gyro_on_table(parts)}
+        return {**super().parameters(parts), **gyro_on_table(parts, self.channel)}
 
     def check(self) -> list[str]:
         try:

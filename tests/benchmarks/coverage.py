@@ -107,6 +107,12 @@ def two_channels(rng: Rng, terms: int = 9) -> Values:
     return found
 
 
+def on_springs(rng: Rng) -> Values:
+    """Two channels whose rotor is on springs, and pickoffs that are off null."""
+    null = {f"gyro.null_{a}": rng.uniform(-10.0, 10.0) * ARCSEC for a in "xy"}
+    return {**two_channels(rng), **null, "gyro.K_q": rng.uniform(-0.03, 0.03), "gyro.K_phi": rng.uniform(0.0, 0.03)}
+
+
 def simple_channels(rng: Rng) -> Values:
     """The four terms a channel of the simple model; the others are 0."""
     return {n: v if n[6:] in SIMPLE or ".k" in n or "terms" in n else 0.0 for n, v in two_channels(rng).items()}
@@ -165,6 +171,10 @@ def of_accelerometer(n: Noise, _: Values) -> Values:
 def of_encoder(n: Noise, values: Values) -> Values:
     """Errors of the angle readings are quanta."""
     return {**of_gyro(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
+
+
+def of_encoder_2dof(n: Noise, values: Values) -> Values:
+    return {**of_two_channels(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
 
 
 def of_two_encoders(n: Noise, values: Values) -> Values:
@@ -247,6 +257,16 @@ CASES = {
          "settle": 2.0},
         floated, latitude(12.0, 78.0), of_encoder,
     ),
+    "servo_polar, y axis": Case(
+        "servo_polar",
+        {"channel": "y", "site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "lock.i_max": 10.0,
+         "time": 172.4, "window": 4.8, "dwell": 48.0, "settle": 2.0},
+        two_channels, latitude(12.0, 78.0), of_encoder_2dof,
+    ),
+    "position_sensitivity": Case(
+        "position_sensitivity", {"dwell": 10.0, "settle": 1.0}, on_springs, latitude(0.0, 85.0), of_two_channels,
+        attitude=True,
+    ),
     "servo_two_axis": Case(
         "servo_two_axis",
         {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage_x.i_max": 10.0, "cage_y.i_max": 10.0, "time": 172.8,
@@ -304,7 +324,10 @@ class Count:
 def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> list[Values]:
     """What each run of a case is given: values and a seed."""
     rng = np.random.default_rng(seed)
-    with Session(case.system) as session:
+    system = load_system(case.system)
+    if "channel" in case.values:  # it decides which slots there are
+        system.set("channel", case.values["channel"])
+    with Session(system) as session:
         probe = case.drawn(rng)
         with seen_windows() as seen:
             load_system(case.system).with_values(probe).reduce(session.run(probe, seed=1))

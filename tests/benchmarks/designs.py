@@ -32,6 +32,7 @@ CASES: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
     "single-axis tumble, D_I and D_F": ("tumble_single_axis", {"D_I": "0.001deg/h/g", "D_F": "0.002deg/h"}, {}),
     "north finder": ("north_finder", {"ψ": "0.2deg"}, {}),
     "four accelerometers": ("accelerometer_four", {}, {}),
+    "IMU, bias and scale factors": ("imu_positions", {"bg_x": "0.05deg/h", "Sa_xx": "20ppm", "Sg_zz": "5ppm"}, {}),
     "eight positions, scale factors": ("eight_position", {"k_x": "0.002deg/h/mA", "k_y": "0.002deg/h/mA"}, {}),
     "eight positions, all": ("eight_position", {}, {}),
     "two-axis servo, all": ("servo_two_axis", {}, DAY),

@@ -139,11 +139,11 @@ def main() -> int:
             for c in result.coefficients:
                 if c.name not in truth:
                     continue
-                low, high = (x * tables.SCALE[c.unit] for x in c.interval)
+                low, high = (x * tables.SCALES[c.unit] for x in c.interval)
                 kind = c.name.split("_")[0]
                 hits.setdefault(kind, []).append(low <= truth[c.name] <= high)
                 z.setdefault(kind, []).append(
-                    (c.estimate * tables.SCALE[c.unit] - truth[c.name]) / c.u / tables.SCALE[c.unit]
+                    (c.estimate * tables.SCALES[c.unit] - truth[c.name]) / c.u / tables.SCALES[c.unit]
                 )
         print(f"\n{way}: {given.runs} runs in {time.monotonic() - began:.0f} s")
         for kind, found in hits.items():

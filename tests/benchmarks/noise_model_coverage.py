@@ -1,8 +1,9 @@
 """Coverage of the noise model on simulated records: intervals of N, Gauss-Markov processes, K, Q; absent terms stated.
 
-    python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing]
+    python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing] [part of a name]
 
-Truths are white noise through a low-pass or a mean, up to three Gauss-Markov processes, K, Q; unit time is a sample.
+Truths are white noise through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that swing (rms,
+angular frequency, decay of each); unit time is a sample.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 """
@@ -26,7 +27,12 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "one process": {"N": 1.0, "markov": [(0.0444, 270.0)]},
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
+    "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
 }
+
+
+FINE = 8  # steps of an oscillator to a sample
+KINDS = ("wild", "step", "line", "missing")
 
 
 def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Generator) -> Array:
@@ -42,6 +48,11 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         a = math.exp(-1.0 / tau)
         w = sigma * math.sqrt(1.0 - a * a) * rng.normal(size=n)
         x = x + lfilter([1.0], [1.0, -a], w, zi=[a * sigma * rng.normal()])[0]
+    for rms, omega, tau in truth.get("swings", []):  # of an angle
+        r = math.exp(-1.0 / (FINE * tau))
+        noise = rng.normal(size=FINE * (n + 1 + round(9 * tau)))
+        angle = lfilter([1.0], [1.0, -2.0 * r * math.cos(omega / FINE), r * r], noise)[::FINE]
+        x = x + np.diff(rms / angle.std() * angle[-n - 1 :])
     x = x + np.cumsum(truth.get("K", 0.0) * rng.normal(size=n)) + np.diff(truth.get("Q", 0.0) * rng.normal(size=n + 1))
     sd = math.sqrt(0.5 * float(np.mean(np.diff(x) ** 2)))
     if "wild" in kinds:
@@ -55,8 +66,10 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
     return np.asarray(x)
 
 
-def main(records: int, n: int, kinds: list[str]) -> None:
+def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
     for name, truth in TRUTHS.items():
+        if only not in name:
+            continue
         inside, stated = defaultdict(list), defaultdict(list)
         agreed, began = [], time.process_time()
         for i in range(records):
@@ -81,4 +94,5 @@ def main(records: int, n: int, kinds: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(float(sys.argv[2])), sys.argv[3:])
+    main(int(sys.argv[1]), int(float(sys.argv[2])), [k for k in sys.argv[3:] if k in KINDS],
+         " ".join(k for k in sys.argv[3:] if k not in KINDS))  # fmt: skip

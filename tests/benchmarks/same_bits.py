@@ -40,7 +40,8 @@ def main() -> int:
         wrong += bool(off)
         print(f"{name}: {'differs: ' + ', '.join(off) if off else 'the same in ' + ' and '.join(places)}", flush=True)
     if write:
-        TABLE.write_text(table({**(expected() if TABLE.exists() and len(names) < len(systems()) else {}), **found}))
+        known = {**(expected() if TABLE.exists() else {}), **found}
+        TABLE.write_text(table({name: known[name] for name in systems() if name in known}))
     return wrong
 
 

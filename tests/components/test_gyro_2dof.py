@@ -401,3 +401,36 @@ def test_term_sets(channel, second):
 def test_refuses(parameters, message):
     with pytest.raises(ComponentError, match=message):
         started(**parameters)
+
+
+# ------------------------------------------------------------------------------------- springs [GYRO-POSITION]
+@pytest.mark.parametrize("K_q, K_phi", [(0.4, 0.0), (0.0, 0.3), (-0.7, 0.2)])
+def test_a_rotor_on_springs_against_the_closed_form(K_q, K_phi):
+    """z = psi_x + j psi_y:  z' = -(K_phi + j K_q) z - omega,  from rest  z = -omega (1 - exp(-kappa t))/kappa."""
+    w, kappa = complex(2e-4, -3e-4), complex(K_phi, K_q)
+    part = started(**STILL, K_q=K_q, K_phi=K_phi, omega=[w.real, w.imag, 0.0])
+    for k in range(1500):
+        part.do_step(k * H, H)
+    z = -w * (1.0 - np.exp(-kappa * 1.5)) / kappa
+    assert complex(part.psi_x, part.psi_y) == pytest.approx(z, rel=1e-9)
+
+
+@pytest.mark.parametrize("nutation", [{}, {"J_x": 1e-4, "J_y": 2e-4, "C_x": 0.02, "C_y": 0.03, "step": 1e-4}])
+def test_a_null_of_the_pickoff_makes_a_drift_of_the_springs(nutation):
+    """Hu 1981, eq. 5-68 in a loop with integral: the rotor stands at the null of its pickoff and drifts by it.
+
+    k_y i_y = omega_x - (K_q null_y - K_phi null_x),    k_x i_x = omega_y - (-K_q null_x - K_phi null_y)
+    """
+    null, K_q, K_phi, w = (3e-5, -5e-5), 0.02, 0.01, (1e-4, -4e-5)
+    values = {**STILL, "K_q": K_q, "K_phi": K_phi, "null_x": null[0], "null_y": null[1], **nutation}
+    gyro = settled(3.0, **values, omega=[*w, 0.0])
+    assert gyro.psi_x == pytest.approx(null[0], rel=1e-9) and gyro.psi_y == pytest.approx(null[1], rel=1e-9)
+    about_x = 17.180e3 * DEG_H * gyro.i_y  # the torquer about y precesses about x
+    about_y = 17.227e3 * DEG_H * gyro.i_x
+    assert about_x == pytest.approx(w[0] - (K_q * null[1] - K_phi * null[0]), rel=1e-9)
+    assert about_y == pytest.approx(w[1] - (-K_q * null[0] - K_phi * null[1]), rel=1e-9)
+
+
+def test_springs_are_of_small_angles():
+    with pytest.raises(ComponentError, match="K_q and K_phi are of small angles"):
+        started(plain=True, **STILL, K_q=0.1, full=1, J_x=1e-4, J_y=1e-4)

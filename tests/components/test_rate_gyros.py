@@ -1,5 +1,5 @@
-"""gyro_fog, gyro_laser, gyro_mems: closed forms and limits against derivations and integrations that use no code of the
-parts.  [GYRO-FOG, GYRO-LOCK-IN, GYRO-LASER, GYRO-MEMS]"""
+"""gyro_fog, gyro_laser, gyro_mems, and what all rate gyros share: closed forms and limits against derivations and
+integrations that use no code of the parts.  [GYRO-FOG, GYRO-LOCK-IN, GYRO-LASER, GYRO-MEMS]"""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ DEG = math.pi / 180.0
 FOG_QUIET = {"optical": 0.0}
 LASER_QUIET = {"crossings": 0.0, "counting": 0.0}
 MEMS_QUIET = {"white": 0.0}
-QUIET = {"gyro_fog": FOG_QUIET, "gyro_laser": {**LASER_QUIET, "lock_in": 0.0}, "gyro_mems": MEMS_QUIET}
+QUIET = {
+    "gyro_fog": FOG_QUIET,
+    "gyro_laser": {**LASER_QUIET, "lock_in": 0.0},
+    "gyro_mems": MEMS_QUIET,
+    "gyro_vibratory": {"white": 0.0},
+    "gyro_hemispherical": {"white": 0.0, "damping_difference": 0.0, "frequency_difference": 0.0},
+}
 PARTS = list(QUIET)
 
 
@@ -68,6 +74,8 @@ def test_a_step_halved_is_the_same_mean(name):
         ("gyro_fog", {"power": 2e-8}),
         ("gyro_laser", {"counting": 0.0}),
         ("gyro_mems", {"bandwidth": 80.0}),
+        ("gyro_vibratory", {"bandwidth": 80.0, "pickoff": 5e-6}),
+        ("gyro_hemispherical", {"white": 1e-3}),
     ],
 )
 def test_white_noise_has_the_density_that_is_shown(name, given):

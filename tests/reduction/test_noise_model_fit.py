@@ -34,11 +34,13 @@ def markov(n: int, sigma: float, tau: float, rng: np.random.Generator) -> np.nda
         # covariance 0.5^h: m = 1: 1 - 0.5; m = 2: (4 var of two - var of four)/8, var of two = 2 + 2 0.5 = 3, of four
         # = 4 + 6 0.5 + 4 0.25 + 2 0.125 = 8.25
         (NoiseTerm("gauss_markov"), [0.0, math.log(1.0 / math.log(2.0))], [0.5, 3.75 / 8.0]),
+        # angle of covariance cos(pi h/2)/2, no decay: (3 c_0 - 4 c_m + c_2m)/m2 = (3 - 0 - 1)/2, (3 + 4 + 1)/8, 0
+        (NoiseTerm("resonance"), [0.0, 30.0, math.log(0.5 * math.pi)], [1.0, 1.0, 0.0]),
     ],
 )
 def test_allan_variances_by_hand(term: NoiseTerm, p: list[float], expected: list[float]) -> None:
     m = 2.0 ** np.arange(len(expected))
-    assert np.ravel(term.allan(np.array(p), m)) == pytest.approx(expected, rel=1e-5)
+    assert np.ravel(term.allan(np.array(p), m)) == pytest.approx(expected, rel=1e-5, abs=1e-9)
 
 
 def test_spectra_have_the_variance_of_a_sample() -> None:
@@ -83,6 +85,39 @@ def test_steps_wild_and_missing_samples() -> None:
     (step,) = model.steps
     assert abs(step.at - 8000) < 50 and step.size == pytest.approx(1.0, abs=4.0 * step.u) and step.u < 0.05
     assert model.agrees, "with what was taken out the deviation is that of the record as it was"
+
+
+def ring_laser(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Angle noise of 1 a sample, N 0.005, and the angle of a dither that wanders, an oscillator of 8 steps a sample."""
+    omega, tau, fine = 2.94, 400.0, 8
+    r = math.exp(-1.0 / (fine * tau))
+    drive = rng.normal(size=fine * (n + 4001))
+    angle = lfilter([1.0], [1.0, -2.0 * r * math.cos(omega / fine), r * r], drive)[::fine][-n - 1 :]
+    out: np.ndarray = 0.005 * rng.normal(size=n) + np.diff(rng.normal(size=n + 1) + 2.0 * angle / angle.std())
+    return out
+
+
+def test_dither_that_is_no_line() -> None:
+    """The band of the dither, four times the angle noise, is neither N nor Q; its frequency 2.94/(2 pi) = 0.4679, its
+    rms 2 (2 sin(1.47)) = 3.98, which 19,200 samples of 800 a coherence know to some 15 %.
+    """
+    model = fit_noise(ring_laser(19_200, np.random.default_rng(5)), 1.0, means=False)
+    assert model.agrees
+    assert model["Q"].determined and model["Q"].low < 1.0 < model["Q"].high < 1.05
+    assert model["N"].low <= 0.005 <= model["N"].high < 0.05
+    bands = [f for f, _, _ in model.peaks()] + [line.frequency for line in model.lines]
+    assert min(abs(f - 0.4679) for f in bands) < 1e-3
+    taken = sum(0.5 * line.amplitude**2 for line in model.lines)
+    assert sum(rms**2 for *_, rms in model.peaks()) + taken == pytest.approx(3.98**2, rel=0.4)
+
+
+def test_a_step_under_angle_noise() -> None:
+    """A step of 0.02 in angle noise of 1: the ends of the angle, of a variance of 2/n of it, do not hide it."""
+    rng = np.random.default_rng(9)
+    n = 10_000
+    x = np.diff(rng.normal(size=n + 1)) + 0.02 * (np.arange(n) >= 6000)
+    (step,) = fit_noise(x, 1.0, means=False).steps
+    assert abs(step.at - 6000) < 300 and abs(step.size - 0.02) < 4.0 * step.u < 0.004
 
 
 def test_what_is_refused() -> None:

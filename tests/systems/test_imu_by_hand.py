@@ -45,7 +45,7 @@ def record(path: Path, **values: str) -> Any:
 
 
 def estimates(result: Any) -> dict[str, float]:
-    return {c.name: c.estimate * tables.SCALE[c.unit] for c in result.coefficients}
+    return {c.name: c.estimate * tables.SCALES[c.unit] for c in result.coefficients}
 
 
 def test_recovers_a_unit_without_noise(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
         result = hand.HandReduction.of_record(record(write(tmp_path / "log.csv", *series)))
         truth = own_axes(unit)
         for c in result.coefficients:
-            low, high = (x * tables.SCALE[c.unit] for x in c.interval)
+            low, high = (x * tables.SCALES[c.unit] for x in c.interval)
             hits += low <= truth[c.name] <= high
             total += 1
     assert total == 240 and 0.90 < hits / total < 0.99
@@ -214,7 +214,8 @@ def test_a_proposed_map_reads_other_names_and_numbered_positions(tmp_path: Path)
     result = hand.HandReduction.of_record(read)
     truth = own_axes(unit)
     z = [
-        (c.estimate * tables.SCALE[c.unit] - truth[c.name]) / (c.u * tables.SCALE[c.unit]) for c in result.coefficients
+        (c.estimate * tables.SCALES[c.unit] - truth[c.name]) / (c.u * tables.SCALES[c.unit])
+        for c in result.coefficients
     ]
     assert np.sqrt(np.mean(np.square(z))) < 2.0
 
@@ -252,8 +253,8 @@ def test_up_and_down(tmp_path: Path) -> None:
              "ba_z": unit.ba[2], "Sa_zz": unit.Sa[2, 2]}  # fmt: skip
     for n, value in truth.items():
         assert (
-            abs(found[n].estimate * tables.SCALE[found[n].unit] - value)
-            < 5.0 * found[n].u * tables.SCALE[found[n].unit]
+            abs(found[n].estimate * tables.SCALES[found[n].unit] - value)
+            < 5.0 * found[n].u * tables.SCALES[found[n].unit]
         )
     assert not any(r.id == "plausibility.earth_rate" for r in result.reasons)
 

@@ -16,7 +16,7 @@ from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 
 DPH = math.pi / 648000.0
-PARTS = ("gyro_rate", "gyro_fog", "gyro_laser", "gyro_mems")
+PARTS = ("gyro_rate", "gyro_fog", "gyro_laser", "gyro_mems", "gyro_vibratory", "gyro_hemispherical")
 #: not counted, so that a short record is white
 PLAIN = {"gyro_laser": {"gyro.counting": 0.0}}
 
@@ -90,7 +90,7 @@ def test_back_to_the_current() -> None:
     assert "rebalance" in system.slots and "surroundings" in system.slots and "gyro.i" not in system.open
 
 
-@pytest.mark.parametrize("part", ["gyro_fog", "gyro_mems"])
+@pytest.mark.parametrize("part", ["gyro_fog", "gyro_mems", "gyro_vibratory"])
 def test_north_finder_takes_them(part: str) -> None:
     """Without noise the heading that is put in; with it the density must be known."""
     quiet = {"gyro.optical": 0.0} if part == "gyro_fog" else {"gyro.white": 0.0}

@@ -259,3 +259,24 @@ def test_refused(tmp_path: Path) -> None:
 def test_refused_plans(values: dict[str, Any], words: str) -> None:
     with pytest.raises(InvalidConfigurationError, match=words):
         load_system(NAME).with_values(values).refuse()
+
+
+def test_a_vibrating_gyro_by_hand() -> None:
+    """Rebalance: 1 % scale times cos 0.1; bias with quadrature 2 deg/s through sin 0.1.  Open loop at its split: 1.
+
+    A whole-angle gyro has its rate, and no stated truth.
+    """
+    given = {"gyro.white": 0.0, "gyro.scale": [0.01, 0.0], "gyro.phase_error": [0.1, 0.0], "gyro.range_max": 0.0}
+    with Session(NAME, {"gyro": "gyro_vibratory"}) as prepared:
+        for quadrature in (0.0, 2.0 * DEG):
+            result = reduced(prepared, {**SHORT, **given, "gyro.quadrature": [quadrature, 0.0]})
+            e, b = found(result)["e"], found(result)["b"]
+            assert e.estimate == pytest.approx(1e6 * (1.01 * math.cos(0.1) - 1.0), abs=1e-2)
+            assert e.truth == pytest.approx(e.estimate, abs=1e-2)
+            assert b.estimate == pytest.approx(quadrature * math.sin(0.1) / DPH, abs=1e-2)
+            assert (b.truth is None) == (quadrature > 0.0)
+        still = {"gyro.white": 0.0, "gyro.closed": 0.0, "settle": 2.0}
+        assert abs(found(reduced(prepared, {**SHORT, **still}))["e"].estimate) < 50.0  # ppm: what rings on after 2.3 s
+    with Session(NAME, {"gyro": "gyro_hemispherical"}) as prepared:
+        result = reduced(prepared, {**SHORT, "gyro.white": 0.0})
+    assert abs(found(result)["e"].estimate) < 20.0 and found(result)["e"].truth is None  # ppm, its drift by angle

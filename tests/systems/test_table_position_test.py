@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import math
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 import gyrobench as gb
 from gyrobench.reduction.loops.scale_errors import truth
 from gyrobench.system.system import load_system
+from gyrobench.workflow.handover import handed_over
 
 ARCSEC = math.pi / 648000
 QUICK = {"move_rate": "8deg/s", "settle": "0.5s", "dwell": "0.3s"}
@@ -25,16 +28,50 @@ TRUE = {
 }  # fmt: skip
 
 
-def position_run(seed: int = 1, **values: Any) -> Any:
+def position_run(seed: int = 1, out: Path | None = None, **values: Any) -> Any:
     test = gb.load("table_position_test", **QUICK)
     for name, value in {**TRUE, **values}.items():
         test.set(name, value)
-    return test.run(seed=seed, check_step=False)
+    return test.run(seed=seed, check_step=False, out=out)
 
 
 @pytest.fixture(scope="module")
-def found() -> Any:
-    return position_run().result
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("position") / "run"
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> Any:
+    return position_run(out=folder).result
+
+
+def test_first_harmonic_is_handed_over(found: Any, folder: Path) -> None:
+    """To four accelerometers on the same axis: D is the position error, where the axis is less where it was sent."""
+    took = gb.load("accelerometer_four", from_run=[folder])
+    for option, name in (("D1c", "E1 cos"), ("D1s", "E1 sin")):
+        assert took.values[option] == pytest.approx(found[name].estimate * ARCSEC, rel=1e-12)
+        assert abs(took.values[option] - found[name].truth * ARCSEC) < 4.0 * took.values["u_D1"]
+    assert took.values["u_D1"] == pytest.approx(max(found["E1 cos"].u, found["E1 sin"].u) * ARCSEC, rel=1e-12)
+    assert gb.load("accelerometer_four", from_run=[folder], D1c="1arcsec").values["D1c"] == pytest.approx(ARCSEC)
+
+
+def test_what_is_not_handed_over(found: Any, folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(gb.GyrobenchError, match="tumble_single_axis takes no values of other runs"):
+        gb.load("tumble_single_axis", from_run=[folder])
+    with pytest.raises(gb.GyrobenchError, match="given by another run, too"):
+        gb.load("accelerometer_four", from_run=[folder, folder])
+    with pytest.raises(gb.GyrobenchError, match="no such folder"):
+        gb.load("accelerometer_four", from_run=[tmp_path / "none"])
+    other = load_system("accelerometer_four")
+    vars(other)["takes"] = {"table_rate_test": dict}
+    with pytest.raises(
+        gb.GyrobenchError, match="a run of table_position_test; accelerometer_four takes values of table_r"
+    ):
+        handed_over(other, [folder])
+    first = importlib.import_module(".head", type(load_system("accelerometer_four")).__module__).first_harmonic
+    left = [replace(c, no_value="polygon") if c.name == "E1 sin" else c for c in found.coefficients]
+    with pytest.raises(LookupError, match="no value of E1 sin: polygon"):
+        first(replace(found, coefficients=left))
 
 
 def test_harmonics_come_back_in_spite_of_the_polygon(found: Any) -> None:

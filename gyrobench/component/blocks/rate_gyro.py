@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from gyrobench.component.blocks.mems import butterworth, sample_number, word
 from gyrobench.component.blocks.random_drift import Flicker, RateRandomWalk
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block
-from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter
-from gyrobench.component.math import Number, Vector, fabs, floor, sign, sqrt, vector
+from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
+from gyrobench.component.math import Number, Vector, fabs, floor, pi, sign, sqrt, vector
 from gyrobench.component.rotation import Rotation
 from gyrobench.component.set_up import GYRO_MOUNT, each, turned
+
+DEG = pi / 180.0
 
 
 def locked(rate: Number, band: Number) -> Number:
@@ -113,3 +116,42 @@ class RateGyro(Component):
     def outputs(self) -> None:
         self.rate = self.measured
         self.saturated = self.beyond
+
+
+class FilteredRateGyro(RateGyro):
+    """Common part of rate gyros with an output filter, a range, an output rate and a word.  [GYRO-MEMS]
+
+    y'' = wn2 (s - y) - sqrt(2) wn y',   wn = 2 pi bandwidth                              Butterworth, second order
+    rate = y within +-range_max, sampled every `period`, in steps of `resolution`
+    """
+
+    bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
+    range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
+    period = Parameter(0.0, "s", "time between two output samples; 0: every step", min=0.0)
+    resolution = Parameter(0.0, "rad/s", "step of the output word; 0: none", min=0.0)
+
+    density = Output("rad/s/sqrt(Hz)", "density N of the white noise (angle random walk)")
+
+    y = State([0.0, 0.0], "rad/s", "filtered rate")
+    v = State([0.0, 0.0], "rad/s2", "its derivative")
+    number = Discrete(-1.0, "1", "number of the output sample")
+
+    def filter_rates(self, s: Vector) -> None:
+        """Write the derivatives of the filter that is fed with s, rad/s."""
+        for j in range(2):
+            self.der.y[j] = self.v[j]
+            self.der.v[j] = butterworth(s[j], self.y[j], self.v[j], self.bandwidth)
+
+    def read_out(self) -> None:
+        """Take the filtered rates as measured if a sample is due."""
+        due = 1.0
+        if self.period > 0.0:
+            count = sample_number(self.t, self.period)
+            due = 1.0 if count > self.number else 0.0
+            self.number = count
+        if due > 0.5:
+            self.measured = self.y
+            self.limit(self.range_max)
+            if self.resolution > 0.0:
+                for j in range(2):
+                    self.measured[j] = word(self.measured[j], self.resolution)

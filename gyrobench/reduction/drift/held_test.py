@@ -10,40 +10,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench import drift, frames
+from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
-from gyrobench.reduction.drift import composite, drift_terms, servo_regression
+from gyrobench.reduction.drift import channels, composite, drift_terms, servo_regression
 from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup.run_metadata import remount_of, truth_of
+from gyrobench.reduction.setup.run_metadata import remount_of
 from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.sources import Effect
-from gyrobench.result import DriftTestResult, Table
+from gyrobench.result import DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeldSetup(SiteSetup):
     """labels: phase -> attitude, of the phases in which the gyro holds the table.  tracking: largest angle of the table
-    against the gyro, rad.  gain: of the pickoff, V/rad of the case (0: unknown).
+    against the gyro, rad.  gain: of the pickoff, V/rad of the case (0: unknown).  channel: of a two-degree-of-freedom
+    gyro, x or y; truth is then in the names and signs of a floated gyro.  k_locked: scale factor of the torquer that
+    locks the other axis, rad/s/A (0: unknown).
     """
 
     labels: Mapping[int, str]
+    channel: str = ""
     tracking: float = servo_regression.TRACKING
     gain: float = 0.0
+    k_locked: float = 0.0
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_wobble: float = 0.0
@@ -54,15 +58,19 @@ class HeldSetup(SiteSetup):
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
-        p = run.parameters
+        p, channel = run.parameters, str(run.options.get("channel", ""))
+        floated = p.get("gyro.K_sg", 0.0) * p.get("gyro.H", 0.0) / (p.get("gyro.C") or 1.0)
         known: dict[str, Any] = {
+            "channel": channel,
             "labels": {row.phase: row.label for row in run.plan if row.mode == "servo"},
             "tracking": float(run.options.get("tracking", servo_regression.TRACKING)),
-            "gain": p.get("gyro.K_sg", 0.0) * p.get("gyro.H", 0.0) / (p.get("gyro.C") or 1.0),
-            "truth": truth_of(run, drift.NAMES),
+            "gain": p.get(f"gyro.K_sg_{channel}", 0.0) if channel else floated,
+            "k_locked": p.get(f"gyro.k_{channel}", 0.0) if channel else 0.0,
+            "truth": channels.truth_in(run, channel),
             "remount": remount_of(run),
         }
-        return super().of(run, **{**known, **own})
+        made = super().of(run, **{**known, **own})
+        return replace(made, errors=channels.errors_in(made.errors, channel))
 
     def name(self, phase: int) -> str:
         """Return the attitude of a phase, with its number where the attitude comes back."""
@@ -133,10 +141,37 @@ class HeldTest(DriftReduction[H]):
     def composite_tables(statistics: Mapping[str, composite.Composite | str]) -> list[Table]:
         return composite.tables(statistics, DPH, "°/h")
 
-    @staticmethod
-    def equation(names: tuple[str, ...]) -> str:
+    def derived(self, found: Findings) -> Findings:
+        """Return the fit in the names of the gyro."""
+        return channels.in_channel(found, self.setup.channel)
+
+    def named(self, reasons: Iterable[Reason]) -> list[Reason]:
+        """Return reasons with the coefficients in the names of the gyro."""
+        return [replace(r, text=channels.words(r.text, self.setup.channel)) for r in reasons]
+
+    def equation(self, names: tuple[str, ...]) -> str:
         """Return the measurement equation with the terms ``names``, Typst math."""
-        return drift_terms.equation('dot(theta) + omega_"E,x" = omega_d, quad omega_d = ', names)
+        channel = self.setup.channel
+        left = f'dot(theta) + omega_"E,{channel or "x"}" = omega_d, quad omega_d = '
+        return channels.typst(channel, left, names) if channel else drift_terms.equation(left, names)
+
+    def locked_tables(self) -> list[Table]:
+        """Return what the torquer of the locked axis read in each phase; none for a floated gyro."""
+        c, k = self.setup.channel, self.setup.k_locked
+        if not c or "locked" not in self.of_held:
+            return []
+        rows: list[list[Any]] = []
+        for p, label in self.setup.labels.items():
+            i = np.asarray(self.of_held["locked"], dtype=float)[self.mine(p)]
+            rate = [float(i.mean()) * k / DPH, float(np.ptp(i)) * k / DPH] if k else [None, None]
+            rows.append([label, p, i.size, float(i.mean()) * 1e3, *rate])
+        other = "y" if c == "x" else "x"
+        caption = (
+            f"Current of the torquer about {c}, which nulls u_{other}; its rate k i is the inertial rate of the {other}"
+            " axis less its drift, and no unknown of the fit"
+        )
+        head = ["attitude", "phase", "windows", "mean current / mA", "rate / (°/h)", "range of the rate / (°/h)"]
+        return [Table("locked", f"The locked {other} axis", caption, head, rows)]
 
     @classmethod
     def from_record(cls, record: Record) -> DriftTestResult:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from gyrobench import drift, frames
 from gyrobench.arrays import Array
 from gyrobench.attitudes import on_servo_table
-from gyrobench.reduction.drift import window_regressors
+from gyrobench.reduction.drift import channels, window_regressors
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
@@ -266,12 +266,12 @@ def candidates(
     ]
 
 
-def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Table:
+def book_table(fit: Findings, combined: Mapping[str, str] | None = None, channel: str = "") -> Table:
     """Return the table of the estimates in the notation and torque sign of Hu 1981.
 
-    combined: our name -> a combination in that notation.
+    combined: our name -> a combination in that notation.  channel: of a two-degree-of-freedom gyro.
     """
-    rows: list[list[Any]] = []
+    rows: list[list[Any]] = channels.book_rows(fit, channel) if channel else []
     for q, value, u in zip(fit.quantities, fit.value.tolist(), fit.u.tolist(), strict=True):
         if q.name in BOOK:
             symbol, sign = BOOK[q.name]
@@ -280,10 +280,25 @@ def book_table(fit: Findings, combined: Mapping[str, str] | None = None) -> Tabl
     return Table(
         "notation_of_hu_1981",
         "Notation of Hu 1981",
-        "Torque sign, ω_M = −ω_d; last column: sign against this report",
+        f"Of the line of the {channel} axis of 3-95; last column: sign against this report"
+        if channel
+        else "Torque sign, ω_M = −ω_d; last column: sign against this report",
         ["Hu 1981", "estimate", "u of type A", "unit", "this report", "sign"],
         rows,
     )
+
+
+def conventions(channel: str = "") -> tuple[str, ...]:
+    """Return the conventions of a servo test, with the axes of a channel of a two-degree-of-freedom gyro."""
+    if not channel:
+        return CONVENTIONS
+    axes, torquer = {"x": ("x, y, z", "y"), "y": ("y, −x, z", "x")}[channel]
+    own = (
+        f"The {channel} axis of a two-degree-of-freedom gyro is held as a gyro with I, O, S = {axes}; in the names "
+        f"D{channel}_… X, Y, Z are along x, y, z. The torquer about {torquer}, which precesses it, is idle; the other "
+        "axis is locked by its rebalance loop."
+    )
+    return (*CONVENTIONS, own)
 
 
 CONVENTIONS = (

@@ -16,7 +16,7 @@ from gyrobench.reduction.series.deviations import Deviation
 ENOUGH = 0.95  # of the averaging times
 PART = 0.1  # of the record: longest averaging time
 SHORTEST = 2  # samples: least averaging time
-NARROW, POINTS = 512, 1 << 15  # averaging time up to which the spectrum decides the degrees of freedom; frequencies
+LOW_CELLS, CELLS = 4000, 1 << 15  # of the spectrum that decides the degrees of freedom: equal logarithms, equal width
 
 
 @dataclass(frozen=True)
@@ -87,19 +87,24 @@ def compare(own: Deviation, implied: Array, samples: int) -> DeviationAgreement:
     return DeviationAgreement(own.tau[k], own.deviation[k], own.low[k], own.high[k], implied[k])
 
 
-def with_spectrum(own: Deviation, model: Model, p: Array) -> Deviation:
+def with_spectrum(own: Deviation, model: Model, p: Array, spread: float = 1.0) -> Deviation:
     """Return a deviation with the intervals that a spectrum S allows, where it is narrower than a power law.
 
-    Of n differences with the transfer function H, degrees of freedom n <S H>^2/<(S H)^2>, sigma^2 = <S H>: a resonance
-    makes fewer of them than a power law has.
+    Of n differences with the transfer function H, degrees of freedom n <S H>^2/<(S H)^2>, sigma^2 = <S H>: a resonance,
+    or noise that rises more steeply than a power law, makes fewer of them.
+    spread: variance of the mean square of the noise over that of even normal noise; as many times fewer.
     """
-    omega = np.pi * (np.arange(POINTS) + 0.5) / POINTS
-    S = spectrum(model, p, Grid(omega))
+    longest = 4.0 * float(own.tau[-1])
+    edges = np.unique(np.concatenate([np.geomspace(np.pi / longest, np.pi, LOW_CELLS), np.linspace(0.0, np.pi, CELLS)]))
+    omega, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    y = spectrum(model, p, Grid(omega)) / np.sin(0.5 * omega) ** 2
     edf = own.edf.copy()
     for i, m in enumerate(own.tau.tolist()):
-        if m <= NARROW:
-            y = S * 2.0 * np.sin(0.5 * m * omega) ** 4 / (m * np.sin(0.5 * omega)) ** 2
-            edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / float(np.mean(y * y)))
-    edf = np.maximum(edf, 1.0)
+        # the mean of sin^8(m omega/2) over each cell, which may hold many of its periods
+        wave = np.array([np.cos(k * m * omega) * np.sinc(0.5 * k * m * width / np.pi) for k in (1, 2, 3, 4)])
+        eighth = (35.0 - 56.0 * wave[0] + 28.0 * wave[1] - 8.0 * wave[2] + wave[3]) / 128.0
+        fourth = float(np.sum(width * y * y * np.maximum(eighth, 0.0))) * 4.0 / (np.pi * m**4)
+        edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / fourth)
+    edf = np.maximum(edf / max(spread, 1.0), 1.0)
     low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
     return replace(own, low=low, high=high, edf=edf)

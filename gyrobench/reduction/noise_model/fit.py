@@ -26,10 +26,9 @@ from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compar
 from gyrobench.reduction.noise_model.noise_model import Minimum, NoiseModel, Process, Scale
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
-from gyrobench.reduction.noise_model.prior import PEAKS
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -78,7 +77,7 @@ def fit_noise(
     treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
     treated, found = _without_steps(treated, means)
     clouds = posterior.draw(found)
-    judge = _Judge(found, _deviations(raw / scale.size, treated), treated.samples)
+    judge = _Judge(found, _deviations(raw / scale.size, treated), treated)
     at = judge.choose(clouds)
     ramp = _ramp(found, clouds)
     slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
@@ -134,9 +133,9 @@ def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treate
     tried: list[tuple[float, Treated, Fitted]] = []
     for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
         parts = [*split(model, p), *found.resonances]
-        places = []
+        places, angle = [], sum(float(t.angle(q)) for t, q in parts)
         for i, s in enumerate(treated.stretches):
-            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means))
+            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means), angle)
             places.append((ratio, i, step))
         ratio, i, step = max(places, key=lambda c: c[0])
         if ratio < bound:
@@ -145,7 +144,7 @@ def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treate
         new = replace(treated, stretches=(*treated.stretches[:i], replace(s, steps=(*s.steps, step)),
                                           *treated.stretches[i + 1 :]))  # fmt: skip
         data = new.ordinates(means)
-        data.fixed = found.data.fixed
+        data.hold(found.resonances)
         fits = [maximize(data, found.prior, f.model, f.p) for f in found.ranked[:3]]
         tried.append((min(f.value for f in fits), new, min(fits, key=lambda f: f.value)))
     if not tried:
@@ -182,10 +181,10 @@ def _deviations(raw: Array, treated: Treated) -> _Scaled:
 class _Judge:
     """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
 
-    def __init__(self, found: ModelSearch, scaled: _Scaled, samples: int) -> None:
-        self.found, self.samples, self.means = found, samples, found.data.grid.means
+    def __init__(self, found: ModelSearch, scaled: _Scaled, treated: Treated) -> None:
+        self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
         terms, p = found.whole
-        self.own, self.clean = (with_spectrum(d, terms, p) for d in (scaled.own, scaled.clean))
+        self.own, self.clean = (with_spectrum(d, terms, p, treated.spread) for d in (scaled.own, scaled.clean))
         self.removed = scaled.removed
         peaks = found.resonances
         self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
@@ -337,7 +336,7 @@ def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) ->
     if not treated.wild.size:
         return {}
     data: Ordinates = treated.ordinates(means, keep_wild=True)
-    data.fixed = found.data.fixed
+    data.hold(found.resonances)
     again = maximize(data, found.prior, at.model, at.p)
     out = {}
     for name, term in CALLED.items():

@@ -31,6 +31,7 @@ ROUNDS = 4  # of spectrum and completion
 ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
 SMOOTH = 0.03  # of the frequency
+WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
 NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
 SEED = 90125
 
@@ -232,6 +233,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
+        excess = min(excess, WHITE * float(P.S.min()))  # no more than is there
     white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
     return Completed(

@@ -10,9 +10,8 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
-from gyrobench.reduction.noise_model.prior import PEAKS
 from gyrobench.reduction.noise_model.steps import LevelStep
-from gyrobench.reduction.noise_model.terms import Grid
+from gyrobench.reduction.noise_model.terms import PEAKS, Grid
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate

@@ -23,7 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft
+from numpy.typing import NDArray
+from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicker, markov_parts
@@ -31,6 +32,9 @@ from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicke
 LOW = 16  # first ordinates of each parity that are kept singly
 WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
 SHORTEST = 64  # samples of a stretch
+AROUND, NEAR, CLEAR = 257, 9, 5.0  # ordinates around and near a peak, and how much the near ones exceed the others
+SINGLE = 500  # of the near ones that exceed most, at most
+CHI = 1.2703628454614782  # log of chi squared of one degree of freedom: its mean is minus this
 HUGE = 1e30
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
@@ -74,9 +78,7 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
     n = x.size
     c = fft.dct(x, norm="ortho")
     square = c * c if extra is None else c * c + extra
-    edges = [2 * LOW + 1]
-    while edges[-1] < n:
-        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
+    edges = _edges(c * c)
     out = []
     for odd in (True, False):
         k = np.arange(1 if odd else 2, n, 2)
@@ -88,6 +90,26 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
         out.append(_Part(odd, n, c[low], 0.5 * (first + last), 0.5 * (last - first) + 1.0, count,
                          np.add.reduceat(square[k], start), np.add.reduceat(c[k], start)))  # fmt: skip
     return out
+
+
+def _edges(square: Array) -> NDArray[np.int64]:
+    """Return the first ordinates of bins of powers (n,): of equal logarithmic width, but single ones of each parity
+    where a peak stands out that is narrower than they are.
+    """
+    n = square.size
+    edges = [2 * LOW + 1]
+    while edges[-1] < n:
+        edges.append(max(edges[-1] + 2, round(edges[-1] * (1.0 + WIDTH))))
+    start = np.array(edges)
+    # by the geometric mean around, that peaks do not move
+    log = np.log(np.maximum(square, 1e-300)) + CHI
+    around = np.exp(ndimage.uniform_filter1d(log, AROUND, mode="reflect"))
+    near = ndimage.uniform_filter1d(square, NEAR, mode="reflect")
+    excess = near / around
+    excess[: edges[0]] = 0.0
+    least = max(CLEAR, float(np.partition(excess, -SINGLE)[-SINGLE])) if n > SINGLE else CLEAR
+    single = np.flatnonzero(ndimage.maximum_filter1d((excess > least).astype(np.int8), 2 * NEAR))
+    return np.unique(np.concatenate([start, single[(single % 2 == 1) & (single >= edges[0])]]))
 
 
 class Ordinates:
@@ -116,7 +138,7 @@ class Ordinates:
         self.count, self.power, self.total = (
             np.concatenate([getattr(p, name) for p in parts]) for name in ("count", "power", "total")
         )
-        self.count, self.power = weight * self.count, weight * self.power
+        self.count, self.power, self.total = weight * self.count, weight * self.power, weight * self.total
         self.starts = np.cumsum([0] + [p.k.size for p in parts])[:-1]
         grid = np.concatenate([omega, self.low_omega.ravel()])
         sizes = np.concatenate([np.repeat(self.n, [p.k.size for p in parts]), np.repeat(self.n, LOW)]).astype(float)
@@ -124,6 +146,7 @@ class Ordinates:
         self.ends = np.sqrt(2.0 / np.repeat(self.n, [p.k.size for p in parts])) * np.cos(0.5 * omega)
         half_low = 0.5 * self.low_omega
         self.low_ends = np.sqrt(2.0 / self.n[:, None]) * np.cos(half_low)
+        self.all_ends = np.concatenate([self.ends, self.low_ends.ravel()])
         self.ramp = np.where(self.odd[:, None], -self.low_ends / (2.0 * np.sin(half_low) ** 2), 0.0)
         ratio, correlation = flicker_covariance()
         self._flicker = np.array([correlation[1 - o :: 2, 1 - o :: 2] for o in self.odd.astype(int)])
@@ -131,6 +154,12 @@ class Ordinates:
         self.all_count = np.concatenate([self.count, np.ones(self.low_omega.size)])
         self.all_power = np.concatenate([self.power, self.columns.ravel() ** 2])
         self.fixed = np.zeros(grid.size)  # spectrum of terms that are not fitted
+        self.fixed_angle = 0.0  # and the variance of their errors of an angle
+
+    def hold(self, terms: Sequence[tuple[NoiseTerm, Array]]) -> None:
+        """Take terms with their parameters as they are, beside those of a model."""
+        self.fixed = np.asarray(sum((t.spectrum(p, self.grid) for t, p in terms), np.zeros(self.fixed.size)))
+        self.fixed_angle = sum(float(t.angle(p)) for t, p in terms)
 
     # ------------------------------------------------------------------ spectra and the covariance of the first ones
     def low_covariance(self, term: NoiseTerm, p: Array, S: Array) -> Array:
@@ -195,10 +224,7 @@ class Ordinates:
 
     def angle(self, model: Model, p: Array) -> Array:
         """Return the variance of the error of an angle (...), 0 where the model has none."""
-        for term, q in split(model, p):
-            if term.name == "quantization":
-                return np.exp(q[..., 0])
-        return np.zeros(p.shape[:-1])
+        return np.asarray(self.fixed_angle + sum(term.angle(q) for term, q in split(model, p)))
 
     def value(self, model: Model, p: Array) -> Array:
         """Return -2 log restricted likelihood (M,) of parameters p (M, q)."""
@@ -244,7 +270,7 @@ class Ordinates:
         gradient = slope[:, high] @ (self.count - self.power / S[high])
         h = 1e-4
         q2 = float(self.angle(model, p))
-        dq = np.array([float(q2) * (t.name == "quantization") for t, q in split(model, p) for _ in range(q.size)])
+        dq = (self.angle(model, p + h * np.eye(p.size)) - self.angle(model, p - h * np.eye(p.size))) / (2.0 * h)
         signs = np.concatenate([[0.0], np.full(p.size, h), np.full(p.size, -h)])
         which = np.concatenate([[0], np.arange(p.size), np.arange(p.size)])
         moved = S[high] + signs[:, None] * dS[which][:, high] if q2 else np.broadcast_to(S[high], (signs.size, self.b))

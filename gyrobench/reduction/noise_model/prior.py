@@ -10,7 +10,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
 
 GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum is smoothed
 FEWEST = 12.0  # ordinates of a group
@@ -22,7 +22,6 @@ FILTERS = {
     "second": [(0.03, 6.0), (0.1, 5.0)],
     "average": [(1.05, 64.0)],
 }
-PEAKS = ("resonance", "band")
 HARD = 1e3  # slope of the walls, of the square of what is beyond
 
 

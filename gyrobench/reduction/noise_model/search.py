@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,12 +11,13 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
-from gyrobench.reduction.noise_model.prior import PEAKS, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import NoiseTerm
+from gyrobench.reduction.noise_model.prior import SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-MOST_MARKOV, MOST_RESONANCES = 3, 12
+MOST_MARKOV, MOST_RESONANCES = 3, 24
+MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
@@ -137,9 +138,12 @@ class ModelSearch:
 
     # ------------------------------------------------------------------ moves
     def excess(self, at: Fitted) -> tuple[Array, Array]:
-        """Return the spectrum of a fit at all ordinates and their powers over it less their number."""
+        """Return the variance of all ordinates by a fit, with the errors of the end angles, and their powers over it
+        less their number.
+        """
         S, low = self.data.covariance(at.model, at.p[None])
         S = np.concatenate([S[0], np.diagonal(low[0], axis1=-2, axis2=-1).ravel()])
+        S = S + 2.0 * float(self.data.angle(at.model, at.p)) * self.data.all_ends**2
         return S, self.data.all_power / S - self.data.all_count
 
     def starts(self, at: Fitted, term: NoiseTerm) -> list[Array]:
@@ -217,13 +221,18 @@ class ModelSearch:
         return at
 
     # ------------------------------------------------------------------ resonances
-    def peak(self, at: Fitted) -> Array | None:
-        """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear."""
+    def peak(self, at: Fitted, vain: Sequence[Array] = ()) -> Array | None:
+        """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear;
+        vain: where one was sought already.
+        """
         data = self.data
         order = np.argsort(data.grid.omega[: data.b])
         S, _ = self.excess(at)
         omega, count = data.grid.omega[order], data.count[order]
         ratio = data.power[order] / S[order]
+        for start in vain:  # its own width about it
+            mine = np.abs(omega - math.exp(start[2])) < 2.0 * math.exp(-start[1])
+            ratio[mine] = count[mine]
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
         best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
         for width in WIDTHS:
@@ -236,24 +245,26 @@ class ModelSearch:
                 centre = float(np.average(omega[part], weights=np.maximum(ratio[part], 1e-9)))
                 spread = max(0.3 * float(omega[i + width - 1] - omega[i]), 2.0 * math.pi / data.n.max())
                 power = float(np.sum((ratio[part] - count[part]) * S[order][part]) / data.samples)
-                best, found = float(p[i]), np.array([math.log(power), -math.log(spread), math.log(centre)])
+                best, found = float(p[i]), np.array([math.log(max(power, 1e-12)), -math.log(spread), math.log(centre)])
         return found
 
     def add_resonances(self) -> None:
         """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
-        while len(self.resonances) < MOST_RESONANCES:
+        vain: list[Array] = []
+        while len(self.resonances) < MOST_RESONANCES and len(vain) < MOST_VAIN:
             at = self.best
-            start = self.peak(at)
+            start = self.peak(at, vain)
             if start is None:
                 break
             tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
             found = max(tried, key=lambda f: f.evidence)
             if found.evidence < at.evidence + 2.0:
-                break
+                vain.append(start)
+                continue
             self._freeze(found)
         for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
             term, p = self.resonances.pop(0)
-            self.data.fixed = np.maximum(self.data.fixed - term.spectrum(p, self.data.grid), 0.0)
+            self.data.hold(self.resonances)
             at = self.best
             without = maximize(self.data, self.prior, at.model, at.p)
             found = self._with(at, term, p)
@@ -261,6 +272,29 @@ class ModelSearch:
                 self._freeze(found)
             else:
                 self.seen = {without.model: without}
+        if self.resonances:
+            self._match()
+
+    def _match(self) -> None:
+        """Give each resonance the power that is there, where it is most of the spectrum: what few ordinates show of its
+        shape, the likelihood takes at the price of its power, which the deviation is the sum of.
+        """
+        S, _ = self.excess(self.best)
+        data = self.data
+        power, count = data.all_power, data.all_count
+        matched = []
+        for term, p in self.resonances:
+            own = term.spectrum(p, data.grid)
+            most = own > 0.5 * S
+            expected = float(np.sum((count * own)[most]))
+            found = float(np.sum((power - count * (S - own))[most]))
+            more = min(max(found / expected, 0.2), 5.0) if expected > 0.0 else 1.0
+            matched.append((term, p + math.log(more) * np.array([1.0, 0.0, 0.0])))
+        self.resonances = matched
+        data.hold(matched)
+        at = self.best
+        self.seen = {}
+        self.fit(at.model, at.p)
 
     def _with(self, at: Fitted, term: NoiseTerm, start: Array) -> Fitted:
         return maximize(self.data, self.prior, (*at.model, term), np.concatenate([at.p, start]))
@@ -269,7 +303,7 @@ class ModelSearch:
         """Keep the last term of a fit as it is, forget what was tried without it."""
         term, p = found.model[-1], found.p[-3:]
         self.resonances.append((term, p))
-        self.data.fixed = self.data.fixed + term.spectrum(p, self.data.grid)
+        self.data.hold(self.resonances)
         self.seen = {}
         self.fit(found.model[:-1], found.p[:-3])
 
@@ -282,7 +316,7 @@ class ModelSearch:
 
 def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
     """Return the models tried for a record that differs little from another one, from the best models of that."""
-    data.fixed = before.data.fixed
+    data.hold(before.resonances)
     found = ModelSearch(data, Prior(data), resonances=before.resonances)
     for f in before.ranked[:3]:
         found.fit(f.model, f.p)

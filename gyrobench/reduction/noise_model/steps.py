@@ -2,7 +2,9 @@
 
 In the cosine transform a step at s has the ordinates -sqrt(2/n) sin(omega_k s)/(2 sin(omega_k/2)); with b(s) the sum of
 P x over the samples from s on, its size is b/d and the ratio b^2/d, d(s) = sum of sin^2(omega_k s)/(2 n sin^2 S_k).
-The level itself is free.  [DRIFT-NOISE-MODEL; own derivation]
+The errors of the end angles, of variance q2, add a rank u to the covariance of each parity: P = D - c D u u' D with
+D = diag(1/S), c = 2 q2/(1 + 2 q2 u'D u), u_k = sqrt(2/n) cos(omega_k/2).  The level itself is free.
+[DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations
@@ -27,29 +29,42 @@ class LevelStep:
     u: float
 
 
-def step_ratios(x: Array, S: Array) -> tuple[Array, Array, Array]:
+def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Array]:
     """Return likelihood ratio, size and standard deviation (n,) of a step at each sample of x (n,); S (n,): spectrum at
-    omega = pi k/n, S[0] is not used.
+    omega = pi k/n, S[0] is not used; q2: variance of the error of an angle.
     """
     n = x.size
     precision = 1.0 / S
     precision[0] = 0.0
-    y = fft.idct(fft.dct(x, norm="ortho") * precision, norm="ortho")
-    b = -np.concatenate([[0.0], np.cumsum(y)[:-1]])
+    c = fft.dct(x, norm="ortho")
+
+    def passed(ordinates: Array) -> Array:
+        """Return the sums from each sample on of D times a series of these ordinates."""
+        y = fft.idct(ordinates * precision, norm="ortho")
+        return -np.concatenate([[0.0], np.cumsum(y)[:-1]])
+
+    b = passed(c)
     half = 0.5 * math.pi * np.arange(1, n) / n
     a = np.zeros(n)
     a[1:] = precision[1:] / (4.0 * np.sin(half) ** 2)
     # sum of a_k cos(2 pi k s/n)
     d = (a.sum() - np.real(np.fft.fft(a))) / n
+    for first in (1, 2) if q2 > 0.0 else ():
+        u = np.zeros(n)
+        u[first::2] = math.sqrt(2.0 / n) * np.cos(half[first - 1 :: 2])
+        share = 2.0 * q2 / (1.0 + 2.0 * q2 * float(u @ (precision * u)))
+        g = passed(u)
+        b = b - share * g * float(u @ (precision * c))
+        d = d - share * g * g
     d[:EDGE] = d[n - EDGE :] = np.inf
     d[0] = np.inf
     d = np.maximum(d, 1e-300)
     return b * b / d, b / d, 1.0 / np.sqrt(d)
 
 
-def largest_step(x: Array, S: Array) -> tuple[LevelStep, float]:
-    """Return the step of the largest likelihood ratio, and that ratio."""
-    ratio, size, sd = step_ratios(x, S)
+def largest_step(x: Array, S: Array, q2: float = 0.0) -> tuple[LevelStep, float]:
+    """Return the step of the largest likelihood ratio, and that ratio; see :func:`step_ratios`."""
+    ratio, size, sd = step_ratios(x, S, q2)
     k = int(np.argmax(ratio))
     return LevelStep(k, float(size[k]), float(sd[k])), float(ratio[k])
 

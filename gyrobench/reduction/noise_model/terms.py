@@ -10,7 +10,8 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
     gauss_markov     sigma^2 P(e^(-1/tau))                            sigma^2, tau
     flicker          B^2/omega, means over T                          B^2
     walk             K^2/(4 sin^2(omega/2))                           K^2
-    resonance        sigma^2 Re P(e^(-1/tau + i omega0))              sigma^2, tau, omega0
+    resonance        sigma^2 sin^2(omega/2)/sin^2(omega0/2) Re((1 - i/(omega0 tau)) P(e^(-1/tau + i omega0))): the
+                     angle of a damped oscillator that noise drives   sigma^2, tau, omega0
     band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
 
 Filters: "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
@@ -33,8 +34,10 @@ from scipy import special
 
 from gyrobench.arrays import Array
 
+PEAKS = ("resonance", "band")
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 LAGS = 4096  # of the covariance of a filter "shape"
+RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
 
 class Grid:
@@ -98,7 +101,7 @@ def _second_poles(p: Array) -> tuple[Any, Any, Any]:
     """Return z1, z2 and the share a: covariance Re(a z1^h + (1 - a) z2^h) of a second-order low-pass, p: log omega_n,
     log zeta.
     """
-    w, zeta = np.exp(np.clip(p[..., 0:1], -15.0, 5.0)), np.exp(np.clip(p[..., 1:2], -5.0, 5.0))
+    w, zeta = np.exp(np.clip(p[..., 0:1], -8.0, 5.0)), np.exp(np.clip(p[..., 1:2], -5.0, 5.0))
     root = np.sqrt((zeta * zeta - 1.0 + 1e-9).astype(complex))
     s1, s2 = -w * (zeta - root), -w * (zeta + root)
     share = s2 / (s2 - s1)  # of the covariance, from that of white noise through 1/((s - s1)(s - s2))
@@ -208,6 +211,20 @@ class NoiseTerm:
         """Return S (..., b) for parameters p (..., size)."""
         return np.exp(p[..., 0:1]) * self.unit(p[..., 1:], grid)
 
+    def angle(self, p: Array) -> Array:
+        """Return the variance (...) of the errors of single angles: of what rises from frequency 0 on, (S - S(0))/
+        (4 sin^2(omega/2)).  Of a stretch the first and the last one stay in the sum of its samples.
+        """
+        v = np.exp(p[..., 0])
+        if self.name == "quantization":
+            return np.asarray(v)
+        if self.name in PEAKS:
+            return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2])) ** 2))
+        if self.name == "white" and (self.filter == "second" or self.filter.startswith("shape")):
+            grid = Grid(math.pi * (np.arange(RISES) + 0.5) / RISES)
+            return np.asarray(v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1))
+        return np.zeros_like(v)
+
     def allan(self, p: Array, m: Array, means: bool = False) -> Array:
         """Return the Allan variance (..., k) of means over m (k,) samples, m whole numbers."""
         v = np.exp(p[..., 0:1])
@@ -228,23 +245,29 @@ class NoiseTerm:
             lag = np.arange(math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0)
             gamma = np.exp(-0.5 * (lag * np.exp(-p[..., 1:2])) ** 2) * np.cos(lag * np.exp(p[..., 2:3]))
             return v * _allan_covariance(gamma, m)
-        z = np.exp(-np.exp(-p[..., 1:2]) + 1j * np.exp(p[..., 2:3]))
-        return np.asarray(v * np.real(_allan_pole(z, m)))
+        decay, centre = np.exp(-p[..., 1:2]), np.exp(p[..., 2:3])
+        once, twice = (np.exp(-k * m * decay) * (np.cos(k * m * centre) + decay / centre * np.sin(k * m * centre))
+                       for k in (1.0, 2.0))  # fmt: skip
+        return np.asarray(v / (4.0 * np.sin(0.5 * centre) ** 2) * (3.0 - 4.0 * once + twice) / m**2)
 
 
 def _resonance(p: Array, grid: Grid) -> Array:
-    """Mean of Re P over each bin: of the antiderivative 2 arctan((1 + r)/(1 - r) tan(x/2)) where a bin has a width."""
-    r, centre = np.exp(-np.exp(-p[..., 0:1])), np.exp(p[..., 1:2])
-    if not grid.half_width.any():
-        return np.asarray(0.5 * (poisson(r, np.cos(grid.omega - centre)) + poisson(r, np.cos(grid.omega + centre))))
-    h = np.maximum(grid.half_width, 1e-9)
+    """Spectrum of the angle of a damped oscillator, covariance r^h (cos omega0 h + sin omega0 h/(omega0 tau)), times
+    that of a difference, 1 at the centre.
+
+    Its mean over each bin by the antiderivatives 2 arctan((1 + r)/(1 - r) tan(x/2)) of sum r^|h| cos hx and
+    log(1 - 2 r cos x + r^2) of 2 sum_(h > 0) r^h sin hx, x = omega +- omega0.
+    """
+    decay, centre = np.exp(-p[..., 0:1]), np.exp(p[..., 1:2])
+    r, h = np.exp(-decay), np.maximum(grid.half_width, 1e-9)
     out: Array = np.zeros(np.broadcast_shapes(centre.shape, grid.omega.shape))
-    for shift in (-centre, centre):
-        x = np.remainder(grid.omega + shift + np.pi, 2.0 * np.pi) - np.pi
-        t1, t0 = (2.0 * np.arctan((1.0 + r) / (1.0 - r) * np.tan(0.5 * np.clip(x + s * h, -3.14159, 3.14159)))
-                  for s in (1.0, -1.0))  # fmt: skip
-        out += 0.5 * (t1 - t0) / (2.0 * h)
-    return out
+    for sign in (-1.0, 1.0):
+        x = np.remainder(grid.omega + sign * centre + np.pi, 2.0 * np.pi) - np.pi
+        ends = [np.clip(x + s * h, -3.14159, 3.14159) for s in (1.0, -1.0)]
+        even = [2.0 * np.arctan((1.0 + r) / (1.0 - r) * np.tan(0.5 * y)) for y in ends]
+        odd = [np.log((1.0 - r) ** 2 + 4.0 * r * np.sin(0.5 * y) ** 2) for y in ends]
+        out += 0.5 * (even[0] - even[1] + sign * decay / centre * (odd[0] - odd[1])) / (2.0 * h)
+    return grid.sine / (4.0 * np.sin(0.5 * centre) ** 2) * np.maximum(out, 0.0)
 
 
 def _band(p: Array, grid: Grid) -> Array:

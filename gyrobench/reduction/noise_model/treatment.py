@@ -28,6 +28,7 @@ MOST = 64  # stretches that are used, the longest
 LEAST = 64  # samples of a record
 LEVELS = 32  # parts of a record whose noise is compared
 DEPARTS = 1e-4  # probability below which the noise level changes
+ENDS = 256  # samples of an end of a stretch that do not tell of the level
 CHUNK = 1 << 17  # samples of a sine computed at a time
 
 
@@ -147,7 +148,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
             y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
         done = [complete(y, find_wild) for y in own]
     stretches = tuple(TreatedStretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True))
-    return Treated(rate.size, stretches, lines, full, *_levels(np.concatenate([d.white for d in done])))
+    return Treated(rate.size, stretches, lines, full, *_levels(np.concatenate([_inner(d.white) for d in done])))
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
@@ -172,6 +173,12 @@ def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
     beta[-2:] = 0.0
     out: Array = np.concatenate([beta @ columns(a, min(a + CHUNK, n)) for a in range(0, n, CHUNK)])
     return out
+
+
+def _inner(z: Array) -> Array:
+    """Return a whitened stretch without its ends, where what is narrow and high is cut off and stands out."""
+    end = min(ENDS, z.size // 16)
+    return z[end : z.size - end]
 
 
 def _levels(z: Array) -> tuple[float, Array, float]:

@@ -34,6 +34,7 @@ class RateReading(RebalanceTest):
     """
 
     rate_gyro: ClassVar[str]  # the part that stands in the slot gyro where a rate is read, unless another one is given
+    readings: ClassVar[tuple[str, ...]] = (CURRENT, RATE)
     reads: ClassVar[dict[str, Option]] = {
         "reading": Option(CURRENT, str, "what is read: current (torque rebalance), or rate (of a rate gyro, axis x)")
     }
@@ -72,15 +73,15 @@ class RateReading(RebalanceTest):
 
     def check(self) -> list[str]:
         problems = super().check()
-        if self["reading"] not in (CURRENT, RATE):
-            problems.append(f"reading = {self['reading']}: must be {CURRENT} or {RATE}")
+        if self["reading"] not in self.readings:
+            problems.append(f"reading = {self['reading']}: must be {' or '.join(self.readings)}")
         for name in ("k", "u_current"):
-            if self.reads_rate and name in self.options and self[name]:
-                problems.append(f"{name}: of a torquer and its current; with reading = rate there is none")
+            if self["reading"] != CURRENT and name in self.options and self[name]:
+                problems.append(f"{name}: of a torquer and its current; with reading = {self['reading']} there is none")
         return problems
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)
-        if not (self.reads_rate or self["k"] or parameters.get("gyro.k")):
+        if self["reading"] == CURRENT and not (self["k"] or parameters.get("gyro.k")):
             problems.append("k unknown: the gyro has no parameter k; give the option k, as 17.2deg/h/mA")
         return problems

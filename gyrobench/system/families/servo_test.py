@@ -18,17 +18,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gyrobench import drift, frames
+from gyrobench import frames
 from gyrobench.attitudes import SERVO_ATTITUDES
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
+from gyrobench.system.families.servo_channel import CHANNEL, ChannelTest, gyro_on_table, own_name
 from gyrobench.system.families.servo_expectation import Expected, capture_problems
 from gyrobench.system.families.table_test import (
     FACE,
     ON_STAND,
-    ON_TABLE,
     SDF_NOISES,
     TableTest,
     on_table,
@@ -50,7 +50,6 @@ GYRO_SERVO = """
 INDEX_RATE = 5e-3  # rad/s: the cage holds the float up to 8.3e-3
 #: rad/s (8 Hz): brushes hold a turning table M / (J capture_rate2) from null, and must let it within capture_angle
 CAPTURE_RATE = 50.0
-GYRO_TO_TABLE = {"H": "H_g", "J": "J_g", "C": "C_g", "K_sg": "K_g"}  # of the gyro -> what the table is told of it
 SITE_AND_STAND = SITE | {"latitude": replace(SITE["latitude"], sets="site.latitude stand.latitude")}
 TRACKING = {
     "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
@@ -78,13 +77,9 @@ def stand_parameters(directions: Iterable[tuple[int, int]]) -> dict[str, Any]:
     return {**places, "stand.base": np.eye(3)}
 
 
-def gyro_on_table(parts: PartValues) -> dict[str, Any]:
-    """Return what the design of the table's servo loop takes of the gyro on it."""
-    return {f"table.{b}": parts[f"gyro.{a}"] for a, b in GYRO_TO_TABLE.items()}
-
-
-class ServoTest(TableTest):
-    """A floated gyro holds the table it stands on; the table angle is read.  A test gives holds().
+class ServoTest(ChannelTest, TableTest):
+    """A floated gyro, or one axis of a gyro with two, holds the table it stands on; the table angle is read.  A test
+    gives holds().
 
     slots = ServoTest.with_parts(stand=..., table=..., gyro=..., cage=...)
     """
@@ -112,6 +107,7 @@ class ServoTest(TableTest):
     options: ClassVar[dict[str, Option]] = (
         SITE_AND_STAND
         | PHYSICAL_FORM
+        | CHANNEL
         | {"settle": Option(10.0, "s", "wait after the loop has closed", 0.5)}
         | TRACKING
         | type_b(
@@ -157,10 +153,10 @@ class ServoTest(TableTest):
             phases.append(Phase(face=FACE, dwell=0.1, window=0.1, **to))  # type: ignore[arg-type]
             times = {"settle": h.settle, "dwell": h.dwell, "expected": travel if math.isfinite(travel) else 0.0}
             phases.append(Phase(h.attitude, "servo", FACE, travel=h.travel, window=h.window, **times))
-        return Plan(phases, {FACE: ON_TABLE})
+        return Plan(phases, {FACE: self.face})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        self.gyro_drift = {n: float(parts[f"gyro.{n}"]) for n in drift.NAMES if f"gyro.{n}" in parts}
+        self.gyro_drift = self.gyro_drift_of(parts)
         self.earth_rate = float(parts["site.earth_rate"]) if "site.earth_rate" in parts else frames.EARTH_RATE
         names = (p.label.partition(":")[0] for p in self.plan().phases)
         return {
@@ -169,7 +165,7 @@ class ServoTest(TableTest):
             "table.base": BASE,
             "table.index_rate": INDEX_RATE,
             "table.capture_rate?": CAPTURE_RATE,
-            **gyro_on_table(parts),
+            **gyro_on_table(parts, self.channel),
         }
 
     def field_axes(self) -> dict[str, Any]:
@@ -180,10 +176,11 @@ class ServoTest(TableTest):
         if (count := len(self.plan().phases)) > 49:
             problems.append(f"the plan has {count} phases, two for each attitude: the stand knows 49")
         rate, limit = parameters.get("table.index_rate"), parameters.get("cage.i_max")
-        if rate is not None and limit is not None and rate > 0.9 * limit * parameters.get("gyro.k", np.inf):
+        k = f"gyro.{own_name(self.channel, 'k')}"
+        if rate is not None and limit is not None and rate > 0.9 * limit * parameters.get(k, np.inf):
             problems.append(
-                f"table.index_rate = {rate:g} rad/s: the cage holds the float up to cage.i_max gyro.k = "
-                f"{limit * parameters['gyro.k']:.3g} rad/s; index more slowly"
+                f"table.index_rate = {rate:g} rad/s: the cage holds the float up to cage.i_max {k} = "
+                f"{limit * parameters[k]:.3g} rad/s; index more slowly"
             )
         return problems or self._hold_problems(parameters)
 

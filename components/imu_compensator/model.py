@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+from gyrobench.component import Component, Input, Output, Parameter
+from gyrobench.component.math import Number, Vector, cross, dot, fabs, vector
+
+G0 = 9.80665  # m/s2
+NONE = [0.0, 0.0, 0.0]
+ZERO = [NONE, NONE, NONE]
+FEW = 0.1  # least determinant of 1 + S
+
+
+def determinant(m: Vector) -> Number:
+    """Return the determinant of a matrix (3, 3)."""
+    return dot(vector(m[0]), cross(vector(m[1]), vector(m[2])))
+
+
+def solved(m: Vector, y: Vector) -> Vector:
+    """Return x of m x = y, m (3, 3), by cross products of the rows:
+
+    x = (y_0 r_1 x r_2 + y_1 r_2 x r_0 + y_2 r_0 x r_1) / (r_0 . r_1 x r_2)
+    """
+    r0 = vector(m[0])
+    r1 = vector(m[1])
+    r2 = vector(m[2])
+    a = cross(r1, r2)
+    b = cross(r2, r0)
+    c = cross(r0, r1)
+    return vector((1.0 / dot(r0, a)) * (y[0] * a + y[1] * b + y[2] * c))
+
+
+class ImuCompensator(Component):
+    """Takes the known errors of an inertial measurement unit off its readings: what imu_positions has found.
+
+        f     = (1 + acc_scale)^-1 (f_read - acc_bias)
+        omega = (1 + gyro_scale)^-1 (rate - gyro_bias - g_sensitivity f/g0)                           [IMU-POSITIONS]
+
+    The parameters are those of the part imu, in axes of the case; with equal ones its readings come back exactly.
+    Refused: matrices 1 + S with a determinant below 0.1.
+    Not modelled: errors that follow the temperature, nonlinearity, a delay between rate and specific force.
+    Source: IMU-POSITIONS; IEEE 1559 (terms).
+    """
+
+    version = "1.0.0"
+
+    step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
+    gyro_bias = Parameter(NONE, "rad/s", "bias of each gyro")
+    gyro_scale = Parameter(ZERO, "1", "gyros: scale factor errors (diagonal) and misalignments")
+    g_sensitivity = Parameter(ZERO, "rad/s", "rate of each gyro per g0 of specific force along x, y, z")
+    acc_bias = Parameter(NONE, "m/s2", "bias of each accelerometer")
+    acc_scale = Parameter(ZERO, "1", "accelerometers: scale factor errors (diagonal) and misalignments")
+
+    rate = Input(NONE, "rad/s", "rates that the gyros x, y, z read")
+    f_read = Input([0.0, 0.0, G0], "m/s2", "specific force that the accelerometers x, y, z read")
+
+    omega = Output("rad/s", "inertial rate, axes of the case", shape=(3,))
+    f = Output("m/s2", "specific force, axes of the case", shape=(3,))
+
+    def start(self) -> None:
+        unit = vector([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self.refuse(fabs(determinant(unit + self.gyro_scale)) < FEW, "gyro_scale: 1 + S has no inverse")
+        self.refuse(fabs(determinant(unit + self.acc_scale)) < FEW, "acc_scale: 1 + S has no inverse")
+
+    def outputs(self) -> None:
+        unit = vector([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        force = solved(unit + self.acc_scale, self.f_read - self.acc_bias)
+        self.f = force
+        self.omega = solved(
+            unit + self.gyro_scale, self.rate - self.gyro_bias - self.g_sensitivity @ force * (1.0 / G0)
+        )

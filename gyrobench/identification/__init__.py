@@ -1,0 +1,1 @@
+"""Identification of a loop from its record: frequency responses with intervals, margins, nonlinearity."""

@@ -1,0 +1,218 @@
+"""From a record of a loop to its responses and margins."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.arrays import Array
+from gyrobench.bench import Bench, UsageError
+from gyrobench.identification.distortion import (
+    Distortion,
+    distortions,
+    is_odd,
+    with_distortion,
+)
+from gyrobench.identification.line_spectrum import (
+    PERIODS,
+    LineAmplitudes,
+    broadband_lines,
+    find_period,
+    misfit,
+    periodic_lines,
+    periods_used,
+)
+from gyrobench.identification.loop_curve import loop_curve
+from gyrobench.identification.loop_margins import margins
+from gyrobench.identification.loop_record import LoopRecord, read_loop
+from gyrobench.identification.ratios import loop_responses
+from gyrobench.identification.written_identification import Identification
+from gyrobench.record.csv_reader import DataError
+
+WHOLE = 0.05  # of a sample: what the last period may be off
+LINES = 8
+BANDS = 12
+CLIPPED = 4  # samples in a row at the largest value
+DRIFT = 1.0  # rms of the response: more drift than that is said
+KNOWN = 0.5  # of the frequencies of a band at which L is determined
+STRONG = 0.01  # of the excited lines: distortion that margins may not pass with
+
+
+def identify(
+    data: str | Path,
+    *,
+    at: str = "",
+    period: str = "",
+    band: tuple[float, float] = (0.0, math.inf),
+    columns: Path | None = None,
+) -> Identification:
+    """Return responses and margins of the loop of a file.
+
+    at: where the excitation enters, period: its period; both replace what the file states.  band: frequencies, Hz.
+    columns: a column map.  Raises UsageError and DataError.
+    """
+    begin = time.perf_counter()
+    file = Bench.find().existing(Path(data))
+    if not file.exists():
+        raise UsageError(f"{file}: no such file of measured data")
+    found = identify_record(read_loop(file, at, period, columns), band)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.inf)) -> Identification:
+    """Return responses and margins of the loop of a record, between two frequencies, Hz.  Raises DataError."""
+    _check(record)
+    samples, notes = _samples_of_period(record)
+    kinds: list[Distortion] = []
+    if samples:
+        lines, omitted = periodic_lines(record, samples)
+        seconds = samples * record.step
+        if not lines.f.size:
+            raise DataError(record.name, ["the excitation has no line that stands out of its noise"])
+        kinds = distortions(lines, omitted, seconds)
+        notes += _about(kinds, lines, seconds)
+        if any(d.kind == "odd" and d.significant for d in kinds):
+            lines = with_distortion(lines, omitted, seconds)
+        lines = lines.take((lines.f >= band[0]) & (lines.f <= band[1]))
+    else:
+        lines, seconds = broadband_lines(record, *band), 0.0
+    responses = loop_responses(lines, record.at)
+    known = responses["S"].determined & (responses["S"].u < KNOWN)
+    if int(known.sum()) < (LINES if samples else BANDS):
+        raise DataError(record.name, [_too_few(record, samples, lines, int(known.sum()))])
+    s = responses["S"]
+    curve = loop_curve(type(s)(*(getattr(s, n)[known] for n in ("f", "value", "u", "dof", "center", "radius"))))
+    found, missing = margins(curve)
+    notes += _drift(record, samples) + _clipped(record)
+    count = periods_used(record.r.size, samples) if samples else 0
+    return Identification(
+        record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2])
+    )
+
+
+def _check(record: LoopRecord) -> None:
+    problems = [
+        f"column '{name}' does not change"
+        for name, x in (("excitation", record.r), ("input", record.u), ("output", record.y))
+        if not np.ptp(x) > 1e-12 * float(np.abs(x).max() or 1.0)
+    ]
+    if problems:
+        raise DataError(record.name, problems)
+
+
+def _samples_of_period(record: LoopRecord) -> tuple[int, list[str]]:
+    """Return the samples of a period, 0 for an excitation that is not periodic; and what there is to say of it."""
+    stated = record.period / record.step
+    samples = round(stated) or find_period(record.r)
+    if not samples:
+        return 0, []
+    count = record.r.size // samples
+    text = f"the excitation has a period of {stated or samples:.7g} samples"
+    if count < PERIODS:
+        said = f"{record.r.size / samples:.2g} periods are in the record, of {samples * record.step:.4g} s each"
+        if record.period:
+            raise DataError(record.name, [f"too short: {said}; at least {PERIODS} are needed, {PERIODS + 3} are good"])
+        return 0, [f"{said}; reduced as an excitation without period (from {PERIODS} on the periods are compared)"]
+    off = misfit(record.r, samples)
+    drift = abs(stated - samples if record.period else off) * count
+    if drift > WHOLE:
+        found = stated if record.period else samples + off
+        if record.period:
+            raise DataError(
+                record.name,
+                [f"{text}, not a whole number: generator and recorder need one clock, or a period of "
+                 f"{samples * record.step:.7g} s"],
+            )  # fmt: skip
+        return 0, [f"the excitation repeats every {found:.3f} samples, not a whole number of them (generator and "
+                   "recorder have clocks of their own); reduced as an excitation without period"]  # fmt: skip
+    return samples, []
+
+
+def _too_few(record: LoopRecord, samples: int, lines: LineAmplitudes, known: int) -> str:
+    kind = "lines of the excitation" if samples else "bands of frequency"
+    return (
+        f"{known} of {lines.f.size} {kind} have a response above the noise, {LINES if samples else BANDS} are needed: "
+        f"the record of {record.length:.4g} s is too short, the excitation too small or of too few frequencies"
+    )
+
+
+def _about(kinds: list[Distortion], lines: LineAmplitudes, period: float) -> list[str]:
+    """Return what the harmonics that are left out say."""
+    if not kinds:
+        why = (
+            "even harmonics are excited, too"
+            if not is_odd(lines, period)
+            else "too few odd and even harmonics are left out"
+        )
+        return [f"nonlinearity cannot be seen: {why}; an odd multisine with omitted lines shows it"]
+    notes = []
+    for d in kinds:
+        level = f"{20.0 * math.log10(max(d.level, 1e-9)):.3g}".replace("-", "−")
+        if d.significant:
+            notes.append(
+                f"nonlinear: {d.count} {d.kind} harmonics that are not excited hold {level} dB "
+                f"of the {d.signal} at the excited ones, beside noise. "
+                + (
+                    "The responses are the best linear approximation for this excitation and amplitude (friction, "
+                    "saturation, backlash); the intervals hold the distortion, at another amplitude the loop is another"
+                    if d.kind == "odd"
+                    else "Even nonlinearity (an offset with friction or backlash, a square) moves the mean, not the "
+                    "responses at odd harmonics"
+                )
+            )
+    return notes
+
+
+def _drift(record: LoopRecord, samples: int) -> list[str]:
+    notes = []
+    for name, x in (("input", record.u), ("output", record.y)):
+        length = samples or max(record.r.size // 10, 1)
+        means = x[: x.size // length * length].reshape(-1, length).mean(axis=1)
+        moved = float(np.ptp(means))
+        if moved > DRIFT * float(np.std(x[:length])) > 0.0:
+            notes.append(f"the {name} drifts by {moved / float(np.std(x[:length])):.2g} times its response; mean and "
+                         "slope are taken out, what is left is seen as noise")  # fmt: skip
+    return notes
+
+
+def _clipped(record: LoopRecord) -> list[str]:
+    return [
+        f"the {name} stays at its largest value for several samples, {n} times: it may be at its limit, where the loop "
+        "is another"
+        for name, x in (("input", record.u), ("output", record.y))
+        if (n := _runs_at_end(x)) >= 2
+    ]  # fmt: skip
+
+
+def _runs_at_end(x: Array) -> int:
+    """Return how often x stays CLIPPED samples and more at its largest or smallest value."""
+    count = 0
+    for end in (x.max(), x.min()):
+        there = np.concatenate([[False], np.abs(x - end) <= 1e-9 * np.ptp(x), [False]])
+        edges = np.flatnonzero(there[1:] != there[:-1])
+        count += int(np.sum(edges[1::2] - edges[::2] >= CLIPPED))
+    return count
+
+
+def parse_band(text: str) -> tuple[float, float]:
+    """Return the frequencies, Hz, of "0.5Hz..80Hz"; either may be missing.  Raises UsageError."""
+    if not text:
+        return 0.0, math.inf
+    low, dots, high = text.partition("..")
+    try:
+        if not dots:
+            raise units.UnitError("write LOW..HIGH")
+        found = (
+            (units.parse_quantity(low, "Hz") if low else 0.0),
+            (units.parse_quantity(high, "Hz") if high else math.inf),
+        )
+    except units.UnitError as error:
+        raise UsageError(f"--band {text}: {error}; for example 0.5Hz..80Hz") from None
+    if not 0.0 <= found[0] < found[1]:
+        raise UsageError(f"--band {text}: the first frequency must be below the second")
+    return found

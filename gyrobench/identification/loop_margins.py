@@ -1,0 +1,168 @@
+"""Margins of a measured loop with 95 % intervals.
+
+A crossing counts where the curve on either side is told from the limit (by 3 u), so that the noise of single points
+makes none.  With g = ln|L|, p = arg L, slopes over f, and equal and independent noise u of both:
+
+    phase margin   u2(p at g = 0)    = u2 (1 + (p'/g')2)
+    gain margin    u2(-g at p = -pi) = u2 (1 + (g'/p')2)
+    peaks          u2(max)           = u2                      (the slope is 0 there)
+
+Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrobench.arrays import Array
+from gyrobench.identification.loop_curve import BETWEEN, LoopCurve
+from gyrobench.record.frequency_response import Complex
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+
+TOLD = 3.0  # u, from the limit
+LARGEST = 1e3  # factor of a gain margin that still counts
+LARGEST_U = 0.3  # of L, relative: what is less certain tells no crossing
+TURN = 2.0 * math.pi
+SMALL = 0.1  # of |L|: what is not resolved below it has no margin
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A margin: value and 95 % interval, SI (rad, s, Hz, factors), at a frequency, Hz."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    f: float
+    unit: str
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+    def shown(self, x: float) -> str:
+        """Return a value of this margin as text."""
+        match self.unit:
+            case "rad":
+                return f"{math.degrees(x):.3g}°"
+            case "factor":
+                return f"{20.0 * math.log10(max(x, 1e-15)):.3g} dB"
+            case "s":
+                return f"{1e3 * x:.3g} ms"
+        return f"{x:.4g} Hz" if self.unit == "Hz" else f"{x:.3g}"
+
+
+def margins(c: LoopCurve) -> tuple[list[Margin], list[str]]:
+    """Return the margins of a loop, and why some are missing."""
+    if not c.f.size:
+        return [], ["no margins: too few frequencies have a response"]
+    size = np.abs(c.L)
+    if np.any(narrow := ~c.resolved & (size > SMALL)):
+        at = float(np.exp(np.mean(np.log(c.f[narrow]))))
+        return [], [
+            f"no margins: about {at:.3g} Hz the loop changes faster than the frequencies can follow, and the smallest "
+            "margin may lie between two of them; a longer period, or a longer record, brings them closer together"
+        ]
+    known = c.u_L < LARGEST_U
+    found, why = [*_phase_margins(c, known), *_gain_margins(c, known)], []
+    names = {m.name for m in found}
+    span = (
+        f"between {c.f[known][0]:.3g} and {c.f[known][-1]:.3g} Hz, where it is known" if np.any(known) else "anywhere"
+    )
+    if "phase margin" not in names:
+        why.append(f"no phase margin: |L| is not seen to cross 1 {span}")
+    if "gain margin" not in names:
+        why.append(f"no gain margin: the phase of L is not seen to cross −180° with |L| below 1 {span}")
+    for name, of, value, invert in (
+        ("disk margin", "S − 1/2", c.S - 0.5, True), ("peak S", "S", c.S, False), ("peak T", "T", 1.0 - c.S, False),
+    ):  # fmt: skip
+        peak = _peak(name, c, value, invert)
+        if peak is None:
+            why.append(f"no {name}: the largest |{of}| is at an end of the frequencies")
+        else:
+            found.append(peak)
+    return found, why
+
+
+def _phase_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
+    size = np.log(np.abs(c.L))
+    found = []
+    for k, f in _crossings(size, c.u_L, known, c.f):
+        slope, u = c.slope_L[k], c.u_L[k]
+        phase = _wrapped(float(np.angle(-c.L[k])) + slope.imag * (f - c.f[k]))
+        late = phase % TURN / (TURN * f)
+        by_gain = (1.0 / f - slope.imag / (phase % TURN)) / slope.real if phase else 0.0
+        halves = (
+            math.hypot(1.0, slope.imag / slope.real),
+            1.0 / abs(slope.real),
+            late * math.hypot(1.0 / (phase % TURN or 1.0), by_gain),
+        )
+        found.append((f, phase, late, *(NORMAL * u * h for h in halves)))
+    if not found:
+        return
+    f, phase, _, U, U_f, _ = min(found, key=lambda m: abs(m[1]))
+    yield Margin("phase margin", phase, phase - U, phase + U, f, "rad")
+    yield Margin("crossover", f, f - U_f, f + U_f, f, "Hz")
+    f, _, late, _, _, U = min(found, key=lambda m: m[2])
+    yield Margin("delay margin", late, late - U, late + U, f, "s")
+
+
+def _gain_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
+    turn = np.angle(-c.L)
+    found = []
+    for k, f in _crossings(turn, c.u_L, known & (np.abs(turn) < 0.25 * TURN), c.f):
+        slope, u = c.slope_L[k], c.u_L[k]
+        log = -float(np.log(np.abs(c.L[k]))) - slope.real * (f - c.f[k])
+        if abs(log) < math.log(LARGEST):
+            found.append((abs(log), log, NORMAL * u * math.hypot(1.0, slope.real / slope.imag), f))
+    for name, up in (("gain margin", True), ("gain-reduction margin", False)):
+        if of_side := [m for m in found if (m[1] > 0.0) == up]:
+            _, log, U, f = min(of_side)
+            yield Margin(name, math.exp(log), math.exp(log - U), math.exp(log + U), f, "factor")
+
+
+def _crossings(value: Array, u: Array, counts: NDArray[np.bool_], f: Array) -> Iterator[tuple[int, float]]:
+    """Yield place and frequency of each crossing of 0 that is told from noise; in the middle of several in one."""
+    before = -1
+    for k in range(value.size):
+        if not counts[k]:
+            before = -1
+            continue
+        if abs(value[k]) < TOLD * u[k]:
+            continue
+        if before >= 0 and (value[k] > 0.0) != (value[before] > 0.0):
+            positive = value[before : k + 1] > 0.0
+            changes = before + np.flatnonzero(positive[1:] != positive[:-1])
+            i = int(changes[changes.size // 2])
+            share = value[i] / (value[i] - value[i + 1])
+            yield (i if share < 0.5 else i + 1), float(f[i] + share * (f[i + 1] - f[i]))
+        before = k
+
+
+def _peak(name: str, c: LoopCurve, value: Complex, invert: bool) -> Margin | None:
+    """Return the largest size of a response; None where it is at an end.
+
+    The largest of noisy values is too large: by how much, and how it scatters, is seen by adding the noise once more.
+    """
+    counts = c.u < LARGEST_U * np.abs(value)
+    counts[:BETWEEN] = counts[-BETWEEN:] = False
+    if not np.any(counts):
+        return None
+    size = np.where(counts, np.abs(value), 0.0)
+    k = int(np.argmax(size))
+    if np.abs(value)[[0, -1]].max() >= size[k]:
+        return None
+    again = np.where(counts, np.abs(value + c.noise), 0.0).max(axis=1)
+    peak, U = 2.0 * float(size[k]) - float(again.mean()), NORMAL * float(again.std(ddof=1))
+    limits = [peak - U, peak, peak + U]
+    low, at, high = (1.0 / x for x in reversed(limits)) if invert else limits
+    return Margin(name, at, low, high, float(c.f[k]), "1" if invert else "factor")
+
+
+def _wrapped(angle: float) -> float:
+    return angle - TURN * math.floor(angle / TURN + 0.5)

@@ -1,0 +1,151 @@
+"""Identified loops against loops of one's own (scipy): how often intervals hold the truth, how far margins are off.
+
+    python tests/benchmarks/identification.py --runs 100                 # random platforms, multisine
+    python tests/benchmarks/identification.py --runs 100 --excitation chirp      # or random
+    python tests/benchmarks/identification.py --runs 40 --friction       # the truth is the best linear approximation
+
+A line for each response and each margin: how many of the intervals held the truth, the rms error (degrees, dB, relative
+else) and the median of U.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+from friction_loops import random_friction
+from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
+
+from gyrobench.identification.identify_loop import identify_record
+from gyrobench.identification.loop_record import LoopRecord
+
+BAND = (1.0, 150.0)  # Hz
+PERIOD = 4000  # samples
+UNITS = {"excitation": "1", "input": "1", "output": "1"}
+
+
+class Count:
+    """Intervals that held the truth, errors, U."""
+
+    def __init__(self) -> None:
+        self.held: Counter[str] = Counter()
+        self.all: Counter[str] = Counter()
+        self.errors: dict[str, list[float]] = defaultdict(list)
+        self.U: dict[str, list[float]] = defaultdict(list)
+        self.seconds: list[float] = []
+        self.notes: Counter[str] = Counter()
+
+    def responses(self, found, truth) -> None:
+        for name, value in truth.items():
+            g = found.responses[name]
+            good = g.determined & (g.u < 0.5)
+            low, high = g.gain()
+            below, above = g.phase()
+            turn = np.angle(value / np.where(g.value, g.value, 1.0))
+            self.held[f"{name}, gain"] += int(np.sum(((low <= np.abs(value)) & (np.abs(value) <= high))[good]))
+            self.held[f"{name}, phase"] += int(np.sum(((below <= turn) & (turn <= above))[good]))
+            for part in ("gain", "phase"):
+                self.all[f"{name}, {part}"] += int(good.sum())
+
+    def margins(self, found, truth) -> None:
+        self.seconds.append(found.seconds)
+        self.notes.update(n.partition(":")[0] for n in found.notes)
+        for m in found.margins:
+            if m.name not in truth:
+                self.all[f"{m.name} (no such truth)"] += 1
+                continue
+            self.all[m.name] += 1
+            self.held[m.name] += truth[m.name] in m
+            scale = {"rad": np.degrees(1.0), "factor": 20.0 / np.log(10.0) / m.value}.get(m.unit, 1.0 / m.value)
+            self.errors[m.name].append(scale * (m.value - truth[m.name]))
+            self.U[m.name].append(scale * 0.5 * (m.high - m.low))
+
+    def show(self) -> None:
+        for name, count in self.all.items():
+            line = f"{name:34s} {self.held[name] / count:.3f} of {count}"
+            if name in self.errors:
+                line += f"   rms {np.sqrt(np.mean(np.square(self.errors[name]))):.3g}  U {np.median(self.U[name]):.3g}"
+            print(line)
+        print(f"seconds each: mean {np.mean(self.seconds):.2f}, largest {np.max(self.seconds):.2f}")
+        print(dict(self.notes))
+
+
+def excitation(kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Return 60 s of excitation of rms 1, of multisines a whole number of periods."""
+    if kind == "multisine":
+        return np.tile(odd_multisine(PERIOD, rng, *BAND), 15)
+    if kind == "chirp":
+        return signal.chirp(np.arange(60000) * H, BAND[0] / 2.0, 60.0, BAND[1], method="logarithmic")
+    return signal.lfilter(*signal.butter(2, 0.3), rng.standard_normal(60000)) * 1.8
+
+
+def linear(runs: int, kind: str, noise: float, first: int) -> Count:
+    """Count random platforms; noise: rms of the sensor's and of the disturbance, over that of the response."""
+    counted = Count()
+    for seed in range(first, first + runs):
+        rng = np.random.default_rng(seed)
+        loop, at = random_platform(rng), PLACES[seed % 3]
+        if not loop.stable() or margins_of(loop, *BAND)["peak S"] > 4.0:
+            continue
+        r = excitation(kind, rng)
+        none = np.zeros(r.size)
+        u, y = loop.run(r, at, none, none)
+        torque = signal.lfilter([1.0], [1.0, -0.98], rng.standard_normal(r.size))
+        torque *= noise * u.std() / torque.std()
+        sensor = noise * y.std() * (rng.standard_normal(r.size) + 0.002 * np.cumsum(rng.standard_normal(r.size)))
+        record = LoopRecord("random platform", H, r, *loop.run(r, at, torque, sensor), at, UNITS)
+        begin = time.perf_counter()
+        found = identify_record(record, BAND)
+        object.__setattr__(found, "seconds", time.perf_counter() - begin)
+        L, P = loop.responses(found.f)
+        counted.responses(found, {"L": L, "S": 1.0 / (1.0 + L), "T": L / (1.0 + L), "P": P})
+        counted.margins(found, margins_of(loop, found.f[0], found.f[-1]))
+    return counted
+
+
+def friction(runs: int, noise: float, first: int, periods: int = 6, realizations: int = 60) -> Count:
+    """Count platforms with friction: the truth is the mean of many multisines without noise."""
+    rng = np.random.default_rng(first)
+    counted, samples = Count(), PERIOD // 2
+    platforms = random_friction(runs, rng)
+    lines, means = [], []
+    for _ in range(realizations):
+        r = np.tile(odd_multisine(samples, rng, *BAND, group=0), 2)  # every odd line
+        u, _ = platforms.run(np.repeat(r[:, None], runs, 1), *(np.zeros((r.size, runs)) for _ in range(2)))
+        lines.append(np.fft.rfft(r[samples:]))
+        means.append(np.fft.rfft(u[samples:], axis=0))
+    x = np.stack(lines)
+    S = np.einsum("mk,mkn->kn", np.conj(x), np.stack(means)) / np.maximum(np.sum(np.abs(x) ** 2, 0), 1e-9)[:, None]
+    r = np.stack([np.tile(odd_multisine(samples, rng, *BAND), periods + 1) for _ in range(runs)], 1)
+    u, y = platforms.run(r, np.zeros_like(r), np.zeros_like(r))
+    torque, sensor = (rng.standard_normal(r.shape) * noise * s for s in (np.ones(runs), y.std(axis=0)))
+    u, y = platforms.run(r, torque, sensor)
+    for k in range(runs):
+        found = identify_record(LoopRecord("friction", H, r[:, k], u[:, k], y[:, k], "plant input", UNITS), BAND)
+        s = S[np.round(found.f * samples * H).astype(int), k]
+        counted.responses(found, {"L": 1.0 / s - 1.0, "S": s, "T": 1.0 - s})
+        counted.all["odd distortion seen"] += 1
+        counted.held["odd distortion seen"] += any(d.kind == "odd" and d.significant for d in found.distortions)
+        counted.margins(found, {})
+    return counted
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--noise", type=float, default=0.1)
+    parser.add_argument("--excitation", default="multisine", choices=("multisine", "chirp", "random"))
+    parser.add_argument("--friction", action="store_true")
+    asked = parser.parse_args()
+    if asked.friction:
+        friction(asked.runs, asked.noise, asked.first).show()
+    else:
+        linear(asked.runs, asked.excitation, asked.noise, asked.first).show()
