@@ -33,7 +33,7 @@ reading = "typical"
 
 
 def test_there_are_some() -> None:
-    assert len(SHEETS) >= 14
+    assert len(SHEETS) >= 17
     for name in SHEETS:
         sheet = find_instrument(name)
         assert sheet.density is not None
@@ -101,6 +101,19 @@ def test_rate_table_returns_the_nonlinearity_of_a_sheet() -> None:
         result = system.reduce(session.run({**values, **settings(sheet), **quiet}, seed=2))
     rows = next(t for t in result.tables if t.id == "rate.departures").rows
     assert max(abs(row[2]) for row in rows) == pytest.approx(1000.0 * (280.0 / 300.0) ** 2, rel=0.05)  # ppm
+
+
+def test_the_vibrating_table_returns_the_bandwidth_of_a_sheet() -> None:
+    """MTi-1: 255 Hz; noise of its density, drift off."""
+    sheet = find_instrument("mti1")
+    values = {"lowest": 20.0, "highest": 450.0, "points": 12, "dwell": 0.2, "settle": 0.1}
+    system = load_system("gyro_bandwidth").with_values(values)
+    quiet = {"gyro.flicker_x": 0.0, "gyro.flicker_y": 0.0}
+    with Session(system, {"gyro": sheet.part}) as session:
+        record = session.run({**values, **settings(sheet), **quiet}, seed=2)
+    result = system.reduce(record)
+    bandwidth = next(c for c in result.coefficients if c.name == "f_3dB")
+    assert bandwidth.estimate == pytest.approx(255.0, rel=0.05)
 
 
 def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

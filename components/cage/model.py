@@ -10,17 +10,17 @@ class Cage(Component):
     """Electrical caging: the torquer holds the float near its zero while the gyro does not hold the table.
 
         i = K_p u limited to +-i_max        while mode is not 3 (servo)
-        i = 0                               in mode 3: the torquer is idle, as a servo test requires
+        i = command                         in mode 3: 0, the torquer is idle, or what keeps a level table level
 
     With u = K_sg b and the precession -k i of the torquer, b' = (H / C) (omega_IA - omega_d - k i): the float follows
     with the rate (H / C) K_sg k K_p, 100 1/s with the default sizes, and stands off by (omega_IA - omega_d) over it.
     A gyro that is not caged while its table is moved keeps the angle, and servo mode turns the table back by it.
 
     Not modelled: float stops, the switching transient of a real torquer.
-    Source: Hu 1981, ch. 3, section 3 (torquer idle while the table is held); caging is our own.
+    Source: Hu 1981, ch. 3, section 3 (torquer idle while the table is held, or compensating); caging is our own.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     K_p = Parameter(120.0, "A/V", "gain", min=0.0)
@@ -29,10 +29,12 @@ class Cage(Component):
     u = Input(0.0, "V", "pickoff voltage")
     mode = Input(0.0, "1", "mode of the table: 3 servo, caged in any other")
 
+    command = Input(0.0, "A", "current wanted in servo mode")
+
     i = Output("A", "torquer current")
     saturated = Output("1", "1 while the current is limited")
 
     def outputs(self) -> None:
-        unlimited = 0.0 if self.mode == SERVO else self.K_p * self.u
+        unlimited = self.command if self.mode == SERVO else self.K_p * self.u
         self.i = clip(unlimited, -self.i_max, self.i_max)
         self.saturated = 1.0 if self.i != unlimited else 0.0

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
-from gyrobench.component import Block, Component, Input, Noise, Output, Parameter, Rotation
+from gyrobench.component import Block, Input, Noise, Output, Parameter, Rotation
 from gyrobench.component.blocks.gyro import DEG_H, GaussMarkov
+from gyrobench.component.blocks.thermal import TemperatureHistory, ThermalErrors
 from gyrobench.component.math import pi, vector
 from gyrobench.component.set_up import GYRO_MOUNT, turned
 
@@ -18,18 +19,20 @@ class ImuAxisNoise(Block):
     acc = Noise(50e-6 * G0, "m/s2/sqrt(Hz)", "white noise of the specific force (50 ug/sqrt(Hz))")
 
 
-class Imu(Component):
+class Imu(TemperatureHistory):
     """Three gyros and three accelerometers as one instrument, quick form: bias, scale factor, misalignment, noise.
 
-        rate   = (1 + gyro_scale) M omega + gyro_bias + g_sensitivity (M f)/g0 + Gauss-Markov + white
-        f_read = (1 + acc_scale) M f + acc_bias + Gauss-Markov + white
+        rate   = (1 + gyro_scale + diag sg(T)) M omega + gyro_bias + bg(T) + g_sensitivity (M f)/g0 + noise
+        f_read = (1 + acc_scale + diag sa(T)) M f + acc_bias + ba(T) + noise           Gauss-Markov and white
 
     M (mount): axes of the case in the axes of the inputs.  Row i of a matrix belongs to the instrument i: its diagonal
     element is the relative error of the scale factor, the two others are the sines by which its input axis leans
-    towards the other axes of the case.  Nothing makes a matrix symmetric or triangular.
+    towards the other axes of the case.  Nothing makes a matrix symmetric or triangular.  b(T), s(T): of the
+    temperature, its way through a hysteresis and its rate (block ThermalErrors); none unless set.
 
-    Not modelled: nonlinearity, asymmetry, dynamics, quantization, lever arms between the accelerometers, temperature,
-    g-squared sensitivity (see floated_gyro, accelerometer_pendulous, fixture).
+    Not modelled: nonlinearity, asymmetry, dynamics, quantization, lever arms between the accelerometers, misalignments
+    and g-sensitivity that follow the temperature, g-squared sensitivity (see floated_gyro, accelerometer_pendulous,
+    fixture, accelerometer_mems).
     Source: IEEE 1559 (terms); Tedaldi 2014 (model of a triad); own quick form.
     """
 
@@ -54,6 +57,8 @@ class Imu(Component):
     )  # fmt: skip
     gyro_bias_tau = Parameter(300.0, "s", "correlation time of the gyro biases", above=0.0)
     acc_bias_tau = Parameter(300.0, "s", "correlation time of the accelerometer biases", above=0.0)
+    gyro = ThermalErrors("rad/s", "rad/K", "gyros")
+    acc = ThermalErrors("m/s2", "m/s/K", "accelerometers")
     x = ImuAxisNoise()
     y = ImuAxisNoise()
     z = ImuAxisNoise()
@@ -67,11 +72,14 @@ class Imu(Component):
     def outputs(self) -> None:
         omega = self.mount @ self.omega
         f = self.mount @ self.f
+        T = self.temperature
+        own = self.gyro.error_at(omega, T, self.way, self.slope)
         drift = vector([self.x_gyro_bias_value, self.y_gyro_bias_value, self.z_gyro_bias_value])
         white = vector([self.noise.x_gyro, self.noise.y_gyro, self.noise.z_gyro])
         self.rate = (
-            omega + self.gyro_scale @ omega + self.gyro_bias + self.g_sensitivity @ f * (1.0 / G0) + drift + white
+            omega + self.gyro_scale @ omega + self.gyro_bias + self.g_sensitivity @ f * (1.0 / G0) + drift + white + own
         )
         drift = vector([self.x_acc_bias_value, self.y_acc_bias_value, self.z_acc_bias_value])
         white = vector([self.noise.x_acc, self.noise.y_acc, self.noise.z_acc])
-        self.f_read = f + self.acc_scale @ f + self.acc_bias + drift + white
+        own = self.acc.error_at(f, T, self.way, self.slope)
+        self.f_read = f + self.acc_scale @ f + self.acc_bias + drift + white + own

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Input, Output, Parameter
+from gyrobench.component import Input, Output, Parameter
+from gyrobench.component.blocks.thermal import TemperatureHistory, ThermalErrors
 from gyrobench.component.math import Number, Vector, cross, dot, fabs, vector
 
 G0 = 9.80665  # m/s2
@@ -28,15 +29,24 @@ def solved(m: Vector, y: Vector) -> Vector:
     return vector((1.0 / dot(r0, a)) * (y[0] * a + y[1] * b + y[2] * c))
 
 
-class ImuCompensator(Component):
+def grown(s: Vector, more: Vector) -> Vector:
+    """Return 1 + s + diag(more), s (3, 3)."""
+    out = vector([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) + s
+    for j in range(3):
+        out[j][j] = out[j][j] + more[j]
+    return vector(out)
+
+
+class ImuCompensator(TemperatureHistory):
     """Takes the known errors of an inertial measurement unit off its readings: what imu_positions has found.
 
-        f     = (1 + acc_scale)^-1 (f_read - acc_bias)
-        omega = (1 + gyro_scale)^-1 (rate - gyro_bias - g_sensitivity f/g0)                           [IMU-POSITIONS]
+        f     = (1 + acc_scale + diag sa(T))^-1 (f_read - acc_bias - ba(T))
+        omega = (1 + gyro_scale + diag sg(T))^-1 (rate - gyro_bias - bg(T) - g_sensitivity f/g0)      [IMU-POSITIONS]
 
-    The parameters are those of the part imu, in axes of the case; with equal ones its readings come back exactly.
+    The parameters are those of the part imu, in axes of the case; with equal ones and the same temperature its inputs
+    come back exactly.
     Refused: matrices 1 + S with a determinant below 0.1.
-    Not modelled: errors that follow the temperature, nonlinearity, a delay between rate and specific force.
+    Not modelled: nonlinearity, a delay between rate, specific force and temperature, an error of the thermometer.
     Source: IMU-POSITIONS; IEEE 1559 (terms).
     """
 
@@ -48,6 +58,9 @@ class ImuCompensator(Component):
     g_sensitivity = Parameter(ZERO, "rad/s", "rate of each gyro per g0 of specific force along x, y, z")
     acc_bias = Parameter(NONE, "m/s2", "bias of each accelerometer")
     acc_scale = Parameter(ZERO, "1", "accelerometers: scale factor errors (diagonal) and misalignments")
+
+    gyro = ThermalErrors("rad/s", "rad/K", "gyros")
+    acc = ThermalErrors("m/s2", "m/s/K", "accelerometers")
 
     rate = Input(NONE, "rad/s", "rates that the gyros x, y, z read")
     f_read = Input([0.0, 0.0, G0], "m/s2", "specific force that the accelerometers x, y, z read")
@@ -61,9 +74,9 @@ class ImuCompensator(Component):
         self.refuse(fabs(determinant(unit + self.acc_scale)) < FEW, "acc_scale: 1 + S has no inverse")
 
     def outputs(self) -> None:
-        unit = vector([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        force = solved(unit + self.acc_scale, self.f_read - self.acc_bias)
+        T = self.temperature
+        bias = self.acc_bias + self.acc.bias_at(T, self.way, self.slope)
+        force = solved(grown(self.acc_scale, self.acc.scale_at(T)), self.f_read - bias)
         self.f = force
-        self.omega = solved(
-            unit + self.gyro_scale, self.rate - self.gyro_bias - self.g_sensitivity @ force * (1.0 / G0)
-        )
+        bias = self.gyro_bias + self.gyro.bias_at(T, self.way, self.slope) + self.g_sensitivity @ force * (1.0 / G0)
+        self.omega = solved(grown(self.gyro_scale, self.gyro.scale_at(T)), self.rate - bias)

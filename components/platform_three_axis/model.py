@@ -56,7 +56,7 @@ class PlatformThreeAxis(Component):
     Source: Xia 2008, section 5.1, eq. 5.1.1-5.1.7; the dynamics are our own model (PLATFORM-3AXIS-DYN).
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
     integrator = "rk4"
     rk4_substeps = 1
 
@@ -97,7 +97,7 @@ class PlatformThreeAxis(Component):
     alpha = Output("rad/s2", "its derivative at the end of the step", shape=(3,))
     f = Output("m/s2", "specific force, platform axes", shape=(3,))
     attitude = Output("rad", "integral of omega", shape=(3,))
-    i_motor = Output("A", "motor currents, A order", shape=(3,))
+    i_motor = Output("A", "motor currents at the end of the step, A order", shape=(3,))
     lock = Output("1", "1 beyond lock_angle")
     saturated = Output("1", "1 while a voltage or a current is at its limit")
     at_stop = Output("1", "1 while the pitch gimbal is at its stop")
@@ -107,6 +107,7 @@ class PlatformThreeAxis(Component):
     turned = State(NONE, "rad", "integral of the inertial rate, platform axes")
     i = State(NONE, "A", "motor currents, A order")
 
+    flowed = Discrete(NONE, "A", "motor currents without inductance, at the end of the step")
     spring = Discrete(NONE, "N.m/rad", "stiffness of the contacts")
     rub = Discrete(NONE, "N.m.s/rad", "their damping")
     reach = Discrete(NONE, "rad", "way at Coulomb friction")
@@ -240,6 +241,9 @@ class PlatformThreeAxis(Component):
         self.refuse(through, "pitch = {pitch} rad, through its stop at {pitch_stop} rad: it must stay below 1.5698 rad")
         for k in range(3):
             self.i[k] = clip(self.i[k], -self.i_max[k], self.i_max[k])
+            if self.L[k] == 0.0:
+                emf = self.k_e[k] * self.dq[k]
+                self.flowed[k] = motor_current(0.0, self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], 0.0)
             if self.spring[k] > 0.0:
                 moved = contact_moved(
                     self.spring[k], self.rub[k], self.presliding, self.reach[k],
@@ -258,7 +262,8 @@ class PlatformThreeAxis(Component):
         for k in range(3):
             emf = self.k_e[k] * self.dq[k]
             amps = motor_current(self.i[k], self.i_max[k], self.v[k], self.v_max[k], emf, self.R[k], self.L[k])
-            self.i_motor[k] = amps
+            # not of the present v: a current loop could not be ordered
+            self.i_motor[k] = self.i[k] if self.L[k] > 0.0 else self.flowed[k]
             if fabs(self.v[k]) >= self.v_max[k] or fabs(amps) >= self.i_max[k]:
                 self.saturated = 1.0
         self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0

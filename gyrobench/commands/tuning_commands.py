@@ -34,10 +34,15 @@ def tune(
         typer.Option(
             "--structure",
             metavar="FACTOR+FACTOR",
-            help="Factors of the controller beside its gain: lead-lag, pi, lag, lead, notch, rolloff.",
+            help="Factors of the controller beside its gain: lead-lag, pi, lag, lead, notch, rolloff; or a whole one "
+            "that is computed: lqg, hinf.",
         ),
     ] = "lead-lag",
     loop: Annotated[str, typer.Option("--loop", metavar="NAME", help="Loop of a system that has several.")] = "",
+    pareto: Annotated[
+        list[str] | None,
+        typer.Option("--pareto", metavar="MEASURE", help="Two of the wishes, given one each: show their trade."),
+    ] = None,
     values: Set = None,
     part: Part = None,
     mapping: Map = None,
@@ -63,7 +68,7 @@ def tune(
     parts, maps = parse_swaps(part, mapping)
     found = tune_loop(
         load_system(system, settings), want or [], over or [], structure, parts=parts, maps=maps, seed=seed,
-        given=settings, loop=loop,
+        given=settings, loop=loop, pareto=pareto or [],
     )  # fmt: skip
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
     if out is not None:

@@ -197,6 +197,7 @@ def tune(
     structure: str = "lead-lag",
     *,
     loop: str = "",
+    pareto: Sequence[str] = (),
     seed: int = 1,
     values: Mapping[str, Any] | None = None,
     parts: Mapping[str, File] | None = None,
@@ -205,8 +206,8 @@ def tune(
 ) -> TunedLoop:
     """Return the controller of a stabilizer loop for what is wanted, worst case over a spread, proven in co-simulation.
 
-    want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+".
-    loop: its name, of a system that has several.
+    want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+",
+    or lqg, hinf.  loop: its name, of a system that has several.  pareto: two measures of the wishes, for their trade.
     values, options, parts, maps: as of :func:`load`.  ``had``: whether all of it can be had, by the linear models;
     ``proven``: and the co-simulation does not contradict; ``reasons``: why not.  ``settings`` and ``part`` are for
     :func:`load`; ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
@@ -219,7 +220,7 @@ def tune(
     test = load(name, given, parts=parts, maps=maps)
     return tune_loop(
         test.system, want, over, structure, parts=test.parts, maps=mapping_files(maps or {}), seed=seed,
-        given={k: str(v) for k, v in given.items()}, loop=loop,
+        given={k: str(v) for k, v in given.items()}, loop=loop, pareto=pareto,
     )  # fmt: skip
 
 

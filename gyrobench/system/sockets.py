@@ -160,6 +160,7 @@ SOCKETS: dict[str, Socket] = {
             (
                 inp("u", "V", "pickoff voltage"),
                 inp("mode", "1", "mode of the table", whole=True),
+                inp("command", "", "current wanted in servo mode, A", optional=True),
                 out("i", "A", "torquer current"),
             ),
         ),

@@ -30,6 +30,7 @@ GENERATIONS, FEWEST = 50, 8  # of it, and the fewest
 CHEAP = 8  # corners of a spread beyond which there are less
 SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of the box
 SIMPLEX = 150  # evaluations of one
+COSTLY = 64  # controllers that are computed: of the look, and of each simplex
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
 ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
 ACROSS = np.linspace(-3.0, 3.0, 31)  # of a resonance, in half widths, for its frequencies
@@ -66,7 +67,11 @@ class TuningProblem:
 
     def ratios(self, x: Array) -> Array:
         """Return ln ratio of each loop and wish, (plants, wishes); below UNSTABLE where a loop is not stable."""
-        return self.judged(self.controller(x))
+        try:
+            return self.judged(self.controller(x))
+        except ArithmeticError:  # no controller of this structure for these numbers
+            self.evaluations += 1
+            return np.full((len(self.plants), len(self.wishes)), 100.0 * UNSTABLE)
 
     def judged(self, controller: Controller) -> Array:
         self.evaluations += 1
@@ -104,6 +109,8 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
+    if not problem.structure.blocks:
+        return _computed(problem)
     low, high = problem.box.T
     nominal, corners = problem.of(1), problem.of(problem.corners)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
@@ -124,14 +131,28 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
     )  # fmt: skip
     best = polished(corners, evolved.x)
     for size in SIZES[:1] if quick else SIZES:
-        tried = polished(corners, _simplex(corners, best, size))
+        tried = polished(corners, simplex_from(corners, best, size))
         best = max(best, tried, key=corners.worst)
     problem.evaluations += nominal.evaluations + corners.evaluations
     return polished(problem, best)
 
 
-def _simplex(problem: TuningProblem, x: Array, size: float) -> Array:
-    """Return the end of the simplex method from x; size: of the first simplex, share of the box."""
+def _computed(problem: TuningProblem) -> Array:
+    """Return the best numbers of a structure whose controllers are computed, which takes time: few are judged."""
+    from scipy.stats import qmc
+
+    low, high = problem.box.T
+    corners = problem.of(problem.corners)
+    spread = low + qmc.Sobol(len(low), scramble=True, seed=1).random(COSTLY) * (high - low)
+    worst = np.array([corners.worst(x) for x in spread])
+    ends = [simplex_from(corners, spread[k], 0.15, COSTLY) for k in np.argsort(-worst)[:2]]
+    best = polished(corners, max(ends, key=corners.worst), 8)
+    problem.evaluations += corners.evaluations
+    return best
+
+
+def simplex_from(problem: TuningProblem, x: Array, size: float, most: int = SIMPLEX) -> Array:
+    """Return the end of the simplex method from x; size: of the first simplex, share of the box; most: evaluations."""
     from scipy.optimize import minimize
 
     low, high = problem.box.T
@@ -146,7 +167,7 @@ def _simplex(problem: TuningProblem, x: Array, size: float) -> Array:
             simplex[k + 1, k] -= size * (high - low)[k]
     found = minimize(
         refused, x, method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
+        options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-3, "fatol": 1e-4},
     )  # fmt: skip
     return np.asarray(np.clip(found.x, low, high), float)
 

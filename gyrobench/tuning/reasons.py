@@ -44,6 +44,7 @@ def reasons_of(
     k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
     crossed = max((c[0] for c in crossovers(f, loops[k])), default=None)
     found += _jitter(problem, x, k, [r for r in results if r.wish.name == JITTER])
+    found += _bode(f, loops[k], results)
     if crossed is not None:
         found += _delay(loop, at, problem.plants[k], crossed)
         found += _modes(problem.plants[k], f, loops[k], crossed)
@@ -65,9 +66,41 @@ def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResul
         return []
     step = problem.plants[k].step
     response = HeldController(problem.controller(x), step).response(np.exp(2j * np.pi * problem.f * step))
-    sources = problem.sights[k].at(problem.f).sources(response)
+    ways = problem.sights[k].at(problem.f)
+    sources, floor = ways.sources(response), ways.floor()
     parts = sorted(((v, n) for n, v in sources.items() if v > 0.0), reverse=True)
-    return [f"the jitter is of {', '.join(f'{n} {1e6 * v:.3g} µrad' for v, n in parts[:3])}"]
+    wish = next(r.wish for r in wanted)
+    end = ": what is wanted is below it" if floor > wish.value else ""
+    return [
+        f"the jitter is of {', '.join(f'{n} {1e6 * v:.3g} µrad' for v, n in parts[:3])}",
+        f"no linear controller of this loop, of any structure, comes below {1e6 * floor:.3g} µrad with this base and "
+        f"this sensor{end}",
+    ]
+
+
+def _bode(f: Array, L: Complex, wanted: Sequence[WishResult]) -> list[str]:
+    """Return what a wanted bandwidth takes of ln |S|, and what Bode's integral makes it give back.
+
+    int ln |S| df up to half the frequency of the steps is 0, or more with unstable poles of the open loop, for a loop
+    with a delay of a step (Sung 1988).  |S| = f/sqrt(f2 + b2) up to b takes b (pi/4 + ln(2)/2).
+    """
+    width = next((r.wish.value for r in wanted if r.wish.name == "bandwidth"), 0.0)
+    rise = np.maximum(-np.log(np.abs(1.0 + L)), 0.0)
+    steps = 0.5 * (rise[1:] + rise[:-1]) * np.diff(f)
+    total = float(steps.sum())
+    if not width or not total > 0.0:
+        return []
+    area = width * (0.25 * np.pi + 0.5 * np.log(2.0))
+    share = np.cumsum(steps) / total
+    low, high = (float(f[1:][np.searchsorted(share, q)]) for q in (0.05, 0.9))
+    if not high > 1.05 * low:
+        return []
+    least = 20.0 / np.log(10.0) * area / (high - low)
+    return [
+        f"by Bode's integral a bandwidth of {width:.4g} Hz takes {area:.3g} Hz from ln |S|, which comes back above "
+        f"0 dB: evenly between {low:.3g} and {high:.3g} Hz, where the best loop gives it back, that is a peak of |S| "
+        f"of {least:.2g} dB; the best loop has {20.0 / np.log(10.0) * float(rise.max()):.2g} dB"
+    ]
 
 
 def _delay(loop: Loop, at: Any, plant: Plant, crossed: float) -> list[str]:

@@ -81,6 +81,24 @@ class SightWays:
         """Return the jitter, rad rms."""
         return math.sqrt(sum(x * x for x in self.sources(G).values()))
 
+    def voltage(self, G: Complex) -> float:
+        """Return what the controller gives to the motor for base and noise together, V rms."""
+        answer = G[self.use] / (1.0 - G[self.use] * self.back)
+        seen = sum((np.abs(u) ** 2 * s for _, u, s in self.base), self.noise)
+        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * seen, self.f)))
+
+    def floor(self) -> float:
+        """Return the jitter, rad rms, below which no linear controller of this loop comes, causal or not.
+
+        The line of sight is (W + X U) d + X n, X = R G/(1 + L); at each frequency the best complex X alone makes
+        |W|2 S - |W conj(U) S|2 / (|U|2 S + S_n), axes of the base summed.
+        """
+        kept = sum((np.abs(w) ** 2 * s for w, _, s in self.base), np.zeros(self.f.size))
+        shared = sum((w * np.conj(u) * s for w, u, s in self.base), np.zeros(self.f.size, complex))
+        seen = sum((np.abs(u) ** 2 * s for _, u, s in self.base), self.noise)
+        least = kept - np.abs(shared) ** 2 / np.maximum(seen, 1e-300)
+        return math.sqrt(max(0.0, float(np.trapezoid(least, self.f))))
+
 
 def sight_models(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float,

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,7 @@ BLOCKS = {
     "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), (2, 0.0), _notch),
     "rolloff": ControllerFactor(((0.0, 2.0),), (0, 2.0), _rolloff),
 }
+COMPUTED = ("lqg", "hinf")  # whole controllers, of gyrobench.tuning.synthesis
 NAMES = {"lead-lag": ["lag", "lead", "pi"]}
 
 
@@ -94,9 +96,8 @@ class ControllerStructure:
         self.blocks: list[str] = []
         for part in (p.strip() for p in name.split("+")):
             if part not in BLOCKS and part not in NAMES:
-                raise UsageError(
-                    f"--structure {name}: no factor '{part}'; {suggest_names(part, [*NAMES, *BLOCKS])}; join them by +"
-                )
+                known = suggest_names(part, [*NAMES, *BLOCKS, *COMPUTED])
+                raise UsageError(f"--structure {name}: no factor '{part}'; {known}; join them by +")
             self.blocks += NAMES.get(part, [part])
         for once in ("pi", "rolloff"):
             if self.blocks.count(once) > 1:
@@ -105,6 +106,10 @@ class ControllerStructure:
         if order > 8:
             raise UsageError(f"--structure {name}: of order {order}; 8 is the highest")
         self.ranges = [r for b in self.blocks for r in BLOCKS[b].ranges]
+
+    def of(self, plant: Any) -> ControllerStructure:
+        """Return the structure for a nominal plant: for this one it is the same."""
+        return self
 
     @property
     def is_lead_lag(self) -> bool:

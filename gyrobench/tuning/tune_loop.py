@@ -19,6 +19,7 @@ from gyrobench.engine.session import RunError, Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
+from gyrobench.record.frequency_response import Complex
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
@@ -28,9 +29,11 @@ from gyrobench.tuning.plant import HeldController, Plant, plants
 from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
-from gyrobench.tuning.sight_jitter import SightModel, sight_models
+from gyrobench.tuning.sight_jitter import SightModel, SightWays, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.synthesis import structure_of
+from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
 from gyrobench.tuning.written_loop import TunedLoop
@@ -39,6 +42,7 @@ ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes a
 NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
 HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
+PEAK = 3.0  # of a random voltage over its rms
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
@@ -57,14 +61,17 @@ def tune(
     seed: int = 1,
     given: Mapping[str, Any] | None = None,
     loop: str = "",
+    pareto: Sequence[str] = (),
 ) -> TunedLoop:
     """Return the controller of a structure with the largest worst ratio of got to wanted over the spread, proven.
 
     want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
     loop: name of the loop, of a system that has several; the others stay as they are.
+    pareto: names of two wishes whose trade is wanted.
     Raises UsageError, TuningError, and what a session raises.
     """
-    wishes, shape = parse_wishes(want), ControllerStructure(structure)
+    wishes, shape = parse_wishes(want), structure_of(structure)
+    pair = traded(pareto, wishes)
     ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
     began = time.perf_counter()
@@ -83,7 +90,11 @@ def tune(
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
-    controller = problem.controller(x)
+        exchanged = trade(problem, x, pair) if pair else None
+    try:
+        controller = problem.controller(x)
+    except ArithmeticError as error:
+        raise TuningError(f"{system.name}: no controller of structure {structure} was found: {error}") from None
     seconds = time.perf_counter() - began
     f = frequencies(problem.plants, problem.box, wishes, DENSE)
     held = HeldController(controller, now.step)
@@ -119,8 +130,9 @@ def tune(
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
-        seconds=seconds, evaluations=problem.evaluations, reasons=reasons, notes=(*_slips(sources), *_notes(proofs)),
-        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "",
+        seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
+        notes=(*_slips(sources), *_driven(ways, responses, nominal, ports.slot), *_notes(proofs)),
+        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
 
 
@@ -158,6 +170,7 @@ class _Loop:
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
         at = points(self.ranges)
         models = self.plants(at)
+        shape = shape.of(models[0])
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
@@ -212,6 +225,18 @@ def _slips(sources: LineOfSight | None) -> list[str]:
     return [
         "dry friction slips in the ride: margins are searched without it, the jitter with viscous friction that makes "
         "torques as large there; its reversals are in the co-simulation alone"
+    ]
+
+
+def _driven(ways: Sequence[SightWays], G: Complex, nominal: Mapping[str, Any], slot: str) -> list[str]:
+    """Return that base and noise alone take the motor to its limit, where they do."""
+    limit = min(float(np.min(nominal.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
+    volts = max((w.voltage(G) for w in ways), default=0.0)
+    if PEAK * volts < limit:
+        return []
+    return [
+        f"base and noise take {volts:.2g} V rms by the linear model, and the motor's limit is {limit:.3g} V: their "
+        "peaks are cut, and the jitter is more than the linear model says"
     ]
 
 
@@ -306,8 +331,13 @@ def _settings(
         f"{slot}.form": 1,
         f"{slot}.num": num,
         f"{slot}.den": den,
-        **({f"{slot}.conditioned": 1} if direct else {}),
+        **({f"{slot}.conditioned": 1} if direct and minimum_phase(controller) else {}),
     }
+
+
+def minimum_phase(controller: Controller) -> bool:
+    """Return whether the zeros of a controller are stable: else its states cannot follow a limited voltage."""
+    return bool(np.all(np.roots(np.trim_zeros(np.array(controller.num), "b")[::-1]).real < 0.0))
 
 
 def _part_of_any() -> str:

@@ -16,6 +16,7 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
+from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.wishes import JITTER, Wish
 
 
@@ -63,6 +64,7 @@ class LoopTuning:
     notes: tuple[str, ...] = ()
     slot: str = "stabilizer"  # of the controller
     loop: str = ""  # name of the loop, of a system with several
+    trade: Trade | None = None
 
     @property
     def name(self) -> str:
@@ -119,6 +121,7 @@ class LoopTuning:
                 }
                 for p in self.proofs
             ],
+            "trade": _trade(self.trade),
             "reasons": list(self.reasons),
             "notes": list(self.notes),
             "seconds": self.seconds,
@@ -128,6 +131,15 @@ class LoopTuning:
     def text(self) -> str:
         """Return all of it as a text."""
         return "\n".join(_lines(self))
+
+
+def _trade(trade: Trade | None) -> dict[str, Any] | None:
+    if trade is None:
+        return None
+    return {
+        "wishes": [w.name for w in trade.wishes],
+        "points": [[_finite(p.first), _finite(p.second), p.others] for p in trade.points],
+    }
 
 
 def _measured(w: ProvenWish) -> dict[str, Any]:
@@ -185,6 +197,13 @@ def _lines(t: LoopTuning) -> list[str]:
         if p.step is not None:
             peak = float(np.abs(p.step[1]).max())
             lines.append(f"  a load of {p.load:g} N·m turns the platform by up to {1e6 * peak:.4g} µrad")
+    if t.trade is not None:
+        a, b = t.trade.wishes
+        lines += ["", f"trade, worst case of the linear models: {a.name}, {b.name}"]
+        lines += [
+            f"  {a.shown(p.first)}, {b.shown(p.second)}" + ("" if p.others else "  ! other wishes are not fulfilled")
+            for p in t.trade.points
+        ]
     lines += [f"\nwhy: {t.reasons[0]}", *(f"     {r}" for r in t.reasons[1:])] if t.reasons else []
     lines += ["", *(f"note: {n}" for n in t.notes)] if t.notes else []
     values = ", ".join(f"{n} = {v:.5g}" for n, v in t.controller.values.items())

@@ -26,6 +26,7 @@ from gyrobench.report.report_files import write_files
 from gyrobench.report.style import styled
 from gyrobench.tuning import tuning_figures as draw
 from gyrobench.tuning.proof import ProvenWish
+from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.tuned_loop import LoopTuning, margin_text, range_text, where
 
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
@@ -50,6 +51,7 @@ def page(t: LoopTuning) -> Page:
     with styled():
         sections = [
             Section("Wishes and what came", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
+            *([Section("Trade of two wishes", "trade", _trade(t.trade))] if t.trade else []),
             Section("Margins", "margins", _margins(t)),
             Section("Sensitivities and open loop", "responses", _responses(t)),
             Section("Proof in co-simulation", "proof", [*_proofs(t), *_step(t), *_notes(t)]),
@@ -89,6 +91,20 @@ def _wishes(t: LoopTuning) -> PageTable:
 
 def _reasons(t: LoopTuning) -> list[Any]:
     return [BulletList(list(t.reasons), warn=True)] if t.reasons else []
+
+
+def _trade(trade: Trade) -> list[Any]:
+    a, b = trade.wishes
+    rows = [
+        Row([text_cell(minus(a.shown(p.first)), "strong"), text_cell(minus(b.shown(p.second))),
+             text_cell("fulfilled" if p.others else "not fulfilled", "pass" if p.others else "fail")])
+        for p in trade.points
+    ]  # fmt: skip
+    caption = "Best of one wish for what is left of the other, worst case of the linear models over the spread."
+    return [
+        *pictures(Picture("trade", draw.trade(trade), caption, f"trade of {a.name} and {b.name}", half=True)),
+        PageTable(columns(a.name, b.name, "other wishes"), rows, "The points of the figure."),
+    ]
 
 
 def _margins(t: LoopTuning) -> list[Any]:

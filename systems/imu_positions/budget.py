@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.sources import Source
@@ -41,6 +43,17 @@ class ImuSetup(SiteSetup):
     u_time: float = 0.0
     u_gravity: float = 0.0
     u_gyro_scale: float = 0.0
+    #: orders of bias and scale factor over the temperature, K of its hysteresis, temperature of the coefficients; none:
+    #: nothing follows the temperature but by the nuisance model
+    thermal: tuple[int, int, float, float] | None = None
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        o = run.options
+        if o.get("thermal"):
+            given = (int(o["bias_order"]), int(o["scale_order"]), float(o["hysteresis_width"]), float(o["reference"]))
+            own = {"thermal": given, **own}
+        return super().of(run, **own)
 
 
 Change = tuple[Array, Array]  # of rate and specific force, (n, 3) or (parts, n, 3), for one unit

@@ -16,7 +16,7 @@ from gyrobench.units import ARCSEC, DPH
 
 UG = 1e-6 * G0  # m/s2
 AXES = "xyz"
-#: printed unit -> SI, of all coefficients of the test
+#: printed unit -> SI, of coefficients that do not follow the temperature
 SCALES = {
     "ppm": 1e-6, "″": ARCSEC, "°/h": DPH, "°/h/g": DPH, "µg": UG, "counts": 1.0, "counts/(rad/s)": 1.0,
     "counts/(m/s²)": 1.0,
@@ -79,7 +79,9 @@ BY_NAME = {c.name: c for c in CHANNELS}
 _PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba": "acc_bias", "Sa": "acc_scale"}
 
 
-def instruments_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str, float] | None:
+def instruments_of(
+    parameters: Mapping[str, Any], thermal_parameters: Mapping[str, tuple[str, str]], slot: str = "imu"
+) -> dict[str, float] | None:
     """Return the coefficients of the simulated instruments, SI; None where they have none."""
     found: dict[str, float] = {}
     for short, long in _PARAMETERS.items():
@@ -90,6 +92,9 @@ def instruments_of(parameters: Mapping[str, Any], slot: str = "imu") -> dict[str
             row = np.atleast_1d(values[i]) if values.ndim == 1 else values[i]
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
+    for name, (short, _) in thermal_parameters.items():
+        if f"{slot}.{name}" in parameters:
+            found |= {f"{short}_{a}": float(v) for a, v in zip(AXES, parameters[f"{slot}.{name}"], strict=True)}
     return found | _own_accelerometers(parameters)
 
 

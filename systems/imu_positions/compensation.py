@@ -12,7 +12,9 @@ from gyrobench.bench import UsageError
 from gyrobench.frames import G0
 from gyrobench.result import Result
 
-from .channels import AXES, SCALES, instruments_of
+from . import thermal
+from .channels import AXES, instruments_of
+from .tables import SCALES
 
 #: parameter of imu and imu_compensator -> the coefficients of its elements
 PARAMETERS = {"gyro_bias": "bg", "gyro_scale": "Sg", "g_sensitivity": "G", "acc_bias": "ba", "acc_scale": "Sa"}
@@ -43,14 +45,25 @@ def values_of(result: Result) -> dict[str, tuple[Any, Any, str]]:
         if not matrix:
             value, u = value[:, 0], u[:, 0]
         found[parameter] = value.tolist(), u.tolist(), UNITS[parameter]
+    if any(n in by_name for n in ("bgH_x", "baH_x")):
+        for parameter, (short, unit) in thermal.parameters().items():
+            held = [of(f"{short}_{a}") for a in AXES]
+            found[parameter] = [v for v, _ in held], [u for _, u in held], unit
+        found["hysteresis_width"] = float(result.provenance["options"]["hysteresis_width"]), 0.0, "K"
     return found
 
 
 def truth_of(parameters: Mapping[str, Any]) -> dict[str, float] | None:
-    """Return the coefficients of what is read, SI: of the simulated instruments, or behind a compensator of them."""
-    found = instruments_of(parameters)
+    """Return the coefficients of what is read, SI: of the simulated instruments, or behind a compensator of them.
+
+    None behind one that follows the temperature: what it leaves is no polynomial.
+    """
+    thermal_parameters = thermal.parameters()
+    found = instruments_of(parameters, thermal_parameters)
     if found is None or "compensator.gyro_bias" not in parameters:
         return found
+    if any(np.any(parameters.get(f"compensator.{n}", 0.0)) for n in thermal_parameters):
+        return None
     return left(found, parameters)
 
 

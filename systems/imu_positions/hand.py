@@ -9,7 +9,7 @@ Each is linear about its solution and goes through the skeleton of a drift test:
 from what is left.  Of the Earth rate w the vertical part is known from gravity and latitude; the level part, whose
 heading is not known, is a line of the budget.  [IMU-HAND; Tedaldi 2014]
 
-Not modelled: nonlinearity, lever arms (slow turns), a delay between the instruments, g-sensitivity while turning.
+Not modelled: nonlinearity, lever arms (slow turns), a delay between the instruments.
 """
 
 from __future__ import annotations

@@ -171,20 +171,32 @@ class Positions:
             return TurnSolution([], matrix, level, np.zeros_like(self.up), u)
         for _ in range(ROUNDS):
             earth = self.vertical + np.array([rate @ d for d in level])
-            turned = [self._turn(k, t, earth, rate @ level[k]) for k, t in enumerate(self.raw_turns)]
+            inverse = np.asarray(np.linalg.inv(np.eye(3) + matrix), dtype=float)
+            G = self._sensitivity(earth, matrix)
+            turned = [self._turn(k, t, earth, rate @ level[k], G, inverse) for k, t in enumerate(self.raw_turns)]
             matrix = turns.solve(turned, matrix)
             level = turns.headings(turned, np.asarray(np.linalg.inv(np.eye(3) + matrix)), self.up[0])
             rate, u = self._level_rate(level, matrix)
         return TurnSolution(turned, matrix, level, np.array([rate @ d for d in level]), u)
 
-    def _turn(self, k: int, t: Turn, earth: Array, level: Array) -> Turn:
+    def _sensitivity(self, earth: Array, matrix: Array) -> Array:
+        """Return the g-sensitivity (3, 3), rad/s per g0, from the readings at rest; earth: Earth rate there (n, 3)."""
+        y = self.gyro / self.scale_g - earth @ (np.eye(3) + matrix).T
+        X = np.column_stack([np.ones(len(y)), self.force / frames.G0])
+        return np.asarray(np.linalg.lstsq(X, y, rcond=None)[0][1:].T)
+
+    def _turn(self, k: int, t: Turn, earth: Array, level: Array, G: Array, inverse: Array) -> Turn:
         """Return a turn with readings over D, the Earth rate (n, 3) of the positions in them; level (3,): at the start.
 
-        The bias is what is read at rest less the Earth rate there; the turning Earth carries the start along.
+        The bias is what is read at rest less the Earth rate there; the turning Earth carries the start along.  Gravity
+        turns with the case, and what the gyros read of it (G) changes against its mean at both ends, which the bias
+        holds.
         """
         span = float(t.time[-1] - t.time[0])
         rate = t.rate / self.scale_g + 0.5 * (earth[k] + earth[k + 1])
-        return Turn(t.time, rate, t.before + span * np.cross(level, t.before), t.after)
+        up = Turn(t.time, rate, t.before, t.after).path(inverse)
+        change = (self.setup.gravity * up - 0.5 * (self.force[k] + self.force[k + 1])) / frames.G0
+        return Turn(t.time, rate - change @ G.T, t.before + span * np.cross(level, t.before), t.after)
 
     def _level_rate(self, level: list[Array], matrix: Array) -> tuple[Array, float]:
         """Return the level Earth rate along both level directions (2,), and the standard uncertainty of each: from what

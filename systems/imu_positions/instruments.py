@@ -8,7 +8,7 @@ from gyrobench.system.families.table_test import sampled
 
 from .channels import CHANNELS
 
-ACCELEROMETERS, COMPENSATOR = "accelerometers", "compensator"  # slots on request
+ACCELEROMETERS, COMPENSATOR, CHAMBER = "accelerometers", "compensator", "chamber"  # slots on request
 
 
 def wires(slots: Container[str] = ()) -> str:
@@ -29,6 +29,10 @@ def wires(slots: Container[str] = ()) -> str:
         lines.append(f"table -> {forces}: f")
     if COMPENSATOR in slots:
         lines += [f"imu -> {COMPENSATOR}: rate", f"{forces} -> {COMPENSATOR}: f_read"]
+    if CHAMBER in slots:
+        warm = ("imu", *(s for s in (ACCELEROMETERS, COMPENSATOR) if s in slots))
+        lines += [f"{CHAMBER} -> {s}: temperature" for s in warm]
+        lines += [f"{CHAMBER} -> thermometer: temperature=x", sampled("thermometer", angles[0])]
     for c in CHANNELS:
         source = f"imu.{c.output}" if c.gyro else f"{forces}.{c.output}"
         if COMPENSATOR in slots:

@@ -13,6 +13,9 @@ from . import geometry
 from .geometry import TURN
 
 INDEX_RATE, ACCELERATION = 0.5, 0.5  # rad/s, rad/s2
+MOVE = 5.0  # s that a move takes in the mean
+#: a plan for temperatures that change: short, many times
+CYCLES = {"positions": 6, "cycles": 6, "dwell": 40.0, "windows": 2, "turns": 2, "settle": 2.0}
 CASE = "case"
 FACES = {CASE: ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}
 #: axis of the case -> axis of the table that turns it, and the inner angle at which it does
@@ -45,18 +48,32 @@ def positions(count: int, dwell: float) -> list[Visit]:
     return [Visit(place, dwell) for place in geometry.places(count)]
 
 
-def plan(visits: Sequence[Visit], times: Times) -> Plan:
+def plan(visits: Sequence[Visit], times: Times, cycles: int = 1) -> Plan:
     """Return the phases: each axis of the table goes the shorter way; turns begin at a position of their own."""
     phases: list[Phase] = []
     at = (0.0, 0.0)
-    for v in visits:
-        at = tuple(nearest_turn(a, b, TURN) for a, b in zip(v.place, at, strict=True))  # type: ignore[assignment]
-        phases.append(_rest(_name(v.place), at, v.dwell, times))
-    if times.rates:
-        at = (nearest_turn(0.0, at[0], TURN), nearest_turn(0.0, at[1], TURN))
-        for axis in times.axes:
-            phases += _turning(axis, at, times)
+    for _ in range(cycles):
+        for v in visits:
+            at = tuple(nearest_turn(a, b, TURN) for a, b in zip(v.place, at, strict=True))  # type: ignore[assignment]
+            phases.append(_rest(_name(v.place), at, v.dwell, times))
+        if times.rates:
+            at = (nearest_turn(0.0, at[0], TURN), nearest_turn(0.0, at[1], TURN))
+            for axis in times.axes:
+                phases += _turning(axis, at, times)
     return Plan(phases, FACES)
+
+
+def chamber(planned: Plan, cold: float, hot: float) -> dict[str, object]:
+    """Return the program of a chamber that is at both temperatures (K) within the time of a plan, and back at 0: ramps
+    of one rate, a tenth of the time at either of them.
+    """
+    time = sum(p.duration() + MOVE for p in planned.phases)
+    rate = (hot + (hot - cold) - cold) / (0.7 * time) or 1.0
+    targets = [hot, cold, 0.0, *[0.0] * 13]
+    return {
+        "chamber.segments?": 3, "chamber.targets": targets, "chamber.ramps": [rate] * 16,
+        "chamber.soaks": [0.1 * time] * 16,
+    }  # fmt: skip
 
 
 def _name(place: Sequence[float]) -> str:

@@ -48,6 +48,7 @@ from .channels import BY_NAME, CHANNELS, UG, overview
 from .compensation import truth_of
 from .hand import UNKNOWN, HandReduction
 from .log import UP_DOWN
+from .thermal import Thermal, quantity
 from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
@@ -64,12 +65,26 @@ class ImuChannel(DriftReduction[ImuSetup]):
         if not self.channel.gyro:
             self.rows = kinematics.motion.at_rest
         self.seen = geometry.rates_seen(kinematics.felt[0]) if self.channel.gyro else (0, 1, 2)
+        self.thermal: Thermal | None = None
+        if setup.thermal:
+            bias, scale, width, reference = setup.thermal
+            self.thermal = Thermal.of(windows, reference, width, (bias, scale)).rows(self.rows)
 
-    def design(self, omega: Array, force: Array) -> Array:
-        """Return the regressors for rates and specific forces (n, 3)."""
-        if self.channel.gyro:
-            return geometry.gyro_columns(omega, force, self.seen)
-        return geometry.accelerometer_columns(force)
+    @property
+    def scaled(self) -> bool:
+        """True where a scale factor over the temperature is shown."""
+        return self.channel.axis in self.seen
+
+    def design(self, omega: Array, force: Array, constant: float = 1.0) -> Array:
+        """Return the regressors for rates and specific forces (n, 3); constant: of those that follow neither."""
+        c = self.channel
+        gyro = c.gyro
+        columns = geometry.gyro_columns(omega, force, self.seen) if gyro else geometry.accelerometer_columns(force)
+        columns[:, 0] = constant
+        if self.thermal is None:
+            return columns
+        bias, scale = self.thermal.columns((omega if c.gyro else force)[:, c.axis], self.scaled)
+        return np.column_stack([columns, constant * bias, scale])
 
     def regression(self) -> Regression:
         s, c, w = self.setup, self.channel, self.windows
@@ -77,6 +92,8 @@ class ImuChannel(DriftReduction[ImuSetup]):
         read = np.asarray(w[f"mean_{c.name}"], dtype=float)[self.rows]
         y = read - (omega if c.gyro else force)[:, c.axis]
         quantities = [c.quantity(n, s.truth or {}) for n in c.names(self.seen)]
+        if self.thermal is not None:
+            quantities += [quantity(c, *e, s.truth or {}) for e in self.thermal.endings(self.scaled)]
         t0, t1 = (np.asarray(w[n], dtype=float)[self.rows] for n in ("t_start", "t_end"))
         phase = np.asarray(w["phase"], dtype=float)[self.rows]
         shown = [Group(c.words, np.arange(y.size), phase, "number of the phase", "")]
@@ -90,7 +107,8 @@ class ImuChannel(DriftReduction[ImuSetup]):
     def _candidates(self) -> list[Candidate]:
         """Return trend and temperature of the bias."""
         c = self.channel
-        rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items()}
+        taken = "temperature" if self.thermal is not None else "-"  # the model has more of it
+        rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items() if not n.startswith(taken)}
         found = nuisances.common(rows, f" {c.name}")
         if c.gyro:
             return found
@@ -103,9 +121,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
         """Return the error of the data where rate and specific force are other ones by these (n, 3)."""
         c = self.channel
         own = (omega if c.gyro else force)[self.rows, c.axis]
-        columns = self.design(omega[self.rows], force[self.rows])
-        columns[:, 0] = 0.0
-        return found.error(own, -columns)
+        return found.error(own, -self.design(omega[self.rows], force[self.rows], 0.0))
 
     def effects(self, found: Findings) -> list[Effect]:
         out = []
@@ -141,6 +157,13 @@ class ImuChannel(DriftReduction[ImuSetup]):
             )
         else:
             equation = f'f_"read,{c.letter}" - f_{c.letter} = b_a + sum_k S_(a,k) f_k'
+        warm = []
+        if self.thermal is not None:
+            equation += " + sum_n b_n T^n + b_H z + b_R dot(T) + sum_n s_n T^n times upright(input)"
+            warm = [
+                "T: temperature above that of the coefficients, even within a window; z: a play within −1 … 1, 1 while "
+                "it rises; the last terms are those of bias and scale factor over the temperature [IMU-THERMAL]."
+            ]
         return Account(
             method="Positions and turns of an inertial measurement unit on a table with two axes; least squares of "
             "each instrument under an estimated noise model [IMU-POSITIONS]",
@@ -155,6 +178,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "Axes x, y, z of the case are those of the plate, which carries it; local frame east, north, up; outer "
                 "table axis level and east, table angles right-handed.",
                 f"Gravity {s.gravity:.6f} m/s² and Earth rate are taken as known; the accelerometers are read at rest.",
+                *warm,
             ],
             reasons=[Reason("rates.unseen", t) for t in geometry.unseen_rates(self.seen)] if c.gyro else [],
             random="noise of the instrument",
@@ -209,6 +233,8 @@ class Reduction(ChannelTests[ImuSetup]):
         force = self.kinematics.felt[1][self.kinematics.motion.at_rest]
         if problems := geometry.force_problems(_places(force) / s.gravity):
             return problems
+        if s.thermal and "temperature" not in self.windows:
+            return ["thermal = true: the record has no column temperature [degC]"]
         return self._mistaken()
 
     def _mistaken(self) -> list[str]:

@@ -78,6 +78,11 @@ class ImuPositions(TableTest):
             {instruments.COMPENSATOR: Slot(COMPENSATOR, "imu_compensator")}, "",
             channels=tuple(f"compensator.{n}[{k}]" for n in ("omega", "f") for k in (1, 2, 3)),
         ),
+        instruments.CHAMBER: OnRequest(
+            {instruments.CHAMBER: Slot("Surroundings", "thermal_chamber"), "thermometer": Slot("Sampler", "sampler")},
+            "", {"temperature": "thermometer.mean"},
+            ("chamber.temperature", "chamber.room"),
+        ),
     }  # fmt: skip
     fitted: ClassVar[Mapping[str, tuple[str, str]]] = {"imu_compensator": (instruments.COMPENSATOR, "compensation")}
     options = (
@@ -89,8 +94,18 @@ class ImuPositions(TableTest):
             "dwell": Option(60.0, "s", "averaging time in each position"),
             "windows": Option(4, int, "averages a position", 1, 100),
             "rate": Option("30deg/s", "rad/s", "rate of the turns; 0: none", 0.0, 20.0),
+            "cycles": Option(1, int, "times that positions and turns are gone through", 1, 16),
             "turns": Option(5, int, "whole turns in each sense about each axis of the case; 0: none", 0, 100),
             "rate_axes": Option("xyz", str, "axes of the case about which it is turned"),
+        }
+        | {
+            "thermal": Option(False, bool, "bias and scale factors that follow the temperature join the model"),
+            "bias_order": Option(3, int, "order of the biases over the temperature", 0, 3),
+            "scale_order": Option(2, int, "order of the scale factors over the temperature", 0, 2),
+            "hysteresis_width": Option(10.0, "K", "temperature change that goes through the hysteresis", 1e-3),
+            "reference": Option(0.0, "K", "temperature that the coefficients belong to, as the thermometer reads it"),
+            "hot": Option(40.0, "K", "highest temperature of the chamber, above that of the coefficients"),
+            "cold": Option(-40.0, "K", "lowest temperature of the chamber"),
         }
         | SETTLE
         | NUISANCES
@@ -135,6 +150,10 @@ class ImuPositions(TableTest):
         super().request(slot)
         if slot in self.on_request and not there:
             vars(self)["wires"] = instruments.wires(self.slots)
+        if slot == instruments.CHAMBER and not there:
+            for name, value in {"thermal": True, **plans.CYCLES}.items():
+                if name not in self.given:
+                    self.set(name, value)
         if slot == instruments.ACCELEROMETERS and not there:
             more = (*self.noises, *ACCELEROMETER_NOISES), (*self.assumed, "accelerometers.mount")
             vars(self).update(noises=more[0], assumed=more[1])
@@ -157,14 +176,15 @@ class ImuPositions(TableTest):
 
     def plan(self) -> Plan:
         """Return the positions, then the turns about x, y and z, each after a rest."""
-        return plans.plan(self.visits(), self.times())
+        return plans.plan(self.visits(), self.times(), self["cycles"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        return {
-            **super().parameters(parts),
-            "table.index_rate": [plans.INDEX_RATE] * 2,
-            "table.acceleration": [plans.ACCELERATION] * 2,
-        }
+        moves = {"table.index_rate": [plans.INDEX_RATE] * 2, "table.acceleration": [plans.ACCELERATION] * 2}
+        more: dict[str, Any] = {}
+        if instruments.CHAMBER in self.slots:
+            more = plans.chamber(self.plan(), self["cold"], self["hot"])
+            more["imu.hysteresis_width?"] = self["hysteresis_width"]
+        return {**super().parameters(parts), **moves, **more}
 
     def check(self) -> list[str]:
         if self["attitudes"] not in ("table", UNKNOWN):

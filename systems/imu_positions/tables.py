@@ -12,10 +12,13 @@ from gyrobench.arrays import Array
 from gyrobench.result import Coefficient, DriftTestResult, Table
 from gyrobench.units import factor
 
-from .channels import CHANNELS, SCALES
+from . import channels, thermal
+from .channels import CHANNELS
 from .geometry import Motion
 
 AXES = "xyz"
+#: printed unit -> SI, of all coefficients of the test
+SCALES = {**channels.SCALES, **thermal.SCALES}
 TRIADS = {"g": ("gyros", "rad/s"), "a": ("accelerometers", "m/s²")}
 
 

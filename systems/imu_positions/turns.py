@@ -41,6 +41,18 @@ class Turn:
         vector = 0.5 * h * (w[:, 1:] + w[:, :-1]) + h * h / 12.0 * np.cross(w[:, :-1], w[:, 1:])
         return _product(vector)
 
+    def path(self, inverse: Array) -> Array:
+        """Return the direction of gravity (m, 3) at each sample, as the gyros carry it on from the start."""
+        w = self.rate @ inverse.T
+        h = np.diff(self.time)[:, None]
+        q = Rotation.from_rotvec(0.5 * h * (w[1:] + w[:-1])).as_quat()
+        reach = 1
+        while reach < len(q):  # products of the first 1, 2, 4 ... turns
+            longer = (Rotation.from_quat(q[:-reach]) * Rotation.from_quat(q[reach:])).as_quat()
+            q = np.concatenate([q[:reach], longer])
+            reach *= 2
+        return np.vstack([self.before, Rotation.from_quat(q).inv().apply(self.before)])
+
     def rotation(self, inverse: Array) -> Array:
         """Return Q (3, 3) for one inverse."""
         return np.asarray(self.rotations(inverse[None])[0])

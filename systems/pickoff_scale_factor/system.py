@@ -24,8 +24,9 @@ TABLE = {"acceleration": 0.1, "index_rate": 0.1}  # of the table, if it does not
 
 class PickoffScaleFactor(ChannelTest, OpenLoopTest):
     """The gyro is open loop with its input axis along the table axis, at right angles to the pole.  The table steps
-    quickly through angles within the range of the pickoff; the slope of its voltage is the scale factor.  Of a
-    two-degree-of-freedom gyro a rebalance loop locks the other axis.
+    quickly through angles within the range of the pickoff; the slope of its voltage is the scale factor.
+
+    Of a two-degree-of-freedom gyro a rebalance loop locks the other axis.
 
     [TEST-PICKOFF; Hu 1981, appendix 1 of chapter 3]
     """

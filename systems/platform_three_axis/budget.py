@@ -3,9 +3,11 @@
 Where the element rests in space, the motion of the base alone says how the joints move, and so which torque comes about
 each motor axis (A order):
 
-    viscous friction       -B theta'                 back EMF       -k_t k_e theta' / (R + L s)
+    viscous friction       -B theta'                 back EMF       -k_t k_e theta' / (R + L s + K_c + K_ci/s)
     dry friction           an elastic contact, theta dragged within presliding, +-friction beyond
     reaction of gimbals    -(I a + w x I w) of the roll and the pitch gimbal, which move with the base
+
+K_c, K_ci: of a current loop about the motor, which takes the back EMF out; 0 without one.
 
 From a torque tau_k to the angles phi of the element leads the closed linear model of the run, T.  The output axes of
 the gyros feed back: a rate error (J/H) w_O' acts as a command, N = (J/H) s2 (mount, row O).  With the response C to
@@ -14,8 +16,9 @@ commands
     C_0 = C (1 + N C)^-1      T_0 = T - C_0 N T      phi = T_0 tau (the ways of the base) + C_0 N phi (output axes)
 
 The same splits the angle about the other axes that a commanded sine leaves.  White and slow drift of the gyros pass to
-the angle as commands, noise of a pickoff as the rate n s (tau s + 1) C/(K_sg H).  Of noise, what is left about mean and
-slope of a window of length D counts, x = pi f D:  1 - (sin x/x)^2 - 3 (sin x/x^2 - cos x/x)^2.
+the angle as commands, noise of a pickoff as the rate n s (tau s + 1) C/(K_sg H), noise of the current read of a
+rebalanced gyro as k n.  Of noise, what is left about mean and slope of a window of
+length D counts, x = pi f D:  1 - (sin x/x)^2 - 3 (sin x/x^2 - cos x/x)^2.
 
 A share is the covariance of the source with the whole over the variance of the whole: shares add up to 100 %, one that
 is negative cancels part of the others.
@@ -45,6 +48,7 @@ from gyrobench.units import ARCSEC
 
 Complex = NDArray[np.complex128]
 AXES = (1, 2, 3)
+MOTORS = ("pitch", "roll", "azimuth")
 GYROS = ("gyro_x", "gyro_y", "gyro_z")
 HIGHEST = 25.0  # Hz, of the motion of a base
 LOWEST = 1e-3  # Hz, where the integral over the noise begins; a window takes what is slower than it
@@ -79,8 +83,13 @@ class ElementResponses:
         self.model, self.angles = model, angles
         p = found.record.run.parameters
         self.platform = {n: np.asarray(p[f"platform.{n}"], float) for n in PLATFORM}
+        for n in ("K_c", "K_ci"):
+            self.platform[n] = np.array([float(p.get(f"{axis}.{n}", 0.0)) for axis in MOTORS])
         self.gyros = [{n: np.asarray(p[f"{gyro}.{n}"], float) for n in GYRO} for gyro in GYROS]
         self.noise = [{n: float(p.get(f"{g}.{n}") or 0.0) for n in NOISE} for g in GYROS]
+        meters = (float(p.get(f"rebalance_{g[-1]}.meter", 0.0)) * float(p.get(f"{g}.k", 0.0)) for g in GYROS)
+        for noise, meter in zip(self.noise, meters, strict=True):
+            noise["meter"] = meter
         self.contact = _stiffness(self.platform) if slides else np.zeros((2, 3))
         self.f_noise = m.grid(LOWEST, 0.5 / model.step, POINTS)
         self.by_noise = self.to("command", self.f_noise)
@@ -142,10 +151,12 @@ class ElementResponses:
         kept = 1.0 - np.sinc(f * time) ** 2 - 3.0 * (np.sin(x) / x**2 - np.cos(x) / x) ** 2
         ways = np.sum(np.abs(self.by_noise) ** 2, axis=1) * np.clip(kept, 0.0, None)[:, None]
         total = {"white drift of the gyros": 0.0, "slow drift of the gyros": 0.0, "noise of the pickoffs": 0.0}
+        total["noise of the currents read"] = 0.0
         for k, (noise, g) in enumerate(zip(self.noise, self.gyros, strict=True)):
             lag = np.abs(s * (g["J"] / g["C"] * s + 1.0) * g["C"] / (g["K_sg"] * g["H"])) ** 2
             slow = slow_density(noise, f)
-            for name, density in zip(total, (noise["white"] ** 2, slow, noise["pickoff"] ** 2 * lag), strict=True):
+            each = (noise["white"] ** 2, slow, noise["pickoff"] ** 2 * lag, noise["meter"] ** 2)
+            for name, density in zip(total, each, strict=True):
                 total[name] += 2.0 * float(np.trapezoid(density * ways[:, k], f))
         return {name: math.sqrt(square) for name, square in total.items() if square > 0.0}
 
@@ -188,7 +199,8 @@ def torques(loop: ElementResponses, base: Array, theta: Array, dt: float) -> dic
 
     speed = rate(theta)
     f = np.fft.rfftfreq(theta.shape[1], dt)
-    lag = 1.0 / (p["R"][:, None] + 2j * np.pi * f * p["L"][:, None])
+    s = np.where(f > 0.0, 2j * np.pi * f, 1e-9j)  # a steady rate: next to none, an integral takes its back EMF out
+    lag = 1.0 / (p["R"][:, None] + s * p["L"][:, None] + p["K_c"][:, None] + p["K_ci"][:, None] / s)
     emf = np.fft.irfft(np.fft.rfft(speed) * lag * (p["k_t"] * p["k_e"])[:, None], theta.shape[1])
     found = {
         "viscous friction": -p["viscous"][:, None] * speed,

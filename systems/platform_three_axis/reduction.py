@@ -19,6 +19,10 @@ from gyrobench.reduction.loops.rides import share, still
 from .budget import budget
 
 AXES = ("pitch", "roll", "azimuth")
+RATES = (
+    "The gyros are rebalanced: their currents are the rates, 1 V is 1 rad/s; each axis has a current, a rate and a "
+    "position loop, and the open loop is that of the rate."
+)
 XYZ = "xyz"
 ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 
@@ -43,12 +47,14 @@ class Reduction(LoopReduction):
         if found.at_rest is not None:
             self._drift(found.at_rest)
         self._lock()
+        rates = "rebalance_x.K_p" in self.run.parameters
         return Account(
             method="Load steps, commanded sines, sines of the base, test sines of each axis and drift of a platform of "
             "three gimbals",
             sources=[
                 "PLATFORM-3AXIS-DYN, PLATFORM-3AXIS-KIN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; Xia 2008, "
-                "ch. 5, eq. 5.1.1-5.2.8, corrected by EX24-EX28"
+                "ch. 5, eq. 5.1.1-5.2.8, corrected by EX24-EX28",
+                *(["SERVO-3LOOP, GYRO-REBALANCE; Xia 2008, section 1.3.2, fig. 1.3, 5.2.4"] if rates else []),
             ],
             equation="M(q) dot.double(q) + b = M_m, quad u_A = T_2 u, quad T_2 = T_1^(-1)",
             conventions=[
@@ -56,6 +62,7 @@ class Reduction(LoopReduction):
                 "one.",
                 "Platform axes x, y, z belong to the inner element; commands and attitudes are along them.",
                 "Loop gains are those of one axis with the two others closed.",
+                *([RATES] if rates else []),
             ],
         )
 
@@ -181,6 +188,11 @@ class Reduction(LoopReduction):
             L, R = (float(p.get(f"platform.{n}", x)[k]) for n, x in (("L", [0.0] * 3), ("R", [1.0] * 3)))
             corner = float(p.get(f"{axis}.T2", 0.0))
             lags[axis] = {"gyro": J / C, "motor": L / R, "corner of the stabilizer": corner}
+            if current := float(p.get(f"{axis}.K_c", 0.0)):
+                lags[axis]["motor"] = L / current  # of the current loop, which cancels L/R
+            if loop := float(p.get(f"rebalance_{gyro}.K_p", 0.0)):
+                gain = loop * float(p[f"gyro_{gyro}.k"]) * float(p[f"gyro_{gyro}.K_sg"])
+                lags[axis]["rebalance"] = C / (gain * float(p[f"gyro_{gyro}.H"]))
         return lags
 
     def _lock(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from gyrobench.system.families import loop_test as loop
@@ -10,13 +11,22 @@ from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, t
 from gyrobench.system.families.three_gyros import MOUNTS, commands
 from gyrobench.system.families.three_gyros import design as three_gyros
 from gyrobench.system.loop_plan import LoopPhase, sweep
+from gyrobench.system.part_files import has_port
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option, Slot
+
+from . import rate_loops
 
 DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
 GYROS = tuple(MOUNTS)
 ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
+ANGLE, RATE = "angle", "rate"
+SERVO = "servo_three_loop"
+#: the motors of a servo with a current loop: of the part as it is
+MOTOR = {"k_t": 1.0, "R": 2.0, "L": 4e-3, "k_e": 1.0}
+CURRENT_STEP = 2e-4  # s
+ANGLE_TEST, RATE_TEST = 2e-3, 0.02  # V, of the test sines: 0.2 mrad of a float, 20 mrad/s
 COMMAND = 1e-3  # rad/s, of the command step
 COMMANDS = commands("exciter.command")
 
@@ -25,7 +35,10 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     """Three floated gyros on the inner element of three gimbals; their signals are distributed to the motors of the
     gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
 
-    [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL; Xia 2008, ch. 5]
+    loops = rate: the gyros are rebalanced, their currents the rates, and each axis has a current, a rate and a position
+    loop.
+
+    [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL, SERVO-3LOOP; Xia 2008, section 1.3.2, ch. 5]
     """
 
     title = "Three-axis stabilized platform"
@@ -70,6 +83,10 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         "swing": Option(83 * MIL, "rad", "amplitude of base and of commanded angle (83 of 6000 mil); 0: neither", 0.0),
         "frequency": Option(1.0, "Hz", "frequency of the commanded sine", 0.1, 5.0),
         "sweeps": Option(True, bool, "test sines for the margins of each axis"),
+        "loops": Option(
+            ANGLE, str, "angle: floated gyros and stabilizers; rate: rebalanced gyros, servos of three loops"
+        ),
+        "track": Option(0.0, "Hz", "crossover of the position loops on the joint angles, loops = rate; 0: none", 0.0),
         **loop.hold(30.0, 5.0),
         **loop.PROFILE,
     }
@@ -86,6 +103,40 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         "platform.lock platform.saturated decoupler.saturated",
     )  # fmt: skip
     channel_period = 1e-3
+
+    @property
+    def rates(self) -> bool:
+        """Return whether the gyros are rebalanced and the servos take rates."""
+        return str(self["loops"]) == RATE
+
+    def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
+        super().place(slot, part, bench)
+        if slot in AXES and not self.rates and has_port(part, "i_motor", bench):
+            self.set("loops", RATE)
+
+    def set(self, name: str, value: Any) -> None:
+        super().set(name, value)
+        if name == "loops":
+            self._arrange()
+
+    def _arrange(self) -> None:
+        """Give the system the slots and wires of its loops; those that were asked for stay."""
+        asked = [slot for slot in self.on_request if slot in self.slots]
+        for changed in ("slots", "wires", "on_request", "factors", "channels", "noises"):
+            vars(self).pop(changed, None)
+        if self.rates:
+            wanted, more = rate_loops.on_request()
+            kept = {n: s for n, s in self.slots.items() if n not in AXES}
+            vars(self).update(
+                slots={**kept, **rate_loops.slots(SERVO)},
+                wires=f"{loop.MOVED}{ThreeAxisTest.wires}{rate_loops.WIRES}",
+                on_request=wanted,
+                factors={**rate_loops.FACTORS, **more},
+                noises=(*self.noises, *(f"{slot}.meter" for slot in rate_loops.NAMES)),
+            )
+        vars(self)["channels"] = self._with_limits()
+        for slot in asked:
+            self.request(slot)
 
     def phases(self) -> list[LoopPhase]:
         """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift."""
@@ -106,18 +157,44 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         if self["sweeps"]:
             for k, axis in enumerate(AXES, 1):
                 tones = [fc * x for x in (0.3, 0.6, 0.9, 1.2, 2.0, 3.5)]
-                phases += sweep(f"loop {axis}", "test", tones, 2e-3, axis=k, settle=4.0, periods=20)
+                size = RATE_TEST if self.rates else ANGLE_TEST
+                phases += sweep(f"loop {axis}", "test", tones, size, axis=k, settle=4.0, periods=20)
         return [*phases, LoopPhase("drift", "hold", settle=3.0, dwell=self["hold"])]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         found: dict[str, Any] = {
             "platform.theta_0": [self["pitch"], self["roll"], self["azimuth"]],
             "decoupler.theta_f_max?": 80 * DEG,
-            **three_gyros(parts, self["crossover"]),
+            **(self.servos(parts) if self.rates else three_gyros(parts, self["crossover"])),
         }
         for slot in (n for n in ESTIMATORS if n in self.slots):
-            found |= self.estimator(slot, parts[f"{ESTIMATORS[slot]}.pickoff"] ** 2 / self.step)
+            density = f"rebalance_{slot[-1]}.meter" if self.rates else f"{ESTIMATORS[slot]}.pickoff"
+            found |= self.estimator(slot, parts[density] ** 2 / self.step)
         return found
+
+    def servos(self, parts: PartValues) -> dict[str, Any]:
+        """Return the parameters of rebalanced gyros and of servos with three loops."""
+        start = [self[n] for n in AXES]
+        return {
+            "commands.theta_f_max?": 80 * DEG,
+            **rate_loops.design(parts, self["crossover"], self["track"], start, MOTOR),
+        }
+
+    def check(self) -> list[str]:
+        problems = [*super().check(), *self.no_choice(loops=(ANGLE, RATE))]
+        if self["track"] > 0.0 and not self.rates:
+            problems.append("track: a position loop is one of loops = rate")
+        if self["track"] > rate_loops.SLOWER * self["crossover"]:
+            problems.append(
+                f"track = {self['track']:g} Hz: a position loop is slower than a fifth of the rate loop, up to "
+                f"{rate_loops.SLOWER * self['crossover']:g} Hz here"
+            )
+        if self.rates and self.step > CURRENT_STEP:
+            problems.append(
+                f"step = {self.step:g} s: the current loops cross at {rate_loops.CURRENT:g} Hz and want "
+                f"{CURRENT_STEP:g} s at most"
+            )
+        return problems
 
     def estimator(self, slot: str, variance: float) -> dict[str, float]:
         """Return what an estimator of a gyro's signal is set to: the variance of a reading, and a band five times the

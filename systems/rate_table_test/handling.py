@@ -10,22 +10,10 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows, shifted
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
+from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
 from gyrobench.result import Coefficient, Reason
 
 FAR = 0.1  # scale factor error from which on something else than the gyro is meant
-NEAR = 0.1  # of a factor that a mistake has
-#: reading over rate -> what makes it
-FACTORS = {
-    -1.0: "the sense of the table or of the gyro is reversed",
-    180.0 / math.pi: "the reading is in °/s and was given as rad/s, or the rate the other way",
-    math.pi / 180.0: "the reading is in rad/s and was given as °/s, or the rate the other way",
-    3600.0: "the reading is in °/h and was given as °/s",
-    1.0 / 3600.0: "the reading is in °/s and was given as °/h",
-    60.0: "a unit of the reading or of the rate is per minute",
-    1.0 / 60.0: "a unit of the reading or of the rate is per minute",
-    1000.0: "the reading is in a thousandth of its unit",
-    1.0e-3: "the reading is in a thousand of its unit",
-}
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
@@ -61,8 +49,4 @@ def implausible(e: Coefficient) -> list[Reason]:
     error = e.estimate * 1e-6
     if not math.isfinite(error) or abs(error) < FAR:
         return []
-    ratio = 1.0 + error
-    known = [text for f, text in FACTORS.items() if abs(ratio / f - 1.0) < NEAR]
-    hint = f": {known[0]}?" if known else ""
-    text = f"The gyro reads {ratio:.4g} times the rate{hint} Check the senses and units of rates and readings."
-    return [Reason("rate.factor", text, ("pass", "fail"), severity="doubt")]
+    return [Reason("rate.factor", factor_sentence(1.0 + error), ("pass", "fail"), severity="doubt")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gyrobench.attitudes import LEVEL, VERTICAL
+from gyrobench.record.csv_reader import CsvColumn
 from gyrobench.system.families.servo_test import laboratory_data
 
 TEMPLATE = """\
@@ -21,7 +22,9 @@ TEMPLATE = """\
 #   x east, y up ... x south, z down    input axis level towards east, north, west or south, at angle 0 the named axis
 #                                       up or down; only while the angle is within 1 degree
 # angle: of the table, right-handed about x, at the start and the end of the window.
+# current: of the torquer, where it compensated the Earth's rate; k (its scale factor) is then needed.
 # mean, std: pickoff voltage, n samples, flagged (suspect samples): optional.  Units may be others of the same kind.
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]
 """
-MEASURED = laboratory_data(TEMPLATE, (*VERTICAL, *LEVEL))
+CURRENT = CsvColumn("current", "A", "mean current of the torquer", required=False)
+MEASURED = laboratory_data(TEMPLATE, (*VERTICAL, *LEVEL), CURRENT)

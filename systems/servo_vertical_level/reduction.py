@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -29,18 +30,32 @@ from gyrobench.reduction.toolkit import (
     Quantity,
     Reason,
     Regression,
+    RunDocument,
     Table,
     told,
 )
 from gyrobench.units import DPH
 
-from . import closed, refusals
+from . import closed, compensation, refusals
 
 
-class Reduction(HeldTest[HeldSetup]):
+@dataclass(frozen=True, kw_only=True)
+class LevelSetup(HeldSetup):
+    """compensate: coefficients that the torquer took out.  levelled: it took the Earth's rate out, too."""
+
+    compensate: str = ""
+    levelled: bool = False
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        known = {n: run.options.get(n, default) for n, default in (("compensate", ""), ("levelled", False))}
+        return super().of(run, **{**known, **own})
+
+
+class Reduction(HeldTest[LevelSetup]):
     """Coefficients and composite drift of a table that is held with its axis vertical or level."""
 
-    setup_of = HeldSetup.of
+    setup_of = LevelSetup.of
     attitudes = (*VERTICAL, *LEVEL)
 
     def record_problems(self) -> list[str]:
@@ -110,10 +125,24 @@ class Reduction(HeldTest[HeldSetup]):
                 self._attitudes_table(found.est.residual),
                 servo_regression.book_table(found, self._book_words(), self.setup.channel),
                 *self.locked_tables(),
+                *self.compensation(found),
                 *self.composite_tables(self.composites(self.y)),
             ],
             reasons=self.named(self._unseen()),
         )
+
+    def compensation(self, found: Findings) -> list[Table]:
+        """Return what is left of a systematic drift that the torquer took out; none where it did not."""
+        s, torqued = self.setup, self.held.torqued
+        if not s.compensate or torqued is None:
+            return []
+        put_in = compensation.coefficients(s.compensate, s.channel)
+        each: dict[str, tuple[Array, Array]] = {}
+        for label in dict.fromkeys(s.labels.values()):
+            rows = np.isin(self.phase, [p for p, n in s.labels.items() if n == label])
+            levelling = s.earth(self.held.axes[rows][0]) if s.levelled and label in LEVEL else 0.0
+            each[label] = self.y[rows], torqued[rows] - levelling
+        return compensation.tables(found, put_in, s.channel, each)
 
     def _unseen(self) -> list[Reason]:
         """Return what the attitudes do not tell, and what angles off level let in of it."""
@@ -153,4 +182,5 @@ class Reduction(HeldTest[HeldSetup]):
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         first = (f"{c.meaning[:1].upper()}{c.meaning[1:]} {c.name} = {{{c.name}}}." for c in coefficients[:2])
-        return [*told(coefficients, *first), found.noise_sentence(), *found.nuisance_sentences()]
+        left = [compensation.sentence(t) for t in self.compensation(found) if t.id == "compensation.attitudes"]
+        return [*told(coefficients, *first), *left, found.noise_sentence(), *found.nuisance_sentences()]

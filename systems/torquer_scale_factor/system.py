@@ -23,8 +23,9 @@ STEADY = 1.0  # s after the current has changed
 
 class TorquerScaleFactor(ChannelTest, TableTest):
     """The gyro holds a servo table on the axis its torquer precesses about; the table rate over the current is the
-    scale factor, its spread over the currents the linearity.  Of a two-degree-of-freedom gyro a rebalance loop locks
-    the axis across the table's.
+    scale factor, its spread over the currents the linearity.
+
+    Of a two-degree-of-freedom gyro a rebalance loop locks the axis across the table's.
 
     [TEST-TORQUER; Hu 1981, eq. A3-1..A3-6]
     """

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench import drift, frames
+from gyrobench.system.families.handed_axis import pole_axis
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
@@ -44,6 +45,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         | type_b("pulse", "switching")
         | TORQUER
     )
+    takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis()}
     measured_data = MEASURED
     channels = ("table.angle", *RebalanceTest.channels)
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gyrobench import drift
 from gyrobench.arrays import Array
+from gyrobench.system.families.handed_axis import pole_axis
 from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
@@ -78,6 +79,7 @@ class TumbleTwoAxis(RebalanceTest):
         | type_b("scale_factor", "nonlinearity", "current", "pulse", "switching")
         | TORQUER
     )  # fmt: skip
+    takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis("outer axis")}
     measured_data = MEASURED
     windows = Windows(
         "sampler.count",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from gyrobench import drift
+from gyrobench.system.families.handed_axis import pole_axis
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
@@ -53,6 +54,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
             for a in "xy"
         }
     )  # fmt: skip
+    takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis()}
     measured_data = MEASURED
     windows = Windows(
         "sampler_x.count",

@@ -1,11 +1,13 @@
-"""How often the 95 % intervals of imu_positions contain the true value: random units, sites, noise, three ways.
+"""How often the 95 % intervals of imu_positions contain the true value: random units, sites, noise, six ways.
 
-    python tests/benchmarks/imu_positions.py [table unknown up_down] [--runs 300] [--seed 1]
+    python tests/benchmarks/imu_positions.py [WAY ...] [--runs 300] [--seed 1]
 
 The records are made in plain numpy and scipy (tests/support/imu_world.py), which shares nothing with the reduction.
 
 table    12 positions and turns about three axes; noise of window means white, Gauss-Markov (correlation time from 0.3
          windows to half the record) or both
+set_up   the same on a table and in a mount that are off by what is stated, or is not (set_up_unstated)
+thermal  six positions and turns, six times, while the temperature goes 40 K up and down; white noise
 unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; white noise of a small unit, of its
          gyros white, Gauss-Markov (0.3 positions to half the record) or both
 up_down  an axis up and down, 120 s each at 20 Hz; the same noise of the gyros
@@ -26,8 +28,10 @@ from typing import Any
 import numpy as np
 from scipy import stats
 from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from imu_world import EARTH, EDGES, FACES, Unit, World, handled, own_axes, plan, poses
 
 from gyrobench.system.system import load_system
@@ -95,6 +99,39 @@ def of_file(head: str, time_of: Any, gyro: Any, acc: Any) -> Any:
         return reduction.Reduction.of_record(system.measured_data.read(system, path, {}))
 
 
+def of_set_up(rng: Rng, stated: bool = True) -> tuple[Any, dict[str, float]]:
+    """A table and a mount that are off by what is stated: 20" level, azimuth, right angle, case; 30 ug gravity."""
+    arcsec = math.pi / 648000.0
+    size = 20.0 * arcsec
+    level, azimuth, square = rng.normal(size=3) * size
+    case = Rotation.from_rotvec(rng.normal(size=3) * size)
+    gravity, latitude = 9.805, rng.uniform(-1.2, 1.2)
+    off = rng.normal() * 3e-4
+    table = Rotation.from_rotvec([0.0, level, azimuth])
+    world, unit = World(latitude, gravity + off, case, table, float(square)), Unit.drawn(rng)
+
+    def noise(t0: Any, t1: Any) -> Any:
+        return tuple(np.column_stack([noise_of(rng, t0, t1, s) for _ in "xyz"]) for s in (0.15 * DPH, 1.3e-4))
+
+    windows = world.windows(plan(FACES + EDGES), unit, noise)
+    sizes = {"u_axis": size, "u_square": size, "u_mount": size, "u_gravity": 3e-4} if stated else {}
+    said = budget.ImuSetup(latitude=latitude, gravity=gravity, earth_rate=EARTH, **sizes)
+    return reduction.reduce(windows, said), unit.coefficients()
+
+
+def of_set_up_unstated(rng: Rng) -> tuple[Any, dict[str, float]]:
+    """The same errors, nothing stated: what the intervals are without."""
+    return of_set_up(rng, False)
+
+
+def of_thermal(rng: Rng) -> tuple[Any, dict[str, float]]:
+    """Six positions and turns, six times, 40 K up and down; white noise of a small unit."""
+    from test_imu_thermal import heated, setup, white
+
+    windows, truth = heated(int(rng.integers(1 << 30)), noise=white(int(rng.integers(1 << 30))))
+    return reduction.reduce(windows, setup()), truth
+
+
 def of_hand(rng: Rng) -> tuple[Any, dict[str, float]]:
     unit, latitude = Unit.drawn(rng, 0.01), rng.uniform(-1.2, 1.2)
     t, gyro, acc = handled(unit, poses(rng, 24), rng, rest=3.0, turn=1.5, acc=1e-3, latitude=latitude, gravity=9.805)
@@ -120,7 +157,8 @@ def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
 
 
 WAYS: dict[str, Callable[[Rng], tuple[Any, dict[str, float]]]] = {
-    "table": of_table, "unknown": of_hand, "up_down": of_up_down,
+    "table": of_table, "set_up": of_set_up, "set_up_unstated": of_set_up_unstated, "thermal": of_thermal,
+    "unknown": of_hand, "up_down": of_up_down,
 }  # fmt: skip
 
 

@@ -434,3 +434,14 @@ def test_a_null_of_the_pickoff_makes_a_drift_of_the_springs(nutation):
 def test_springs_are_of_small_angles():
     with pytest.raises(ComponentError, match="K_q and K_phi are of small angles"):
         started(plain=True, **STILL, K_q=0.1, full=1, J_x=1e-4, J_y=1e-4)
+
+
+def test_springs_are_the_same_in_python_and_native():
+    """The reference run has none: both targets, bit for bit, with nutation and without."""
+    for nutation in ({}, {"J_x": 1e-4, "J_y": 2e-4, "C_x": 0.02, "C_y": 0.03}):
+        values = {"K_q": 0.3, "K_phi": 0.2, "null_x": 1e-5, "null_y": -2e-5, "omega": [1e-4, -2e-4, 0.3], **nutation}
+        plain, native = (started(plain=kind, **STILL, **values) for kind in (True, False))
+        for k in range(40):
+            plain.do_step(k * H, H)
+            native.do_step(k * H, H)
+            assert (plain.u_x, plain.u_y, plain.psi_x) == (native.u_x, native.u_y, native.psi_x)

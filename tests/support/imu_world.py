@@ -47,6 +47,52 @@ class Unit:
 
 
 @dataclass
+class Heat:
+    """What follows the temperature, SI, of three instruments; T above the reference, z a play of this width (K)."""
+
+    bias: Array  # (3, 3): of T, T2, T3 (rows) for each instrument
+    hysteresis: Array
+    ramp: Array
+    scale: Array  # (2, 3): of T, T2
+    width: float = 10.0
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, bias: float, scale: float) -> Heat:
+        """bias: SI, of the polynomial at 40 K; scale: relative, there."""
+        powers = 40.0 ** -np.arange(1.0, 4.0)[:, None]
+        return cls(rng.normal(size=(3, 3)) * bias * powers, rng.normal(size=3) * bias, rng.normal(size=3) * bias * 30.0,
+                   rng.normal(size=(2, 3)) * scale * powers[:2])  # fmt: skip
+
+    def means(self, t0: Array, t1: Array, temperature: Any, inputs: Array) -> Array:
+        """Return what is read too much (n, 3), means over windows; temperature: function of the time, K; inputs (n, 3)
+        of the instruments, even over each window.
+        """
+        t = np.arange(t0[0], t1[-1] + 0.25, 0.25)
+        T = temperature(t)
+        z, play = 0.0, []
+        for step in np.diff(T, prepend=T[0]):
+            z = min(max(z + 2.0 * step / self.width, -1.0), 1.0)
+            play.append(z)
+        slope = np.gradient(T, t)
+        each = np.array([T, T**2, T**3]).T @ self.bias + np.outer(play, self.hysteresis) + np.outer(slope, self.ramp)
+        grown = np.array([T, T**2]).T @ self.scale
+        out = np.empty((t0.size, 3))
+        for k, (a, b) in enumerate(zip(t0, t1, strict=True)):
+            rows = (t >= a) & (t < b)
+            out[k] = each[rows].mean(axis=0) + grown[rows].mean(axis=0) * inputs[k]
+        return out
+
+    def coefficients(self, kind: str) -> dict[str, float]:
+        """Return the values by the names of the reduction."""
+        found = {}
+        for i, a in enumerate("xyz"):
+            found |= {f"b{kind}{n}_{a}": self.bias[k, i] for k, n in enumerate(("T", "T2", "T3"))}
+            found |= {f"b{kind}H_{a}": self.hysteresis[i], f"b{kind}R_{a}": self.ramp[i]}
+            found |= {f"S{kind}{n}_{a}": self.scale[k, i] for k, n in enumerate(("T", "T2"))}
+        return {n: float(v) for n, v in found.items()}
+
+
+@dataclass
 class World:
     """Site and errors of the set-up.  case: turn of the instrument on the plate; table: of the table in the room."""
 

@@ -45,13 +45,13 @@ def test_coefficients_by_hand() -> None:
 
 def test_every_drift_test_has_the_option() -> None:
     assert DRIFT_TESTS == [
-        "eight_position", "fixed_position", "open_loop_drift", "servo_polar", "servo_two_axis", "servo_vertical_level",
-        "tumble_single_axis", "tumble_two_axis", "tumble_two_channel",
+        "eight_position", "fixed_position", "open_loop_drift", "position_sensitivity", "servo_polar", "servo_two_axis",
+        "servo_vertical_level", "tumble_single_axis", "tumble_two_axis", "tumble_two_channel",
     ]  # fmt: skip
     for name in DRIFT_TESTS:
         system = load_test(name)
         assert isinstance(system, System)
-        text = ROTOR if name in ("eight_position", "servo_two_axis", "tumble_two_channel") else FLOAT
+        text = ROTOR if system.slots["gyro"].socket == "TwoAxisGyro" else FLOAT
         values = system.with_values({"physical": text})
         found = derived(name, text)
         assert found and found.items() <= values.parameters(PartValues(values)).items()

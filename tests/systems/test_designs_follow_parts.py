@@ -13,6 +13,7 @@ from gimballed import only
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import Result
+from gyrobench.system.system import load_system
 
 Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
@@ -174,13 +175,24 @@ def test_another_estimator_in_the_loop_is_named() -> None:
 
 
 # ------------------------------------------------------------------------------------ angle or rate
-@pytest.mark.parametrize("slot", ["pitch", "azimuth"])
-def test_servo_that_wants_a_rate_does_not_fit_a_loop_of_angles(slot: str, command: Command, tmp_path: Path) -> None:
+SDF = "stabilizer_sdf"
+
+
+def test_servo_that_wants_a_rate_does_not_fit_a_loop_of_angles(command: Command, tmp_path: Path) -> None:
     """It fitted, and the loop swung up with 33 Hz."""
-    code, out, err = command("run", THREE, "--part", f"{slot}=servo_three_loop", "--out", tmp_path / "run")
+    code, out, err = command("run", SDF, "--part", "stabilizer=servo_three_loop", "--out", tmp_path / "run")
     assert (code, out) == (2, "") and not (tmp_path / "run").exists()
     text = "u: wrong quantity: u is for an angular rate, here the gyro signal stands for an angle"
-    assert f"slot {slot}: FMU 'ServoThreeLoop' does not fit socket Stabilizer\n  - {text}" in err
+    assert f"slot stabilizer: FMU 'ServoThreeLoop' does not fit socket Stabilizer\n  - {text}" in err
+
+
+@pytest.mark.parametrize("slot", ["pitch", "azimuth"])
+def test_servo_that_wants_a_rate_gives_a_platform_rate_gyros(slot: str) -> None:
+    loaded = load_system(THREE)
+    loaded.place(slot, "servo_three_loop")
+    assert loaded["loops"] == "rate" and {loaded.slots[a].part for a in ("pitch", "roll", "azimuth")} == {
+        "servo_three_loop"
+    }
 
 
 def test_the_same_servo_fits_where_the_signal_is_a_rate() -> None:

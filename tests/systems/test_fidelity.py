@@ -49,6 +49,7 @@ CASES = {
     "fixed_position": Case({"readings": 10, "dwell": 20.0, "settle": 3.0}),
     "open_loop_drift": Case({"pairs": 5, "wait": 6.0, "dwell": 0.1}, 5e-6, "the rate of a move is held over each step"),
     "accelerometer_multipoint": Case({}),
+    "position_sensitivity": Case({"cycles": 2, "dwell": 10.0}),
     "servo_polar": Case({**DAY50, "gyro.J": 2e-5}),
     "servo_vertical_level": Case({"dwell": 60.0, "settle": 2.0, **NO_CROSS}),
     "servo_two_axis": Case(day(50.0)),
@@ -88,7 +89,7 @@ def test_dynamic_is_quasi_static(name: str) -> None:
 
 NOISE_IS_THE_RESULT = {"drift_record"}  # without noise there is nothing to estimate
 #: their own tests put errors in and get them back; nothing is quasi-static about a table
-TABLES = {"angle_system_test", "table_position_test", "table_rate_test"}
+TABLES = {"angle_system_test", "stand_alignment", "table_position_test", "table_rate_test"}
 
 
 def test_every_method_is_here() -> None:

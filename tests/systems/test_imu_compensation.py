@@ -20,7 +20,7 @@ from gyrobench.workflow.fitted_values import refuse_unfitted, write_fitted
 
 room = type(load_system("imu_positions")).__module__
 compensation: Any = importlib.import_module(".compensation", room)
-channels: Any = importlib.import_module(".channels", room)
+tables: Any = importlib.import_module(".tables", room)
 PLAN: dict[str, Any] = {"positions": 6, "dwell": 10.0, "settle": 1.0, "turns": 1, "rate": 1.0, "nuisances": "none"}
 
 
@@ -47,7 +47,7 @@ def test_a_second_run_proves_the_compensation(calibrated: Any) -> None:
     found = again.run(seed=2, check_step=False).result
     first = {c.name: c for c in run.result.coefficients}
     for c in found.coefficients:
-        si, before = channels.SCALES[c.unit], first[c.name]
+        si, before = tables.SCALES[c.unit], first[c.name]
         assert c.truth is not None and abs(c.truth * si) < 4.5 * before.u * si + 1e-7 * abs(before.estimate * si)
         assert abs(c.estimate - c.truth) < 4.5 * c.u
     largest = max(abs(c.estimate) for c in found.coefficients if c.unit == "ppm")
@@ -81,8 +81,8 @@ def test_the_same_values_for_other_tools(calibrated: Any, tmp_path: Path) -> Non
     _, run, (toml, document, header) = calibrated
     held = json.loads(document.read_text(encoding="utf-8"))["parameters"]
     first = {c.name: c for c in run.result.coefficients}
-    assert held["acc_scale"]["value"][0][2] == first["Sa_xz"].estimate * channels.SCALES[first["Sa_xz"].unit]
-    assert held["gyro_bias"]["u"][1] == first["bg_y"].u * channels.SCALES[first["bg_y"].unit]
+    assert held["acc_scale"]["value"][0][2] == first["Sa_xz"].estimate * tables.SCALES[first["Sa_xz"].unit]
+    assert held["gyro_bias"]["u"][1] == first["bg_y"].u * tables.SCALES[first["bg_y"].unit]
     settings = read_settings(toml)
     assert {n: json.loads(v) for n, v in settings.items()} == {f"compensator.{n}": v["value"] for n, v in held.items()}
     source = tmp_path / "main.c"

@@ -37,7 +37,7 @@ class VibratoryGyro(FilteredRateGyro):
     phase_T = Parameter(0.0, "rad/K", "change of the phase error with temperature")
     g2 = Parameter([[0.0] * 3] * 2, "rad.s3/m2", "rows: change of each bias with the square of the force along x, y, z")
     loop = Parameter(100.0, "Hz", "force rebalance: frequency at which the loop has 3 dB", above=0.0)
-    white = Noise(0.005, "rad/s/sqrt(Hz)", "noise of the force, as a rate: density N, of each phase", samples=4)
+    white = Noise(1e-4, "rad/s/sqrt(Hz)", "noise of the force, as a rate: density N, of each phase", samples=4)
     pickoff = Noise(0.0, "rad/sqrt(Hz)", "noise of the pick-off, over twice the drive motion", samples=4)
 
     residual = Output("rad/s", "force rebalance: quadrature that is held, of x and y; open loop: 0", shape=(2,))

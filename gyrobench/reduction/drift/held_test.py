@@ -30,7 +30,7 @@ from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup.run_metadata import remount_of
 from gyrobench.reduction.setup.setups import SiteSetup
-from gyrobench.reduction.setup.sources import Effect
+from gyrobench.reduction.setup.sources import TORQUER_SCALE, Effect
 from gyrobench.result import DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
@@ -40,7 +40,7 @@ class HeldSetup(SiteSetup):
     """labels: phase -> attitude, of the phases in which the gyro holds the table.  tracking: largest angle of the table
     against the gyro, rad.  gain: of the pickoff, V/rad of the case (0: unknown).  channel: of a two-degree-of-freedom
     gyro, x or y; truth is then in the names and signs of a floated gyro.  k_locked: scale factor of the torquer that
-    locks the other axis, rad/s/A (0: unknown).
+    locks the other axis, rad/s/A (0: unknown).  k: of the torquer that compensates in a level attitude.
     """
 
     labels: Mapping[int, str]
@@ -48,6 +48,8 @@ class HeldSetup(SiteSetup):
     tracking: float = servo_regression.TRACKING
     gain: float = 0.0
     k_locked: float = 0.0
+    k: float = 0.0
+    u_scale_factor: float = 0.0
     u_axis: float = 0.0
     u_mount: float = 0.0
     u_wobble: float = 0.0
@@ -60,11 +62,13 @@ class HeldSetup(SiteSetup):
     def of(cls, run: RunDocument, **own: Any) -> Self:
         p, channel = run.parameters, str(run.options.get("channel", ""))
         floated = p.get("gyro.K_sg", 0.0) * p.get("gyro.H", 0.0) / (p.get("gyro.C") or 1.0)
+        torquer = {"": "k", "x": "k_y", "y": "k_x"}.get(channel, "k")  # it stands on the other axis
         known: dict[str, Any] = {
             "channel": channel,
             "labels": {row.phase: row.label for row in run.plan if row.mode == "servo"},
             "tracking": float(run.options.get("tracking", servo_regression.TRACKING)),
             "gain": p.get(f"gyro.K_sg_{channel}", 0.0) if channel else floated,
+            "k": float(run.options.get("k") or p.get(f"gyro.{torquer}") or 0.0),
             "k_locked": p.get(f"gyro.k_{channel}", 0.0) if channel else 0.0,
             "truth": channels.truth_in(run, channel),
             "remount": remount_of(run),
@@ -104,7 +108,11 @@ class HeldTest(DriftReduction[H]):
         self.held, self.phase, rows = servo_regression.held_windows(self.windows, s.labels, self.attitudes, s.latitude)
         tracking = servo_regression.tracking_problems(self.windows, rows, s.gain, s.tracking)
         self.of_held = {n: np.asarray(v)[rows] for n, v in self.windows.items()}
-        return [*self.record_problems(), *tracking]
+        if "current" in self.of_held:
+            self.held = replace(self.held, torqued=s.k * np.asarray(self.of_held["current"], dtype=float))
+        unknown = self.held.torqued is not None and not s.k > 0.0
+        text = "k unknown: the record has currents of the torquer; give its scale factor, as k = 17.2deg/h/mA"
+        return [*self.record_problems(), *tracking, *([text] if unknown else [])]
 
     def drift_rates(self, quantities: list[Quantity], groups: list[Group]) -> Regression:
         """Return the regression of the drift rates of all windows, neighbours of which share an angle reading."""
@@ -114,7 +122,10 @@ class HeldTest(DriftReduction[H]):
         return Regression(quantities, X, y, h.t_start, h.t_end, groups, noise="readings", candidates=weighed)
 
     def effects(self, found: Findings) -> list[Effect]:
-        return servo_regression.effects(self.held, self.setup.place, found, self.columns, self.phase, self.setup)
+        known = servo_regression.effects(self.held, self.setup.place, found, self.columns, self.phase, self.setup)
+        if self.held.torqued is None:
+            return known
+        return [*known, TORQUER_SCALE.effect(self.setup, found.error(-self.held.torqued))]
 
     def mine(self, phase: int) -> NDArray[np.bool_]:
         """Return the rows (n,) of a phase."""

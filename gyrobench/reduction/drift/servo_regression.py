@@ -64,7 +64,8 @@ BOOK: dict[str, tuple[str, int]] = {
 @dataclass(frozen=True)
 class HeldWindows:
     """Windows of a held table: angles (n,) rad, times (n,) s, and the gyro axes x, y, z (rows, in ENU) at angle 0 of
-    each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.
+    each window (n, 3, 3).  body: the gyro axes in those of the attitude, for mounts that are not true.  torqued (n,):
+    precession by the torquer, rad/s.
     """
 
     angle_start: Array
@@ -73,6 +74,7 @@ class HeldWindows:
     t_end: Array
     axes: Array
     body: Array | None = None
+    torqued: Array | None = None
 
     @property
     def rate(self) -> Array:
@@ -127,7 +129,7 @@ def drift_rate(held: HeldWindows, site: Location) -> Array:
     earth = window_regressors.average(held.seen(site.earth_rate * frames.pole(site.latitude))[:, :, 0])
     along = 1.0 if held.body is None else held.body[0, 0]
     out: Array = earth + along * held.rate
-    return out
+    return out if held.torqued is None else out - held.torqued
 
 
 def design(held: HeldWindows, site: Location, names: tuple[str, ...]) -> Array:

@@ -107,8 +107,12 @@ class LoopTest(System):
     def __init__(self) -> None:
         """Record what says that a part is at a limit, of every part: what was measured then is not the linear loop."""
         super().__init__()
+        vars(self)["channels"] = self._with_limits()
+
+    def _with_limits(self) -> tuple[str, ...]:
+        """Return the channels with the flags of all parts that have a limit."""
         flags = [f"{name}.saturated" for name, slot in self.slots.items() if _has_limit(slot)]
-        vars(self)["channels"] = tuple(dict.fromkeys((*self.channels, *flags)))
+        return tuple(dict.fromkeys((*self.channels, *flags)))
 
     def phases(self) -> list[LoopPhase]:
         """Return what the test does, one after the other."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.attitudes import SERVO_ATTITUDES
-from gyrobench.record.csv_reader import WINDOW_COLUMNS
+from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.configurable import Option
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
@@ -59,7 +59,7 @@ TRACKING = {
 @dataclass(frozen=True)
 class Hold:
     """A phase in which the gyro holds the table: attitude, start angle (rad), s of settling, dwell and windows, rad
-    that must be turned at least, s that this may take.
+    that must be turned at least, s that this may take; current of the torquer, A.
     """
 
     attitude: str
@@ -69,6 +69,7 @@ class Hold:
     start: float = 0.0
     travel: float = 0.0
     longest: float = math.inf
+    current: float = 0.0
 
 
 def stand_parameters(directions: Iterable[tuple[int, int]]) -> dict[str, Any]:
@@ -152,7 +153,7 @@ class ServoTest(ChannelTest, TableTest):
             to = {"label": f"{h.attitude}: to the start", "mode": "index", "target": h.start, "settle": 1.0}
             phases.append(Phase(face=FACE, dwell=0.1, window=0.1, **to))  # type: ignore[arg-type]
             times = {"settle": h.settle, "dwell": h.dwell, "expected": travel if math.isfinite(travel) else 0.0}
-            phases.append(Phase(h.attitude, "servo", FACE, travel=h.travel, window=h.window, **times))
+            phases.append(Phase(h.attitude, "servo", FACE, h.current, travel=h.travel, window=h.window, **times))
         return Plan(phases, {FACE: self.face})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
@@ -206,12 +207,13 @@ class ServoTest(ChannelTest, TableTest):
         return list(dict.fromkeys(problems)) or capture_problems(parameters, rates)
 
 
-def laboratory_data(template: str, known: Sequence[str]) -> MeasuredData:
-    """Return the template and reader of a laboratory's table angles, held in the attitudes ``known``."""
+def laboratory_data(template: str, known: Sequence[str], *more: CsvColumn) -> MeasuredData:
+    """Return the template and reader of a laboratory's table angles, held in the attitudes ``known``; more: columns."""
     columns = tuple(
         replace(c, unit="V", meaning="pickoff voltage", required=False) if c.name in ("mean", "std") else c
         for c in WINDOW_COLUMNS
     )
+    columns = (*columns, *more)
     names = dict.fromkeys(known, "servo")
     needed = {"latitude": "45.75deg"}
     return MeasuredData(template, partial(read_record, needed=needed, attitudes=lambda _: names, columns=columns))

@@ -1,0 +1,210 @@
+"""Record of a vibrating table -> gain, bandwidth, 90 degree frequency, delay and equivalent order of a rate gyro.
+
+Amplitudes and phases of gyro and table at each frequency make points, with u from the noise beside their lines; a curve
+of poles and a delay is fitted to them, and the figures are those of the curve.  What an error of the set-up does is
+found by moving the points and taking the figures anew.  [TEST-BANDWIDTH]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.reduction.estimation.effects import PREDICTED
+from gyrobench.reduction.loops.loop_curves import bode, curve
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.sources import TIME_BASE, Source
+from gyrobench.result import BudgetLine
+from gyrobench.units import DEG
+
+from .mistakes import mistakes
+from .points import points_of
+from .response import GyroResponse, figures, logarithm
+from .truth import true_values
+
+READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
+READING_LAG = Source("table.reading.lag", "lag of the reading of the table rate", "s", "u_lag", "reading late")
+COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
+#: name, meaning, unit, SI per unit
+FIGURES = (
+    ("K", "gain at low frequency: rate indicated over rate of the table", "1", 1.0),
+    ("f_3dB", "bandwidth: frequency at which the gain is 3 dB below that at low frequency", "Hz", 1.0),
+    ("f_90", "frequency at which the gyro lags by 90°", "Hz", 1.0),
+    ("delay", "delay at low frequency: lag of the phase over angular frequency", "ms", 1e-3),
+    ("order", "equivalent order: of the Butterworth low-pass with this slope at −3 dB", "1", 1.0),
+)
+PLAIN = 1e-9  # Hz; finer than any figure
+STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
+NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
+MISFIT = 1e-4  # p of chi2 below which the curve does not fit
+
+
+class Reduction(MeasureReduction):
+    """Frequency response of a rate gyro."""
+
+    part = "gyro"
+    ranked_by = "f_3dB"
+
+    def measure(self) -> Account:
+        points = points_of(self.record)
+        response = GyroResponse.of(points.f, points.value, points.u)
+        found = figures(response)
+        if found is None:
+            raise ReductionError("no curve fits these points; more frequencies are needed")
+        if not points.known:
+            factor = math.sqrt(found.curve.chi2 / found.curve.dof)
+            response = replace(response, u=response.u * max(factor, PLAIN))
+            found = figures(response) or found
+        self.points, self.response, self.figures = points, response, found
+        self._report()
+        least, most = (float(x) / DEG for x in (np.min(points.table), np.max(points.table)))
+        return Account(
+            method="Sines of table rate at one frequency after another; a curve of poles and a delay by weighted least "
+            "squares [TEST-BANDWIDTH]",
+            sources=["TEST-BANDWIDTH; IEEE 1431; IEEE 952; IEEE 647"],
+            equation="H(s) = K e^(-s T) \\/ product (1 + 2 zeta s\\/omega + s^2\\/omega^2)",
+            conventions=[
+                "Gain and phase: rate indicated over rate of the table as read; a lag is negative.",
+                f"Curve: {found.curve.poles} poles and a delay, of the least Bayesian information criterion.",
+                f"Table rate: amplitude {least:.4g} to {most:.4g} °/s.",
+            ],
+            reasons=list(mistakes(response, found)),
+        )
+
+    def summary(self) -> list[str]:
+        said = ["Gain at low frequency {K}, delay {delay}."]
+        if math.isfinite(self.figures.value[1]):
+            said = ["Bandwidth (−3 dB) {f_3dB}, equivalent order {order}.", *said]
+        if math.isfinite(self.figures.value[2]):
+            said.append("The gyro lags by 90° at {f_90}.")
+        return told(self.found.coefficients, *said)
+
+    # ------------------------------------------------------------------ figures and their budget
+    def _report(self) -> None:
+        found, points, curve_of = self.found, self.points, self.figures.curve
+        highest = float(points.f[-1])
+        truth = true_values(self.run, highest)
+        by = self._sensitivities()
+        for k, (name, meaning, unit, scale) in enumerate(FIGURES):
+            value = float(self.figures.value[k])
+            if not math.isfinite(value):
+                found.measure(name, meaning, unit, None, no_value=NOT_REACHED.format(f=highest))
+                continue
+            shares = [float(np.nan_to_num(row[k])) * u for _, u, row in by]
+            u = math.hypot(float(self.figures.u[k]), *shares)
+            true = float(truth[k]) if truth is not None and math.isfinite(truth[k]) else None
+            found.measure(name, meaning, unit, value, u, scale=scale, truth=true)
+            found.coefficients[-1] = replace(found.coefficients[-1], u_a=float(self.figures.u[k]) / scale)
+            self._budget(name, unit, scale, k, by, shares)
+        self._predicted(by)
+        self._doubts()
+        span = np.geomspace(points.f[0], highest, 200)
+        fitted = logarithm(curve_of.p, span)
+        shown = curve(f"{curve_of.poles} poles and a delay", span, np.exp(fitted[0] + 1j * fitted[1]))
+        measured = [Point(float(f), complex(v), float(u), 1.0) for f, v, u in
+                    zip(points.f, points.value, self.response.u, strict=True)]  # fmt: skip
+        caption = (
+            "Gain and phase of the gyro against the table. Points: measured, with 95 % error bars; line: fitted curve."
+        )
+        found.responses.append(bode("frequency response", "loop", caption, measured, [shown], "gain", "1"))
+        found.tables.append(self._table())
+
+    def _table(self) -> Table:
+        r, fitted = self.response, logarithm(self.figures.curve.p, self.response.f)
+        db = 20.0 / math.log(10.0)
+        rows = [
+            [float(f), float(a), db * float(g), math.degrees(p), float(u) * 100.0, db * float(dg), math.degrees(dp)]
+            for f, a, g, p, u, dg, dp in zip(
+                r.f, self.points.table / DEG, r.gain, r.phase, r.u, r.gain - fitted[0], r.phase - fitted[1], strict=True
+            )
+        ]
+        head = [
+            "f / Hz",
+            "table / (°/s)",
+            "gain / dB",
+            "phase / °",
+            "u / %",
+            "gain less curve / dB",
+            "phase less curve / °",
+        ]
+        caption = "Gain and phase at each frequency; u: of the gain, relative, and of the phase in rad"
+        return Table("response.points", "Frequency response", caption, head, rows)
+
+    def _sources(self) -> list[tuple[Source, float, GyroResponse]]:
+        """Return the sources, the step that is taken of each, and the response as an error of that size makes it."""
+        r, w = self.response, 2.0 * np.pi * self.response.f
+        one = np.ones(r.f.size)
+        gain, lag, time, cosine = STEPS
+        return [
+            (READING_GAIN, gain, r.moved(-gain * one + 0j)),
+            (READING_LAG, lag, r.moved(1j * lag * w)),
+            (TIME_BASE, time, r.at(1.0 - time)),
+            (COSINE, cosine, r.moved(cosine * one + 0j)),
+        ]
+
+    def _sensitivities(self) -> list[tuple[Source, float, Array]]:
+        """Return of each source its standard uncertainty and the change (5,) of the figures for one unit of it, SI."""
+        base = self.figures
+        out = []
+        for source, step, moved in self._sources():
+            again = figures(moved, lambda curves: next((c for c in curves if c.poles == base.curve.poles), curves[-1]))
+            change = np.zeros(5) if again is None else (again.value - base.value) / step
+            u = float(self.run.options.get(source.option, 0.0)) if source.option in self.run.options else 0.0
+            out.append((source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
+        return out
+
+    def _budget(self, name: str, unit: str, scale: float, k: int, by: list[tuple[Source, float, Array]],
+                shares: list[float]) -> None:  # fmt: skip
+        for (source, u, row), share in zip(by, shares, strict=True):
+            if u > 0.0:
+                per = unit if source.unit == "1" else f"{unit}/{source.unit}"
+                self.found.budget.append(
+                    BudgetLine(source.id, source.name, u, source.unit, float(np.nan_to_num(row[k])) / scale, per,
+                               abs(share) / scale, unit, name, source.note)
+                )  # fmt: skip
+
+    def _predicted(self, by: list[tuple[Source, float, Array]]) -> None:
+        """Show by how much each figure is off by the simulated errors of the set-up."""
+        errors = simulated_errors(self.run)
+        known = [(s, float(e), row) for s, _, row in by if isinstance(e := errors.get(s.id), float) and e]
+        if not known:
+            return
+        rows = []
+        for k, (name, _, unit, scale) in enumerate(FIGURES):
+            if math.isfinite(self.figures.value[k]):
+                each = [error * float(row[k]) / scale for _, error, row in known]
+                rows.append([name, *each, sum(each), float(self.figures.u[k]) / scale, unit])
+        said = [f"({n}) {s.name}, {units.format_quantity(e, s.unit)}" for n, (s, e, _) in enumerate(known, 1)]
+        caption = (
+            "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
+            f"{'; '.join(said)}."
+        )
+        head = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
+        self.found.tables.append(Table(PREDICTED, "Predicted shifts by simulated errors", caption, head, rows))
+
+    def _doubts(self) -> None:
+        found, points, c = self.found, self.points, self.figures.curve
+        if points.saturated:
+            at = ", ".join(f"{f:.3g} Hz" for f in points.saturated)
+            found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
+                                          "smaller rate.")  # fmt: skip
+        stated = any(u > 0.0 for _, u, _ in self._sensitivities())
+        if self.run.measured and not stated and self.run.type_b != "none":
+            found.doubt("type_b.unstated", "No uncertainty of the table or its reading is stated: u is of the points "
+                                           "alone. State u_gain, u_lag ..., or declare type_b = none.")  # fmt: skip
+        if points.known and c.chi2 > c.dof + 4.0 * math.sqrt(2.0 * c.dof):
+            text = (
+                f"The curve does not fit the points: χ² = {c.chi2:.3g} of {c.dof} degrees of freedom. u of the figures "
+                "is widened by its root. The gyro has a response of another shape, or points are wrong."
+            )
+            found.warn("response.misfit", text)
+        peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
+        if peak > 0.5 * math.log(2.0):
+            top = float(self.response.f[int(np.argmax(self.response.gain))])
+            rise = 20.0 * peak / math.log(10.0)
+            more = "Measure more frequencies there."
+            found.warn("response.resonance", f"The gain rises to {rise:.3g} dB at {top:.3g} Hz: a resonance. {more}")

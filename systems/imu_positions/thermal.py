@@ -1,0 +1,119 @@
+"""Bias and scale factor that follow the temperature, as further columns of each instrument's fit.
+
+    reading - input = ... + bT T + bT2 T2 + bT3 T3 + bH z + bR T' + (ST T + ST2 T2) input               [IMU-THERMAL]
+
+T above the temperature of the coefficients, T' its rate of change, z how far it is through a hysteresis: a play of the
+width that is stated.  All are means over a window in which T changes evenly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.units import DPH
+
+from .channels import UG, ImuInstrument
+
+PLACES = (np.arange(8) + 0.5) / 8.0  # of a window, at which the play is taken
+#: ending of a coefficient -> parameter of the parts, size of its unit over that of the bias, unit, meaning
+BIAS = {
+    "T": ("bias_T", 1.0, "/K", "change of the bias of the {} per kelvin"),
+    "T2": ("bias_T2", 1.0, "/K²", "change of the bias of the {} per kelvin squared"),
+    "T3": ("bias_T3", 1.0, "/K³", "change of the bias of the {} per kelvin cubed"),
+    "H": ("hysteresis", 1.0, "", "bias of the {} while the temperature rises, less the mean of both ways"),
+    "R": ("ramp", 60.0, "/(K/min)", "bias of the {} per rate of change of the temperature"),
+}
+SCALE = {
+    "T": ("scale_T", 1e-6, "ppm/K", "change of the scale factor of the {} per kelvin"),
+    "T2": ("scale_T2", 1e-6, "ppm/K²", "change of the scale factor of the {} per kelvin squared"),
+}
+#: printed unit -> SI, beside those of channels.SCALES
+SCALES = {
+    **{f"{unit}{more}": size * si for unit, si in (("°/h", DPH), ("µg", UG)) for _, size, more, _ in BIAS.values()},
+    **{unit: size for _, size, unit, _ in SCALE.values()},
+}
+
+
+@dataclass(frozen=True)
+class Thermal:
+    """Temperature of the windows: T, T2, T3, z, T' (n,), and the orders of bias and scale factor."""
+
+    powers: tuple[Array, Array, Array]
+    way: Array
+    slope: Array
+    orders: tuple[int, int]
+
+    @classmethod
+    def of(cls, windows: Mapping[str, Any], reference: float, width: float, orders: tuple[int, int]) -> Thermal:
+        """Return the temperatures of windows above the reference; width (K): of the hysteresis.
+
+        Within a window the temperature changes evenly, between the ends that the means of its neighbours give it.
+        """
+        t0, t1, mean = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "temperature"))
+        between = PchipInterpolator(0.5 * (t0 + t1), mean - reference, extrapolate=True)
+        start, end = between(t0), between(t1)
+        path = start[:, None] + (end - start)[:, None] * PLACES
+        first, second, third = ((path**k).mean(axis=1) for k in (1, 2, 3))
+        return cls((first, second, third), _play(start, path, end, width), (end - start) / (t1 - t0), orders)
+
+    def rows(self, kept: Array) -> Thermal:
+        """Return the temperatures of some of the windows."""
+        first, second, third = (p[kept] for p in self.powers)
+        return replace(self, powers=(first, second, third), way=self.way[kept], slope=self.slope[kept])
+
+    def endings(self, scaled: bool) -> list[tuple[str, str]]:
+        """Return kind and ending of the coefficients; scaled: whether those of the scale factor are shown."""
+        bias, scale = self.orders
+        found = [("b", e) for e in ("T", "T2", "T3")[:bias]] + [("b", "H"), ("b", "R")]
+        return found + ([("S", e) for e in ("T", "T2")[:scale]] if scaled else [])
+
+    def columns(self, own: Array, scaled: bool) -> tuple[Array, Array]:
+        """Return what the coefficients of bias (n, p) and scale factor (n, q) multiply; own: the input (n,)."""
+        bias, scale = self.orders
+        constant = np.column_stack([*self.powers[:bias], self.way, self.slope])
+        grown = [own * p for p in self.powers[:scale]] if scaled else []
+        return constant, np.column_stack(grown) if grown else np.empty((own.size, 0))
+
+
+def _play(start: Array, path: Array, end: Array, width: float) -> Array:
+    """Return the mean of a play within -1 ... 1 over each window, 0 at the first start."""
+    z, before, out = 0.0, float(start[0]), []
+    for first, inside, last in zip(start, path, end, strict=True):
+        seen = []
+        for T in (first, *inside, last):
+            z = min(max(z + 2.0 * (float(T) - before) / width, -1.0), 1.0)
+            before = float(T)
+            seen.append(z)
+        out.append(float(np.mean(seen[1:-1])))
+    return np.array(out)
+
+
+def name_of(channel: ImuInstrument, kind: str, ending: str) -> str:
+    """Return the name of a coefficient: bgT_x, SaT2_z."""
+    return f"{kind}{channel.kind}{ending}_{channel.letter}"
+
+
+def quantity(channel: ImuInstrument, kind: str, ending: str, truth: Mapping[str, float]) -> Quantity:
+    """Return a coefficient with its meaning and unit."""
+    name = name_of(channel, kind, ending)
+    _, size, unit, meaning = (BIAS if kind == "b" else SCALE)[ending]
+    if kind == "b":
+        unit, size = ("°/h" + unit, size * DPH) if channel.gyro else ("µg" + unit, size * UG)
+    return Quantity(name, meaning.format(channel.words), unit, size, truth.get(name))
+
+
+def parameters() -> dict[str, tuple[str, str]]:
+    """Return parameter of imu and imu_compensator -> its coefficients without the axis, and its unit."""
+    found: dict[str, tuple[str, str]] = {}
+    for kind, word, unit, per_rate in (("g", "gyro", "rad/s", "rad/K"), ("a", "acc", "m/s2", "m/s/K")):
+        ends = {"T": f"{unit}/K", "T2": f"{unit}/K2", "T3": f"{unit}/K3", "H": unit, "R": per_rate}
+        found |= {f"{word}_{BIAS[e][0]}": (f"b{kind}{e}", u) for e, u in ends.items()}
+        found |= {f"{word}_{SCALE[e][0]}": (f"S{kind}{e}", u) for e, u in (("T", "1/K"), ("T2", "1/K2"))}
+    return found

@@ -1,0 +1,118 @@
+"""Azimuth and elevation of a table's axis against the pole: Polaris, mirror and inclinometer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.option_groups import CORRECTIONS
+from gyrobench.system.families.table_test import sampled
+from gyrobench.system.part_values import PartValues
+from gyrobench.system.plan import Phase, Plan
+from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.units import DEG
+
+from . import polaris
+from .measured import MEASURED
+
+STAR, MIRROR, AXIS = 1.0, 2.0, 3.0
+FACE = "stand"
+LOWEST = 8.0 * DEG  # of Polaris, for a refraction that holds
+SIGHTS = Socket(
+    "Theodolite",
+    "sights of a star, a mirror and an axis by a plan: target in, circle and level out",
+    (
+        inp("target", "1", "1 star, 2 mirror, 3 axis; negative: face right"),
+        out("reading", "rad", "horizontal circle, face right less half a turn; or the inclinometer"),
+        out("level", "rad", "plate level across the line of sight"),
+        out("angle_read", "rad", "the target, as an angle"),
+        out("in_position", "1", "1: sighted", whole=True),
+    ),
+)
+
+
+class StandAlignment(System):
+    """A theodolite before a test stand sights Polaris and a mirror on the stand, in both faces, and an inclinometer
+    reads the stand's axis, turned round: how far the axis is off the pole, about east and across.
+
+    [STAND-ALIGNMENT; Hu 1981, section 5.7]
+    """
+
+    title = "Alignment of a test stand"
+    spec = ("STAND-ALIGNMENT", "ALIGN-ERRORS")
+    reduction = "reduction"
+    slots: ClassVar[Mapping[str, Slot]] = {
+        "sequencer": Slot("Sequencer", "sequencer"),
+        "theodolite": Slot(SIGHTS, "theodolite"),
+        "sampler": Slot("Sampler", "sampler"),
+        "level_reader": Slot("Sampler", "sampler"),
+    }
+    wires = f"""
+        sequencer -> theodolite: target
+        theodolite -> sequencer: angle_read=angle in_position
+        theodolite.reading -> sampler.x
+        theodolite.level -> level_reader.x
+        {sampled("sampler", "theodolite: angle_read")}
+        {sampled("level_reader", "theodolite: angle_read")}
+    """
+    options = {
+        "latitude": Option(
+            "45.75deg", "rad", "geographic latitude, north positive", -89 * DEG, 89 * DEG, sets="theodolite.latitude"
+        ),
+        "longitude": Option("126.63deg", "rad", "geographic longitude, east positive", -math.pi, 2.0 * math.pi),
+        "start": Option("2026-11-28T12:00", str, "UTC of the first sight, as 2026-11-28T12:00"),
+        "ut1_utc": Option(0.0, "s", "UT1 less UTC of the day", -0.9, 0.9),
+        "pressure": Option("1013hPa", "Pa", "pressure of the air", 0.0, 2e5, sets="theodolite.pressure"),
+        "air": Option("283.15K", "K", "temperature of the air", 220.0, 330.0, sets="theodolite.temperature"),
+        "sets": Option(6, int, "sets of mirror, star, star, mirror and both inclinometer readings", 2, 16),
+        "settle": Option("60s", "s", "time to turn and to point", 1.0),
+        "dwell": Option("20s", "s", "time of a sight", 1.0),
+    } | CORRECTIONS | {
+        "u_time": Option(0.0, "s", "standard uncertainty of the clock", 0.0),
+        "u_latitude": Option(0.0, "rad", "standard uncertainty of the latitude, deflection of the vertical in it", 0.0),
+        "u_star": Option(0.0, "rad", "standard uncertainty of the place of Polaris, each way", 0.0),
+        "u_level": Option(0.0, "1", "relative standard uncertainty of the scale of the plate level", 0.0),
+        "u_circle": Option(0.0, "rad", "error of the circle once a turn, std. unc. of its amplitude", 0.0),
+        "u_mirror": Option(0.0, "rad", "std. unc. of the mirror's normal against the axis, in azimuth", 0.0),
+        "u_inclinometer": Option(0.0, "rad", "std. unc. of the inclinometer that turning does not show", 0.0),
+    }  # fmt: skip
+    measured_data = MEASURED
+    noises = ("theodolite.pointing", "theodolite.bubble")
+    windows = Windows.of("sampler", level="level_reader.mean")
+    done = "sequencer.done"
+    channels = ("theodolite.reading", "theodolite.level", "theodolite.altitude", "theodolite.angle_read")
+    shown = ("theodolite.reading", "theodolite.level", "theodolite.altitude")
+    channel_period = 10.0
+    step = 0.5  # s: nothing is fast here
+
+    def plan(self) -> Plan:
+        each = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"]}
+        names = {STAR: "star", MIRROR: "mirror", AXIS: "axis"}
+        order = (MIRROR, STAR, -STAR, -MIRROR, AXIS, -AXIS)
+        phases = [
+            Phase(f"set {k + 1}: {names[abs(t)]}, {'left' if t > 0 else 'right'}", "index", FACE, t, **each)
+            for k in range(self["sets"])
+            for t in order
+        ]
+        return Plan(phases, {FACE: np.eye(3).tolist()})
+
+    def parameters(self, parts: PartValues) -> dict[str, Any]:
+        H, declination = polaris.hour_angle(polaris.julian(self["start"]), self["longitude"], self["ut1_utc"])
+        place = {"theodolite.hour_angle": H, "theodolite.declination": declination}
+        return {**self.plan().parameters(), **self.owned(), **place}
+
+    def check(self) -> list[str]:
+        problems = []
+        try:
+            polaris.julian(self["start"])
+        except ValueError:
+            problems.append(f"start = {self['start']}: write it as 2026-11-28T12:00, in UTC")
+        if self["latitude"] < LOWEST:
+            problems.append(
+                f"latitude = {math.degrees(self['latitude']):.4g}°: Polaris stands too low; from 8° north on"
+            )
+        return problems

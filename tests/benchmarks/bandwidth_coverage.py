@@ -1,0 +1,75 @@
+"""How often the 95 % intervals of gyro_bandwidth contain the true value: random gyros and noise.
+
+    python tests/benchmarks/bandwidth_coverage.py [--runs 300] [--seed 1]
+
+Each run draws filter, loop, split and scale factor, white noise of gyro and reading and, in half of the runs each,
+flicker, a random walk, stated errors of gain and lag of the reading, runs the whole co-simulation on a shortened plan
+and reduces it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+import numpy as np
+from scipy import stats
+
+from gyrobench.engine.session import Session
+from gyrobench.system.system import load_system
+
+NAME, DEG = "gyro_bandwidth", math.pi / 180.0
+SHORT = {"points": 14, "lowest": 2.0, "highest": 150.0, "dwell": 0.3, "periods": 12, "settle": 0.3}
+PARTS = ("gyro_mems", "gyro_vibratory", "gyro_fog")
+
+
+def drawn(rng: np.random.Generator, part: str) -> dict[str, object]:
+    white = 0.02 * DEG * 10.0 ** rng.uniform(-1.0, 0.5)
+    gain, lag = 3e-3 * rng.integers(2), 5e-5 * rng.integers(2)
+    values: dict[str, object] = {
+        **SHORT,
+        "u_gain": gain,
+        "u_lag": lag,
+        "table.read_gain": gain * rng.normal(),
+        "table.read_lag": lag * rng.normal(),
+        "table.reading": white * rng.integers(2),
+        "gyro.scale": [rng.uniform(-0.02, 0.02), 0.0],
+        "gyro.walk_x": white * 10.0 ** rng.uniform(-3.0, -1.0) * rng.integers(2),
+        "gyro.flicker_x": white * 10.0 ** rng.uniform(-1.5, 0.0) * rng.integers(2),
+    }
+    if part == "gyro_fog":
+        return {**values, "gyro.optical": 0.0, "gyro.electronics": white}
+    values |= {"gyro.white": white, "gyro.bandwidth": rng.uniform(25.0, 90.0)}
+    if part == "gyro_vibratory":
+        values |= {"gyro.loop": rng.uniform(30.0, 150.0), "gyro.split": rng.uniform(-200.0, 200.0)}
+    return values
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    rng = np.random.default_rng(given.seed)
+    hits: dict[str, list[bool]] = {}
+    for k, part in enumerate(PARTS):
+        with Session(NAME, {"gyro": part}) as session:
+            for run in range(given.runs // len(PARTS)):
+                values = drawn(rng, part)
+                options = {n: v for n, v in values.items() if "." not in n}
+                record = session.run(values, seed=100_000 * given.seed + 10_000 * k + run)
+                for c in load_system(NAME).with_values(options).reduce(record).coefficients:
+                    if c.truth is not None and not c.no_value:
+                        hits.setdefault(c.name, []).append(c.interval[0] <= c.truth <= c.interval[1])
+    bad = 0
+    for name, held in hits.items():
+        k, n = sum(held), len(held)
+        low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
+        bad += not low <= 0.95 <= high
+        print(f"{name:<6}{k / n:.3f} of {n} ({low:.3f} to {high:.3f})")
+    return int(bad > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

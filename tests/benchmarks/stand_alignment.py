@@ -1,0 +1,49 @@
+"""Coverage of the intervals of stand_alignment:  python tests/benchmarks/stand_alignment.py [--runs N]
+
+Random stands, theodolites, dates and latitudes (12 to 70 deg), co-simulated with noise; the share of 95 % intervals
+that hold the truth, by coefficient.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+import numpy as np
+
+from gyrobench.engine.session import Session
+from gyrobench.units import ARCSEC
+
+
+def drawn(rng: np.random.Generator) -> dict[str, object]:
+    """Return values of a run."""
+    names = ("azimuth", "elevation", "collimation", "trunnion", "level_zero", "inclinometer_zero")
+    year, month, day, hour = (int(rng.integers(*limits)) for limits in ((20, 35), (1, 13), (1, 28), (0, 24)))
+    return {
+        **{f"theodolite.{n}": float(rng.uniform(-30.0, 30.0)) * ARCSEC for n in names},
+        "theodolite.lean": [float(x) * ARCSEC for x in rng.uniform(-10.0, 10.0, 2)],
+        "theodolite.circle_zero": float(rng.uniform(-1.0, 1.0)), "longitude": float(rng.uniform(-3.0, 3.0)),
+        "latitude": math.radians(rng.uniform(12.0, 70.0)), "start": f"20{year}-{month:02d}-{day:02d}T{hour:02d}:00",
+        "sets": int(rng.integers(2, 7)),
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Count, and print a line for each coefficient."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=200)
+    runs, rng, held = parser.parse_args().runs, np.random.default_rng(1), dict[str, int]()
+    with Session("stand_alignment") as session:
+        for seed in range(runs):
+            values = drawn(rng)
+            result = session.system.with_values(values).reduce(session.run(values, seed=seed + 1))
+            for c in result.coefficients:
+                assert c.truth is not None
+                held[c.name] = held.get(c.name, 0) + (c.interval[0] <= c.truth <= c.interval[1])
+    for name, count in held.items():
+        print(f"{name:18} {count / runs:.3f} of {runs}")
+    print(f"{'all':18} {sum(held.values()) / (runs * len(held)):.4f}")
+
+
+if __name__ == "__main__":
+    main()

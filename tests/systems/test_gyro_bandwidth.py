@@ -1,0 +1,229 @@
+"""Bandwidth of a rate gyro: closed forms come back, set-up errors, measured files, mistakes named."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import signal
+from wired import Native
+
+from gyrobench.engine.session import Session
+from gyrobench.result import Result
+from gyrobench.system.system import load_system
+
+NAME = "gyro_bandwidth"
+RESPONSE: Any = importlib.import_module(".response", type(load_system(NAME)).__module__)
+#: twelve frequencies up to 150 Hz in some 15 s of table time
+SHORT: dict[str, Any] = {"points": 12, "lowest": 3.0, "highest": 150.0, "dwell": 0.3, "periods": 10, "settle": 0.3}
+QUIET: dict[str, Any] = {"gyro.white": 0.0}
+HEAD = "frequency [Hz],table [deg/s],gyro [deg/s],phase [deg]"
+
+
+def reduced(part: str, values: dict[str, Any], seed: int = 1) -> Result:
+    options = {n: v for n, v in values.items() if "." not in n}
+    with Session(NAME, {"gyro": part}) as session:
+        record = session.run(values, seed=seed)
+    result: Result = load_system(NAME).with_values(options).reduce(record)
+    return result
+
+
+def found(result: Result) -> dict[str, Any]:
+    return {c.name: c for c in result.coefficients}
+
+
+def butterworth(f: np.ndarray, order: int, bandwidth: float) -> np.ndarray:
+    b, a = signal.butter(order, 2.0 * math.pi * bandwidth, analog=True)
+    return np.asarray(signal.freqs(b, a, 2.0 * np.pi * f)[1])
+
+
+# ------------------------------------------------------------------------------------------------ figures of a curve
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+def test_a_butterworth_has_its_order(order: int) -> None:
+    f = np.geomspace(1.0, 200.0, 25)
+    r = RESPONSE.figures(RESPONSE.GyroResponse.of(f, 0.98 * butterworth(f, order, 60.0), np.full(f.size, 1e-4)))
+    K, f3, f90, _, n = r.value
+    assert (K, f3, n) == pytest.approx((0.98, 60.0, order), rel=1e-5)
+    b, a = signal.butter(order, 2.0 * math.pi * 60.0, analog=True)
+    w = np.linspace(1e-3, 2.0 * math.pi * 200.0, 200_001)
+    phase = np.unwrap(np.angle(signal.freqs(b, a, w)[1]))
+    late = np.flatnonzero(phase < -0.5 * math.pi)
+    assert (f90 == pytest.approx(w[late[0]] / (2.0 * math.pi), rel=1e-4)) if late.size else math.isnan(f90)
+    assert r.value[3] == pytest.approx(-phase[1] / w[1], rel=2e-3)
+
+
+def test_random_responses_come_back() -> None:
+    """24 low-passes with a delay, noise of 0.3 %: z of all figures, chi2 of 96 within 4 standard deviations."""
+    rng = np.random.default_rng(4)
+    f = np.geomspace(1.0, 200.0, 20)
+    squares = []
+    for _ in range(24):
+        b, z, t = rng.uniform(30.0, 80.0), rng.uniform(0.5, 0.9), rng.uniform(0.0, 2e-3)
+
+        def true(g: np.ndarray, b: float = b, z: float = z, t: float = t) -> np.ndarray:
+            x = 1j * g / b
+            return np.asarray(np.exp(-2j * np.pi * g * t) / (1.0 + 2.0 * z * x + x * x))
+
+        noisy = true(f) * np.exp(3e-3 * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size)))
+        r = RESPONSE.figures(RESPONSE.GyroResponse.of(f, noisy, np.full(f.size, 3e-3)))
+        dense = np.linspace(0.01, 200.0, 20_000)
+        values = true(dense)
+        gain, phase = np.abs(values), np.unwrap(np.angle(values))
+        f3 = np.interp(-math.sqrt(0.5), -gain[gain.argmax() :], dense[gain.argmax() :])
+        f90 = np.interp(0.5 * math.pi, -phase, dense)
+        delay = t + 2.0 * z / (2.0 * math.pi * b)
+        squares.append(((r.value[:4] - [1.0, f3, f90, delay]) / r.u[:4]) ** 2)
+    assert np.sum(squares) == pytest.approx(96.0, abs=4.0 * math.sqrt(2.0 * 96.0) * 1.3)
+
+
+# ------------------------------------------------------------------------------------------------ runs
+@pytest.mark.parametrize(
+    ("part", "given", "expected"),
+    [
+        # two poles of the filter: 50 Hz both, order 2; delay sqrt(2)/(2 pi 50)
+        ("gyro_mems", {"gyro.white": 0.0}, (1.0, 50.0, 50.0, math.sqrt(2.0) / (0.1 * math.pi), 2.0)),
+        # rebalance of 30 Hz: one pole; the delay of the wide filter beside it
+        ("gyro_vibratory", {"gyro.white": 0.0, "gyro.loop": 30.0, "gyro.bandwidth": 5000.0},
+         (1.0, 30.0, None, 1e3 / (60.0 * math.pi) + math.sqrt(2.0) / (10.0 * math.pi), 1.0)),
+        # mean of the step that ends: half of 0.1 ms
+        ("gyro_fog", {"gyro.optical": 0.0}, (1.0, None, None, 0.05, None)),
+    ],
+)  # fmt: skip
+def test_closed_forms_come_back(part: str, given: dict[str, Any], expected: tuple[float | None, ...]) -> None:
+    c = found(reduced(part, {**SHORT, **given}))
+    for name, value in zip(("K", "f_3dB", "f_90", "delay", "order"), expected, strict=True):
+        if value is None:
+            assert c[name].no_value, name
+        else:
+            assert c[name].estimate == pytest.approx(value, rel=3e-3), name
+            assert c[name].estimate == pytest.approx(c[name].truth, rel=1e-3), name
+
+
+@pytest.fixture(scope="module")
+def wrong() -> Result:
+    """A reading 1 % too large and 0.2 ms late."""
+    return reduced("gyro_vibratory", {**SHORT, **QUIET, "table.read_gain": 0.01, "table.read_lag": 2e-4, "u_gain": 0.01,
+                                      "u_lag": 2e-4})  # fmt: skip
+
+
+def test_set_up_errors_do_what_is_predicted(wrong: Result) -> None:
+    c = found(wrong)
+    assert c["K"].estimate == pytest.approx(1.0 / 1.01, rel=1e-3)
+    assert c["delay"].estimate == pytest.approx(c["delay"].truth - 0.2, abs=0.01)  # ms
+    rows = {r[0]: r for r in next(t for t in wrong.tables if t.id == "budget.predicted").rows}
+    assert rows["K"][3] == pytest.approx(-0.01, rel=0.02)
+    assert rows["delay"][3] == pytest.approx(-0.2, rel=0.02)
+    assert rows["f_90"][3] == pytest.approx(c["f_90"].estimate - c["f_90"].truth, rel=0.15)
+
+
+def test_stated_uncertainties_are_in_u(wrong: Result) -> None:
+    c = found(wrong)
+    assert c["K"].u == pytest.approx(0.01, rel=0.05) and c["delay"].u == pytest.approx(0.2, rel=0.05)
+    assert {b.id for b in wrong.budget} == {"table.reading.gain", "table.reading.lag"}
+    assert abs(c["K"].z) < 1.1 and abs(c["delay"].z) < 1.1
+
+
+def test_the_table_loses_no_angle() -> None:
+    part = Native("rate_table_vibrating", read_gain=0.01, read_lag=1e-3)
+    part.initialize()
+    part.motion_angle, part.motion_rate, part.motion_acceleration = [0, 0, 0.2], [0, 0, 3.0], [0, 0, 10.0]
+    part.do_step(0.0, 0.1)
+    assert part.omega[2] == pytest.approx(2.0)  # 0.2 rad in 0.1 s
+    assert part.rate_read == pytest.approx(1.01 * (3.0 - 0.01))
+
+
+# ------------------------------------------------------------------------------------------------ files
+def written(tmp_path: Path, rows: np.ndarray, comments: str = "") -> Path:
+    file = tmp_path / "r.csv"
+    head = f"{HEAD},u [1]" if rows.shape[1] == 5 else HEAD
+    lines = [",".join(f"{x:.9g}" for x in row) for row in rows]
+    file.write_text("\n".join([*comments.splitlines(), head, *lines]) + "\n", encoding="utf-8")
+    return file
+
+
+def rows_of(order: int = 2, bandwidth: float = 50.0, noise: float = 1e-3) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    f = np.geomspace(1.0, 200.0, 20)
+    h = butterworth(f, order, bandwidth) * np.exp(noise * (rng.normal(size=20) + 1j * rng.normal(size=20)))
+    return np.column_stack([f, np.full(20, 10.0), 10.0 * np.abs(h), np.degrees(np.unwrap(np.angle(h)))])
+
+
+def measured(tmp_path: Path, rows: np.ndarray, comments: str = "# type_b = none") -> Result:
+    system = load_system(NAME).with_values({})
+    result: Result = system.reduce(system.read_measured(written(tmp_path, rows, comments), {}))
+    return result
+
+
+def test_a_measured_file(tmp_path: Path) -> None:
+    """With u and without: the scatter about the curve takes its place."""
+    rows = rows_of()
+    for table in (rows, np.column_stack([rows, np.full(20, 1e-3)])):
+        c = found(measured(tmp_path, table))
+        assert abs(c["f_3dB"].estimate - 50.0) < 4.0 * c["f_3dB"].u < 0.2
+        assert c["order"].estimate == pytest.approx(2.0, abs=0.02)
+
+
+def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
+    ids = [r.id for r in measured(tmp_path, rows_of(), "").reasons]
+    assert "type_b.unstated" in ids
+    assert "type_b.unstated" not in [r.id for r in measured(tmp_path, rows_of(), "# u_gain = 1e-3").reasons]
+
+
+def mistaken(kind: str) -> np.ndarray:
+    rows = rows_of(noise=1e-4)
+    w = 2.0 * math.pi * rows[:, 0]
+    if kind == "sense":
+        rows[:, 3] += 180.0
+    elif kind == "sign":
+        rows[:, 3] *= -1.0
+    elif kind == "unit":
+        rows[:, 2] *= 3600.0
+    elif kind == "integral":
+        rows[:, 2] /= w
+        rows[:, 3] -= 90.0
+    elif kind == "derivative":
+        rows[:, 1] /= w
+        rows[:, 3] += 90.0
+    elif kind == "rows":
+        rows[[4, 11], 2:] = rows[[11, 4], 2:]
+    else:
+        rows[9, 2] *= 1.2
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("kind", "id", "said"),
+    [
+        ("sense", "response.sense", "reversed"),
+        ("sign", "response.lead", "opposite sign"),
+        ("unit", "response.factor", "°/h"),
+        ("integral", "response.angle", "integral of the rate"),
+        ("derivative", "response.angle", "derivative of the rate"),
+        ("rows", "response.exchanged", "Hz and"),
+        ("point", "response.outlier", "off the curve"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, kind: str, id: str, said: str) -> None:
+    reasons = {r.id: r.text for r in measured(tmp_path, mistaken(kind)).reasons}
+    assert said in reasons.get(id, f"only {sorted(reasons)}")
+
+
+def test_a_good_record_names_none(tmp_path: Path) -> None:
+    reasons = [r.id for r in measured(tmp_path, rows_of(noise=1e-4)).reasons]
+    assert not [r for r in reasons if r.startswith("response.")]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"lowest": 300.0}, "must be below highest"),
+        ({"highest": 2000.0}, "20 communication steps"),
+        ({"lowest": 0.01}, "turns the table by"),
+    ],
+)
+def test_refused(values: dict[str, Any], said: str) -> None:
+    assert said in " ".join(load_system(NAME).with_values(values).check())

@@ -1,0 +1,160 @@
+"""Bias and scale factor of an IMU over the temperature: a world in plain numpy comes back, a chamber is run through, a
+compensator with what was found proves itself in a second cycle.  [IMU-THERMAL]"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from imu_world import FACES, Heat, Unit, World, plan
+
+import gyrobench as gb
+from gyrobench.commands.arguments import read_settings
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.system.system import load_system
+from gyrobench.workflow.fitted_values import write_fitted
+
+room = type(load_system("imu_positions")).__module__
+reduction: Any = importlib.import_module(".reduction", room)
+geometry: Any = importlib.import_module(".geometry", room)
+budget: Any = importlib.import_module(".budget", room)
+tables: Any = importlib.import_module(".tables", room)
+DPH = math.pi / 648000.0
+CYCLE = [*plan(FACES, rate=0.0, dwell=40.0, count=2), *plan((), rate=1.0, turns=2)]
+
+
+def program(end: float) -> Any:
+    """Smooth: 0, +40, -40, 0 K, the corners rounded as by a lag."""
+
+    def temperature(t: Any) -> Any:
+        x = np.asarray(t) / end
+        return 40.0 * np.interp(x, np.linspace(0.0, 1.0, 2001), SMOOTH)
+
+    return temperature
+
+
+x = np.linspace(0.0, 1.0, 2001)
+corners = np.interp(x, [0.0, 0.2, 0.3, 0.65, 0.75, 0.95, 1.0], [0.0, 1.0, 1.0, -1.0, -1.0, 0.0, 0.0])
+kernel = np.exp(-np.arange(400) / 60.0)
+SMOOTH = np.convolve(np.concatenate([np.zeros(399), corners]), kernel / kernel.sum(), mode="valid")
+
+
+def heated(seed: int, cycles: int = 6, noise: Any = None) -> tuple[Any, dict[str, float]]:
+    """Windows of a unit that is taken through the temperatures, and its coefficients."""
+    rng = np.random.default_rng(seed)
+    world, unit = World(), Unit.drawn(rng)
+    gyros, accelerometers = Heat.drawn(rng, 20.0 * DPH, 5e-4), Heat.drawn(rng, 2e-3 * 9.8, 5e-4)
+    w = world.windows(CYCLE * cycles, unit, noise)
+    temperature = program(float(w["t_end"][-1]))
+    t0, t1 = w["t_start"], w["t_end"]
+    exact = world.windows(CYCLE * cycles, Unit(*(np.zeros(s) for s in (3, (3, 3), (3, 3), 3, (3, 3)))))
+    for heat, kind in ((gyros, "g"), (accelerometers, "a")):
+        inputs = np.array([exact[f"mean_{kind}{a}"] for a in "xyz"]).T
+        for a, more in zip("xyz", heat.means(t0, t1, temperature, inputs).T, strict=True):
+            w[f"mean_{kind}{a}"] = w[f"mean_{kind}{a}"] + more
+    fine = t0[:, None] + (t1 - t0)[:, None] * (np.arange(40) + 0.5) / 40.0
+    w["temperature"] = temperature(fine).mean(axis=1)
+    return w, unit.coefficients() | gyros.coefficients("g") | accelerometers.coefficients("a")
+
+
+def setup(**more: Any) -> Any:
+    site = {"latitude": 0.7, "gravity": 9.805, "earth_rate": 7.2921159e-5, "nuisances": False}
+    return budget.ImuSetup(**{**site, "thermal": (3, 2, 10.0, 0.0), **more})
+
+
+def test_a_world_in_plain_numpy_comes_back() -> None:
+    """No noise; what is left comes from a temperature that only the means of windows tell, 1.4 K a window at 4 K/min:
+    below 0.03 of a thermal effect at 40 K (20 deg/h, 2 mg, 500 ppm)."""
+    w, truth = heated(1)
+    found = {c.name: c.estimate * tables.SCALES[c.unit] for c in reduction.reduce(w, setup()).coefficients}
+    assert set(found) == set(truth) and len(found) == 75
+    for n, value in found.items():
+        kind, ending = n[:2], n.partition("_")[0][2:]
+        gyro = kind[1] == "g" or n[0] == "G"
+        size = {"b": 20.0 * DPH if gyro else 2e-3 * 9.8, "S": 5e-4, "G": 20.0 * DPH}[n[0]]
+        power = {"T": 40.0, "T2": 40.0**2, "T3": 40.0**3, "R": 1.0 / 30.0}.get(ending, 1.0)
+        assert abs(value - truth[n]) * power < 0.03 * size, n
+
+
+def white(seed: int) -> Any:
+    rng = np.random.default_rng(seed)
+
+    def noise(t0: Any, t1: Any) -> Any:
+        return tuple(s / np.sqrt(t1 - t0)[:, None] * rng.normal(size=(t0.size, 3)) for s in (3e-5, 5e-3))
+
+    return noise
+
+
+def test_intervals_hold_the_truth() -> None:
+    """White noise, four units of 75 coefficients, those of a unit being related; the benchmark counts more."""
+    hits = total = 0
+    for seed in range(4):
+        w, truth = heated(100 + seed, 3, white(300 + seed))
+        for c in reduction.reduce(w, setup()).coefficients:
+            low, high = (v * tables.SCALES[c.unit] for v in c.interval)
+            hits += low <= truth[c.name] <= high
+            total += 1
+    assert total == 300 and 0.9 < hits / total < 0.99
+
+
+VALUES: dict[str, Any] = {
+    "chamber.tau": 60.0, "chamber.lag": 20.0, "dwell": 10.0, "windows": 1, "turns": 1, "rate": 1.0, "cycles": 5,
+    "nuisances": "none",
+    "imu.gyro_bias_T": [2e-6, -1e-6, 5e-7], "imu.gyro_bias_T2": [2e-8, 1e-8, 0.0], "imu.gyro_hysteresis": [2e-5] * 3,
+    "imu.gyro_scale_T": [2e-5, -1e-5, 0.0], "imu.acc_bias_T": [5e-4, -3e-4, 2e-4], "imu.acc_bias_T3": [1e-7, 0.0, 0.0],
+    "imu.acc_ramp": [0.05, 0.0, -0.05], "imu.acc_scale_T": [3e-5, 1e-5, -2e-5], "imu.acc_scale_T2": [2e-7, 0.0, 0.0],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def first() -> Any:
+    return gb.load("imu_positions", VALUES).run(seed=1, check_step=False)
+
+
+def test_a_unit_in_the_chamber(first: Any) -> None:
+    temperature = np.asarray(first.record.channels["chamber.temperature"])
+    assert temperature.max() > 35.0 and temperature.min() < -35.0 and abs(temperature[-1]) < 15.0
+    z = np.array([(c.estimate - c.truth) / c.u for c in first.result.coefficients if c.truth is not None])
+    assert z.size == 75 and np.abs(z).max() < 4.5 and 0.7 < np.sqrt(np.mean(z**2)) < 1.4
+
+
+def test_the_compensation_holds_in_a_second_cycle(first: Any, tmp_path: Path) -> None:
+    """With what was found in a part, another run: the temperature terms are gone within both intervals; none of it was
+    so before."""
+    files = write_fitted(load_system("imu_positions"), first.result, first.record, "imu_compensator", tmp_path)
+    held = json.loads(files[1].read_text(encoding="utf-8"))["parameters"]
+    assert held["acc_bias_T"]["unit"] == "m/s2/K" and len(held["acc_bias_T"]["value"]) == 3
+    found = gb.load("imu_positions", VALUES | read_settings(files[0])).run(seed=2, check_step=False).result
+    before = {c.name: c for c in first.result.coefficients}
+    z = {c.name: c.estimate / math.hypot(c.u, before[c.name].u) for c in found.coefficients}
+    assert (
+        len(z) == 75 and max(map(abs, z.values())) < 4.5 and 0.6 < np.sqrt(np.mean(np.square(list(z.values())))) < 1.4
+    )
+    assert abs(before["bgT_x"].estimate) > 20.0 * before["bgT_x"].u
+    assert abs(before["SaT_x"].estimate) > 20.0 * before["SaT_x"].u
+    assert all(c.truth is None for c in found.coefficients)  # what is left of a polynomial over another is none
+
+
+def test_a_laboratory_reads_its_thermometer_in_degrees(tmp_path: Path) -> None:
+    w, truth = heated(5, 3, white(5))
+    names = ["phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{k}{a}" for k in "ga" for a in "xyz")]
+    units = ["", " [s]", " [s]", *[" [rad]"] * 4, *[" [rad/s]"] * 3, *[" [m/s2]"] * 3]
+    head = ",".join([n + u for n, u in zip(names, units, strict=True)] + ["temperature [degC]"])
+    rows = np.column_stack([*(w[n] for n in names), w["temperature"] + 25.0])
+    path = tmp_path / "lab.csv"
+    said = "# latitude = 40.10704566deg\n# gravity = 9.805m/s2\n# thermal = true\n# reference = 25degC\n"
+    path.write_text(said + head + "\n" + "\n".join(",".join(f"{v:.15g}" for v in r) for r in rows.tolist()) + "\n")
+    system = load_system("imu_positions")
+    record = system.read_measured(path, {})
+    found = {c.name: c for c in reduction.Reduction.of_record(record).coefficients}
+    for name in ("baT_x", "bgT_y", "SaT_z"):
+        c, si = found[name], tables.SCALES[found[name].unit]
+        assert abs(c.estimate * si - truth[name]) < 4.5 * c.u * si
+    del record.windows["temperature"]
+    with pytest.raises(ReductionError, match="the record has no column temperature"):
+        system.reduce(record)

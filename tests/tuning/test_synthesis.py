@@ -1,0 +1,194 @@
+"""Controllers that are computed: published examples, reduction, w-plane, the command; trade, floor, Bode's integral."""
+
+from __future__ import annotations
+
+import math
+from importlib.util import find_spec
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from gyrobench.bench import UsageError
+from gyrobench.tuning import synthesis
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies
+from gyrobench.tuning.plant import HeldController, Plant
+from gyrobench.tuning.reasons import _bode
+from gyrobench.tuning.sight_jitter import SightWays
+from gyrobench.tuning.structures import ControllerStructure
+from gyrobench.tuning.synthesis import (
+    StateSpace,
+    SynthesizedStructure,
+    filter_gain,
+    mixed_sensitivity,
+    reduced,
+    regulator_gain,
+    structure_of,
+    transfer_function,
+    w_plane,
+)
+from gyrobench.tuning.trade import trade, traded
+from gyrobench.tuning.tuned_loop import WishResult
+from gyrobench.tuning.wishes import parse_wishes
+
+needs_slycot = pytest.mark.skipif(find_spec("slycot") is None, reason="slycot is not installed")
+STEP = 1e-3
+
+
+def servo(delay: int = 2) -> Plant:
+    """Return 100/(s (s + 5)) held over a step of 1 ms, with whole steps of delay."""
+    from scipy.signal import cont2discrete
+
+    continuous = (
+        np.array([[0.0, 1.0], [0.0, -5.0]]),
+        np.array([[0.0], [1.0]]),
+        np.array([[100.0, 0.0]]),
+        np.zeros((1, 1)),
+    )
+    a, b, c, _, _ = cont2discrete(continuous, STEP)
+    n = 2 + delay
+    A, B, C = np.zeros((n, n)), np.zeros((n, 1)), np.zeros((1, n))
+    A[:2, :2], B[:2] = a, b
+    A[2, :2] = c
+    for k in range(3, n):
+        A[k, k - 1] = 1.0
+    C[0, -1] = 1.0
+    return Plant(A, B, C, STEP, {})
+
+
+def problem(structure: str, wishes: list[str]) -> TuningProblem:
+    plant, wanted = servo(), parse_wishes(wishes)
+    shape = structure_of(structure).of(plant)
+    decades = box(shape, wanted, None, STEP)
+    return TuningProblem(shape, wanted, [plant], decades, frequencies([plant], decades, wanted))
+
+
+def test_regulator_and_filter_of_doyle_and_stein() -> None:
+    """Doyle 1979, the example: F = (50, 10), filter (30, -50), and its table for q2 = 100 to 10000 at the input."""
+    A, B, C = np.array([[0.0, 1.0], [-3.0, -4.0]]), np.array([[0.0], [1.0]]), np.array([[2.0, 1.0]])
+    H = 4.0 * math.sqrt(5.0) * np.array([[math.sqrt(35.0), 1.0]])
+    G = np.array([[35.0], [-61.0]])
+    assert regulator_gain(A, B, H.T @ H, 1.0)[0] == pytest.approx([50.0, 10.0], rel=1e-6)
+    table = {0.0: (30.0, -50.0), 100.0: (26.8, -40.2), 500.0: (20.4, -17.7), 1000.0: (16.7, -1.9), 1e4: (6.9, 84.6)}
+    for q2, printed in table.items():
+        assert filter_gain(A, C, G @ G.T + q2 * B @ B.T, 1.0)[:, 0] == pytest.approx(printed, abs=0.05)
+
+
+@needs_slycot
+def test_mixed_sensitivity_of_published_examples() -> None:
+    """Skogestad 2005, example 2.17: 1.37.  (s - 1)/(s + 1) with 0.1 (s + 100)/(100 s + 1) and 0.1: MATLAB's hinfsyn
+    ends at 0.1844, 1 % of its tolerance above the least, 0.1817.
+    """
+    lag = np.polymul([10.0, 1.0], np.polymul([0.05, 1.0], [0.05, 1.0]))
+    from scipy.signal import tf2ss
+
+    a, b, c, _ = tf2ss([200.0], lag)
+    weights = [(np.array([1 / 1.5, 10.0]), np.array([1.0, 1e-3])), (np.array([1.0]), np.array([1.0])), None]
+    assert mixed_sensitivity(StateSpace(a, b, c, 0.0), weights, 1e-5)[1] == pytest.approx(1.37, abs=0.005)
+    g = StateSpace(np.array([[-1.0]]), np.array([[1.0]]), np.array([[-2.0]]), 1.0)
+    weights = [(np.array([0.1, 10.0]), np.array([100.0, 1.0])), (np.array([0.1]), np.array([1.0])), None]
+    assert 0.985 * 0.1844 < mixed_sensitivity(g, weights, 1e-6)[1] < 0.1844
+
+
+@needs_slycot
+@pytest.mark.parametrize("zero", [0.5, 2.0, 7.0])
+def test_the_least_norm_that_a_zero_allows(zero: float) -> None:
+    """Without a price of control min || W1 S || = |W1(z)| for one zero z in the right half plane, to four digits.
+
+    Skogestad 2005, section 5.6: S(z) = 1 whatever the controller (maximum modulus).
+    """
+    g = StateSpace(np.array([[-1.0]]), np.array([[1.0]]), np.array([[-(1.0 + zero)]]), 1.0)  # (s - z)/(s + 1)
+    num, den = np.array([0.5, 3.0]), np.array([1.0, 0.01])
+    found = mixed_sensitivity(g, [(num, den), (np.array([1e-5]), np.array([1.0])), None], 1e-7)[1]
+    assert found == pytest.approx(np.polyval(num, zero) / np.polyval(den, zero), rel=1e-4)
+
+
+def test_the_w_plane_is_the_plant_and_its_reduction_keeps_the_integrator() -> None:
+    plant = servo(4)
+    full = w_plane(plant)
+    few = reduced(full, 4, 0.5)
+    for f in (0.01, 1.0, 10.0, 30.0):
+        s = 2j / STEP * math.tan(math.pi * f * STEP)
+        assert full.response(s) == pytest.approx(plant.response(np.array([f]))[0], rel=1e-9)
+        assert few.response(s) == pytest.approx(full.response(s), rel=0.03)
+    num, den = transfer_function(few)
+    assert np.polyval(num, 3j) / np.polyval(den, 3j) == pytest.approx(few.response(3j), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["lqg", pytest.param("hinf", marks=needs_slycot)])
+def test_a_computed_controller_does_what_is_wanted(name: str) -> None:
+    """The same wishes as a lead-lag network fulfils; of order 8 at most, stable by its discrete poles."""
+    from gyrobench.tuning.controller_search import search
+
+    it = problem(name, ["phase margin=50deg", "gain margin=6dB", "bandwidth>5Hz"])
+    x = search(it)
+    controller = it.controller(x)
+    assert np.exp(it.worst(x)) > 1.0 and len(controller.den) <= 9
+    assert np.abs(HeldController(controller, STEP).poles(it.plants)).max() < 1.0
+
+
+def test_hinf_without_slycot_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(synthesis, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=r"takes slycot, which is not installed: pip install 'gyrobench\[tune\]'"):
+        SynthesizedStructure("mixsyn")
+    assert structure_of("lqg").name == "lqg" and isinstance(structure_of("pi"), ControllerStructure)
+
+
+def test_a_trade_gives_one_wish_for_the_other() -> None:
+    """More phase margin, less bandwidth, strictly; what was found for both lies on it or is no better."""
+    from gyrobench.tuning.controller_search import search
+
+    it = problem("lead", ["phase margin=50deg", "bandwidth>20Hz", "gain margin=6dB"])
+    x = search(it, quick=True)
+    points = trade(it, x, (0, 1)).points
+    assert len(points) >= 4
+    assert all(a.first < b.first and a.second > b.second for a, b in pairwise(points))
+    first, second = (float(np.exp(r)) for r in it.ratios(x)[0][:2])
+    at = [p for p in points if p.first >= 0.98 * first * math.radians(50.0)]
+    assert at and max(p.second for p in at) >= 0.98 * second * 20.0
+
+
+def test_what_is_traded_is_wanted() -> None:
+    wishes = parse_wishes(["phase margin=50deg", "bandwidth>20Hz"])
+    assert traded([], wishes) is None and traded(["bandwidth", "phase margin"], wishes) == (1, 0)
+    with pytest.raises(UsageError, match="name two wishes"):
+        traded(["bandwidth"], wishes)
+    with pytest.raises(UsageError, match="--pareto jitter: is not among what is wanted"):
+        traded(["jitter", "bandwidth"], wishes)
+
+
+def test_no_controller_is_below_the_floor() -> None:
+    """W = 1, U = 1, R = 1: (1 - T) d - T n, least S S_n/(S + S_n) at each frequency (Wiener); random G are above it."""
+    rng = np.random.default_rng(1)
+    f = np.geomspace(1.0, 100.0, 300)
+    S, n = 1e-6 / f**2, np.full(f.size, 1e-9)
+    one = np.ones(f.size, complex)
+    ways = SightWays(np.ones(f.size, bool), f, ((one, one, S), *[(0 * one, 0 * one, 0 * S)] * 2), one, -one, n)
+    by_hand = math.sqrt(np.trapezoid(S * n / (S + n), f))
+    assert ways.floor() == pytest.approx(by_hand, rel=1e-9)
+    for _ in range(200):
+        G = rng.normal(size=f.size) + 1j * rng.normal(size=f.size)
+        assert ways.rms(G * 10.0 ** rng.uniform(-2, 2)) >= by_hand
+    assert ways.rms(-(S / n).astype(complex)) >= by_hand
+
+
+def test_the_voltage_of_noise_and_base() -> None:
+    """No way back: the controller's gain times the root of the integral of all densities, 3 sqrt(2e-4 x 99)."""
+    f = np.linspace(1.0, 100.0, 500)
+    one = np.ones(f.size, complex)
+    none = (0 * one, 0 * one, 0 * f)
+    ways = SightWays(np.ones(f.size, bool), f, ((one, one, 1e-4 + 0 * f), none, none), one, 0 * one, 1e-4 + 0 * f)
+    assert ways.voltage(one + one + one) == pytest.approx(3.0 * math.sqrt(2e-4 * 99.0), rel=1e-9)
+
+
+def test_the_integral_of_bode_is_zero_and_named() -> None:
+    """A stable loop with a delay of a step: what ln |S| takes below 0 it gives back above it, within 1 %."""
+    plant = servo(2)
+    f = np.geomspace(1e-4, 0.5 / STEP, 20001)
+    L = plant.response(f) * 2.0
+    log = np.log(np.abs(1.0 / (1.0 + L)))
+    below, above = (float(np.trapezoid(np.clip(s * log, 0.0, None), f)) for s in (-1.0, 1.0))
+    assert above == pytest.approx(below, rel=0.01)
+    wish = parse_wishes(["bandwidth>10Hz"])[0]
+    text = _bode(f, L, [WishResult(wish, 5.0, 5.0, {})])[0]
+    assert "a bandwidth of 10 Hz takes 11.3 Hz" in text  # 10 (pi/4 + ln(2)/2)
