@@ -26,6 +26,7 @@ from gyrobench.bench import UsageError
 from gyrobench.boundary import checked
 from gyrobench.files import sha256, write_whole
 from gyrobench.notebook import Displayed, data_frame
+from gyrobench.record.mapped_column import mapped
 from gyrobench.record.run_document import RecordError, RunDocument, SuiteDocument, read_run
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 WHOLE = ("phase", "n", "flagged")  # integer columns
 SUFFIXES = (".parquet", ".csv")
+LONG = 1 << 18  # rows: a longer column that is read on request stays on the disk
 
 
 def _have_parquet() -> bool:
@@ -134,7 +136,11 @@ class ColumnsOnRequest(Mapping[str, AnyArray]):
             import pyarrow.parquet as pq
 
             with self.file.open("rb") as data, pq.ParquetFile(data) as table:
-                self.read[name] = _numpy(table.read(columns=[name]).column(0))
+                if table.metadata.num_rows > LONG:
+                    blocks = (b.column(0) for b in table.iter_batches(LONG, columns=[name]))
+                    self.read[name] = mapped(np.asarray(b.to_numpy(zero_copy_only=False)) for b in blocks)
+                else:
+                    self.read[name] = _numpy(table.read(columns=[name]).column(0))
         return self.read[name]
 
     def __iter__(self) -> Iterator[str]:

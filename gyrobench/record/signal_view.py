@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import AnyArray, Array
+from gyrobench.record.mapped_column import release
 
 FIRST, FACTOR = 16, 4  # samples in a bucket of the first level, buckets in one of the next
 
@@ -61,7 +62,10 @@ class SignalPyramid:
             b, e = first // every, -(-last // every)
             at = np.sort(np.concatenate([low[b:e], high[b:e]]))
             at = np.unique(np.clip(np.concatenate([[first], at, [last - 1]]), first, last - 1))
-        return SignalView(np.asarray(self.time[at], dtype=float), self.values[at], every)
+        view = SignalView(np.asarray(self.time[at], dtype=float), self.values[at], every)
+        for column in (self.time, self.values):
+            release(column)
+        return view
 
 
 class LiveSignals:
@@ -118,5 +122,5 @@ def _extremes(values: Array, at: AnyArray | None, factor: int, pick: Callable[..
     whole = len(held) - len(held) % factor
     first = pick(held[:whole].reshape(-1, factor), axis=1) + np.arange(0, whole, factor)
     rest = [] if whole == len(held) else [whole + int(pick(held[whole:]))]
-    found = np.concatenate([first, rest]).astype(np.int64)
+    found = np.concatenate([first, rest]).astype(np.int64 if len(values) > np.iinfo(np.int32).max else np.int32)
     return found if at is None else at[found]

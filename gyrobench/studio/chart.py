@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
 TEXT, GRID = "#7b8791", "rgba(128, 140, 150, 0.3)"  # read on light and on dark ground
 RECORDS = 3  # kept open
+OPENING = threading.Lock()  # a record that two tabs ask for is read once
 
 
 class RecordSignals:
@@ -32,6 +34,7 @@ class RecordSignals:
         self.time = record.channels["time"] if "time" in record.channels else np.empty(0)
         self.names = [n for n in record.channels if n != "time"]
         self._pyramids: dict[str, SignalPyramid] = {}
+        self._turn = threading.Lock()
 
     @property
     def span(self) -> tuple[float, float]:
@@ -44,9 +47,10 @@ class RecordSignals:
 
     def pyramid(self, name: str) -> SignalPyramid:
         """Return the pyramid of a channel."""
-        if name not in self._pyramids:
-            self._pyramids[name] = SignalPyramid(self.time, self.record.channels[name])
-        return self._pyramids[name]
+        with self._turn:  # two tabs that ask at once have one pyramid
+            if name not in self._pyramids:
+                self._pyramids[name] = SignalPyramid(self.time, self.record.channels[name])
+            return self._pyramids[name]
 
     def points(self, name: str, begin: float, end: float, factor: float) -> list[list[float | None]]:
         """Return [time, value] of a view of a channel; a gap where the value is not finite."""
@@ -61,7 +65,8 @@ class RecordSignals:
 
 def signals_of(folder: Path) -> RecordSignals:
     """Return the signals of a run; a record is read once while it stays the same."""
-    return _signals(folder, (folder / "run.json").stat().st_mtime_ns)
+    with OPENING:
+        return _signals(folder, (folder / "run.json").stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=RECORDS)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
 LIVE_SIGNALS = 4
 PRINTED, LONG = 400, 500  # lines of a command that are kept, characters of one
+NICE = 5  # lower than the studio, whose pages answer while runs have all cores
 WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
 
 
@@ -213,4 +214,6 @@ def main(folder: Path) -> int:
 
 if __name__ == "__main__":
     os.environ.setdefault("GYROBENCH_TRACEBACK", "")
+    if hasattr(os, "nice"):
+        os.nice(NICE)
     sys.exit(main(Path(sys.argv[1])))

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from gyrobench.record.mapped_column import mapped, release
+from gyrobench.record.record import LONG, ColumnsOnRequest, write_table
 from gyrobench.record.signal_view import LiveSignals, SignalPyramid
 
 
@@ -94,3 +99,39 @@ def test_live_signals_take_what_is_torn() -> None:
     live.add(np.array([[2.0, 9.0], [3.0, np.nan]]))
     assert live.rows[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
     assert 9.0 not in live.rows[:, 1]
+
+
+def test_a_long_column_stays_on_the_disk_and_is_what_it_was(tmp_path: Path) -> None:
+    """Values bit for bit, a view of them too, after their memory was given back; nothing can be written into them."""
+    rng = np.random.default_rng(5)
+    time, values = np.arange(LONG + 1000) * 1e-3, rng.standard_normal(LONG + 1000)
+    write_table(tmp_path / "channels", {"time": time, "y": values})
+    columns = ColumnsOnRequest(tmp_path / "channels.parquet")
+    held = columns["y"]
+    np.testing.assert_array_equal(held, values)
+    assert not held.flags.writeable
+    ours, plain = SignalPyramid(columns["time"], held), SignalPyramid(time, values)
+    for stretch in ((0.0, 1e9), (3.0, 4.0), (100.0, 200.0)):
+        np.testing.assert_array_equal(ours.view(*stretch).values, plain.view(*stretch).values)
+    assert ours.values is held, "no copy"
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps").is_file(), reason="the memory of a mapping is told by Linux alone")
+def test_memory_is_given_back() -> None:
+    held = mapped(np.full(1 << 20, float(k)) for k in range(4))
+
+    def resident() -> int:
+        place, found = held.ctypes.data, 0
+        for line in Path("/proc/self/smaps").read_text().splitlines():
+            if re.match(r"[0-9a-f]+-[0-9a-f]+ ", line):
+                low, high = (int(x, 16) for x in line.split()[0].split("-"))
+                inside = low <= place < high
+            elif line.startswith("Rss:") and inside:
+                found = int(line.split()[1])
+        return found
+
+    assert held.sum() == (1 << 20) * 6.0 and resident() > 30_000  # kB
+    release(held)
+    assert resident() < 1000
+    assert held[-1] == 3.0
+    release(np.zeros(3))
