@@ -49,7 +49,8 @@ def root(
       gyrobench run tumble_single_axis
       gyrobench COMMAND --help
 
-    Exit codes: 0 done, 1 a validation fails, a loop cannot be tuned as wanted or, with --strict,
-    a verdict is fail, inconclusive or void (there is no value to judge), 2 invalid request,
-    configuration or data, 3 a run, its reduction or its report failed, 130 interrupted.
+    Exit codes: 0 done, 1 a validation fails, a loop cannot be tuned as wanted or has not the wanted
+    margins or, with --strict, a verdict is fail, inconclusive or void (there is no value to judge),
+    2 invalid request, configuration or data, 3 a run, its reduction or its report failed,
+    130 interrupted.
     """

@@ -15,7 +15,9 @@ from gyrobench.identification.distortion import Distortion
 from gyrobench.identification.loop_curve import LoopCurve
 from gyrobench.identification.loop_margins import Margin
 from gyrobench.identification.loop_record import LoopRecord
+from gyrobench.identification.plant_fit import PlantFit, shown_values
 from gyrobench.identification.ratios import MeasuredResponse
+from gyrobench.identification.wanted_margins import MarginVerdict
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,8 @@ class LoopIdentification:
     """Responses L, S, T and P (plant, output over input, SI) of a loop, each with u; its margins; remarks.
 
     periods: how many were used, each of ``period``, s; 0, 0 for an excitation without.
-    excited_output: amplitude of the output at each frequency, SI.
+    excited_output: amplitude of the output at each frequency, SI.  fit: physical parameters of the plant, if asked for.
+    dependent: why margins are those of one amplitude, else "".  verdicts: of margins that were wanted.
     """
 
     record: LoopRecord = field(repr=False)
@@ -35,6 +38,9 @@ class LoopIdentification:
     curve: LoopCurve = field(repr=False)
     notes: list[str]
     excited_output: Array = field(repr=False)
+    dependent: str = ""
+    fit: PlantFit | None = None
+    verdicts: list[MarginVerdict] = field(default_factory=list)
     seconds: float = 0.0
 
     def __getitem__(self, name: str) -> Margin:
@@ -93,6 +99,11 @@ class LoopIdentification:
                 {"kind": d.kind, "lines": d.count, "level": d.level, "noise": d.floor, "p": d.p, "signal": d.signal}
                 for d in self.distortions
             ],
+            "wanted": [
+                {"name": v.wanted.name, "limit": v.wanted.limit, "verdict": v.verdict, "why": v.why}
+                for v in self.verdicts
+            ],
+            "plant": self.fit.as_dict() if self.fit else None,
             "notes": list(self.notes),
             "seconds": self.seconds,
         }
@@ -104,9 +115,11 @@ class LoopIdentification:
             [m.name, m.shown(m.value), f"{m.shown(m.low)} to {m.shown(m.high)}", f"at {m.f:.4g} Hz"]
             for m in self.margins
         ]
-        rows = [["", "", "95 %", ""], *rows] if rows else []
-        width = [max((len(r[k]) for r in rows), default=0) for k in range(4)]
-        lines += [("  " + "  ".join(c.ljust(n) for c, n in zip(r, width, strict=True))).rstrip() for r in rows]
+        lines += _aligned([["", "", "95 %", ""], *rows]) if rows else []
+        lines += ["", *(f"  {v}" for v in self.verdicts)] if self.verdicts else []
+        if self.fit:
+            lines += ["", "plant:", *_aligned([["", "", "95 %"], *shown_values(self.fit)])]
+            lines += [f"  {self.fit.sentence}"]
         if self.linear:
             levels = " and ".join(
                 f"{20.0 * math.log10(max(d.floor, 1e-9)):.3g} dB ({d.kind})" for d in self.distortions
@@ -114,6 +127,11 @@ class LoopIdentification:
             lines += ["", f"no nonlinearity above the noise, which is {levels} of the excited lines"]
         lines += ["", *(f"note: {n}" for n in self.notes)] if self.notes else []
         return "\n".join(lines)
+
+
+def _aligned(rows: list[list[str]]) -> list[str]:
+    width = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
+    return [("  " + "  ".join(c.ljust(n) for c, n in zip(r, width, strict=True))).rstrip() for r in rows]
 
 
 def _points(g: MeasuredResponse) -> dict[str, list[float | None]]:

@@ -33,6 +33,7 @@ def open_loop(t: LoopIdentification) -> str:
     size, phase, f = decibel(np.abs(t.curve.L)), np.degrees(np.unwrap(np.angle(t.curve.L))), t.curve.f
     near = np.interp(f, g.f[_known(t)], turn)
     phase = phase + 360.0 * np.round(np.median((near - phase) / 360.0)) if f.size else phase
+    size, phase = (np.where(t.curve.sound, x, np.nan) for x in (size, phase))
     axes[0, 0].semilogx(f, size, color=VERMILION, linewidth=0.9, zorder=5, label="curve through the points")
     axes[1, 0].semilogx(f, phase, color=VERMILION, linewidth=0.9, zorder=5)
     _about_limits(axes)
@@ -45,9 +46,19 @@ def plant(t: LoopIdentification) -> str:
     """Return gain and phase of the plant over frequency."""
     fig, axes = figure(WIDE * 0.8, 96, nrows=2, sharex=True)
     unit, factor = t.plant_unit
-    _bode(axes, t.responses["P"], t.responses["P"].determined, factor)
+    turn = _bode(axes, t.responses["P"], t.responses["P"].determined, factor)
+    if t.fit is not None:
+        size, phase = decibel(factor * np.abs(t.fit.value)), np.degrees(np.unwrap(np.angle(t.fit.value)))
+        measured = np.interp(t.fit.f, t.f[t.responses["P"].determined], turn)
+        phase = phase + 360.0 * np.round(np.median((measured - phase) / 360.0))
+        for ax, y in zip(axes[:, 0], (size, phase), strict=True):
+            ax.semilogx(
+                t.fit.f, y, color=VERMILION, linewidth=1.0, zorder=5, label="model" if ax is axes[0, 0] else None
+            )
+        fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
     axes[0, 0].set_ylabel(f"|P| / dB re {unit}")
     axes[1, 0].set_xlabel(axis_label("frequency", "Hz"))
+    _plain(axes[1, 0].xaxis)
     return svg(fig, "plant")
 
 
@@ -102,8 +113,8 @@ def sensitivities(t: LoopIdentification) -> str:
             ax.vlines(g.f[which], low, high, color=BLUE, linewidth=0.9, zorder=2)
         else:
             ax.fill_between(g.f[which], low, high, **BAND)
-        ax.semilogx(t.curve.f, decibel(np.abs(dense)), color=VERMILION, linewidth=0.9, zorder=5,
-                    label="curve through the points")  # fmt: skip
+        seen = np.where(t.curve.sound, decibel(np.abs(dense)), np.nan)
+        ax.semilogx(t.curve.f, seen, color=VERMILION, linewidth=0.9, zorder=5, label="curve through the points")
         zero_line(ax)
         ax.set_ylabel(axis_label(f"|{name}|", "dB"))
         bottom = float(decibel(np.abs(g.value[which])).min(initial=0.0))
@@ -137,7 +148,8 @@ def nyquist(t: LoopIdentification) -> str:
     circles = [Circle((c.real, c.imag), r) for c, r in zip(g.center[which], g.radius[which], strict=True)]
     ax.add_collection(PatchCollection(circles, facecolor=BLUE, alpha=0.18, linewidth=0, zorder=1))
     ax.plot(g.value.real[which], g.value.imag[which], **DOTS, label="measured, 95 %")
-    ax.plot(t.curve.L.real, t.curve.L.imag, color=VERMILION, linewidth=0.9, zorder=5, label="curve")
+    seen = np.where(t.curve.sound, t.curve.L, np.nan)
+    ax.plot(seen.real, seen.imag, color=VERMILION, linewidth=0.9, zorder=5, label="curve")
     if (ring := _disk_of(t)) is not None:
         ax.fill(ring.real, ring.imag, color=SHADE, zorder=0)
         ax.plot(ring.real, ring.imag, "--", color=GREEN, linewidth=1.0, label="disk margin")

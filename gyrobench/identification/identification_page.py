@@ -14,6 +14,8 @@ from gyrobench.bench import Bench
 from gyrobench.identification import identification_figures as draw
 from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.loop_record import PLANT_INPUT, PLANT_OUTPUT
+from gyrobench.identification.plant_fit import shown_values
+from gyrobench.identification.plant_model import PARAMETERS
 from gyrobench.report import FORMATS
 from gyrobench.report.page_model import (
     BulletList,
@@ -52,7 +54,7 @@ def page(t: LoopIdentification) -> Page:
     ]
     with styled():
         sections = [
-            Section("Margins", "margins", [_margins(t), *_notes(t), *_near(t)]),
+            Section("Margins", "margins", [_margins(t), *_verdicts(t), *_notes(t), *_near(t)]),
             Section("Open loop", "open-loop-section", _open_loop(t)),
             Section("Sensitivities", "sensitivities-section", _sensitivities(t)),
             Section("Plant", "plant-section", _plant(t)),
@@ -80,6 +82,15 @@ def _margins(t: LoopIdentification) -> Any:
     return PageTable(columns("measure", "value", "95 %", "at", wide=["measure"]), rows, caption)
 
 
+def _verdicts(t: LoopIdentification) -> list[Any]:
+    if not t.verdicts:
+        return []
+    rows = [Row([text_cell(minus(str(v.wanted)), "strong"), text_cell(v.verdict, v.verdict), text_cell(v.why)])
+            for v in t.verdicts]  # fmt: skip
+    caption = "What is wanted: it passes where the whole interval does, unless the loop depends on its amplitude."
+    return [PageTable(columns("wanted", "verdict", "", wide=[""]), rows, caption)]
+
+
 def _notes(t: LoopIdentification) -> list[Any]:
     return [BulletList([f"{n[:1].upper()}{n[1:]}." for n in t.notes], warn=True)] if t.notes else []
 
@@ -105,7 +116,20 @@ def _sensitivities(t: LoopIdentification) -> list[Any]:
 
 def _plant(t: LoopIdentification) -> list[Any]:
     caption = "Plant P: output over input, both as they answer to the excitation, with 95 % coverage intervals."
-    return pictures(Picture("plant", draw.plant(t), caption, "Bode plot of the plant"))
+    return [*_parameters(t), *pictures(Picture("plant", draw.plant(t), caption, "Bode plot of the plant"))]
+
+
+def _parameters(t: LoopIdentification) -> list[Any]:
+    if t.fit is None:
+        return []
+    rows = [
+        Row([text_cell(name, "strong"), text_cell(PARAMETERS[name][1]), text_cell(value), text_cell(interval)])
+        for name, value, interval in shown_values(t.fit)
+    ]
+    heads = columns("parameter", "", "value", "95 %", wide=[""])
+    caption = "Physical parameters of the plant, by weighted least squares over all frequencies."
+    sentence = f"{t.fit.sentence[:1].upper()}{t.fit.sentence[1:]}."
+    return [PageTable(heads, rows, caption), BulletList([sentence], warn=True) if t.fit.lacks else Text(sentence)]
 
 
 def _distortion(t: LoopIdentification) -> list[Any]:

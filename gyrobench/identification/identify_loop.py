@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.bench import Bench, UsageError
+from gyrobench.identification.amplitude import difference
 from gyrobench.identification.distortion import (
     Distortion,
     distortions,
@@ -30,7 +32,9 @@ from gyrobench.identification.line_spectrum import (
 from gyrobench.identification.loop_curve import loop_curve
 from gyrobench.identification.loop_margins import margins
 from gyrobench.identification.loop_record import LoopRecord, read_loop
+from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.ratios import loop_responses
+from gyrobench.identification.wanted_margins import parse_wanted
 from gyrobench.identification.written_identification import Identification
 from gyrobench.record.csv_reader import DataError
 
@@ -40,7 +44,7 @@ BANDS = 12
 CLIPPED = 4  # samples in a row at the largest value
 DRIFT = 1.0  # rms of the response: more drift than that is said
 KNOWN = 0.5  # of the frequencies of a band at which L is determined
-STRONG = 0.01  # of the excited lines: distortion that margins may not pass with
+STRONG = 0.01  # of the excited lines: with more distortion the margins may be others at another amplitude
 
 
 def identify(
@@ -50,18 +54,50 @@ def identify(
     period: str = "",
     band: tuple[float, float] = (0.0, math.inf),
     columns: Path | None = None,
+    fit: Sequence[str] = (),
+    want: Sequence[str] = (),
+    against: str | Path | None = None,
 ) -> Identification:
     """Return responses and margins of the loop of a file.
 
     at: where the excitation enters, period: its period; both replace what the file states.  band: frequencies, Hz.
-    columns: a column map.  Raises UsageError and DataError.
+    columns: a column map.  fit: parameters of the plant to find ("J") or known ("k_t=0.4N.m/A").  want: margins
+    that the loop must have.  against: a record of the same loop at another amplitude.  Raises UsageError and DataError.
     """
     begin = time.perf_counter()
     file = Bench.find().existing(Path(data))
     if not file.exists():
         raise UsageError(f"{file}: no such file of measured data")
-    found = identify_record(read_loop(file, at, period, columns), band)
+    record = read_loop(file, at, period, columns)
+    wanted = parse_wanted(want)
+    if fit:
+        parse_fit(fit)  # what is asked for wrongly is said first
+    found = identify_record(record, band)
+    if against is not None:
+        found = _compared(found, Path(against), at, period, band, columns)
+    if fit:
+        found = replace(found, fit=fit_plant(record, found.responses["P"], fit))
+    found = replace(found, verdicts=[w.verdict(found.margins, found.dependent) for w in wanted])
     return replace(found, seconds=time.perf_counter() - begin)
+
+
+def _compared(
+    found: Identification, against: Path, at: str, period: str, band: tuple[float, float], columns: Path | None
+) -> Identification:
+    """Return what was found with a note of how the loop differs at another amplitude."""
+    other = identify(against, at=at, period=period, band=band, columns=columns)
+    ratio = float(np.std(other.record.r) / np.std(found.record.r))
+    try:
+        apart = difference(found.curve, other.curve)
+    except ValueError as error:
+        raise UsageError(f"--against {against}: {error} with {found.record.name}") from None
+    begin = f"against {other.record.name}, {ratio:.3g} times the excitation: "
+    if apart is None:
+        return replace(found, notes=[*found.notes, f"{begin}L is the same within its uncertainty"])
+    size, turn, f = apart
+    text = f"L differs by {size:+.2g} dB and {turn:+.2g}° at {f:.3g} Hz; the loop depends on its amplitude"
+    text = text.replace("-", "−")
+    return replace(found, dependent=text, notes=[f"nonlinear: {begin}{text}", *found.notes])
 
 
 def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.inf)) -> Identification:
@@ -90,8 +126,10 @@ def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.i
     found, missing = margins(curve)
     notes += _drift(record, samples) + _clipped(record)
     count = periods_used(record.r.size, samples) if samples else 0
+    strong = [d for d in kinds if d.kind == "odd" and d.significant and d.level > STRONG]
+    dependent = "odd harmonics show that the loop depends on its amplitude" if strong else ""
     return Identification(
-        record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2])
+        record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2]), dependent
     )
 
 

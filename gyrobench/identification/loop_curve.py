@@ -9,9 +9,9 @@ by weighted least squares (Levy, Sanathanan, then Gauss-Newton).  L = 1/S - 1 an
 curve serves all margins.  The widest window that passes the test of its residuals against the stated noise is found,
 the cubic before the fraction; one NARROWER times as far down the list is used, whose bias then is well below its
 uncertainty.  Residuals above the stated noise widen the uncertainty (Birge's ratio).  Where no window passes (hardly
-any noise, or points too far apart) the narrowest one is taken, and where its uncertainty is large the loop is not
-resolved there.  Source: Pintelon 2012, 7.2 and 9.8 (local models, Sanathanan's
-iteration); McKelvey 2012 (local rational models).
+any noise, or points too far apart) the least uncertain one is taken, and where its uncertainty is large the loop is not
+resolved there.  Source: Pintelon 2012, 7.2 and 9.8 (local models, Sanathanan's iteration); McKelvey 2012 (local
+rational models).
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from gyrobench.record.frequency_response import Complex
 WINDOWS = (41, 29, 21, 15, 11, 8)  # points
 NARROWER = 3  # windows than the widest that passes
 PASSES = 0.1  # p of the residuals
-MISFIT = 1e-6  # p, below which the narrowest window is no noise
+NEARLY = 0.01  # p of a narrower window than the widest that passes
+UNSOUND, NEIGHBOURS = 3.0, 4  # times the median u of so many measured frequencies to either side
+MISFIT = 1e-6  # p, below which the best window is no noise
 RESOLVED = 0.02  # of |S|, the largest misfit: 0.17 dB, 1.1 degrees
 DRAWS = 60
 BETWEEN = 8  # frequencies of the curve for each measured one
@@ -65,6 +67,14 @@ class LoopCurve:
         return np.asarray(self.u / np.maximum(np.abs(self.S * (1.0 - self.S)), 1e-300))
 
     @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Return where u is not far above that at the frequencies about it: a pole that the noise has put there."""
+        u = self.u.reshape(-1, BETWEEN)
+        about = np.pad(np.median(u, axis=1), NEIGHBOURS, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(about, 2 * NEIGHBOURS + 1)
+        return np.asarray((u < UNSOUND * np.median(windows, axis=1)[:, None]).ravel())
+
+    @property
     def slope_L(self) -> Complex:
         """Return d ln L / df."""
         return np.asarray(-self.slope / (self.S * (1.0 - self.S)))
@@ -88,31 +98,43 @@ def loop_curve(s: MeasuredResponse) -> LoopCurve:
     if not sizes:
         none, empty = np.zeros(0), np.zeros(0, complex)
         return LoopCurve(none, empty, none, empty, np.zeros((DRAWS, 0), complex), none > 0.0)
-    variance = _level(s)
+    variance = noise_level(s)
     rng = np.random.default_rng(DRAWS)
     draw = (rng.standard_normal((s.f.size, DRAWS)) + 1j * rng.standard_normal((s.f.size, DRAWS))) * np.sqrt(0.5)
-    tried: list[list[_Models]] = []  # of each window the cubic and the fraction
-    use = np.full(s.f.size, 2 * len(sizes))  # place in the list of all models
-    for k, size in enumerate(sizes):
+    every: list[_Models] = []  # of each window the cubic and the fraction
+    for size in sizes:
         idx = _window(s.f.size, size)
         d = s.f[idx] - s.f[:, None]
-        tried.append(
-            [_fits(d, s.value[idx], variance[idx], s.dof[idx], draw[idx], rational) for rational in (False, True)]
-        )
-        for rational, models in enumerate(tried[-1]):
-            narrower = min(k + NARROWER, len(sizes) - 1)
-            use = np.where((use == 2 * len(sizes)) & (models.p > PASSES), 2 * narrower + rational, use)
-    last, forced = tried[-1][-1], use == 2 * len(sizes)
-    every = [m for pair in tried for m in pair] + [last]
-    rows = np.arange(s.f.size)
+        every += [_fits(d, s.value[idx], variance[idx], s.dof[idx], draw[idx], rational) for rational in (False, True)]
+    p, rows = np.stack([m.p for m in every]), np.arange(s.f.size)
+    widened = np.stack([m.cov[:, 0, 0].real * np.maximum(m.square, 1.0) for m in every])
+    use, forced = _chosen(p, widened)
     theta, cov, scale, draws = (
         np.stack([getattr(m, n) for m in every])[use, rows] for n in ("theta", "cov", "scale", "draws")
     )
     wider = np.maximum(np.stack([m.square for m in every])[use, rows], 1.0)
     cov, draws = cov * wider[:, None, None], draws * np.sqrt(wider)[:, None, None]
     u = np.sqrt(np.maximum(cov[:, 0, 0].real, 0.0) / 2.0)
-    resolved = ~(forced & (last.p < MISFIT) & (u > RESOLVED * np.abs(theta[:, 0])))
+    resolved = ~(forced & (p[use, rows] < MISFIT) & (u > RESOLVED * np.abs(theta[:, 0])))
     return _dense(s.f, theta, cov, scale, draws, resolved)
+
+
+def _chosen(p: Array, widened: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return which model is used at each frequency, and where none passes.
+
+    p, widened: (models, n), cubic and fraction in turn; of the residuals, and the variance widened by them.
+    """
+    passes = p > PASSES
+    forced = ~np.any(passes, axis=0)
+    window, rational = np.divmod(np.argmax(passes, axis=0), 2)
+    use = np.argmin(np.where(np.isfinite(widened), widened, np.inf), axis=0)
+    left = ~forced
+    for narrower in range(NARROWER, -1, -1):
+        model = 2 * np.minimum(window + narrower, p.shape[0] // 2 - 1) + rational
+        take = left & (p[model, np.arange(use.size)] > NEARLY)
+        use = np.where(take, model, use)
+        left &= ~take
+    return use, forced
 
 
 def _window(count: int, size: int) -> NDArray[np.intp]:
@@ -121,8 +143,8 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
     return np.asarray(first[:, None] + np.arange(size))
 
 
-def _level(s: MeasuredResponse) -> Array:
-    """Return the variance of S: its logarithm on parabolas over neighbours, less the mean of that of chi-squared."""
+def noise_level(s: MeasuredResponse) -> Array:
+    """Return the variance of a response: its logarithm on parabolas, less the mean of that of chi-squared."""
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2
     least = (SMALLEST * np.abs(s.value).max()) ** 2
@@ -194,6 +216,14 @@ def _jacobian(s: Complex, under: Complex, powers: Array) -> Complex:
     return np.concatenate([powers, -s[:, :, None] * powers[:, :, 1:]], axis=2) / under[:, :, None]
 
 
+def _evaluated(theta: Complex, cov: Complex, d: Array) -> tuple[Complex, Array]:
+    """Return the derivatives of S by the coefficients at d (n, m), (n, m, 6), and the variance of S there."""
+    under = _under(theta, d)
+    s, powers = _over(theta, d) / under, d[:, :, None] ** np.arange(4)
+    jac = np.concatenate([powers, -s[:, :, None] * powers[:, :, 1:3]], axis=2) / under[:, :, None]
+    return jac, np.einsum("nmi,nij,nmj->nm", jac, cov, np.conj(jac)).real
+
+
 def _dense(
     f: Array, theta: Complex, cov: Complex, scale: Array, draws: Complex, resolved: NDArray[np.bool_]
 ) -> LoopCurve:
@@ -204,9 +234,8 @@ def _dense(
     d = (at - f[:, None]) / scale[:, None]
     under = _under(theta, d)
     s = _over(theta, d) / under
-    powers = d[:, :, None] ** np.arange(4)
-    jac = np.concatenate([powers, -s[:, :, None] * powers[:, :, 1:3]], axis=2) / under[:, :, None]
-    u = np.sqrt(np.maximum(np.einsum("nmi,nij,nmj->nm", jac, cov, np.conj(jac)).real, 0.0) / 2.0)
+    jac, variance = _evaluated(theta, cov, d)
+    u = np.sqrt(np.maximum(variance, 0.0) / 2.0)
     noise = np.moveaxis(jac @ draws, 2, 0).reshape(DRAWS, -1)
     b, a = theta[:, None, :4], theta[:, None, 4:]
     rise = b[..., 1] + d * (2.0 * b[..., 2] + 3.0 * d * b[..., 3]) - s * (a[..., 0] + 2.0 * d * a[..., 1])

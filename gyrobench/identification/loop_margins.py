@@ -147,9 +147,10 @@ def _crossings(value: Array, u: Array, counts: NDArray[np.bool_], f: Array) -> I
 def _peak(name: str, c: LoopCurve, value: Complex, invert: bool) -> Margin | None:
     """Return the largest size of a response; None where it is at an end.
 
-    The largest of noisy values is too large: by how much, and how it scatters, is seen by adding the noise once more.
+    The largest of noisy values is too large: by how much, and how it scatters, is seen by adding the noise once more;
+    this correction is as uncertain as it is large.
     """
-    counts = c.u < LARGEST_U * np.abs(value)
+    counts = (c.u < LARGEST_U * np.abs(value)) & c.sound
     counts[:BETWEEN] = counts[-BETWEEN:] = False
     if not np.any(counts):
         return None
@@ -158,7 +159,8 @@ def _peak(name: str, c: LoopCurve, value: Complex, invert: bool) -> Margin | Non
     if np.abs(value)[[0, -1]].max() >= size[k]:
         return None
     again = np.where(counts, np.abs(value + c.noise), 0.0).max(axis=1)
-    peak, U = 2.0 * float(size[k]) - float(again.mean()), NORMAL * float(again.std(ddof=1))
+    excess = float(again.mean()) - float(size[k])
+    peak, U = float(size[k]) - excess, NORMAL * math.hypot(max(float(again.std(ddof=1)), float(c.u[k])), excess)
     limits = [peak - U, peak, peak + U]
     low, at, high = (1.0 / x for x in reversed(limits)) if invert else limits
     return Margin(name, at, low, high, float(c.f[k]), "1" if invert else "factor")

@@ -43,6 +43,7 @@ from gyrobench.workflow.run_comparison import Comparison, compare_results, read_
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
+    from gyrobench.identification.multisine import Multisine
     from gyrobench.identification.written_identification import Identification
     from gyrobench.tuning.written_loop import TunedLoop
 
@@ -61,6 +62,7 @@ __all__ = [
     "identify",
     "load",
     "load_suite",
+    "multisine",
     "open_run",
     "reduce",
     "site",
@@ -232,11 +234,17 @@ def identify(
     period: str = "",
     band: str | tuple[float, float] = "",
     columns: File | None = None,
+    fit: Sequence[str] = (),
+    want: Sequence[str] = (),
+    against: File | None = None,
 ) -> Identification:
     """Return open loop, sensitivities, plant and margins of a laboratory's record of a loop, with intervals.
 
     at: where the excitation enters, "plant input", "reference" or "plant output"; period: its period ("2s"); default:
     what the file states or shows.  band: "0.5Hz..80Hz", or two frequencies in Hz.  columns: a column map.
+    fit: physical parameters of the plant, to find ("J", "mode") or known ("k_t=0.4N.m/A"); ``fit.values``,
+    ``fit.interval("J")``, ``fit.toml(name)`` for ``--set @FILE``.
+    want: margins that it must have ("phase margin=40deg"); against: a record of it at another amplitude.
     ``responses["L"]`` has frequencies, values and intervals, ``["phase margin"]`` is a margin, ``notes`` say what is
     missing or not linear, ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type
     GyrobenchError.
@@ -246,5 +254,24 @@ def identify(
 
     limits = parse_band(band) if isinstance(band, str) else band
     return identify_loop(
-        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns)
+        Path(data),
+        at=at,
+        period=period,
+        band=limits,
+        columns=None if columns is None else Path(columns),
+        fit=fit,
+        want=want,
+        against=None if against is None else Path(against),
     )
+
+
+@checked
+def multisine(band: str, peak: str, period: str = "4s", rate: str = "1kHz", *, seed: int = 1) -> Multisine:
+    """Return an excitation for :func:`identify`: odd lines of a band, some left out to show nonlinearity, small peak.
+
+    band: "0.5Hz..100Hz"; peak: with its unit, "0.2N.m".  ``signal`` is a period, SI, ``write(file, periods)`` writes it
+    as CSV.  Raises errors of type GyrobenchError.
+    """
+    from gyrobench.identification.multisine import parse_multisine
+
+    return parse_multisine(band, peak, period, rate, seed)

@@ -23,12 +23,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from friction_loops import random_friction
 from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
 
+from gyrobench.errors import GyrobenchError
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.loop_record import LoopRecord
+from gyrobench.identification.plant_fit import fit_plant
 
 BAND = (1.0, 150.0)  # Hz
 PERIOD = 4000  # samples
-UNITS = {"excitation": "1", "input": "1", "output": "1"}
+UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
 
 
 class Count:
@@ -53,6 +55,22 @@ class Count:
             self.held[f"{name}, phase"] += int(np.sum(((below <= turn) & (turn <= above))[good]))
             for part in ("gain", "phase"):
                 self.all[f"{name}, {part}"] += int(good.sum())
+
+    def parameters(self, record, found, truth) -> None:
+        self.all["plant fitted"] += 1
+        try:
+            fit = fit_plant(record, found.responses["P"], ["J", "viscous", "delay", "mode", "held"])
+        except GyrobenchError:
+            return
+        self.held["plant fitted"] += 1
+        self.all["model describes the plant"] += 1
+        self.held["model describes the plant"] += not fit.lacks
+        for name, value in truth.items():
+            low, high = fit.interval(name)
+            self.all[name] += 1
+            self.held[name] += low <= value <= high
+            self.errors[name].append(fit.values[name] / value - 1.0)
+            self.U[name].append(0.5 * (high - low) / abs(value))
 
     def margins(self, found, truth) -> None:
         self.seconds.append(found.seconds)
@@ -107,6 +125,8 @@ def linear(runs: int, kind: str, noise: float, first: int) -> Count:
         L, P = loop.responses(found.f)
         counted.responses(found, {"L": L, "S": 1.0 / (1.0 + L), "T": L / (1.0 + L), "P": P})
         counted.margins(found, margins_of(loop, found.f[0], found.f[-1]))
+        if kind == "multisine":
+            counted.parameters(record, found, loop.truth)
     return counted
 
 

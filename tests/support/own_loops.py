@@ -7,7 +7,7 @@ rate.  Nothing of gyrobench is used.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import signal
@@ -24,6 +24,7 @@ class SampledLoop:
     a: np.ndarray
     m: np.ndarray
     n: np.ndarray
+    truth: Mapping[str, float] = field(default_factory=dict)  # J, viscous ..., of the platform
 
     @property
     def closed(self) -> np.ndarray:
@@ -57,12 +58,21 @@ def random_platform(rng: np.random.Generator) -> SampledLoop:
     J, fc, late = 10.0 ** rng.uniform(-1.5, 0.5), rng.uniform(5.0, 20.0), int(rng.integers(1, 6))
     c = J * rng.uniform(0.1, 3.0)
     w0, z, share = 2.0 * np.pi * fc * rng.uniform(3.0, 6.0), rng.uniform(0.02, 0.08), rng.uniform(0.05, 0.3)
-    num, den = [1.0 + share, 2.0 * z * w0, w0**2], np.polymul([J, c], [1.0, 2.0 * z * w0, w0**2])
+    mode = [1.0, 2.0 * z * w0, w0**2]
+    num, den = np.polyadd(mode, share / J * np.polymul([1.0, 0.0], [J, c])), np.polymul([J, c], mode)
     b, a, _ = signal.cont2discrete((num, den), H, method="zoh")
     wc = 2.0 * np.pi * fc
     gain, wi = J * wc * rng.uniform(0.7, 1.0), wc / rng.uniform(4.0, 10.0)
     m, n, _ = signal.cont2discrete(([gain, gain * wi], [1.0, 0.0]), H, method="bilinear")
-    return SampledLoop(np.concatenate([np.zeros(late), b.ravel()]), a, m.ravel(), n)
+    truth = {
+        "J": J,
+        "viscous": c,
+        "delay": late * H,
+        "mode_f": w0 / (2.0 * np.pi),
+        "mode_damping": z,
+        "mode_share": share,
+    }
+    return SampledLoop(np.concatenate([np.zeros(late), b.ravel()]), a, m.ravel(), n, truth)
 
 
 def odd_multisine(samples: int, rng: np.random.Generator, low: float, high: float, group: int = 4) -> np.ndarray:

@@ -15,7 +15,7 @@ posterior of all models worth their weight.  [DRIFT-NOISE-MODEL]
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,10 +36,11 @@ from gyrobench.reduction.series.noise_coefficients import Estimate
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 ABSENT = 0.025  # probability of its absence below which a term is determined
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
+LIKELY = 0.03  # part of the posterior of models with flicker, or of those without, from which on N holds for them too
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
 STEPS = 5
-TRIED_MODELS, TRIED = 12, 60  # maxima and draws of each model that are held against the deviation
+TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -239,6 +240,8 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         v0 = found.prior.others[CALLED[name]][0]
         return Estimate(0.0, 0.0, math.exp(0.5 * (v0 + 2.0)), False)
     low, high = (math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975))
+    if name == "N":
+        low, high = _beside_any_drift(figure, clouds, low, high)
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
@@ -249,6 +252,22 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
     return Estimate(value, min(low, value), max(high, value), True)
+
+
+def _beside_any_drift(
+    figure: Callable[[Model, Array], Array | None], clouds: Sequence[Cloud], low: float, high: float
+) -> tuple[float, float]:
+    """Return the interval of N, wide enough for that of the models with flicker and that of those without: flicker
+    reaches to the highest frequencies, Gauss-Markov drift does not, and a short record does not tell them apart.
+    """
+    total = sum(float(c.weight.sum()) for c in clouds)
+    for with_flicker in (True, False):
+        some = [c for c in clouds if any(t.name == "flicker" for t in c.model) == with_flicker]
+        values, weights = weighted(some, figure)
+        if values.size and float(weights.sum()) > LIKELY * total:
+            ends = [math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975)]
+            low, high = min(low, ends[0]), max(high, ends[1])
+    return low, high
 
 
 def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:

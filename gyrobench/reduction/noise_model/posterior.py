@@ -16,7 +16,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import B, Fitted, K, ModelSearch, Q, volume
+from gyrobench.reduction.noise_model.search import WIDEST, B, Fitted, K, ModelSearch, Q, volume
 
 WINDOW = 6.0  # of the logarithm of the evidence: models below the best by more are left out
 MOST = 10  # models
@@ -59,7 +59,7 @@ def sample(found: Fitted, data: Ordinates, prior: Prior, count: int, rng: np.ran
     laplace = (
         full
         + 0.5 * q * math.log(2.0 * math.pi)
-        - 0.5 * float(np.linalg.slogdet(found.information + 1e-3 * np.eye(q))[1])
+        - 0.5 * float(np.linalg.slogdet(found.information + WIDEST * np.eye(q))[1])
     )
     return Cloud(found.model, p, w / w.sum(), log_p), evidence - laplace
 

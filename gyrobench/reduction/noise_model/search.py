@@ -16,6 +16,7 @@ from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
+WIDEST = 0.25  # information of a parameter that the record does not tell: its volume is the prior's, some 5
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
@@ -89,7 +90,7 @@ def volume(model: Model, information: Array) -> float:
     Their prior is known to nobody: how sharply the record shows their parameters is no argument against them.
     """
     filters = np.concatenate([(np.arange(t.size) * (t.name == "white") > 0) | (t.name in PEAKS) for t in model])
-    H = information + 1e-3 * np.eye(filters.size)
+    H = information + WIDEST * np.eye(filters.size)
     logdet = float(np.linalg.slogdet(H)[1])
     count = int(filters.sum())
     if count:
