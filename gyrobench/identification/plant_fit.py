@@ -1,7 +1,7 @@
 """Physical parameters of a plant from its measured response: values, covariance, test of the model.
 
 Weighted least squares over all frequencies, weights of the stated noise; the covariance is that of first order.  What
-is left, over its noise, is chi-squared where the model describes the plant; more of it (p < 0.01) is lack of fit: the
+is left, over its noise, is chi-squared where the model describes the plant; more of it (p < 0.001) is lack of fit: the
 uncertainties are widened by Birge's ratio, and the frequency is named at which the model is furthest off.
 Source: Pintelon 2012, 9.11 (least squares in the frequency domain) and 11.3 (test of the cost).
 """
@@ -37,7 +37,7 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
 HELD = "held"
-LACK = 0.01
+LACK = 0.001
 LARGEST_U = 0.3
 ALIKE = 1e-7  # smallest over largest singular value of the sensitivities: below it two parameters act alike
 FREQUENCIES = 60  # at which a mode is looked for
@@ -293,7 +293,9 @@ def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str])
         said = f"{int(good.sum())} frequencies with a plant above the noise are too few to find {len(free)} parameters"
         raise DataError(record.name, [said])
     kept = MeasuredResponse(*(getattr(plant, n)[good] for n in ("f", "value", "u", "dof", "center", "radius")))
-    f, value, sigma = kept.f, kept.value, np.sqrt(noise_level(kept) / 2.0)
+    f, value = kept.f, kept.value
+    relative = replace(kept, value=np.ones_like(value))  # the noise of a resonance is as large as its gain
+    sigma = np.sqrt(noise_level(relative) / 2.0) * np.abs(value)
     problem, x = _found(_PlantProblem(model, known, free, f, value), sigma)
     by = problem.sensitivity(x, sigma)
     size = np.linalg.norm(by, axis=0)
