@@ -48,6 +48,11 @@ def contradicted(noise: NoiseModel) -> str:
 
 def _disagreement(noise: NoiseModel) -> str:
     a = min(noise.agreements, key=lambda a: a.share)
+    if a.holds:
+        return (
+            f"what {noise.treatment.filled + noise.treatment.wild.size} missing or wild samples would add to the noise "
+            "at low frequencies cannot be told from the others"
+        )
     tau, ratio = a.worst
     of = "record" if a is noise.agreement else "record without lines, steps and wild samples"
     return (

@@ -4,8 +4,9 @@ The precision of the noise is diagonal in the cosine transform, P = C' diag(1/S)
 others say of it by (P x)_t/P_tt, of standard deviation P_tt^(-1/2): wild is what exceeds a limit, the largest of
 its neighbourhood first; where many are, the limit falls as long as few of what exceeds it are the noise's own.  Missing
 and wild samples x_m get their conditional mean -P_mm^-1 P_mo x_o (conjugate gradients), and the powers of the ordinates
-the expectation of what is left, by a draw P_mm^-1 (P u)_m of u from the same noise.  S is a smoothed spectrum of the
-completed stretch, so both are repeated.  [DRIFT-NOISE-MODEL; own derivation]
+the expectation of what is left, by draws P_mm^-1 (P u)_m of u from the same noise.  S is a smoothed spectrum of the
+completed stretch, so both are repeated until it stays: slowly where much less noise is at some frequencies than at
+others, so each change is carried on by half of itself and more.  [DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations
@@ -27,11 +28,16 @@ BULK = 0.97  # of the samples, by which the scatter is measured
 CORE = 3.0  # standard deviations of samples that no wild one is among
 LOCAL, PARTS = 512, 64  # samples, at least, and parts of a stretch, at most, of which the scatter is taken
 SWEEPS = 8  # of wild samples
-ROUNDS = 4  # of spectrum and completion
+ROUNDS, MOST_ROUNDS, AVERAGED = 4, 24, 8  # of spectrum and completion, at least, at most; the last that are averaged
+RESTS, STAYS = 0.03, 0.1  # change of the logarithm of a spectrum that needs no more rounds, and after the last
+ONWARD = 1.8  # how far the change of a round is carried on
+MOST_LOST = 0.5  # of the power in an octave: where less is known, noise of several kinds is not told apart
+DRAWS = 40_000  # samples of all draws of a round; one at least, four at most
 ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
 SMOOTH = 0.03  # of the frequency
 WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
+FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
 NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
 SEED = 90125
 
@@ -42,6 +48,7 @@ class Completed:
 
     wild: indices.  missing: samples that were not there.  white (n,): the stretch with an even spectrum, of unit
     variance, NaN where a sample is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
+    stays: whether the spectrum came to an end, and most of it, in every octave, is of the samples that are there.
     """
 
     x: Array
@@ -50,6 +57,7 @@ class Completed:
     missing: int
     white: Array
     noise: Array | None
+    stays: bool = True
 
     @property
     def drawn(self) -> Array:
@@ -73,6 +81,8 @@ def smooth_spectrum(power: Array) -> Array:
     out = np.empty(n)
     out[1:] = np.where((fine > ABOVE * broad) & (k > 30), fine, broad)
     out[1:] = np.maximum(out[1:], 1e-12 * float(np.mean(power[1:])))
+    # nothing holds a mean of few ordinates up when completion and spectrum follow one another
+    out[1:FIRST] = np.maximum(out[1:FIRST], LEAST * out[min(FIRST, n - 1)])
     out[0] = 100.0 * n * float(np.max(out[1:]))
     return out
 
@@ -210,10 +220,20 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     lost = np.zeros(x.size)
     noise: Array | None = None
     z = np.zeros(x.size)
-    for k in range(ROUNDS):
+    S: Array | None = None
+    stays = True
+    draws = min(max(DRAWS // x.size, 1), 4)
+    for k in range(MOST_ROUNDS):
         if k == 1:  # what was wild beside a wilder one may be none under its own spectrum
             wild[:] = False
-        P = _Precision(smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost))
+        now = smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost)
+        change = math.inf if S is None else changed(now, S)
+        stays = change < STAYS
+        if k >= ROUNDS and change < RESTS:
+            break
+        last = k - (MOST_ROUNDS - AVERAGED)
+        S = now if S is None or last >= 0 else S * (now / S) ** ONWARD
+        P = _Precision(S)
         y = _filled(x, missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
             z = P(y) / math.sqrt(P.diagonal)
@@ -224,12 +244,18 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
             y = _filled(x, missing | wild, P)
         at = np.flatnonzero(missing | wild)
         if not at.size:
+            stays = True
             if k:
                 break
             continue
-        noise = np.zeros(x.size)
-        noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
-        lost = fft.dct(noise, norm="ortho") ** 2
+        found = np.zeros(x.size)
+        for _ in range(draws):
+            noise = np.zeros(x.size)
+            noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
+            found += fft.dct(noise, norm="ortho") ** 2 / draws
+        lost = lost + (found - lost) / (last + 1.0) if last > 0 else found
+    if noise is not None:
+        stays = stays and bool(np.all(octaves(lost) < MOST_LOST * octaves(fft.dct(y, norm="ortho") ** 2 + lost)))
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
@@ -237,8 +263,20 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
     return Completed(
-        y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise
+        y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise, stays
     )
+
+
+def changed(now: Array, before: Array) -> float:
+    """Return the largest mean change of the logarithm of a spectrum (n,) over an octave."""
+    return float(np.max(np.abs(octaves(np.log(now / before)))))
+
+
+def octaves(x: Array) -> Array:
+    """Return the means of ordinates (n,) over octaves, from the eighth on."""
+    edges = FIRST * 2 ** np.arange(max(int(math.log2(x.size / FIRST)), 1))
+    out: Array = np.add.reduceat(x[FIRST:], edges - FIRST) / np.diff(np.append(edges, x.size))
+    return out
 
 
 def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:

@@ -94,8 +94,10 @@ class NoiseModel:
 
     @property
     def agrees(self) -> bool:
-        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned."""
-        return all(a.holds for a in self.agreements)
+        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned, and
+        what stands for missing and wild samples came to an end.
+        """
+        return all(a.holds for a in self.agreements) and self.treatment.settled
 
     @property
     def cleaned(self) -> Array:

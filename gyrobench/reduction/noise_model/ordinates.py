@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.gap_completion import smooth_spectrum
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicker, markov_parts
 
 LOW = 16  # first ordinates of each parity that are kept singly
@@ -77,19 +78,36 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
     """Both parities of a stretch (n,), odd ones first; extra: powers (n,) of the ordinates to be added."""
     n = x.size
     c = fft.dct(x, norm="ortho")
-    square = c * c if extra is None else c * c + extra
-    edges = _edges(c * c)
+    square, known = c * c, np.ones(n)
+    edges = _edges(square)
+    if extra is not None:
+        square = square + extra
+        known = _known(extra, square)
+        c = c / np.sqrt(known)
+    weight = np.minimum(known / np.mean(known), 1.0) ** 2
     out = []
     for odd in (True, False):
         k = np.arange(1 if odd else 2, n, 2)
         low, k = k[:LOW], k[LOW:]
         start = np.unique(np.searchsorted(k, edges))
         start = start[start < k.size]
-        count = np.diff(np.append(start, k.size)).astype(float)
+        count = np.add.reduceat(weight[k], start)
         first, last = k[start].astype(float), k[np.append(start[1:], k.size) - 1].astype(float)
         out.append(_Part(odd, n, c[low], 0.5 * (first + last), 0.5 * (last - first) + 1.0, count,
-                         np.add.reduceat(square[k], start), np.add.reduceat(c[k], start)))  # fmt: skip
+                         np.add.reduceat((weight * square)[k], start),
+                         np.add.reduceat((weight * c)[k], start)))  # fmt: skip
     return out
+
+
+def _known(extra: Array, square: Array) -> Array:
+    """Return the part (n,) of the powers of the ordinates that the samples give; the rest is of those that lack.
+
+    With a known error of variance f S an ordinate tells of log S as (1 - f)^2 ordinates: they count so, against what
+    the lack of samples takes from all alike.
+    """
+    lacks = smooth_spectrum(np.maximum(extra, 0.0)) / smooth_spectrum(np.maximum(square, 0.0))
+    lacks[0] = 0.0
+    return np.asarray(1.0 - np.clip(lacks, 0.0, 0.95))
 
 
 def _edges(square: Array) -> NDArray[np.int64]:

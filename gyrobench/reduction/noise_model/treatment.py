@@ -82,6 +82,11 @@ class Treated:
         return sum(s.done.missing for s in self.stretches)
 
     @property
+    def settled(self) -> bool:
+        """Return whether what was completed came to an end, in all stretches."""
+        return all(s.done.stays for s in self.stretches)
+
+    @property
     def steps(self) -> list[LevelStep]:
         """Return the steps, at their place on the grid."""
         return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.steps]
