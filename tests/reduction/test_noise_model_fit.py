@@ -69,6 +69,23 @@ def test_white_noise_through_a_filter_and_drift() -> None:
     assert w**2 / (1.0 - phi**2) == pytest.approx(process.sigma.value**2)
 
 
+@pytest.mark.parametrize(("share", "stated"), [(0.1, False), (1e-3, True)])
+def test_missing_samples_under_a_steep_spectrum(share: float, stated: bool) -> None:
+    """Angle noise Q = 1 beside N = 0.1: the power of a missing sample is that of high frequencies, 2 Q2 = 2, evenly spread.
+
+    A tenth of them add 0.2 to a spectrum that is N2 = 0.01 at low frequencies: nothing is stated then.  Of a thousandth
+    it is 0.002, and N is told.
+    """
+    rng = np.random.default_rng(8)
+    n = 8192
+    x = 0.1 * rng.normal(size=n) + np.diff(rng.normal(size=n + 1))
+    x[rng.random(n) < share] = math.nan
+    model = fit_noise(x, 1.0, means=False)
+    assert model.agrees == model.treatment.settled == stated
+    if stated:
+        assert model["N"].low <= 0.1 <= model["N"].high and model["N"].determined
+
+
 def test_steps_wild_and_missing_samples() -> None:
     """A step of 1, 20 samples off by 20, a twentieth missing: N of the rest; with the wild ones N2 is 1 + 0.001 400."""
     rng = np.random.default_rng(3)
