@@ -59,7 +59,7 @@ def identify(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Identify a loop: open loop, sensitivities, plant and margins, with intervals.
+    """Identify a loop from its record: responses and margins.
 
     The file has columns time, excitation, input (of the plant; or controller, its output) and output, each with its
     unit.  A periodic excitation of three periods and more is averaged over them, any other one by bands of
@@ -109,7 +109,7 @@ def multisine(
     periods: Annotated[int, typer.Option("--periods", metavar="N", help="Periods in the file.", min=1, max=1000)] = 10,
     seed: Seed = 1,
 ) -> None:
-    """Write an excitation: odd lines, some left out to show nonlinearity, small peak.
+    """Write an odd multisine, an excitation that shows nonlinearity.
 
     \b
     Example: gyrobench multisine excitation.csv --band 0.5Hz..100Hz --peak 0.2N.m

@@ -26,6 +26,7 @@ from scipy import linalg
 
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
+from gyrobench.errors import GyrobenchError
 from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.structures import Controller, ControllerStructure, rounded
 
@@ -44,7 +45,7 @@ RANGES = {
 ALIASES = {"mixsyn": "hinf"}
 
 
-class SynthesisError(ArithmeticError):
+class SynthesisError(GyrobenchError, ArithmeticError):
     """No controller exists for these weights, or none that numbers can hold."""
 
 

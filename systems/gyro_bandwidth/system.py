@@ -75,7 +75,7 @@ class GyroBandwidth(System):
     done = "exciter.done"
     step = 1e-4
     channels = ("exciter.phase", "exciter.gate", "table.rate_read", "gyro.rate[1]", "gyro.saturated")
-    shown = ("table.rate_read", "gyro.rate[1]")
+    shown = ("table.rate_read", "gyro.rate")
     measured_data = MEASURED
 
     @property

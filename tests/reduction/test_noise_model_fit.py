@@ -71,7 +71,7 @@ def test_white_noise_through_a_filter_and_drift() -> None:
 
 @pytest.mark.parametrize(("share", "stated"), [(0.1, False), (1e-3, True)])
 def test_missing_samples_under_a_steep_spectrum(share: float, stated: bool) -> None:
-    """Angle noise Q = 1 beside N = 0.1: the power of a missing sample is that of high frequencies, 2 Q2 = 2, evenly spread.
+    """Angle noise Q = 1 beside N = 0.1: a missing sample lacks 2 Q2 = 2, evenly over all frequencies.
 
     A tenth of them add 0.2 to a spectrum that is N2 = 0.01 at low frequencies: nothing is stated then.  Of a thousandth
     it is 0.002, and N is told.

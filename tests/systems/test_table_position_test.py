@@ -56,8 +56,8 @@ def test_first_harmonic_is_handed_over(found: Any, folder: Path) -> None:
 
 
 def test_what_is_not_handed_over(found: Any, folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(gb.GyrobenchError, match="tumble_single_axis takes no values of other runs"):
-        gb.load("tumble_single_axis", from_run=[folder])
+    with pytest.raises(gb.GyrobenchError, match="fixed_position takes no values of other runs"):
+        gb.load("fixed_position", from_run=[folder])
     with pytest.raises(gb.GyrobenchError, match="given by another run, too"):
         gb.load("accelerometer_four", from_run=[folder, folder])
     with pytest.raises(gb.GyrobenchError, match="no such folder"):

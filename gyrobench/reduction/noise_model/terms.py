@@ -242,7 +242,8 @@ class NoiseTerm:
             z, amplitude, nugget = markov_parts(np.exp(p[..., 1:2]), means)
             return np.asarray(v * (amplitude * _allan_pole(z, m) - nugget / m))
         if self.name == "band":
-            lag = np.arange(math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0)
+            longest = math.ceil(8.0 * math.exp(float(np.max(p[..., 1])))) + 2.0
+            lag = np.arange(min(longest, 2.0 * float(np.max(m)) + 1.0))
             gamma = np.exp(-0.5 * (lag * np.exp(-p[..., 1:2])) ** 2) * np.cos(lag * np.exp(p[..., 2:3]))
             return v * _allan_covariance(gamma, m)
         decay, centre = np.exp(-p[..., 1:2]), np.exp(p[..., 2:3])
@@ -312,7 +313,7 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
     if name == "average":
         k, lower, upper = _average_parts(p)
-        lag = np.arange(float(np.max(k)) + 2.0)
+        lag = np.arange(min(float(np.max(k)) + 2.0, 2.0 * float(np.max(m)) + 1.0))  # a longer mean is not asked for
         gamma = lower * np.maximum(1.0 - lag / k, 0.0) + upper * np.maximum(1.0 - lag / (k + 1.0), 0.0)
         gamma = gamma / (lower * k + upper * (k + 1.0))
     else:
