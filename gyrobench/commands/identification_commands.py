@@ -109,7 +109,7 @@ def multisine(
     periods: Annotated[int, typer.Option("--periods", metavar="N", help="Periods in the file.", min=1, max=1000)] = 10,
     seed: Seed = 1,
 ) -> None:
-    """Write an odd multisine, an excitation that shows nonlinearity.
+    """Write an odd multisine as the excitation of a loop.
 
     \b
     Example: gyrobench multisine excitation.csv --band 0.5Hz..100Hz --peak 0.2N.m
