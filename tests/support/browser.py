@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import json
 import re
@@ -61,6 +62,7 @@ class Browser:
         self._process.terminate()
         self._process.wait(LIMIT)
         self._loop.close()
+        asyncio.set_event_loop(None)
         self._log.close()
 
     def _address(self) -> str:
@@ -78,6 +80,7 @@ class Browser:
         message = {"id": self._number, "method": method, "params": params}
         if self._session:
             message["sessionId"] = self._session
+        asyncio.set_event_loop(self._loop.asyncio_loop)  # type: ignore[attr-defined]  # another test may have taken it away
         self._socket.write_message(json.dumps(message))
         while True:
             answer = self._read()
