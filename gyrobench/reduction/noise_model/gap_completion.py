@@ -27,7 +27,7 @@ LOWEST, CHANCE = 3.7, 0.03  # limit in a record of many wild samples: part of th
 BULK = 0.97  # of the samples, by which the scatter is measured
 CORE = 3.0  # standard deviations of samples that no wild one is among
 LOCAL, PARTS = 512, 64  # samples, at least, and parts of a stretch, at most, of which the scatter is taken
-SWEEPS, LEAKS = 8, 0.03  # of wild samples; what is less than a part of the largest waits for the next
+SWEEPS, LEAKS = 8, 0.1  # of wild samples; what is less than a part of the largest waits for the next
 ROUNDS, MOST_ROUNDS, AVERAGED = 4, 24, 8  # of spectrum and completion, at least, at most; the last that are averaged
 RESTS, STAYS = 0.03, 0.1  # change of the logarithm of a spectrum that needs no more rounds, and after the last
 ONWARD = 1.8  # how far the change of a round is carried on
@@ -37,7 +37,7 @@ ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
 SMOOTH = 0.03  # of the frequency
 WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
-FIRST, LEAST = 8, 0.01  # ordinates whose spectrum is not less than a part of that after them
+FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
 NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
 SEED = 90125
 
@@ -292,8 +292,8 @@ def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:
 
 
 def _wildest(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which samples exceed the limit, all within three of them and a part of the largest: what a far larger one
-    leaves in others by its weights is none of theirs.
+    """Return which samples exceed the limit, all within three of them and a part of the largest: a far larger one is in
+    all others by its weights, and in the scatter around, by which they are measured.
     """
     gone = missing | wild
     size = np.abs(np.where(gone, 0.0, z))
