@@ -110,28 +110,19 @@ class Reduction(MeasureReduction):
         caption = (
             "Gain and phase of the gyro against the table. Points: measured, with 95 % error bars; line: fitted curve."
         )
-        found.responses.append(bode("frequency response", "loop", caption, measured, [shown], "gain", "1"))
+        response = bode("frequency response", "loop", caption, measured, [shown], "gain", "1")
+        found.responses.append(replace(response, coherence=[]))  # u of a point is by its periods
         found.tables.append(self._table())
 
     def _table(self) -> Table:
         r, fitted = self.response, logarithm(self.figures.curve.p, self.response.f)
         db = 20.0 / math.log(10.0)
         rows = [
-            [float(f), float(a), db * float(g), math.degrees(p), float(u) * 100.0, db * float(dg), math.degrees(dp)]
-            for f, a, g, p, u, dg, dp in zip(
-                r.f, self.points.table / DEG, r.gain, r.phase, r.u, r.gain - fitted[0], r.phase - fitted[1], strict=True
-            )
+            [float(f), float(a), db * float(dg), math.degrees(dp)]
+            for f, a, dg, dp in zip(r.f, self.points.table / DEG, r.gain - fitted[0], r.phase - fitted[1], strict=True)
         ]
-        head = [
-            "f / Hz",
-            "table / (°/s)",
-            "gain / dB",
-            "phase / °",
-            "u / %",
-            "gain less curve / dB",
-            "phase less curve / °",
-        ]
-        caption = "Gain and phase at each frequency; u: of the gain, relative, and of the phase in rad"
+        head = ["f / Hz", "table / (°/s)", "gain less curve / dB", "phase less curve / °"]
+        caption = "What the fitted curve leaves of gain and phase, at each frequency"
         return Table("response.points", "Frequency response", caption, head, rows)
 
     def _sources(self) -> list[tuple[Source, float, GyroResponse]]:
