@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.ratios import MeasuredResponse
-from gyrobench.record.frequency_response import Complex
-from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
+from gyrobench.report import loop_plane
+from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, figure, svg, zero_line
 
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.2, "zorder": 3}
 DOTS: dict[str, Any] = {"color": BLUE, "marker": "o", "linestyle": "", "markersize": 2.2, "zorder": 4}
@@ -125,15 +125,8 @@ def sensitivities(t: LoopIdentification) -> str:
     return svg(fig, "sensitivities")
 
 
-def _disk(margin: float) -> Complex:
-    """Return the circle in the plane of L on which |S - 1/2| = 1/margin."""
-    s = 0.5 + np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361)) / margin
-    return np.asarray(1.0 / s - 1.0)
-
-
-def _disk_of(t: LoopIdentification) -> Complex | None:
-    found = [m for m in t.margins if m.name == "disk margin" and 0.0 < m.value < 1.99]
-    return _disk(found[0].value) if found else None
+def _disks(t: LoopIdentification) -> list[loop_plane.Disk]:
+    return [("disk margin", m.value, GREEN) for m in t.margins if m.name == "disk margin" and 0.0 < m.value < 1.99]
 
 
 def nyquist(t: LoopIdentification) -> str:
@@ -150,14 +143,7 @@ def nyquist(t: LoopIdentification) -> str:
     ax.plot(g.value.real[which], g.value.imag[which], **DOTS, label="measured, 95 %")
     seen = np.where(t.curve.sound, t.curve.L, np.nan)
     ax.plot(seen.real, seen.imag, color=VERMILION, linewidth=0.9, zorder=5, label="curve")
-    if (ring := _disk_of(t)) is not None:
-        ax.fill(ring.real, ring.imag, color=SHADE, zorder=0)
-        ax.plot(ring.real, ring.imag, "--", color=GREEN, linewidth=1.0, label="disk margin")
-    ax.plot([-1.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=6)
-    zero_line(ax)
-    ax.set(xlim=(-3.2, 1.2), ylim=(-2.4, 2.4), xlabel="Re L", ylabel="Im L", aspect="equal")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.4)
-    return svg(fig, "nyquist")
+    return loop_plane.nyquist(fig, ax, _disks(t))
 
 
 def nichols(t: LoopIdentification) -> str:
@@ -171,17 +157,7 @@ def nichols(t: LoopIdentification) -> str:
         if size.size:
             turn = turn - 360.0 * np.ceil(turn[int(np.argmin(np.abs(size)))] / 360.0)
         ax.plot(turn, size, **style)
-    if (ring := _disk_of(t)) is not None:
-        x, y = np.degrees(np.unwrap(np.angle(-ring))) - 180.0, decibel(np.abs(ring))
-        x = x - 360.0 * np.round((np.mean(x) + 180.0) / 360.0)
-        ax.fill(x, y, color=SHADE, zorder=0)
-        ax.plot(x, y, "--", color=GREEN, linewidth=1.0, label="disk margin")
-    ax.plot([-180.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=5)
-    zero_line(ax)
-    ax.set(xlabel=axis_label("phase of L", "°"), ylabel=axis_label("|L|", "dB"), ylim=(-40.0, 40.0), xlim=(-360.0, 0.0))
-    ax.set_xticks([-360, -270, -180, -90, 0])
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.4)
-    return svg(fig, "nichols")
+    return loop_plane.nichols(fig, ax, _disks(t))
 
 
 def distortion(t: LoopIdentification) -> str:

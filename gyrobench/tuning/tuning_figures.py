@@ -9,7 +9,8 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, SHADE, VERMILION, WIDE, axis_label, figure, svg, zero_line
+from gyrobench.report import loop_plane
+from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, figure, svg, zero_line
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.tuned_loop import LoopTuning
@@ -19,12 +20,6 @@ SPAN = 40.0  # figures over frequency show so much about the crossover
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
 OTHER: dict[str, Any] = {"color": MUTED, "linewidth": 0.5, "alpha": 0.6, "zorder": 2}
 DOTS: dict[str, Any] = {"color": VERMILION, "marker": "o", "linestyle": "", "markersize": 3.2, "zorder": 4}
-
-
-def disk(margin: float) -> Complex:
-    """Return the circle in the plane of L on which |S - 1/2| = 1/margin; L must stay outside."""
-    far, near = -(2.0 + margin) / (2.0 - margin), -(2.0 - margin) / (2.0 + margin)
-    return np.asarray(0.5 * (far + near) + 0.5 * (near - far) * np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361)))
 
 
 def margin_disks(t: LoopTuning) -> list[tuple[str, float, str]]:
@@ -50,24 +45,20 @@ def _inside(t: LoopTuning) -> Array:
     return np.asarray((t.f >= low) & (t.f <= high))
 
 
+def _named(t: LoopTuning) -> list[loop_plane.Disk]:
+    return [(f"disk, {name}", margin, colour) for name, margin, colour in margin_disks(t)]
+
+
 def nyquist(t: LoopTuning) -> str:
     """Return L near the critical point, with the disks that it must not enter."""
     fig, axes = figure(HALF, 78)
     ax = axes[0, 0]
     for k, L in reversed(list(enumerate(t.loops))):
         ax.plot(L.real, L.imag, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
-    for name, margin, colour in margin_disks(t):
-        ring = disk(margin)
-        ax.fill(ring.real, ring.imag, color=SHADE, zorder=0)
-        ax.plot(ring.real, ring.imag, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
     if t.proofs and t.proofs[0].points:
         measured = np.array([p.value for p in t.proofs[0].points])
         ax.plot(measured.real, measured.imag, **DOTS, label="co-simulation")
-    ax.plot([-1.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=5)
-    zero_line(ax)
-    ax.set(xlim=(-3.2, 1.2), ylim=(-2.4, 2.4), xlabel="Re L", ylabel="Im L", aspect="equal")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
-    return svg(fig, "nyquist")
+    return loop_plane.nyquist(fig, ax, _named(t))
 
 
 def nichols(t: LoopTuning) -> str:
@@ -78,11 +69,6 @@ def nichols(t: LoopTuning) -> str:
     for k, L in reversed(list(enumerate(t.loops))):
         size, turn = _polar(L[pick], t.f[pick])
         ax.plot(turn, size, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
-    for name, margin, colour in margin_disks(t):
-        ring = disk(margin)
-        x, y = np.degrees(np.unwrap(np.angle(-ring))) - 180.0, 20.0 * np.log10(np.abs(ring))
-        ax.fill(x, y, color=SHADE, zorder=0)
-        ax.plot(x, y, "--", color=colour, linewidth=1.0, label=f"disk, {name}")
     if t.proofs and t.proofs[0].points:
         points = t.proofs[0].points
         size, turn = _polar(np.array([p.value for p in points]), np.array([p.f for p in points]))
@@ -90,12 +76,7 @@ def nichols(t: LoopTuning) -> str:
         there = np.interp([p.f for p in points], t.f, nominal)
         turn = turn + 360.0 * np.round((there - turn) / 360.0)
         ax.plot(turn, size, **DOTS, label="co-simulation")
-    ax.plot([-180.0], [0.0], "+", color="black", markersize=7, markeredgewidth=1.2, zorder=5)
-    zero_line(ax)
-    ax.set(xlabel=axis_label("phase of L", "°"), ylabel=axis_label("|L|", "dB"), ylim=(-40.0, 40.0), xlim=(-360.0, 0.0))
-    ax.set_xticks([-360, -270, -180, -90, 0])
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
-    return svg(fig, "nichols")
+    return loop_plane.nichols(fig, ax, _named(t))
 
 
 def _polar(L: Complex, f: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gyrobench as gb
-from gyrobench.tuning.tuning_figures import disk
+from gyrobench.report.loop_plane import disk
 from gyrobench.tuning.tuning_page import minus, page
 
 
