@@ -48,7 +48,7 @@ class Completed:
 
     wild: indices.  missing: samples that were not there.  white (n,): the stretch with an even spectrum, of unit
     variance, NaN where a sample is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
-    stays: whether the spectrum came to an end, and most of it, in every octave, is of the samples that are there.
+    stays: whether the spectrum of the completion came to an end.
     """
 
     x: Array
@@ -254,8 +254,6 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
             noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
             found += fft.dct(noise, norm="ortho") ** 2 / draws
         lost = lost + (found - lost) / (last + 1.0) if last > 0 else found
-    if noise is not None:
-        stays = stays and bool(np.all(octaves(lost) < MOST_LOST * octaves(fft.dct(y, norm="ortho") ** 2 + lost)))
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
@@ -265,6 +263,13 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     return Completed(
         y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise, stays
     )
+
+
+def mostly_known(x: Array, extra: Array | None) -> bool:
+    """Return whether most of the power in every octave is that of x (n,), not of what the completion lacks."""
+    if extra is None:
+        return True
+    return bool(np.all(octaves(extra) < MOST_LOST * octaves(fft.dct(x, norm="ortho") ** 2 + extra)))
 
 
 def changed(now: Array, before: Array) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.gap_completion import Completed, complete
+from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
 from gyrobench.reduction.noise_model.steps import LevelStep, without
 from gyrobench.reduction.series.checks import SeriesError
@@ -83,8 +83,11 @@ class Treated:
 
     @property
     def settled(self) -> bool:
-        """Return whether what was completed came to an end, in all stretches."""
-        return all(s.done.stays for s in self.stretches)
+        """Return whether what was completed came to an end, and is the lesser part without the steps, in all stretches.
+
+        A step has power at low frequencies, beside which little is lost.
+        """
+        return all(s.done.stays and mostly_known(s.clean, s.done.extra) for s in self.stretches)
 
     @property
     def steps(self) -> list[LevelStep]:
