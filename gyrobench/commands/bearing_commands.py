@@ -44,5 +44,7 @@ def bearing(
     found = design_bearing(parse_settings(values), stiffness, load)
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
     if out is not None:
-        for path in found.write(out).values():
+        from gyrobench.design.bearing_page import write_bearing
+
+        for path in write_bearing(found, out).values():
             echo(display_path(path), err=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import UsageError, suggest_names
@@ -32,7 +31,7 @@ FULL = 0.9  # eccentricity up to which a load is carried: beyond, the surfaces' 
 
 @dataclass(frozen=True)
 class BearingDesign:
-    """A bearing with its load; ``print`` shows it as a text, :meth:`write` makes the page.  SI."""
+    """A bearing with its load; ``print`` shows it as a text.  SI."""
 
     bearing: AerostaticBearing
     load: float  # N, radial; 0: none
@@ -69,16 +68,6 @@ class BearingDesign:
         lines = ["# aerostatic bearing, designed; thrust faces and vortex torque as the part has them", "[bearing]"]
         lines += [f'{n} = "{getattr(self.bearing, f):.9g}{UNITS[f]}"' for n, f in OF_PART.items()]
         return "\n".join([*lines, f"air_eccentricity = {self.eccentricity:.9g}"]) + "\n"
-
-    def write(self, folder: str | Path) -> dict[str, Path]:
-        """Write bearing.json, bearing.html, bearing.pdf and bearing.toml; return the path of each."""
-        from gyrobench.design.bearing_page import write_bearing
-        from gyrobench.files import write_whole
-
-        written = write_bearing(self, Path(folder))
-        values = Path(folder) / "bearing.toml"
-        write_whole(values, self.toml().encode())
-        return {**written, "toml": values}
 
     def __str__(self) -> str:
         return "\n".join([f"{n}  {v}" for n, v in rows(self)] + [f"warning: {w}" for w in self.bearing.warnings()])

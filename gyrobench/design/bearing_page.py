@@ -14,6 +14,7 @@ import numpy as np
 from gyrobench.bench import Bench
 from gyrobench.design.aerostatic import flow_function
 from gyrobench.design.bearing_design import FULL, UNITS, BearingDesign, rows
+from gyrobench.files import write_whole
 from gyrobench.report import FORMATS
 from gyrobench.report.page_model import (
     BulletList,
@@ -43,8 +44,11 @@ LEFT = 0.1  # end of the axis of the restriction
 
 
 def write_bearing(design: BearingDesign, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
-    """Write bearing.json, bearing.html, bearing.pdf; as :func:`gyrobench.report.report_files.write`."""
-    return write_files(design.as_dict(), lambda: page(design), folder, formats, NAMES, Bench.find().folder)
+    """Write bearing.json, bearing.html, bearing.pdf and bearing.toml; return the path of each."""
+    written = write_files(design.as_dict(), lambda: page(design), folder, formats, NAMES, Bench.find().folder)
+    values = folder / "bearing.toml"
+    write_whole(values, design.toml().encode())
+    return {**written, "toml": values}
 
 
 def page(d: BearingDesign) -> Page:

@@ -40,7 +40,7 @@ FLOATED: dict[str, tuple[str, str]] = {
     "angular_momentum": ("N.m.s", "H"),
     "float_inertia": ("kg.m2", "J"),
     "float_damping": ("N.m.s/rad", "C"),
-    "torquer_scale_factor": ("rad/s/A", "k"),
+    "torquer": ("rad/s/A", "k"),
     "pickoff_gain": ("V/rad", "K_sg"),
     "turn_on": ("rad/s", "turn_on"),
     "random_drift": ("rad/s", "markov"),

@@ -13,6 +13,7 @@ import pytest
 from gyrobench.bench import UsageError, standard_folder
 from gyrobench.design.aerostatic import AerostaticBearing, BearingError
 from gyrobench.design.bearing_design import BearingDesign, design_bearing
+from gyrobench.design.bearing_page import write_bearing
 from gyrobench.packaging import load_part
 from gyrobench.units import parse_quantity
 
@@ -53,7 +54,7 @@ def test_the_part_takes_the_values(designed: BearingDesign) -> None:
 
 
 def test_page(designed: BearingDesign, tmp_path: Path) -> None:
-    written = designed.write(tmp_path)
+    written = write_bearing(designed, tmp_path)
     assert {p.name for p in written.values()} == {"bearing.json", "bearing.html", "bearing.pdf", "bearing.toml"}
     assert json.loads(written["json"].read_text())["stiffness"] == pytest.approx(1e9, rel=1e-6)
     html = written["html"].read_text(encoding="utf-8")
