@@ -14,7 +14,7 @@ import numpy as np
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DPH, Account, Gate, LoopReduction, Table, drift, over_time
 from gyrobench.units import display
 
-from .closed import SourceOfDrift, MovingPlace, budget, led
+from .closed import MovingPlace, SourceOfDrift, budget, led
 
 #: what measures about x, y, z of the platform: the gyro, the row of its mount, its channel
 ROWS = (("gyro_b", 1, "y"), ("gyro_a", 0, "x"), ("gyro_a", 1, "y"))
