@@ -41,6 +41,7 @@ BARELY = math.log(2.0)  # above the variance that a record just shows: what is b
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
 STEPS = 5
 TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
+DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no model of the record
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -218,6 +219,7 @@ class _Judge:
                 return f
         for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
             order = np.argsort(-cloud.log)[:TRIED]
+            order = order[cloud.log[order] > np.max(cloud.log) - DEEP]
             for p, variance in zip(cloud.p[order], allan(cloud.model, cloud.p[order], tau, self.means), strict=True):
                 share = self.share(variance)
                 if share > max(t[0] for t in tried):
