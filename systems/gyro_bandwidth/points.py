@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.loop_measures import gates, phasor
-from gyrobench.reduction.loops.response_errors import line_ratio
+from gyrobench.reduction.loops.loop_measures import gates
+from gyrobench.reduction.loops.response_errors import line_ratios
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = 8  # frequencies
@@ -22,7 +24,7 @@ class Points:
     """Frequencies (n,), Hz; gyro over table; relative u; amplitude of the table, rad/s; whether u is known."""
 
     f: Array
-    value: np.ndarray[tuple[int], np.dtype[np.complex128]]
+    value: NDArray[Any]
     u: Array
     table: Array
     known: bool = True
@@ -54,9 +56,7 @@ def _of_rows(record: Record) -> Points:
 
 
 def _of_phases(record: Record) -> Points:
-    rows = [
-        (g.f, *line_ratio(g, TABLE, GYRO), abs(phasor(g.t, g[TABLE], g.f))) for g in gates(record) if g.kind == "motion"
-    ]
-    over = tuple(g.f for g in gates(record) if g.kind == "motion" and np.any(g["gyro.saturated"] > 0.5))
-    f, value, u, table = (np.array(column) for column in zip(*rows, strict=True))
-    return Points(f, value, u, table, True, over)
+    shaken = [g for g in gates(record) if g.kind == "motion"]
+    over = tuple(g.f for g in shaken if np.any(g["gyro.saturated"] > 0.5))
+    r = line_ratios(shaken, TABLE, GYRO)
+    return Points(r.f, r.value, r.u, r.x, True, over)

@@ -25,9 +25,9 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 LIMIT = 40.0  # of a logarithm
 FAR = 30.0  # times the highest frequency: a frequency of the rotor against its bearings beyond it is not seen
 RATIOS = (0.95, 0.6)  # of tau_0 to tau, first guesses
-GOOD = 1.0  # chi2/2 over degrees of freedom below which no other start is tried
 CORNERS = (1.2, 2.5, 6.0)  # of the rotor's frequency to the highest, first guesses
 ROOT = math.sqrt(0.5)
+SURE = 0.1  # relative u of tau_0 and f_0 beyond which what elasticity gives is not normally distributed
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def response(p: Array, f: Array, output: bool) -> Complex:
 
 
 @dataclass(frozen=True)
-class Fit:
+class AngleFit:
     """A fitted curve: p and its covariance, chi2, degrees of freedom, criterion."""
 
     p: Array
@@ -78,7 +78,7 @@ class Fit:
         return out
 
 
-def fitted(r: AngleResponse, elastic: bool, near: Fit | None = None) -> Fit | None:
+def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> AngleFit | None:
     """Return the curve of stiff or elastic bearings; None where it does not converge or is not determined.
 
     near: a curve of that form close by, the only first guess then.
@@ -98,8 +98,6 @@ def fitted(r: AngleResponse, elastic: bool, near: Fit | None = None) -> Fit | No
         found = optimize.least_squares(residual, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=100)
         if best is None or found.cost < best.cost:
             best = found
-        if best.cost < GOOD * dof:
-            break
     assert best is not None
     if elastic and best.x[3] < -2.0 * math.log(2.0 * math.pi * FAR * float(r.f[-1])):
         return None
@@ -108,7 +106,7 @@ def fitted(r: AngleResponse, elastic: bool, near: Fit | None = None) -> Fit | No
         return None
     cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) / np.outer(scale, scale)
     chi2 = 2.0 * float(best.cost)
-    return Fit(best.x, cov, chi2, dof, chi2 + free * math.log(2 * r.f.size))
+    return AngleFit(best.x, cov, chi2, dof, chi2 + free * math.log(2 * r.f.size))
 
 
 def _starts(r: AngleResponse, elastic: bool) -> list[Array]:
@@ -160,15 +158,20 @@ def crossing(gain: Callable[[Array], Array], highest: float) -> float:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """Figures (7,) as read_off gives them, their u, the curve, and that of the other form where it can be fitted."""
+class DynamicFigures:
+    """Figures (7,) as read_off gives them, their u, the curve that they are of."""
 
     value: Array
     u: Array
-    fit: Fit
+    fit: AngleFit
+
+    @property
+    def determined(self) -> bool:
+        """Whether what only the elasticity gives (tau_0, f_0, stiffnesses) has a value."""
+        return bool(np.all(self.u[2:4] < SURE * self.value[2:4]))
 
 
-def figures(r: AngleResponse, H: float) -> Figures | None:
+def figures(r: AngleResponse, H: float) -> DynamicFigures | None:
     """Return the figures of a response; None where no curve fits."""
     stiff, elastic = (fitted(r, form) for form in (False, True))
     known = [fit for fit in (stiff, elastic) if fit is not None]
@@ -182,16 +185,16 @@ def figures(r: AngleResponse, H: float) -> Figures | None:
         wider = _variances(elastic, highest, H, r.output)
         beyond = (other - value) ** 2 - np.maximum(wider - variance, 0.0)
         variance = variance + np.maximum(np.nan_to_num(beyond), 0.0)
-    return Figures(value, np.sqrt(variance), fit)
+    return DynamicFigures(value, np.sqrt(variance), fit)
 
 
-def values_near(r: AngleResponse, H: float, fit: Fit) -> Array:
+def values_near(r: AngleResponse, H: float, fit: AngleFit) -> Array:
     """Return the figures (7,) of a response close to one with this fit, by the same form; its own where it fails."""
     again = fitted(r, fit.elastic, fit) or fit
     return read_off(again.p, float(r.f[-1]), H, r.output)
 
 
-def _variances(fit: Fit, highest: float, H: float, output: bool) -> Array:
+def _variances(fit: AngleFit, highest: float, H: float, output: bool) -> Array:
     columns = []
     for k in range(fit.p.size):
         step = np.zeros(fit.p.size)

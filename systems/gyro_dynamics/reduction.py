@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCMIN,
@@ -33,7 +34,7 @@ from gyrobench.reduction.loops.response_errors import (
 from gyrobench.reduction.setup.sources import STATED, TIME_BASE, Source
 
 from .mistakes import mistakes
-from .model import AngleResponse, Figures, figures, response, values_near
+from .model import AngleResponse, DynamicFigures, figures, response, values_near
 from .points import points_of
 from .steps import StepFigures, figures_of
 from .truth import true_values
@@ -57,6 +58,8 @@ SMALL = 1e-4  # of an error, by which sensitivities are taken
 LAG = 1e-6  # s, the same
 UNSEEN = "not seen up to {f:.4g} Hz: the bearings are stiff, or higher frequencies are needed"
 NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
+UNSURE = "the elasticity is seen, but leaves this open by more than a tenth"
+ELASTIC = ("tau_0", "f_0", "K_I", "K_O")
 NO_SPIN = "the angular momentum H is not given"
 APART = 0.001  # probability below which sines and steps differ
 
@@ -74,7 +77,7 @@ class Reduction(MeasureReduction):
         if not self.K_sg > 0.0:
             raise ReductionError("the pickoff gain is not known: give --set K_sg=10V/rad")
         points = self.points = points_of(self.record, self.K_sg, self.output)
-        self.figures: Figures | None = None
+        self.figures: DynamicFigures | None = None
         self.steps: StepFigures | None = figures_of(points.turns)
         reasons = []
         if points.response is not None:
@@ -125,14 +128,17 @@ class Reduction(MeasureReduction):
         for k, (name, meaning, unit, scale) in enumerate(FIGURES):
             if self.output and name in ("f_3dB", "K_I", "K_O"):
                 continue
-            if not math.isfinite(found.value[k]):
+            if not math.isfinite(found.value[k]) or (name in ELASTIC and not found.determined):
                 self.found.measure(name, meaning, unit, None, no_value=self._why(name, highest))
                 continue
             own = float(found.u[k])
             u = math.hypot(own, *(s.share(k) for s in by))
             true = float(truth[k]) if truth is not None and math.isfinite(truth[k]) else None
             said = OUTPUT_GAIN if self.output and name == "g" else meaning
-            self.found.measure(name, said, unit, float(found.value[k]), u, scale=scale, truth=true)
+            value, spread = float(found.value[k]), None
+            if name in ELASTIC:  # fitted by their logarithms
+                spread = (value / scale * math.exp(-NORMAL * u / value), value / scale * math.exp(NORMAL * u / value))
+            self.found.measure(name, said, unit, value, u, scale=scale, truth=true, interval=spread)
             self.found.coefficients[-1] = replace(self.found.coefficients[-1], u_a=own / scale)
             self.found.budget += [s.line(name, unit, scale, k) for s in by if s.u > 0.0]
             shown.append((k, name, unit, scale, own))
@@ -144,13 +150,15 @@ class Reduction(MeasureReduction):
         elastic = self.figures is not None and self.figures.fit.elastic
         if name == "f_3dB":
             return NOT_REACHED.format(f=highest)
+        if elastic and self.figures is not None and not self.figures.determined:
+            return UNSURE
         return NO_SPIN if elastic and name in ("K_I", "K_O") else UNSEEN.format(f=highest)
 
     def _u(self, source: Source) -> float:
         u = float(self.run.options.get(source.option, 0.0) or 0.0)
         return math.sqrt(2.0) * u * u if source is COSINE else u
 
-    def _sensitivities(self, r: AngleResponse, found: Figures) -> list[Sensitivity]:
+    def _sensitivities(self, r: AngleResponse, found: DynamicFigures) -> list[Sensitivity]:
         w = 2.0 * np.pi * r.f
         moved = [
             (READING_GAIN, SMALL, r.moved(-SMALL), self.H),
@@ -166,7 +174,7 @@ class Reduction(MeasureReduction):
             for source, size, again, H in moved
         ]
 
-    def _figure(self, r: AngleResponse, found: Figures) -> None:
+    def _figure(self, r: AngleResponse, found: DynamicFigures) -> None:
         span = np.geomspace(r.f[0], r.f[-1], 200)
         order = "third" if found.fit.elastic else "first"
         lines = [curve(f"{order} order", span, response(found.fit.p, span, r.output))]

@@ -22,7 +22,7 @@ TAIL = 0.5  # of a rest after a turn: left to the float
 
 
 @dataclass(frozen=True)
-class Turn:
+class TableTurn:
     """A turn of the table with its rests: t (s), theta, b (rad), begin and end of the turn (s)."""
 
     t: Array
@@ -73,7 +73,7 @@ class StepFigures:
         return self.shortest_tail < 10.0 * abs(self.tau)
 
 
-def figures_of(turns: list[Turn]) -> StepFigures | None:
+def figures_of(turns: list[TableTurn]) -> StepFigures | None:
     """Return the figures of turns; None of fewer than three."""
     pairs = [p for p in (turn.gain_and_lag() for turn in turns) if p is not None]
     if len(pairs) < LEAST:
@@ -86,7 +86,7 @@ def figures_of(turns: list[Turn]) -> StepFigures | None:
     )  # fmt: skip
 
 
-def turns_of(t: Array, theta: Array, b: Array) -> list[Turn]:
+def turns_of(t: Array, theta: Array, b: Array) -> list[TableTurn]:
     """Return the turns of a record over time, each with the second half of the rest before and the rest after it."""
     rate = np.abs(np.gradient(theta, t))
     moving = np.concatenate([[False], rate > STILL * float(rate.max()), [False]])
@@ -100,5 +100,5 @@ def turns_of(t: Array, theta: Array, b: Array) -> list[Turn]:
         if a - start < 4 or last - z < 8:
             continue
         inside = slice(start, last)
-        found.append(Turn(t[inside], theta[inside], b[inside], float(t[a]), float(t[min(z, t.size - 1)])))
+        found.append(TableTurn(t[inside], theta[inside], b[inside], float(t[a]), float(t[min(z, t.size - 1)])))
     return found

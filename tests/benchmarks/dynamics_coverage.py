@@ -53,6 +53,7 @@ def main() -> int:
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
     hits: dict[str, list[bool]] = {}
+    z: dict[str, list[float]] = {}
     for k, part in enumerate(PARTS):
         with Session(NAME, {"gyro": part}) as session:
             for run in range(given.runs // len(PARTS)):
@@ -63,12 +64,13 @@ def main() -> int:
                     if c.truth is not None and not c.no_value:
                         name = f"{c.name} ({values['axis']})"
                         hits.setdefault(name, []).append(c.interval[0] <= c.truth <= c.interval[1])
+                        z.setdefault(name, []).append(c.z or 0.0)
     bad = 0
     for name, held in sorted(hits.items()):
         k, n = sum(held), len(held)
         low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
         bad += not low <= 0.95 <= high
-        print(f"{name:<18}{k / n:.3f} of {n} ({low:.3f} to {high:.3f})")
+        print(f"{name:<18}{k / n:.3f} of {n} ({low:.3f} to {high:.3f}), rms z {np.std(z[name]):.2f}")
     return int(bad > 0)
 
 

@@ -116,7 +116,7 @@ def test_the_area_is_the_time_constant_whatever_the_turn() -> None:
         t = np.arange(0.0, 0.4, 2e-5)
         theta = 3e-4 * law(np.clip((t - 0.15) / 0.02, 0.0, 1.0))
         b = signal.lsim(([g], D), theta, t)[1] + 1e-6 + 2e-6 * t
-        gain, tau = STEPS.Turn(t, theta, b, 0.15, 0.17).gain_and_lag()
+        gain, tau = STEPS.TableTurn(t, theta, b, 0.15, 0.17).gain_and_lag()
         assert (gain, tau) == pytest.approx((g, tau_0 + more), rel=2e-6)
 
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import units
@@ -20,6 +22,7 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor, response
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Table
 
 READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
@@ -27,19 +30,45 @@ READING_LAG = Source("table.reading.lag", "lag of the reading of the table rate"
 COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
 ROUNDING = 1e-6  # least relative uncertainty of a point
 LINES = 12  # numbers from which neighbour_noise estimates
+BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
+ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
 
 
-def line_ratio(gate: Gate, x: str, y: str) -> tuple[complex, float]:
-    """Return channel y over x at the frequency of a gate, and its relative uncertainty by the lines beside it."""
-    t, a, b = gate.t, gate[x], gate[y]
-    point = response(t, a, b, gate.f)
-    noise = [neighbour_noise(t, signal, gate.f) for signal in (b, a)]
-    if any(n is None for n in noise):
-        return point.value, max(point.u or 0.0, ROUNDING)
+@dataclass(frozen=True)
+class LineRatios:
+    """Frequencies (n,), Hz; ratios of two channels, complex; their relative standard uncertainties; amplitudes of x."""
+
+    f: Array
+    value: NDArray[Any]
+    u: Array
+    x: Array
+
+
+def line_ratios(gates: Sequence[Gate], x: str, y: str) -> LineRatios:
+    """Return channel y over channel x at the frequencies of gates, with the noise beside their lines.
+
+    The noise of a channel over frequency is smooth: a polynomial through the logarithms of what each gate shows of it,
+    of 12 numbers, has many more.  Weights from 12 numbers each would make u a fifth too small.
+    """
+    f = np.array([g.f for g in gates])
+    time = np.array([g.t[-1] - g.t[0] for g in gates])
+    sizes = np.array([[abs(phasor(g.t, g[c], g.f)) for c in (x, y)] for g in gates])
+    value = np.array([response(g.t, g[x], g[y], g.f).value for g in gates])
+    noise = np.array([[_noise(g, c) for c in (x, y)] for g in gates])
     few = float(special.stdtrit(LINES, 0.975)) / NORMAL  # many points together: no allowance for few numbers
-    sizes = [abs(phasor(t, signal, gate.f)) for signal in (b, a)]
-    u = math.hypot(*(float(n or 0.0) / few / size for n, size in zip(noise, sizes, strict=True)))
-    return point.value, max(u, ROUNDING)
+    shown = np.maximum(noise / few, 1e-3 * ROUNDING * sizes) * np.sqrt(time)[:, None]
+    at = np.log(f / f.mean())
+    degree = min(BEND, max(0, f.size // 3 - 1))
+    smooth = np.column_stack([np.exp(np.polyval(np.polyfit(at, c, degree), at)) for c in np.log(shown).T])
+    u = np.linalg.norm(ROOT_POWER * smooth / np.sqrt(time)[:, None] / sizes, axis=1)
+    return LineRatios(f, value, np.maximum(u, ROUNDING), sizes[:, 0])
+
+
+def _noise(gate: Gate, channel: str) -> float:
+    found = neighbour_noise(gate.t, gate[channel], gate.f)
+    if found is None:
+        raise ReductionError(f"{gate.f:g} Hz: too few periods to see the noise beside the line")
+    return found
 
 
 @dataclass(frozen=True)
