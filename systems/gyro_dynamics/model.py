@@ -23,9 +23,6 @@ from gyrobench.arrays import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 LIMIT = 40.0  # of a logarithm
-FAR = 30.0  # times the highest frequency: a frequency of the rotor against its bearings beyond it is not seen
-RATIOS = (0.95, 0.6)  # of tau_0 to tau, first guesses
-CORNERS = (1.2, 2.5, 6.0)  # of the rotor's frequency to the highest, first guesses
 ROOT = math.sqrt(0.5)
 SURE = 0.1  # relative u of tau_0 and f_0 beyond which what elasticity gives is not normally distributed
 
@@ -49,12 +46,12 @@ class AngleResponse:
 
 
 def response(p: Array, f: Array, output: bool) -> Complex:
-    """Return float over case at f (Hz); p: ln g, ln tau_0 (s), and of elastic bearings ln(tau - tau_0), ln(a2)."""
+    """Return float over case at f (Hz); p: ln g, ln tau (s), and of elastic bearings a2 (s2), a3 = a2 tau_0 (s3)."""
     s = 2j * np.pi * f
-    q = np.exp(np.clip(p, -LIMIT, LIMIT))
-    tau, a2 = (q[1] + q[2], q[3]) if p.size == 4 else (q[1], 0.0)
-    D = 1.0 + s * (tau + s * a2 * (1.0 + s * q[1]))
-    found: Complex = -q[0] * s * (tau + s * s * a2 * q[1]) / D if output else q[0] / D
+    g, tau = np.exp(np.clip(p[:2], -LIMIT, LIMIT))
+    a2, a3 = p[2:] if p.size == 4 else (0.0, 0.0)
+    D = 1.0 + s * (tau + s * (a2 + s * a3))
+    found: Complex = -g * s * (tau + s * s * a3) / D if output else g / D
     return found
 
 
@@ -78,53 +75,39 @@ class AngleFit:
         return out
 
 
-def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> AngleFit | None:
-    """Return the curve of stiff or elastic bearings; None where it does not converge or is not determined.
-
-    near: a curve of that form close by, the only first guess then.
-    """
+def fitted(r: AngleResponse, elastic: bool) -> AngleFit | None:
+    """Return the curve of stiff or elastic bearings; None where it does not converge or is not determined."""
     free = 4 if elastic else 2
     dof = 2 * r.f.size - free
     if dof < 3:
         return None
+    top = 2.0 * math.pi * float(r.f[-1])
+    units = np.array([1.0, 1.0, top**-2, top**-3])[:free]
 
     def residual(p: Array) -> Array:
-        ratio = np.log(response(p, r.f, r.output) / r.value) / r.u
+        ratio = np.log(response(units * p, r.f, r.output) / r.value) / r.u
         out: Array = np.concatenate([ratio.real, ratio.imag])
         return out
 
-    best = None
-    for start in [near.p] if near else _starts(r, elastic):
-        found = optimize.least_squares(residual, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=100)
-        if best is None or found.cost < best.cost:
-            best = found
-    assert best is not None
-    if elastic and best.x[3] < -2.0 * math.log(2.0 * math.pi * FAR * float(r.f[-1])):
-        return None
+    start = np.append(_start(r), [0.0] * (free - 2))
+    best = optimize.least_squares(residual, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200)
     scale = np.linalg.norm(best.jac, axis=0)
     if not np.all(scale > 0.0) or np.linalg.cond(best.jac / scale) > 1e7:
         return None
-    cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) / np.outer(scale, scale)
+    units = units / scale
+    cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) * np.outer(units, units)
     chi2 = 2.0 * float(best.cost)
-    return AngleFit(best.x, cov, chi2, dof, chi2 + free * math.log(2 * r.f.size))
+    return AngleFit(best.x * scale * units, cov, chi2, dof, chi2 + free * math.log(2 * r.f.size))
 
 
-def _starts(r: AngleResponse, elastic: bool) -> list[Array]:
-    """Return first guesses: tau where the phase of 1/(1 + tau s) is -45 degrees, or beyond the points."""
+def _start(r: AngleResponse) -> Array:
+    """Return a first guess of ln g, ln tau: where the phase of 1/(1 + tau s) is -45 degrees, or nearest to it."""
     late = np.abs(np.angle(r.value * (1j if r.output else 1.0)))  # -tau s/(1 + tau s) begins at -90 degrees
     k = int(np.argmin(np.abs(late - 0.25 * math.pi)))
     tau = math.tan(min(max(float(late[k]), 1e-3), 1.5)) / (2.0 * math.pi * float(r.f[k]))
     w = 2.0 * math.pi * r.f
     size = np.abs(r.value) / (w * tau if r.output else 1.0) * np.sqrt(1.0 + (w * tau) ** 2)
-    low = [math.log(float(np.median(size[: max(3, size.size // 3)]))), math.log(tau)]
-    if not elastic:
-        return [np.array(low)]
-    top = 2.0 * math.pi * float(r.f[-1])
-    return [
-        np.array([low[0], low[1] + math.log(part), low[1] + math.log(1.0 - part), -2.0 * math.log(corner * top)])
-        for part in RATIOS
-        for corner in CORNERS
-    ]
+    return np.array([math.log(float(np.median(size[: max(3, size.size // 3)]))), math.log(tau)])
 
 
 # ------------------------------------------------------------------------------------------------ figures
@@ -133,16 +116,16 @@ Values = Callable[[Array], Array]  # p -> figures
 
 def read_off(p: Array, highest: float, H: float, output: bool) -> Array:
     """Return g, tau, tau_0 (s), f_0, f_3dB (Hz), K_I, K_O (N.m/rad); NaN where the curve or H leaves none."""
-    q = np.exp(np.clip(p, -LIMIT, LIMIT))
     out = np.full(7, math.nan)
-    out[0], out[1] = q[0], q[1]
-    if p.size == 4:
-        out[1], out[2], out[3] = q[1] + q[2], q[1], 1.0 / (2.0 * math.pi * math.sqrt(q[3]))
-        if H > 0.0 and not output:
-            out[5] = H * q[0] / q[2]
-            out[6] = H * H / (q[3] * out[5])
+    g, tau = out[:2] = np.exp(np.clip(p[:2], -LIMIT, LIMIT))
+    if p.size == 4 and p[2] > 0.0:
+        a2, tau_0 = float(p[2]), float(p[3] / p[2])
+        out[2], out[3] = tau_0, 1.0 / (2.0 * math.pi * math.sqrt(a2))
+        if H > 0.0 and not output and tau_0 < tau:
+            out[5] = H * g / (tau - tau_0)
+            out[6] = H * H / (a2 * out[5])
     if not output:
-        out[4] = crossing(lambda f: np.abs(response(p, f, False)) / q[0], highest)
+        out[4] = crossing(lambda f: np.abs(response(p, f, False)) / g, highest)
     return out
 
 
@@ -167,7 +150,7 @@ class DynamicFigures:
 
     @property
     def determined(self) -> bool:
-        """Whether what only the elasticity gives (tau_0, f_0, stiffnesses) has a value."""
+        """Whether what only the elasticity gives (tau_0, f_0, stiffnesses) has a value; False of NaN."""
         return bool(np.all(self.u[2:4] < SURE * self.value[2:4]))
 
 
@@ -190,17 +173,18 @@ def figures(r: AngleResponse, H: float) -> DynamicFigures | None:
 
 def values_near(r: AngleResponse, H: float, fit: AngleFit) -> Array:
     """Return the figures (7,) of a response close to one with this fit, by the same form; its own where it fails."""
-    again = fitted(r, fit.elastic, fit) or fit
+    again = fitted(r, fit.elastic) or fit
     return read_off(again.p, float(r.f[-1]), H, r.output)
 
 
 def _variances(fit: AngleFit, highest: float, H: float, output: bool) -> Array:
     columns = []
+    size = np.sqrt(np.diag(fit.cov))
     for k in range(fit.p.size):
         step = np.zeros(fit.p.size)
-        step[k] = 1e-5
+        step[k] = 1e-2 * size[k]
         up, down = (read_off(fit.p + sign * step, highest, H, output) for sign in (1.0, -1.0))
-        columns.append((up - down) / 2e-5)
+        columns.append((up - down) / (2.0 * step[k]))
     J = np.column_stack(columns)
     out: Array = np.einsum("ij,jk,ik->i", J, fit.widened(), J)
     return out

@@ -128,7 +128,7 @@ class Reduction(MeasureReduction):
         for k, (name, meaning, unit, scale) in enumerate(FIGURES):
             if self.output and name in ("f_3dB", "K_I", "K_O"):
                 continue
-            if not math.isfinite(found.value[k]) or (name in ELASTIC and not found.determined):
+            if not math.isfinite(found.value[k]) or (name in ELASTIC and found.fit.elastic and not found.determined):
                 self.found.measure(name, meaning, unit, None, no_value=self._why(name, highest))
                 continue
             own = float(found.u[k])

@@ -23,10 +23,11 @@ def true_values(run: RunDocument, highest: float, output: bool) -> Array | None:
     if not np.array_equal(np.reshape(p.get("mount", np.eye(3)), (3, 3)), np.eye(3)):
         return None
     H, J, C = (float(p[n]) for n in ("H", "J", "C"))
-    rest = []
-    if name == "CompliantGyro":
-        K_I, K_O = float(p["K_I"]), float(p["K_O"])
-        rest = [math.log(H * H / (K_I * C)), math.log(H * H / (K_I * K_O))]
     if not C > 0.0:
         return None
-    return read_off(np.array([0.0 if output else math.log(H / C), math.log(J / C), *rest]), highest, H, output)
+    tau, rest = J / C, []
+    if name == "CompliantGyro":
+        K_I, K_O = float(p["K_I"]), float(p["K_O"])
+        a2 = H * H / (K_I * K_O)
+        tau, rest = J / C + H * H / (K_I * C), [a2, a2 * J / C]
+    return read_off(np.array([0.0 if output else math.log(H / C), math.log(tau), *rest]), highest, H, output)
