@@ -8,7 +8,7 @@ NONE = [0.0, 0.0, 0.0]
 
 
 class AngleIncrements(Component):
-    """What a strapdown unit gives its user: angle increments of three gyros at the output rate.  [TEST-CONING]
+    """Output of a strapdown unit: angle increments of three gyros, at its output rate.  [TEST-CONING]
 
         y'' = wn2 (rate - y) - sqrt(2) wn y',   wn = 2 pi bandwidth         Butterworth, second order; 0 Hz: y = rate
         d_l = y_l h,   a_l = a_(l-1) + d_l,   b_l = b_(l-1) + 1/2 (a_(l-1) + d_(l-1)/6) x d_l

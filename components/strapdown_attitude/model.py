@@ -31,11 +31,11 @@ class StrapdownAttitude(Component):
         phi = dtheta                                                                samples = 1
         phi = first + second + 2/3 first x second                                   samples = 2 (Miller 1983)
         q  <- exp(-Earth rate T) q exp(phi),   T: time since the last update
-        p = q q_reference^-1,   error: rotation vector of p p_0^-1 along the mean axes of the case, p_0: p as the gate opens
+        p  = q q_reference^-1,   error: rotation vector of p p_0^-1 along the mean axes of the case
         drift: change of error over the step, by the step
 
-    While align = 1 the attitude is the reference, then it is the user's own.  The error is that of the last update; it
-    counts from the gate, so that an oscillation of p (a filter is late) leaves nothing after whole periods.
+    While align = 1 the attitude is the reference, then it is the user's own.  The error is that of the last update; p_0
+    is p as the gate opens, so that an oscillation of p (a filter is late) leaves nothing after whole periods.
     Not modelled: velocity and position (sculling), errors of the reference, delay of the computer.
     Source: Miller 1983; Savage 1998; Bortz 1971.
     """

@@ -9,9 +9,9 @@ by w T_u.  N of them are [exp(phi) exp(w T_u e)]^N exp(-N w T_u e): a drift of
 
     (angle of exp(phi) exp(w T_u e) - w T_u)/T_u          about e, exact for every half-angle
 
-and kappa = 1 + drift/c.  For small half-angles and increments that are integrals it is sin(w T)/(w T), for pairs of them
-with 2/3 of their product sin(2 w T)/(2 w T) + 8/3 sin2(w T/2) sin(w T)/(w T).  [TEST-CONING; Bortz 1971, Miller 1983,
-Savage 1998]
+and kappa = 1 + drift/c.  For small half-angles and increments that are integrals it is sin(w T)/(w T), for pairs
+of them with 2/3 of their product sin(2 w T)/(2 w T) + 8/3 sin2(w T/2) sin(w T)/(w T).
+[TEST-CONING; Bortz 1971, Miller 1983, Savage 1998]
 """
 
 from __future__ import annotations

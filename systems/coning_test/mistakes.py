@@ -1,4 +1,4 @@
-"""Mistakes in a coning test: columns exchanged, senses reversed, full angles for half-angles, units; by what they do."""
+"""Mistakes in a coning test: columns exchanged, senses reversed, full for half angles, units; by what they do."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
         if abs(drift[own]) > MORE * abs(rate) + noise:
             text = (
                 f"At {f:g} Hz the attitude drifts by {drift[own] / rate:.3g} of ω (1 − cos θ), more than without any "
-                "coning terms. Are frequency (Hz, not rad/s or rpm), half-angle (not the full angle) and drift in the "
-                "units that are given?"
+                "coning terms. Are frequency (Hz, not rad/s or per minute), half-angle (not the full angle) and drift "
+                "in the units that are given?"
             )
         elif drift[own] / rate > PART and abs(drift[own]) > 2.0 * noise:
             expected = float(setup.chain.drift(f, theta, own)[own]) / rate

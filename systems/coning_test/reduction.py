@@ -147,7 +147,6 @@ class ConingAxis(DriftReduction[ConingSetup]):
     def account(self, found: Findings) -> Account:
         s, a = self.setup, self.axis
         c = s.chain
-        filtered = f"filter of {c.bandwidth:g} Hz" if c.bandwidth else "no filter"
         kind = "rotation vectors" if c.coning else "integrals of the rates"
         return Account(
             method="Cones of known half-angle and frequency; least squares of the drift along each axis under an "
@@ -161,8 +160,8 @@ class ConingAxis(DriftReduction[ConingSetup]):
                 "Drift: rotation of the computed attitude against the true one, along the mean axes of the case.",
                 "A gyro on the axis of a cone reads −ω (1 − cos θ), to which no turn belongs; the coning of the two "
                 "others takes it back.",
-                f"Stated: {filtered}, an increment each {c.interval * 1e3:g} ms, which are {kind}; {c.samples} "
-                "of them an update.",
+                f"Stated: filter of {c.bandwidth:g} Hz (0: none), an increment each {c.interval * 1e3:g} ms, "
+                f"which are {kind}; {c.samples} of them an update.",
             ],
             random="noise of the gyros",
         )
@@ -175,7 +174,7 @@ class Reduction(ChannelTests[ConingSetup]):
     """Drift along three axes from windows with :data:`COLUMNS`, frequency and half_angle."""
 
     names = tuple(AXES)
-    label = "axis {}"
+    label = "{} axis"
     handling = staticmethod(mistakes.candidates)
     channel = ConingAxis
 
@@ -267,7 +266,7 @@ def true_values(run: RunDocument, axis: str) -> dict[str, float] | None:
     matrix = np.reshape(np.asarray(p["imu.gyro_scale"], dtype=float), (3, 3))
     cones = Cones.of({n: np.array([getattr(r, t) for r in run.plan])
                       for n, t in (("frequency", "target"), ("half_angle", "target_y"))})  # fmt: skip
-    found = {}
+    found: dict[str, float] = {}
     for k, (f, theta) in enumerate(cones.cones):
         drift = chain.drift(f, theta, AXES.index(axis), matrix)
         found |= {cones.names(a)[k]: float(d) for a, d in zip(AXES, drift, strict=True)}

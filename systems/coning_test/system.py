@@ -1,4 +1,4 @@
-"""Coning test of a strapdown unit: what its gyros, its output and its user's algorithm make of a motion without turn."""
+"""Coning test of a strapdown unit: what gyros, output and algorithm of its user make of a motion without turn."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.system.configurable import InvalidValueError
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
+from gyrobench.system.values import InvalidValueError
 from gyrobench.units import DEG
 
 from .closed import AXES, Chain
@@ -190,7 +190,8 @@ class ConingTest(System):
         step, interval, window = self.step, self["interval"], self["window"]
         updates = self["samples"] * interval
         for name, long, short, unit in (
-            ("interval", interval, step, f"steps of {step:g} s"), ("window", window, updates, "updates of the attitude"),
+            ("interval", interval, step, f"steps of {step:g} s"),
+            ("window", window, updates, "updates of the attitude"),
         ):  # fmt: skip
             if round(long / short) < 1 or abs(long / short - round(long / short)) > WHOLE * long / short:
                 problems.append(f"{name} = {long:g} s: must be a whole number of {unit}")

@@ -9,6 +9,7 @@ shortened plan and reduces it.  --unstated: the errors of the set-up are simulat
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import sys
 from collections.abc import Callable
@@ -57,6 +58,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--unstated", action="store_true")
     given = parser.parse_args()
+    logging.getLogger("gyrobench").setLevel(logging.ERROR)  # a line for each simulated error
     rng = np.random.default_rng(given.seed)
     hits: dict[str, list[bool]] = {}
     with Session(given.test) as session:

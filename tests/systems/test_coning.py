@@ -1,4 +1,4 @@
-"""Coning test: parts against SciPy's rotations, closed form against the run, files, mistakes, refusals.  [TEST-CONING]"""
+"""Coning test: parts against SciPy's rotations, the closed form, files, mistakes, refusals.  [TEST-CONING]"""
 
 from __future__ import annotations
 
@@ -163,7 +163,14 @@ def rows(axis: int = 2, noise: float = 0.05, sense: float = 1.0, factor: float =
 
 
 def reduced(command: Command, folder: Path, table: list[list[float]], code: int = 0) -> Any:
-    head = ["# axis = z", "# interval = 10ms", "# bandwidth = 0Hz", "# coning = false", "# samples = 1", "# type_b = none"]
+    head = [
+        "# axis = z",
+        "# interval = 10ms",
+        "# bandwidth = 0Hz",
+        "# coning = false",
+        "# samples = 1",
+        "# type_b = none",
+    ]
     names = "t_start [s],t_end [s],frequency [Hz],half_angle [deg],drift_x [deg/h],drift_y [deg/h],drift_z [deg/h]"
     file = folder / "cones.csv"
     file.write_text("\n".join([*head, names, *(",".join(f"{v:.9g}" for v in row) for row in table)]) + "\n")
