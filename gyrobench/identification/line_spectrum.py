@@ -28,7 +28,9 @@ from gyrobench.record.frequency_response import Complex
 ORDER = 2  # of the local polynomials
 BINS = 12  # at least, of noise at either side, of a periodic excitation
 NARROW = 10  # bins at least to either side, of another
-SHARE = 0.005  # of the frequency to either side, where that is more: less than half of what a mode damped by 1 % is wide
+SHARE = (
+    0.005  # of the frequency to either side, where that is more: less than half of what a mode damped by 1 % is wide
+)
 EXCITED = 1e-3  # of the largest amplitude of r: smaller ones are no excitation
 INFLATED = 10.0  # times the variance of a mean of the band (2.3 is the least): r is nearly as smooth as a transient
 ROUNDING = 1e-12

@@ -7,7 +7,8 @@ makes none.  With g = ln|L|, p = arg L, slopes over f, and equal and independent
     gain margin    u2(-g at p = -pi) = u2 (1 + (g'/p')2)
     peaks          u2(max)           = u2                      (the slope is 0 there)
 
-Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
+Where the curve is flat at a crossing, all places at which it is not told from the limit may be it, and the interval
+reaches over the values there.  Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
 """
 
 from __future__ import annotations
@@ -141,7 +142,7 @@ def _near(value: Array, u: Array, counts: NDArray[np.bool_], k: int) -> slice:
 
 
 def _interval(value: float, U: float, near: Array, own: float) -> tuple[float, float]:
-    """Return the interval of a value by the slope, U, or by the values near the crossing; own: U of the value itself."""
+    """Return the interval of a value by the slope, U, or by values near the crossing; own: U of the value itself."""
     down, up = max(U, value - float(near.min())), max(U, float(near.max()) - value)
     return value - math.hypot(down, own), value + math.hypot(up, own)
 

@@ -103,7 +103,9 @@ def margins_of(loop: HasResponses, low: float, high: float) -> Mapping[str, floa
     g, p = np.log(np.abs(L)), np.angle(-L)
     found: dict[str, float] = {}
     crossed = [_at(f, g, k) for k in np.flatnonzero((g[1:] > 0.0) != (g[:-1] > 0.0))]
-    phases = list(zip(np.angle(-loop.responses(np.array(crossed))[0]).tolist(), crossed, strict=True)) if crossed else []
+    phases = (
+        list(zip(np.angle(-loop.responses(np.array(crossed))[0]).tolist(), crossed, strict=True)) if crossed else []
+    )
     if phases:
         found["phase margin"], found["crossover"] = min(phases, key=lambda m: abs(m[0]))
         found["delay margin"] = min(a % (2.0 * np.pi) / (2.0 * np.pi * x) for a, x in phases)
