@@ -8,7 +8,9 @@ makes none.  With g = ln|L|, p = arg L, slopes over f, and equal and independent
     peaks          u2(max)           = u2                      (the slope is 0 there)
 
 Where the curve is flat at a crossing, all places at which it is not told from the limit may be it, and the interval
-reaches over the values there.  Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
+reaches over the values there.
+
+Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
 """
 
 from __future__ import annotations
