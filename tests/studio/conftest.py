@@ -32,7 +32,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
     process.wait(20)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # not of the session: while it lives, no other test could run an event loop
 def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
@@ -42,7 +42,7 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def context(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
     """A browser that has opened the first address once: it has the cookie and keeps the scripts of the front end."""
     made = browser.new_context(viewport=VIEW)
