@@ -1,7 +1,7 @@
 """Build the documentation site:  python docs/site/build.py [--out build/site]
 
 Copies the Markdown pages and what they link to, adds a page for each module of gyrobench, the notebook with its outputs
-and systems that run in a page, and runs Sphinx in strict mode.  Nothing is fetched: neither here nor when a page is opened.
+and systems that run in a page, and runs Sphinx in strict mode.  Nothing is fetched: neither here nor by an opened page.
 """
 
 from __future__ import annotations
