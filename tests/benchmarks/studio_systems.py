@@ -4,7 +4,8 @@
 
 A studio on a bench of its own; each system's page is fetched, its run is asked for in the bench's folder, as a form
 does, and started by the studio (as many at a time as it has cores); then the page of the run and its report are
-fetched.  Printed for each: s of its page, s of the run with its report, verdict, and what is wrong.
+fetched.  Printed for each: s of its page, s of the run with its report, verdict, the bodies of its moving picture, and
+what is wrong.
 """
 
 from __future__ import annotations
@@ -17,13 +18,18 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+import numpy as np
 from short_plans import SHORT
 from studio_requests import Door
 
 from gyrobench.bench import Bench, standard_folder
+from gyrobench.record.record import Record
 from gyrobench.studio.job_process import REQUEST, JobReport, read_report, store
 from gyrobench.studio.jobs import ENDED, FOLDER
 from gyrobench.studio.request import JobRequest
+from gyrobench.system.moving_bodies import attitudes, parse_bodies
+from gyrobench.system.suite import Suite
+from gyrobench.workflow.inputs import load_test
 
 LIMIT = 600.0  # s, without any run that ends
 
@@ -50,6 +56,15 @@ def end_of(folder: Path) -> JobReport | None:
     return report if report is not None and report.state in ENDED else None
 
 
+def moving(folder: Path, name: str) -> str:
+    """Return the bodies of the moving picture of a run."""
+    test = load_test(name)
+    if isinstance(test, Suite) or not (bodies := parse_bodies(getattr(test, "bodies", ""))):
+        return ""
+    record = Record.load(folder)
+    return ", ".join(attitudes(bodies, record, np.arange(min(1, len(record.channels.get("time", ()))))))
+
+
 def shown(door: Door, home: Path, report: JobReport) -> str:
     """Return what is wrong with the pages of a run."""
     place = Path(report.folder).relative_to(home.resolve() / "reports" / "out").as_posix()
@@ -60,7 +75,7 @@ def shown(door: Door, home: Path, report: JobReport) -> str:
 
 def walk(door: Door, home: Path, names: list[str]) -> int:
     """Walk the pages, run the systems, look at the runs; print and return how many are wrong."""
-    print(f"| system | page / s | run / s | state | verdict | wrong |\n|{'---|' * 6}", flush=True)
+    print(f"| system | page / s | run / s | state | verdict | moving | wrong |\n|{'---|' * 7}", flush=True)
     pages = {name: page(door, f"/system/{name}") for name in names}
     left, wrong, last = {name: asked_for(home, name) for name in names}, 0, time.monotonic()
     while left and time.monotonic() < last + LIMIT:
@@ -73,11 +88,10 @@ def walk(door: Door, home: Path, names: list[str]) -> int:
             said = [pages[name][1], "" if report.state == "done" else report.message]
             said += [shown(door, home, report)] if report.folder else ["" if said[1] else "no folder"]
             wrong += any(said)
+            bodies = moving(Path(report.folder), name) if report.folder else ""
             words = "; ".join(filter(None, said)).replace("\n", " ")
-            print(
-                f"| `{name}` | {pages[name][0]:.2f} | {took:.1f} | {report.state} | {report.verdict} | {words} |",
-                flush=True,
-            )
+            seconds = f"{pages[name][0]:.2f} | {took:.1f}"
+            print(f"| `{name}` | {seconds} | {report.state} | {report.verdict} | {bodies} | {words} |", flush=True)
     print(f"{len(names)} systems, {wrong} wrong, {len(left)} without an end: {' '.join(left)}")
     return wrong + len(left)
 
