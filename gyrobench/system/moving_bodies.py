@@ -146,7 +146,8 @@ def _phases(slot: str, record: Record, at: AnyArray) -> AnyArray | None:
     """Return the phase of each row of the channels, as the slot says or until the end of its last window, or None."""
     said = record.channels.get(f"{slot}.phase")
     if said is not None:
-        return np.maximum(np.asarray(said)[at].astype(int), 1)
+        own: AnyArray = np.maximum(np.asarray(said)[at].astype(int), 1)
+        return own
     if not {"phase", "t_end"} <= set(record.windows) or not len(record.windows["phase"]):
         return None
     phases = np.asarray(record.windows["phase"], dtype=int)
