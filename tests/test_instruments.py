@@ -222,7 +222,7 @@ def test_the_servo_with_the_stiffness_of_a_sheet_starts(name: str) -> None:
 
 
 def test_the_gyro_of_the_table_of_sensitivities() -> None:
-    """Table 5-5 follows from its coefficients: 0.1e-6 ERU/ug along I and S, 50e-6 ERU/g2 along I (ET24)."""
+    """Table 5-5 follows from its coefficients: 0.1e-6 ERU/ug along I and S, 50e-6 ERU/g2 along I (ET19)."""
     found = with_instruments("draper", {})[1]
     assert found["gyro.D_I"] * 1e-6 == pytest.approx(0.1e-6 * EARTH_RATE)
     assert found["gyro.D_S"] == found["gyro.D_I"] and found["gyro.D_IS"] == pytest.approx(1e-3 * EARTH_RATE)

@@ -47,7 +47,7 @@ WORDS = (
     ("controller", "controller|stabilizer|rebalance|servo|decoupler|cage|slaving|current|coupling"),
     ("plan", "sequencer|program|command|supervisor|sampler|monitor|earth_follower"),
     ("motor", "motor|slipring|bearing|tachometer"),
-    ("reader", "meter|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
+    ("reader", "meter|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
     ("place", "site|ground|surroundings|foundation|thermostat|chamber"),
     ("source", "source|offset|exciter|motion|manoeuvre|torque|vibration"),
     ("gyro", "gyro"),
