@@ -20,6 +20,7 @@ from .closed import MovingPlace, SourceOfDrift, budget, led
 ROWS = (("gyro_b", 1, "y"), ("gyro_a", 0, "x"), ("gyro_a", 1, "y"))
 UNITS = {"rad": (ARCMIN, "′"), "rad/s": (DPH, "°/h")}
 NAMES = ("east", "north", "up")
+HOUR = 3600.0  # s
 
 
 class Reduction(LoopReduction):
@@ -58,14 +59,19 @@ class Reduction(LoopReduction):
             delta[k], spread[k] = got.rate, got.u
             told = None if truth is None else float(truth[k])
             found.measure(f"drift {axis}", f"against {NAMES[k]}", "°/h", got.rate, got.u, scale=DPH, truth=told)
-        size, most = float(np.linalg.norm(delta)), float(np.linalg.norm(spread))
         total = None if truth is None else float(np.linalg.norm(truth))
-        found.measure(
-            "drift", "of the platform against level and north, size", "°/h", size, most, scale=DPH, truth=total
-        )
-        hour = led(delta, self.place.rate(), 3600.0)
-        for name, value in (("tilt", math.hypot(hour[0], hour[1])), ("heading", abs(hour[2]))):
-            found.measure(f"{name} 1 h", f"{name} error after an hour", "′", value, 3600.0 * most, scale=ARCMIN)
+        size, u = _along(delta, np.diag(spread**2))
+        found.measure("drift", "of the platform against level and north, size", "°/h", size, u, scale=DPH, truth=total)
+        rate = self.place.rate()
+        leads = np.column_stack([led(axis, rate, HOUR) for axis in np.eye(3)])  # e after an hour, of a unit drift
+        hour, cov = leads @ delta, leads @ np.diag(spread**2) @ leads.T
+        then = None if truth is None else leads @ truth
+        tilt, u = _along(hour[:2], cov[:2, :2])
+        true = None if then is None else math.hypot(then[0], then[1])
+        found.measure("tilt 1 h", "tilt error after an hour", "′", tilt, u, scale=ARCMIN, truth=true)
+        true = None if then is None else float(then[2])
+        u = math.sqrt(cov[2, 2])
+        found.measure("heading 1 h", "heading error after an hour", "′", float(hour[2]), u, scale=ARCMIN, truth=true)
         found.tables.append(self._budget(delta))
         curves = {f"{axis}": (a - a[0]) / ARCMIN for axis, a in zip("xyz", apart, strict=True)}
         caption = "Platform less level and north: what it has turned too far about its axes."
@@ -109,8 +115,15 @@ class Reduction(LoopReduction):
         drift_, tilt, heading = (c[n].estimate for n in ("drift", "tilt 1 h", "heading 1 h"))
         return [
             f"The platform drifts against level and north by {drift_:.3g} °/h; the budget allows for {total:.3g} °/h.",
-            f"After an hour it would be {tilt:.3g}′ off level and {heading:.3g}′ off north.",
+            f"After an hour it would be {tilt:.3g}′ off level and {abs(heading):.3g}′ off north.",
         ]
+
+
+def _along(x: Any, cov: Any) -> tuple[float, float]:
+    """Return the size of a vector and its standard uncertainty, to first order: along the vector itself."""
+    size = float(np.linalg.norm(x))
+    unit = x / size if size > 0.0 else np.zeros(x.size)
+    return size, math.sqrt(float(unit @ cov @ unit)) if size > 0.0 else math.sqrt(float(np.max(np.diag(cov))))
 
 
 def _static(p: Mapping[str, Any], gyro: str, channel: str) -> float:

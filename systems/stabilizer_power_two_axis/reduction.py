@@ -83,7 +83,9 @@ class Reduction(LoopReduction):
         rest = self.own[2 - axis]
         moved = other - other[0] - (rest.rate * (gate.t - gate.t[0]) if rest else 0.0)
         meaning = f"largest angle about {AXES[2 - axis]} by a load about {name}"
-        noise = float(np.std(other[-other.size // 4 :] - np.mean(other[-other.size // 4 :])))
+        late = moved[-moved.size // 4 :]  # at rest but for its drift
+        index = np.arange(late.size)
+        noise = float(np.std(late - np.polyval(np.polyfit(index, late, 1), index)))
         closed = self._cross(M, gate.t[-1] - gate.t[0])
         found.measure(f"cross {name}", meaning, "″", float(np.abs(moved).max()), noise, scale=ARCSEC, closed=closed)
 
