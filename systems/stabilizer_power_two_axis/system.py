@@ -95,7 +95,7 @@ class StabilizerPowerTwoAxis(LoopTest):
 
     def axes(self) -> TwoAxes:
         """Return the closed forms of these options."""
-        return TwoAxes(*(self[n] for n in GYRO), self["K_m"])
+        return TwoAxes(**{n: float(self[n]) for n in (*GYRO, "K_m")})
 
     def phases(self) -> list[LoopPhase]:
         settle = 3.0  # s: the slowest pole of the default loop, -6 1/s

@@ -216,8 +216,9 @@ class Reduction(DriftReduction[AlignmentSetup]):
 
     def _large(self, found: Findings) -> list[Reason]:
         """Return that an error of the theodolite is so large that its square counts."""
-        fitted = {n: found.est.beta[self.names.index(n)] for n in ("collimation", "trunnion") if n in self.names}
-        sizes = {**fitted, "lean": np.max(np.abs(self.v))}
+        both = ("collimation", "trunnion")
+        fitted = {n: float(found.est.beta[self.names.index(n)]) for n in both if n in self.names}
+        sizes = {**fitted, "lean": float(np.max(np.abs(self.v)))}
         large = [f"{n} {abs(float(x)) / ARCSEC:.0f}″" for n, x in sizes.items() if abs(float(x)) > LARGE]
         if not large:
             return []
