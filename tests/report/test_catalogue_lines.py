@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from option_texts import option_texts
 
 from gyrobench.bench import standard_folder
 from gyrobench.report import language
@@ -44,7 +45,8 @@ def stale(english: str) -> bool:
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f"{f.parent.name}-{f.stem}")
 def test_every_line_of_a_catalogue_is_said_by_the_code(file: Path) -> None:
-    assert not [english for english in language._read(file)["texts"] if stale(english)]
+    lines = set(language._read(file)["texts"]) - option_texts(file)
+    assert not [english for english in sorted(lines) if stale(english)]
 
 
 def test_a_line_that_nothing_says_is_found() -> None:
