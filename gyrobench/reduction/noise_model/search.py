@@ -28,7 +28,7 @@ STARTS: dict[str, list[list[float]]] = {
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
 }
-LEAST_COHERENT = 10.0  # samples that a band keeps its phase: what does not is the broadband terms' own
+COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
 
@@ -253,6 +253,7 @@ class ModelSearch:
     def add_resonances(self) -> None:
         """Add resonances while powers stand out of the fit; each is fitted with the broadband terms, then frozen."""
         vain: list[Array] = []
+        settled = False  # whether the broadband terms were sought again beside the bands so far
         while len(self.resonances) < MOST_RESONANCES and len(vain) < MOST_VAIN:
             at = self.best
             start = self.peak(at, vain)
@@ -260,10 +261,15 @@ class ModelSearch:
                 break
             tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
             found = max(tried, key=lambda f: f.evidence)
-            if found.evidence < at.evidence + 2.0 or found.p[-2] < math.log(LEAST_COHERENT):
+            if found.p[-2] < math.log(COHERENT) and not settled:
+                self.climb(at, SIMPLE)
+                settled = True
+                continue
+            if found.evidence < at.evidence + 2.0:
                 vain.append(start)
                 continue
             self._freeze(found)
+            settled = False
         for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
             term, p = self.resonances.pop(0)
             self.data.hold(self.resonances)
