@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import least_squares
@@ -65,7 +66,7 @@ class HeadingProblem:
             # y at the angle q is y cos q - x sin q
             rates = (a[0], a[1]) if np.any(self.axis == 0.0) else (-a[1], a[0])
             return tilted_heading(rates, self.force, self.earth)
-        if a.size == 2:
+        if self.names[0] == "c":
             half = math.acos(float(np.clip(a[0] / self.earth.north, -1.0, 1.0)))
             return half if self.earth.rough >= 0.0 else -half, math.nan
         return math.atan2(a[1], a[0]), math.hypot(a[0], a[1])
@@ -92,8 +93,36 @@ def tilted_heading(rates: tuple[float, float], force: Force, place: LocalEarth) 
     return math.atan2(east, north), math.hypot(east, north) / (ct * cg)
 
 
-def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
-    """Return the problem of a method.  Raises ReductionError for windows that do not carry it."""
+def drift_columns(t_start: Array, t_end: Array, order: int) -> Array:
+    """Return window means (n, order) of the Legendre polynomials P_1 .. P_order of time, -1 at the first start and 1 at
+    the last end: the size of each is what it adds at the end.  [NORTH-DRIFT]
+    """
+    first, last = float(np.min(t_start)), float(np.max(t_end))
+    a, b = (2.0 * (t - first) / (last - first) - 1.0 for t in (t_start, t_end))
+    sums = [Legendre.basis(k).integ() for k in range(1, order + 1)]
+    return np.column_stack([(f(b) - f(a)) / (b - a) for f in sums]) if sums else np.zeros((t_start.size, 0))
+
+
+def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth, order: int = 0) -> HeadingProblem:
+    """Return the problem of a method with a drift of the bias up to this power of time.  Raises ReductionError for
+    windows that do not carry it.
+    """
+    problem = _of_method(method, w, earth)
+    if order == 0:
+        return problem
+    if method.startswith("strapdown"):
+        raise ReductionError(f"drift_order = {order}: of the methods with one gyro axis, not of {method}")
+    X = np.column_stack([problem.X, drift_columns(problem.t_start, problem.t_end, order)])
+    if np.linalg.matrix_rank(X) < X.shape[1] or np.linalg.cond(X) > 1e3:
+        raise ReductionError(
+            f"drift_order = {order}: these positions do not tell the drift from the heading; take them more than once, "
+            "or turn the head (method continuous)"
+        )
+    names = (*problem.names, *(f"d_{k}" for k in range(1, order + 1)))
+    return replace(problem, names=names, X=X)
+
+
+def _of_method(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
     missing = [n for n in NEEDED.get(method, ()) if n not in w]
     if missing:
         raise ReductionError(f"method {method}: column {', '.join(missing)} is missing")

@@ -8,7 +8,9 @@ stands beside it.  [NORTH-COMMON; GSP ch. 5, section 5.3.2]
 
 Two positions have two headings, psi and -psi: the rough heading, which no residual shows to be wrong, chooses.
 
-Not modelled: linear drift of the bias unless the nuisance model finds it, motion of the base.
+With drift_order = n the bias is a polynomial of that degree in time, estimated with the heading.  [NORTH-DRIFT]
+
+Not modelled: without it, a drift of the bias unless the nuisance model finds a trend; motion of the base.
 """
 
 from __future__ import annotations
@@ -62,6 +64,11 @@ TILT = Source("head.tilt.{axis}", "tilt of the head about {axis}", "rad", "u_lev
 GYRO_BIAS = Source("gyro.bias.{axis}", "bias of the gyro along {axis}", "rad/s", "u_bias")
 FORCE_NOISE = Source("accelerometers.noise.{axis}", "noise of the accelerometers along {axis}", "m/s2")
 FORCE_BIAS = Source("accelerometers.bias.{axis}", "bias of the accelerometer along {axis}", "m/s2", "u_accelerometer")
+DRIFTS = (
+    "linear drift of the bias, at the end",
+    "quadratic drift of the bias, at the end",
+    "cubic drift of the bias, at the end",
+)
 STATUS = {2.0: "is ill-conditioned", 3.0: "contradicts the latitude", 4.0: "is of a moving base"}  # of the finder
 UNDETERMINED = (
     "the rates do not determine the heading: their horizontal part is below three times its uncertainty; take a longer "
@@ -76,6 +83,7 @@ class NorthFinderSetup(SiteSetup):
     rough_stated: the run is simulated, and knows its heading.  finder: what the estimator of the run says.  unbiased:
     the gyro is simulated without bias, or it is declared that there is none.
 
+    drift_order: highest power of time of a drift of the bias that is estimated with the heading.
     density of the white rate noise (rad/s/sqrt(Hz); 0: unknown), total time and settling (s): for the comparison of the
     methods.
     """
@@ -88,6 +96,7 @@ class NorthFinderSetup(SiteSetup):
     density: float = 0.0
     time: float = 0.0
     settle: float = 0.0
+    drift_order: int = 0
     u_latitude: float = 0.0
     u_angle: float = 0.0
     u_level: float = 0.0
@@ -118,16 +127,19 @@ class Reduction(DriftReduction[NorthFinderSetup]):
     def regression(self) -> Regression:
         s = self.setup
         self.north = s.earth.north
-        self.model = p = of_windows(s.method, self.windows, s.earth)
+        self.model = p = of_windows(s.method, self.windows, s.earth, s.drift_order)
         two = p.X.shape[0] > len(self.windows["mean"])
         weighed = nuisances.common(self.windows) if s.nuisances and not two else []
+        if s.drift_order:
+            weighed = [c for c in weighed if c.name != "trend"]
         turning = s.method in plans.TURNING
         clockwise = np.degrees(np.unwrap(p.along)) if turning else np.degrees(p.along)
         dense = None
         if not turning and not s.method.startswith("strapdown"):
             grid = np.linspace(0.0, 360.0, 181)
             curve = [np.cos(np.radians(grid)), -np.sin(np.radians(grid)), np.ones_like(grid)]
-            dense = (grid, np.column_stack(curve if p.X.shape[1] == 3 else curve[::2]))
+            drifts = [np.zeros_like(grid)] * s.drift_order
+            dense = (grid, np.column_stack([*(curve[::2] if p.names[0] == "c" else curve), *drifts]))
         shown = [
             Group(f"rate along {name}", np.flatnonzero(p.axis == a), clockwise[p.axis == a], "head angle", "°", dense)
             for name, a in (("y", 1.0), ("x", 0.0))
@@ -143,7 +155,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         """Return the fit as heading, horizontal rate and bias.  Raises ReductionError where first order does not hold,
         or where the rate is not the Earth's.
         """
-        p, truth = self.model, self.setup.truth or {}
+        p, s, truth = self.model, self.setup, self.setup.truth or {}
         psi, A = p.heading(self.unknowns(found))
         if math.isnan(A):
             self.slope, cosine = self._slope(found, psi), float(self.unknowns(found)[0])
@@ -162,15 +174,16 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             heading, rate = p.heading(a)
             if math.isnan(A):
                 heading = psi + self.slope * (float(a[0]) - cosine) / self.north
-            every = (near(heading), rate, float(a[p.bias]))
+            every = (near(heading), rate, float(a[p.bias]), *(float(d) for d in a[p.bias + 1 :][: s.drift_order]))
             return [v for v, seen in zip(every, there, strict=True) if seen]
 
-        there = (True, not math.isnan(A), p.bias >= 0)
+        there = (True, not math.isnan(A), p.bias >= 0, *[True] * s.drift_order)
         true = near(truth["ψ"]) if "ψ" in truth else None
         wanted = (
             Quantity.of("ψ", "heading of the axis y, clockwise from north", "deg", true),
             Quantity.of("A", "horizontal Earth rate", "deg/h", truth.get("A")),
             Quantity.of("b", "bias of the gyro along y", "deg/h", truth.get("b")),
+            *(Quantity.of(f"d_{k}", DRIFTS[k - 1], "deg/h", truth.get(f"d_{k}")) for k in range(1, s.drift_order + 1)),
         )
         return found.derive([q for q, seen in zip(wanted, there, strict=True) if seen], values)
 
@@ -359,11 +372,11 @@ def setup_of(record: Record) -> NorthFinderSetup:
     names = {n: f"finder.{n}" for n in ("heading", "sigma", "status")}
     there = all(c in record.channels for c in names.values())
     return NorthFinderSetup.of(
-        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured, truth=_truth(run),
-        sigma_rough=float(o.get("sigma_rough", 0.0)),
+        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured,
+        truth=_truth(run, windows), sigma_rough=float(o.get("sigma_rough", 0.0)),
         finder={n: float(np.asarray(record.channels[c])[-1]) for n, c in names.items()} if there else None,
         time=float(windows["t_end"][-1]) - (float(windows["t_start"][0]) if run.measured else 0.0),
-        settle=float(o.get("settle", 0.0)),
+        settle=float(o.get("settle", 0.0)), drift_order=int(o.get("drift_order", 0)),
         density=float(o.get("density", 0.0)) or float(run.parameters.get("gyro.white_y", 0.0)),
         unbiased=run.type_b == "none" or (
             not np.any(run.parameters.get("gyro.bias", 1.0)) and bias_is_all(run.parameters)
@@ -377,11 +390,19 @@ def method_of(run: RunDocument) -> str:
     return plans.shortest(run.options, float(run.step or 1e-3))[1] if method == "auto" else method
 
 
-def _truth(run: RunDocument) -> dict[str, float] | None:
+def _truth(run: RunDocument, windows: Mapping[str, Array]) -> dict[str, float] | None:
     if run.measured:
         return None
     site, p = Location.of(run), run.parameters
     truth = {"ψ": float(run.options["heading"]), "A": site.earth_rate * math.cos(site.latitude)}
-    if "gyro.bias" in p and bias_is_all(p) and not np.any(np.asarray(p.get("gyro.ramp", 0.0))):
-        truth["b"] = float(np.asarray(p["gyro.bias"])[1])
+    order = int(run.options.get("drift_order", 0))
+    if "gyro.bias" in p and bias_is_all(p):
+        bias, ramp, curve = (float(np.ravel(p.get(f"gyro.{n}", [0.0, 0.0]))[1]) for n in ("bias", "ramp", "curve"))
+        if order >= 2 or (curve == 0.0 and (order == 1 or ramp == 0.0)):
+            # bias + ramp t + curve t2 over t = middle + half x; x2 = (2 P_2 + 1)/3
+            first, last = (float(x) for x in (windows["t_start"][0], windows["t_end"][-1]))
+            middle, half = (first + last) / 2.0, (last - first) / 2.0
+            truth["b"] = bias + ramp * middle + curve * (middle**2 + half**2 / 3.0)
+            terms = (half * (ramp + 2.0 * curve * middle), 2.0 / 3.0 * curve * half**2, 0.0)
+            truth |= {f"d_{k + 1}": x for k, x in enumerate(terms[:order])}
     return truth

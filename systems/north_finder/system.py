@@ -31,11 +31,12 @@ class NorthFinding(TableTest):
     """The heading of a head from the horizontal Earth rate: two, four or several positions, continuous rotation, with
     the tilt measured, or strapdown.  The method is the estimator in the slot finder, and its plan.
 
-    [NORTH-COMMON, NORTH-2POS, NORTH-4POS, NORTH-CONT, NORTH-TILT, NORTH-STRAPDOWN; GSP ch. 5, section 5.3.2]
+    [NORTH-COMMON, NORTH-2POS, NORTH-4POS, NORTH-CONT, NORTH-TILT, NORTH-STRAPDOWN, NORTH-DRIFT; GSP ch. 5,
+    section 5.3.2]
     """
 
     title = "North finding by gyro"
-    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN")
+    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT")
     reduction = "reduction"
     protocol = "design"
     slots = {
@@ -79,6 +80,7 @@ class NorthFinding(TableTest):
             "positions": Option(12, int, "positions a turn (method several)", 3, 36),
             "back": Option(False, bool, "positions forwards, then backwards: a linear drift of the bias cancels"),
             "turns": Option(5.0, "1", "turns of the head (methods continuous, tilt)", 0.5, 100.0),
+            "drift_order": Option(0, int, "power of time up to which a drift of the bias is estimated", 0, 3),
             "settle": Option(0.5, "s", "wait after each move", 0.0),
             "windows": Option(32, int, "averaging windows of all positions together", 8, 1000),
             "heading": Option("40deg", "rad", "true heading of the head (simulated)", -math.pi, math.pi),
@@ -171,6 +173,8 @@ class NorthFinding(TableTest):
             "finder.gravity?": gravity,
             "finder.density?": self["density"] or self._density(parts) or 1e-9,
         }
+        if self["drift_order"]:
+            finder["finder.ramp?"] = self["drift_order"]
         if self.chosen == "two":
             finder["finder.rough?"] = self["rough"]
         moved = {"table.acceleration": plans.ACCELERATION, "table.index_rate": plans.RATE}
@@ -211,6 +215,8 @@ class NorthFinding(TableTest):
             problems.append(
                 f"time = {self.total:.4g} s: moves and settling take {lost:.4g} s, the readings need {least:.3g} s more"
             )
+        if self["drift_order"] and self.chosen.startswith("strapdown"):
+            problems.append(f"drift_order: of the methods with one gyro axis, not of {self.chosen}")
         if self.chosen in ("two", "strapdown two") and self["back"]:
             problems.append(f"back: the method {self.chosen} has two positions only; a drift cancels with four")
         return problems

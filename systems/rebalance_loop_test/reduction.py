@@ -238,7 +238,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             rows.append([label, rate / DPH, x / MA, scatter / UA, K, u, left / UA, n])
         caption = (
             "Means of each rate; K: reading less that at the rate 0, over the part β of the largest rate, against the "
-            "current of the largest rate [Hu 1981, eq. 5-75]; departure: mean of the residuals of the fit"
+            "current of the largest rate [5-75]; departure: mean of the residuals of the fit"
         )
         head = ["rate", "input / (°/h)", "reading / mA", "std of a reading / µA", "K less 1 / ppm", "u(K) / ppm",
                 "departure / µA", "readings"]  # fmt: skip

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.result import DriftTestResult
@@ -152,6 +153,30 @@ def test_drift_of_the_bias(sessions: Callable[[str], Session]) -> None:
     drift = {"gyro.ramp": [0.0, 20.0 * DPH / 3600.0], **QUIET}
     once, back = (off(run(sessions, "four", back=b, time=60.0, **drift)) for b in (False, True))
     assert abs(once) > 5 * ARCMIN and abs(back) < 0.01 * abs(once)
+
+
+def test_drift_of_higher_order(sessions: Callable[[str], Session]) -> None:
+    """bias + ramp t + curve t2 of 3 deg/h and 6 deg/h over 60 s is estimated with the heading.
+
+    By hand, t = m + h x with x = -1..1 over the readings: d_1 = h (ramp + 2 curve m), d_2 = 2/3 curve h2.
+    """
+    ramp, curve = 3.0 * DPH / 60.0, 6.0 * DPH / 3600.0
+    drift = {"gyro.ramp": [0.0, ramp], "gyro.curve": [0.0, curve], **QUIET, "time": 60.0, "windows": 64}
+    for method, more in (("continuous", {}), ("several", {"positions": 6, "back": True})):
+        record = run(sessions, method, drift_order=2, **more, **drift)
+        assert abs(off(record)) < 0.01 * ARCMIN, method
+        found = Reduction.from_record(record)
+        t0, t1 = float(record.windows["t_start"][0]), float(record.windows["t_end"][-1])
+        m, h = (t0 + t1) / 2.0, (t1 - t0) / 2.0
+        expected = {"ψ": 40.0, "d_1": h * (ramp + 2.0 * curve * m) / DPH, "d_2": 2.0 / 3.0 * curve * h * h / DPH}
+        for name, value in expected.items():
+            assert found[name].estimate == pytest.approx(value, rel=1e-4), (method, name)
+            assert found[name].truth == pytest.approx(value, rel=1e-9)
+        assert found["b"].estimate == pytest.approx(found["b"].truth, rel=1e-4)
+    linear = run(sessions, "continuous", drift_order=1, **drift)
+    assert abs(off(linear)) > ARCMIN
+    with pytest.raises(GyrobenchError, match="one gyro axis"):
+        run(sessions, "strapdown two", drift_order=1)
 
 
 def test_a_moving_base_does_not_pass_for_noise(

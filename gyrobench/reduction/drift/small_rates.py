@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +43,8 @@ class SmallRates:
                 half = 0.5 * (float(y[plus].mean()) - float(y[minus].mean()))
                 u = 0.5 * noise * math.sqrt(1.0 / np.count_nonzero(plus) + 1.0 / np.count_nonzero(minus))
                 rows.append((r, half / r, u / r))
-        rate, ratio, u = (np.array([row[k] for row in rows]) for k in range(3))
-        return cls(rate, ratio, u, unit, scale)
+        columns = [np.array([row[k] for row in rows]) for k in range(3)]
+        return cls(columns[0], columns[1], columns[2], unit, scale)
 
     @property
     def silent(self) -> bool:
@@ -123,7 +124,7 @@ def _distinct(values: Array) -> list[float]:
     return found
 
 
-def pooled_std(level: NDArray[np.int_], y: Array) -> float:
+def pooled_std(level: NDArray[Any], y: Array) -> float:
     """Return the standard deviation of readings at the same level (numbers from 0), pooled; NaN of one at each."""
     n = np.bincount(level)
     mean = np.bincount(level, weights=y) / np.maximum(n, 1)
