@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Legendre
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import least_squares
 from gyrobench.reduction.setup.window_checks import ReductionError
 
-LEAST = {"two": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
+LEAST = {"two": 2, "null": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
 NEEDED = {"tilt": ("f_y",), "strapdown": ("mean_x", "f_x", "f_y"), "strapdown two": ("mean_x", "f_x", "f_y")}
 STEEP = math.radians(85.0)
+NEAR_NULL = math.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,8 @@ class Force:
 @dataclass(frozen=True)
 class HeadingProblem:
     """y = X a + noise over rows of t_start, t_end.  bias: its index in a, -1 without.  along: (n,) angle of y from the
-    reference, clockwise; axis: 1 of rows of y, 0 of x.  force: where the tilt is read.  Raises ReductionError for an
-    attitude that is not one.
+    reference, clockwise; axis: 1 of rows of y, 0 of x.  force: where the tilt is read.  zero: heading at which a cosine
+    alone is 1 (rad).  Raises ReductionError for an attitude that is not one.
     """
 
     names: tuple[str, ...]
@@ -55,6 +57,7 @@ class HeadingProblem:
     axis: Array
     earth: LocalEarth
     force: Force | None = None
+    zero: float = 0.0
 
     def __post_init__(self) -> None:
         if self.force is not None:
@@ -68,7 +71,8 @@ class HeadingProblem:
             return tilted_heading(rates, self.force, self.earth)
         if self.names[0] == "c":
             half = math.acos(float(np.clip(a[0] / self.earth.north, -1.0, 1.0)))
-            return half if self.earth.rough >= 0.0 else -half, math.nan
+            heading = self.zero + (half if self.earth.rough >= 0.0 else -half)
+            return math.remainder(heading, 2.0 * math.pi), math.nan
         return math.atan2(a[1], a[0]), math.hypot(a[0], a[1])
 
 
@@ -137,6 +141,8 @@ def _of_method(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Headin
     quarters = len({round(math.cos(a), 2) + 1j * round(math.sin(a), 2) for a in middle})
     if least is not None and quarters < least:
         raise ReductionError(f"method {method}: {quarters} positions, at least {least} are needed")
+    if method == "null":
+        return _null(rate, t0, t1, middle, earth)
     if method == "two":
         if float(np.max(np.abs(s))) > 0.01:
             raise ReductionError("method two: positions at the angles 0 and 180° are needed")
@@ -153,6 +159,28 @@ def _of_method(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Headin
     # of the force as of the rate; a bias of the accelerometer is a constant
     f = least_squares(X, np.asarray(w["f_y"], dtype=float), problem.names)
     return replace(problem, force=Force(-float(f.beta[1]), float(f.beta[0]), float(f.u[1]), float(f.u[0])))
+
+
+def at_null(w: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Return which windows of the method null are within NEAR_NULL of the last position, or half a turn from it."""
+    angle = np.asarray(w["angle_end"], dtype=float)
+    out: NDArray[np.bool_] = np.abs(np.sin(angle - angle[-1])) < math.sin(NEAR_NULL)
+    return out
+
+
+def _null(rate: Array, t0: Array, t1: Array, middle: Array, earth: LocalEarth) -> HeadingProblem:
+    """Return the problem of pairs about the null: c = A cos(psi - zero), zero the angle of the last position.
+
+    Across it the rate is +-A, of which a small turn of a pair against the last one takes its sine.  [NORTH-NULL]
+    """
+    side = 1.0 if earth.rough >= 0.0 else -1.0
+    zero = math.remainder(float(middle[-1]), 2.0 * math.pi)
+    if math.cos(zero + side * 0.5 * math.pi - earth.rough) < 0.0:  # of the two positions that of the rough heading
+        zero = math.remainder(zero + math.pi, 2.0 * math.pi)
+    x = middle - zero
+    X = np.column_stack([np.cos(x), np.ones_like(x)])
+    return HeadingProblem(("c", "bias"), X, rate - side * earth.north * np.sin(x), t0, t1, 1, -middle, np.ones_like(x),
+                          earth, zero=zero)  # fmt: skip
 
 
 def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s: Array) -> HeadingProblem:

@@ -53,7 +53,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import plans
-from .model import LocalEarth, attitude, of_windows
+from .model import LocalEarth, at_null, attitude, of_windows
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
@@ -122,7 +122,11 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
-        return problems + window_problems(self.windows)
+        problems += window_problems(self.windows)
+        if s.method == "null" and not problems:
+            near = at_null(self.windows)
+            self.windows = {n: np.asarray(v)[near] for n, v in self.windows.items()}
+        return problems
 
     def regression(self) -> Regression:
         s = self.setup
@@ -193,6 +197,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         for a cosine beyond 1.
         """
         s, x = self.setup, float(self.unknowns(found)[0]) / self.north
+        psi = math.remainder(psi - self.model.zero, 2.0 * math.pi)
         half = 0.0 if found.ideal else float(found.reported.half_width[0]) / self.north
         b = (s.u_level * s.earth.up / self.north, s.u_latitude * math.tan(s.latitude))
         U = math.sqrt(half**2 + NORMAL**2 * sum(v * v for v in b))
@@ -226,8 +231,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 if s.method == "strapdown":  # two positions and a turning head take it out
                     out.append(FORCE_BIAS.of(axis=n).effect(s, values=values))
             out.append(LATITUDE.effect(s, values=self._moved(found, latitude=1.0)))
-        elif s.method == "two":  # cos psi = c / A
-            by_latitude = self.slope * math.tan(s.latitude) * math.cos(psi)
+        elif s.method in plans.SIDED:  # cos(psi - zero) = c / A
+            by_latitude = self.slope * math.tan(s.latitude) * math.cos(psi - p.zero)
             out.append(LATITUDE.effect(s, values=by_latitude * one))
         return out
 
@@ -271,7 +276,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             if 2.0 * float(special.ndtr(-off)) < LEVEL:
                 departs = f"departs from that of the latitude by {off:.1f} standard uncertainties"
                 reasons.append(_doubt("earth_rate.departs", f"The horizontal Earth rate {departs}."))
-        if s.method == "two":
+        if s.method in plans.SIDED:
             reasons += self._side(result["ψ"])
         if s.finder and s.finder["status"] != 1.0:
             words = STATUS.get(s.finder["status"], "is not there")
@@ -286,9 +291,14 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             reasons.append(_doubt("gyro.bias", "The bias of the gyro is in the heading, and not in u.", "pass"))
         return replace(result, reasons=[*result.reasons, *reasons])
 
+    def _other(self, psi: float) -> float:
+        """Return the other heading with the same rates of two positions, rad."""
+        return math.remainder(2.0 * self.model.zero - psi, 2.0 * math.pi)
+
     def _side(self, psi: Coefficient) -> list[Reason]:
         """Return what speaks against the heading that the rough one chose, of the two that two positions have."""
-        s, both = self.setup, f"Two positions have two headings, {psi.estimate:.4g}° and {-psi.estimate:.4g}°"
+        s, second = self.setup, self._other(psi.estimate * DEG) / DEG
+        both = f"Two positions have two headings, {psi.estimate:.4g}° and {second:.4g}°"
         if not s.sigma_rough:
             chosen = (
                 f"{both}; the rough one, {s.rough / DEG:.4g}°, chose, and nothing in the record would show that it "
@@ -296,11 +306,11 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             text = f"{chosen}lies on the wrong side. State its standard uncertainty, sigma_rough, or {THIRD}."
             return [] if s.rough_stated else [_doubt("rough.unstated", text, "pass")]
         u = math.hypot(s.sigma_rough, psi.u * DEG)
-        here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, -psi.estimate))
+        here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, second))
         rough = f"the rough one is {s.rough / DEG:.4g}° ± {s.sigma_rough / DEG:.2g}°"
         if here > MOST:
             return [_doubt("rough.contradicts", f"{both}; {rough} (u), {here:.1f} standard uncertainties from it.")]
-        if other < MOST and not psi.interval[0] < -psi.estimate < psi.interval[1]:
+        if other < MOST and not psi.interval[0] < second < psi.interval[1]:
             return [
                 _doubt("rough.open", f"{both}; {rough} (u), which does not choose one. Know it better, or {THIRD}.")
             ]
@@ -324,7 +334,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 ["measured less this, relative", (A / self.north - 1.0) * 100.0, "%"],
             ]
         if math.isnan(A):
-            rows.append(["the other heading with these rates", -psi / DEG, "°"])
+            rows.append(["the other heading with these rates", self._other(psi) / DEG, "°"])
         if p.force is not None:
             theta, gamma = attitude(p.force.x, p.force.y, s.gravity)
             rows += [["pitch, up positive", theta / DEG, "°"], ["roll, right side down positive", gamma / DEG, "°"]]

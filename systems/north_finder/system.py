@@ -24,6 +24,8 @@ from . import plans
 from .measured import MEASURED
 
 FORCE = "\ntable -> gyro: f"  # of a gyro that feels it
+SOUGHT = "sequencer -> table: mode target face"
+SEEKING = "sequencer -> table: mode face\n    sequencer -> finder: target\n    finder.command -> table.target"
 FACES = {plans.FACE: np.eye(3).tolist()}
 
 
@@ -124,6 +126,8 @@ class NorthFinding(TableTest):
                 "finder": replace(self.slots["finder"], part=part),
                 "site": replace(self.slots["site"], part=moving),
             }
+            wired = (SOUGHT, SEEKING) if self.chosen == "null" else (SEEKING, SOUGHT)
+            vars(self)["wires"] = self.wires.replace(*wired)
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
@@ -175,7 +179,7 @@ class NorthFinding(TableTest):
         }
         if self["drift_order"]:
             finder["finder.ramp?"] = self["drift_order"]
-        if self.chosen == "two":
+        if self.chosen in plans.SIDED:
             finder["finder.rough?"] = self["rough"]
         moved = {"table.acceleration": plans.ACCELERATION, "table.index_rate": plans.RATE}
         return {**super().parameters(parts), **moved, **BASES.get(self["base"], {}), **finder}
@@ -215,9 +219,9 @@ class NorthFinding(TableTest):
             problems.append(
                 f"time = {self.total:.4g} s: moves and settling take {lost:.4g} s, the readings need {least:.3g} s more"
             )
-        if self["drift_order"] and self.chosen.startswith("strapdown"):
-            problems.append(f"drift_order: of the methods with one gyro axis, not of {self.chosen}")
-        if self.chosen in ("two", "strapdown two") and self["back"]:
+        if self["drift_order"] and (self.chosen.startswith("strapdown") or self.chosen == "null"):
+            problems.append(f"drift_order: of the methods with one gyro axis and fixed positions, not of {self.chosen}")
+        if self.chosen in ("two", "null", "strapdown two") and self["back"]:
             problems.append(f"back: the method {self.chosen} has two positions only; a drift cancels with four")
         return problems
 
@@ -229,14 +233,14 @@ class NorthFinding(TableTest):
         near = min(abs(self["rough"]), math.pi - abs(self["rough"]))
         if self.chosen == "two" and near < plans.MARGIN:
             found.append("Two positions near north or south: the heading is ill-conditioned; take four.")
-        if self.chosen == "two" and math.sin(self["rough"]) * math.sin(self["heading"]) < 0.0:
+        if self.chosen in plans.SIDED and math.sin(self["rough"]) * math.sin(self["heading"]) < 0.0:
             found.append(
                 "Two positions have two headings, ψ and −ψ, and no residual tells them apart: rough lies on the other "
                 "side of the meridian than the heading and will choose the wrong one. Correct rough, or take a third "
                 "position, at 90° to the two (method four or several)."
             )
         tilted = max(abs(self["pitch"]), abs(self["roll"]))
-        if tilted > 1e-5 and self.chosen in ("two", "four", "several", "continuous"):
+        if tilted > 1e-5 and self.chosen in ("two", "null", "four", "several", "continuous"):
             found.append(
                 f"The head is tilted by up to {math.degrees(tilted):.3g}°, the method {self.chosen} takes it for "
                 "level: the heading is wrong by the tilt about north times tan(latitude); take tilt or strapdown."

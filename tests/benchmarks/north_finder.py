@@ -35,7 +35,7 @@ DPH = units.factor("deg/h")
 
 
 def drawn(method: str, rng: np.random.Generator) -> dict[str, Any]:
-    heading = rng.uniform(0.6, math.pi - 0.6) if method == "two" else rng.uniform(-math.pi, math.pi)
+    heading = rng.uniform(0.6, math.pi - 0.6) if method in plans.SIDED else rng.uniform(-math.pi, math.pi)
     values: dict[str, Any] = {"method": method, "heading": float(heading), "latitude": float(rng.uniform(-1.22, 1.22))}
     tilt = {"tilt": 0.01}.get(method, 0.5 if method.startswith("strapdown") else 0.0)
     values |= {"pitch": float(rng.uniform(-tilt, tilt)), "roll": float(rng.uniform(-tilt, tilt))}

@@ -165,6 +165,28 @@ def test_ramp_takes_a_linear_drift() -> None:
     assert abs(apart(found["heading"], -2.0)) < 1e-7
 
 
+def test_seeking_the_null_of_two_positions() -> None:
+    """Pairs there and back, the head at the angle commanded; turn = psi - 90 deg after a pair, sigma of three pairs."""
+    latitude, psi, bias, density = 0.7, 0.3, 3e-6, 1e-7
+    plain = Plain(load_part("northfinder_null_seeking"))
+    plain.set({"latitude": latitude, "every": 1e9, "rough": 1.0, "density": density})
+    plain.initialize(0.0)
+    rows = [(p, 0.0 if (p // 2) % 2 == 0 else math.pi, float(j > 2)) for p in range(1, 9) for j in range(24)]
+    angle = 0.0
+    for n, (phase, target, gate) in enumerate([*rows, (8, math.pi, 0.0)]):
+        rate = W * math.cos(latitude) * math.cos(psi - angle) + bias
+        plain.set({"rate[2]": rate, "f[3]": G, "angle": angle, "gate": gate, "phase": float(phase), "target": target,
+                   "finished": float(n == len(rows))})  # fmt: skip
+        plain.step(n * 0.1, 0.1)
+        angle = plain.get(["command"])[0]
+        if n == 2 * 24 + 2:
+            assert apart(angle, psi - math.pi / 2 + math.pi) == pytest.approx(0.0, abs=1e-9)
+    heading, sigma, found, status = plain.get(["heading", "sigma", "bias", "status"])
+    assert heading == pytest.approx(psi, abs=1e-9) and found == pytest.approx(bias, rel=1e-6) and status == 1.0
+    time = 6 * 20 * 0.1  # three pairs; the first sample of a phase is not taken
+    assert sigma == pytest.approx(density / (W * math.cos(latitude) * math.sqrt(time)), rel=1e-9)
+
+
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_drift_of_any_order_is_taken_out(order: int) -> None:
     """w = A cos + b + r t^order of 1e-3 deg/h at 1 s, by the normal equations of six unknowns; sigma from numpy's."""
