@@ -91,6 +91,7 @@ NOISE_IS_THE_RESULT = {"drift_record"}  # without noise there is nothing to esti
 #: their own tests put errors in and get them back; nothing is quasi-static about a table, or a vibration
 TABLES = {
     "angle_system_test",
+    "coning_test",
     "gyro_bandwidth",
     "gyro_dynamics",
     "stand_alignment",
