@@ -99,11 +99,13 @@ def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> Ang
         return out
 
     starts = [near.p / units] if near else _starts(r, free, top)
-    fits = [
-        optimize.least_squares(residual, p, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200)
-        for p in starts
-    ]
-    best = min(fits, key=lambda fit: float(fit.cost))
+
+    def least(p: Array, most: int) -> Any:
+        return optimize.least_squares(residual, p, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=most)
+
+    if len(starts) > 1:  # a few steps tell which minimum is the lowest
+        starts = [min((least(p, 25) for p in starts), key=lambda fit: float(fit.cost)).x]
+    best = least(starts[0], 200)
     scale = np.linalg.norm(best.jac, axis=0)
     if not np.all(scale > 0.0) or np.linalg.cond(best.jac / scale) > 1e7:
         return None
