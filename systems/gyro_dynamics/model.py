@@ -27,7 +27,7 @@ ROOT = math.sqrt(0.5)
 TINY = 1e-12  # least gain
 CORNERS = (0.3, 0.5, 0.8, 1.3, 2.2, 4.0)  # f_0 over the highest frequency, first guesses
 RATIOS = (0.9, 0.5)  # tau_0 over tau, first guesses
-SURE = 0.1  # relative u of tau_0 and f_0 beyond which what elasticity gives is not normally distributed
+SURE = 0.1  # relative u of tau_0, tau - tau_0 and f_0 beyond which what elasticity gives is not normally distributed
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,8 @@ class DynamicFigures:
     @property
     def determined(self) -> bool:
         """Whether what only the elasticity gives (tau_0, f_0, stiffnesses) has a value; False of NaN."""
-        return bool(np.all(self.u[2:4] < SURE * self.value[2:4]))
+        _, tau, tau_0, f_0, *_ = self.value
+        return bool(self.u[2] < SURE * min(tau_0, tau - tau_0) and self.u[3] < SURE * f_0)
 
 
 def figures(r: AngleResponse, H: float) -> DynamicFigures | None:
