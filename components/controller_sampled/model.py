@@ -16,7 +16,7 @@ class ControllerSampled(Component):
     Source: Hu 1981, eq. 6-10..6-19 with ET22; softer poles, delay and feedforward: own design.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     period = Parameter(5e-3, "s", "sampling period T, a multiple of the communication step", min=1e-3, max=1e-2)

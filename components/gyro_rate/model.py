@@ -8,7 +8,7 @@ from gyrobench.component.set_up import GYRO_MOUNT, each, turned
 class GyroRate(Component):
     """Two-axis rate gyro with its loop closed inside, quick form: rates along x and y of the head.  [NORTH-COMMON]
 
-        rate_j = (1 + scale_j) (mount omega)_j + bias_j + ramp_j t + Gauss-Markov + white
+        rate_j = (1 + scale_j) (mount omega)_j + bias_j + ramp_j t + curve_j t2 + Gauss-Markov + white
 
     White noise of the density N leaves the standard deviation N / sqrt(T) in a mean over T (angle random walk, 1
     deg/sqrt(h) = 60 deg/h/sqrt(Hz)).
@@ -18,13 +18,14 @@ class GyroRate(Component):
     Source: GSP ch. 5, section 5.3.2 (gyro of a north finder); DRIFT-RANDOM-CLASSES.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     scale = Parameter([0.0, 0.0], "1", "relative errors of the scale factors", min=-0.1, max=0.1)
     simulates = (each("bias", ("gyro.bias.x",), ("gyro.bias.y",)), turned("mount", GYRO_MOUNT))
     bias = Parameter([0.1 * DEG_H, 0.1 * DEG_H], "rad/s", "bias of each axis (0.1 deg/h)")
     ramp = Parameter([0.0, 0.0], "rad/s2", "linear drift of the bias")
+    curve = Parameter([0.0, 0.0], "rad/s3", "quadratic drift of the bias")
     mount = Rotation("rows: gyro axes x, y, z in head axes")
     markov_x = GaussMarkov(0.0, "rad/s", "Gauss-Markov drift along x")
     markov_y = GaussMarkov(0.0, "rad/s", "Gauss-Markov drift along y")
@@ -41,5 +42,7 @@ class GyroRate(Component):
         w = self.mount @ self.omega
         random_x = self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
         random_y = self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
-        self.rate[0] = (1.0 + self.scale[0]) * w[0] + self.bias[0] + self.ramp[0] * self.t + random_x
-        self.rate[1] = (1.0 + self.scale[1]) * w[1] + self.bias[1] + self.ramp[1] * self.t + random_y
+        drift_x = self.t * (self.ramp[0] + self.t * self.curve[0])
+        drift_y = self.t * (self.ramp[1] + self.t * self.curve[1])
+        self.rate[0] = (1.0 + self.scale[0]) * w[0] + self.bias[0] + drift_x + random_x
+        self.rate[1] = (1.0 + self.scale[1]) * w[1] + self.bias[1] + drift_y + random_y

@@ -6,7 +6,8 @@ from gyrobench.component.blocks.north import RotatingFinder
 class NorthfinderMultiPosition(RotatingFinder):
     """Heading from the mean rates of a gyro in three or more positions of a head, by least squares.  [NORTH-CONT]
 
-        w_i = C cos(angle_i) + B sin(angle_i) + b (+ r t),   C = A cos psi,   B = A sin psi,   psi = atan2(B, C)
+        w_i = C cos(angle_i) + B sin(angle_i) + b (+ r t + r2 t2 + r3 t3)
+        C = A cos psi,   B = A sin psi,   psi = atan2(B, C)
 
     The positions need not be equally spaced nor equally long: each sample counts with its own angle and time.
 
@@ -15,4 +16,4 @@ class NorthfinderMultiPosition(RotatingFinder):
     Source: GSP ch. 5, eq. 5-44, 5-52..5-56, corrected.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"

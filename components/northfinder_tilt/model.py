@@ -22,7 +22,7 @@ class NorthfinderTilt(RotatingFinder):
     Source: GSP ch. 5, eq. 5-57..5-62, corrected: sign of the vertical term, specific force.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     def sample(self) -> Number:
         s = self.f[1] / self.gravity

@@ -23,7 +23,7 @@ class TableDynamic(BuiltTable):
     Source: Hu 1981, sections 5.4 (two-2), 5.5, 6.1; each block names its equations.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     M_load = Input(0.0, "N.m", "further torque on the table")
 

@@ -23,7 +23,13 @@ class TableServo(AxisTable):
         L(s) = G K_g H_g C(s) / ( s [ (J s + D) (J_g s + C_g) + H_g2 ] (1 + lag s) ),   |L(j crossover)| = 1
 
     Servo mode begins with capture, M = -clip(k_p u) - k_d w, until u and w stay near zero, or u alone for so long that
-    w - omega_d must have been slow; then the networks are preset and the fine loop closes.  All linear terms
+    w - omega_d must have been slow; then the networks are preset and the fine loop closes.  With capture_law 1 the rate
+    wanted is that from which the motor can just brake, proximate time-optimal [Workman 1987]:
+
+        M = -k_d (f(e) + w)    f = k e up to e_l, sign(e) (sqrt(2 a |e|) - k e_l) beyond    e = u / sensitivity
+        k = k_p/k_d,  a = capture_share torque_max / J,  e_l = a / (2 k2), at which both have the slope k
+
+    All linear terms
     are integrated exactly; load, limit and square law of the motor are taken once in each internal step and stay out of
     the linearization.
 
@@ -32,7 +38,7 @@ class TableServo(AxisTable):
     Source: Hu 1981, eq. 3-54, 3-55, 5-1..5-21, sections 5.5 (one-1), 6.1 (item 6).
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     angle0 = Parameter(0.0, "rad", "angle at the start")
     acceleration = Parameter(0.1, "rad/s2", "acceleration of every kinematic move", above=0.0)
@@ -69,6 +75,10 @@ class TableServo(AxisTable):
     capture_speed = Parameter(pi / 90.0, "rad/s", "speed limit while capturing (2 deg/s)", above=0.0)
     capture_angle = Parameter(8.0 * pi / 648000.0, "rad", "fine below this table angle from null (8 arcsec)", above=0.0)
     capture_slow = Parameter(3e-5, "rad/s", "fine below this rate, or this one against the drift", above=0.0)
+    capture_law = Parameter(0, int, "0: speed limit, 1: proximate time-optimal", min=0, max=1)
+    capture_share = Parameter(
+        0.8, "1", "share of the largest torque that braking counts on (law 1)", above=0.0, max=1.0
+    )
     capture_hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
 
     simulates = (
@@ -108,6 +118,9 @@ class TableServo(AxisTable):
     capture_gain = Discrete(0.0, "N.m/V", "k_p while capturing")
     brake = Discrete(0.0, "N.m.s/rad", "k_d while capturing")
     near = Discrete(0.0, "V", "capture_angle as a pickoff voltage")
+    sensed = Discrete(0.0, "V/rad", "pickoff voltage per table angle")
+    joint = Discrete(0.0, "rad", "table angle from which on the rate wanted is that of braking (law 1)")
+    braked = Discrete(0.0, "rad/s2", "acceleration that braking counts on (law 1)")
 
     stage = Discrete(DRIVEN, "1", "0 kinematic, 1 capture, 2 fine")
     near_for = Discrete(0.0, "s", "time near null while capturing")
@@ -203,6 +216,10 @@ class TableServo(AxisTable):
         self.capture_gain = self.J * self.capture_rate * self.capture_rate / sensitivity
         self.brake = 2.0 * self.J * self.capture_rate * self.capture_damping
         self.near = self.capture_angle * sensitivity
+        self.sensed = sensitivity
+        self.braked = self.capture_share * self.torque_max / self.J
+        share = self.capture_rate / (2.0 * self.capture_damping)  # k_p / k_d
+        self.joint = 0.5 * self.braked / (share * share)
         wide = self.capture == 1.0 and self.gain * self.near > 2.0 * self.torque_max
         self.refuse(wide, "capture_angle = {capture_angle} rad is beyond the linear range, torque_max / K_T")
         for k in range(2):
@@ -241,6 +258,17 @@ class TableServo(AxisTable):
         d = self.theta - self.mark
         return self.mark_c + (self.mark_c * self.cosine_less_one(d) - self.mark_s * self.sine(d))
 
+    def pulled(self, volt: Number) -> Number:
+        """Return the torque of the capture law by the angle alone, that of the tachometer not counted."""
+        limit = self.brake * self.capture_speed
+        if self.capture_law < 1.0:
+            return clip(-self.capture_gain * volt, -limit, limit)
+        e = fabs(volt) / self.sensed
+        wanted = self.capture_gain * fabs(volt)
+        if e > self.joint:
+            wanted = self.brake * sqrt(2.0 * self.braked * e) - self.capture_gain * self.joint * self.sensed
+        return -wanted if volt > 0.0 else wanted
+
     def flow(self) -> None:
         slip = self.spin - 0.5 * (self.base_last + self.earth())  # a base that moves: its mean over the step
         volt = self.polarity * self.u if self.stage == FINE else 0.0
@@ -257,8 +285,7 @@ class TableServo(AxisTable):
             middle = self.demand + 0.5 * self.h * (self.slope - self.demand_rate * volt)
             m = m + (self.shaped(middle) - middle)
         if self.stage == CAPTURE:
-            limit = self.brake * self.capture_speed
-            capture = clip(-self.polarity * self.capture_gain * self.u, -limit, limit) + self.drag
+            capture = self.pulled(self.polarity * self.u) + self.drag
             m = m + clip(capture, -self.torque_max, self.torque_max)
         m = m + self.load + self.torque + self.noise.rumble - self.viscous * slip
         self.der.spin = (m - self.back * fast) * self.per_J
@@ -344,9 +371,8 @@ class TableServo(AxisTable):
             self.push = self.shaped(self.demand)
             others = others - self.back * (volt * self.per_lag + fast)
         else:
-            limit = self.brake * self.capture_speed
             self.drag = -self.brake * self.spin
-            capture = clip(-self.capture_gain * volt, -limit, limit) + self.drag
+            capture = self.pulled(volt) + self.drag
             self.push = clip(capture, -self.torque_max, self.torque_max)
         self.motion.a = (self.push + others) * self.per_J
         self.motion.x = self.theta

@@ -27,7 +27,7 @@ class TableServoDynamic(BuiltTable):
     Source: Hu 1981, eq. 3-54, 3-55, 6-10..6-19, sections 5.4 (two-2), 5.5, 6.1; the law on the pickoff: own design.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     law = SampledController(period="period", quantum="quantum", p=0.5)
 

@@ -29,7 +29,7 @@ class TableTwoAxisDynamic(TwoAxisTable):
     Source: Lagrange's equations of the two bodies; Hu 1981, sections 5.4, 5.5, 6.1; each block names its equations.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     simulates = tuple(
         harmonic(

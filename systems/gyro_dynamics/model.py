@@ -24,7 +24,10 @@ from gyrobench.arrays import Array
 Complex = NDArray[np.complexfloating[Any, Any]]
 LIMIT = 40.0  # of a logarithm
 ROOT = math.sqrt(0.5)
-SURE = 0.1  # relative u of tau_0 and f_0 beyond which what elasticity gives is not normally distributed
+TINY = 1e-12  # least gain
+CORNERS = (0.3, 0.5, 0.8, 1.3, 2.2, 4.0)  # f_0 over the highest frequency, first guesses
+RATIOS = (0.9, 0.5)  # tau_0 over tau, first guesses
+SURE = 0.1  # relative u of tau_0, tau - tau_0 and f_0 beyond which what elasticity gives is not normally distributed
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,11 @@ class AngleFit:
         return out
 
 
-def fitted(r: AngleResponse, elastic: bool) -> AngleFit | None:
-    """Return the curve of stiff or elastic bearings; None where it does not converge or is not determined."""
+def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> AngleFit | None:
+    """Return the curve of stiff or elastic bearings; None where it does not converge or is not determined.
+
+    near: a curve of that form close by, the only first guess then.
+    """
     free = 4 if elastic else 2
     dof = 2 * r.f.size - free
     if dof < 3:
@@ -85,12 +91,21 @@ def fitted(r: AngleResponse, elastic: bool) -> AngleFit | None:
     units = np.array([1.0, 1.0, top**-2, top**-3])[:free]
 
     def residual(p: Array) -> Array:
-        ratio = np.log(response(units * p, r.f, r.output) / r.value) / r.u
+        value = response(units * p, r.f, r.output)
+        ratio = (
+            np.log(np.where(np.abs(value) > TINY, value, TINY) / r.value) / r.u
+        )  # about the output axis it has a zero
         out: Array = np.concatenate([ratio.real, ratio.imag])
         return out
 
-    start = np.append(_start(r), [0.0] * (free - 2))
-    best = optimize.least_squares(residual, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200)
+    starts = [near.p / units] if near else _starts(r, free, top)
+
+    def least(p: Array, most: int) -> Any:
+        return optimize.least_squares(residual, p, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=most)
+
+    if len(starts) > 1:  # a few steps tell which minimum is the lowest
+        starts = [min((least(p, 25) for p in starts), key=lambda fit: float(fit.cost)).x]
+    best = least(starts[0], 200)
     scale = np.linalg.norm(best.jac, axis=0)
     if not np.all(scale > 0.0) or np.linalg.cond(best.jac / scale) > 1e7:
         return None
@@ -100,14 +115,21 @@ def fitted(r: AngleResponse, elastic: bool) -> AngleFit | None:
     return AngleFit(best.x * scale * units, cov, chi2, dof, chi2 + free * math.log(2 * r.f.size))
 
 
-def _start(r: AngleResponse) -> Array:
-    """Return a first guess of ln g, ln tau: where the phase of 1/(1 + tau s) is -45 degrees, or nearest to it."""
+def _starts(r: AngleResponse, free: int, top: float) -> list[Array]:
+    """Return first guesses: tau where the phase of 1/(1 + tau s) is -45 degrees, or nearest to it; of elastic bearings
+    f_0 below and above the highest frequency (top, rad/s), whose resonance and, about the output axis, zero make minima
+    of their own.
+    """
     late = np.abs(np.angle(r.value * (1j if r.output else 1.0)))  # -tau s/(1 + tau s) begins at -90 degrees
     k = int(np.argmin(np.abs(late - 0.25 * math.pi)))
     tau = math.tan(min(max(float(late[k]), 1e-3), 1.5)) / (2.0 * math.pi * float(r.f[k]))
     w = 2.0 * math.pi * r.f
     size = np.abs(r.value) / (w * tau if r.output else 1.0) * np.sqrt(1.0 + (w * tau) ** 2)
-    return np.array([math.log(float(np.median(size[: max(3, size.size // 3)]))), math.log(tau)])
+    low = [math.log(float(np.median(size[: max(3, size.size // 3)]))), math.log(tau)]
+    if free == 2:
+        return [np.array(low)]
+    elastic = [[x**-2, part * tau * top * x**-2] for x in CORNERS for part in RATIOS]
+    return [np.array([*low, *rest]) for rest in ([0.0, 0.0], *elastic)]
 
 
 # ------------------------------------------------------------------------------------------------ figures
@@ -151,7 +173,8 @@ class DynamicFigures:
     @property
     def determined(self) -> bool:
         """Whether what only the elasticity gives (tau_0, f_0, stiffnesses) has a value; False of NaN."""
-        return bool(np.all(self.u[2:4] < SURE * self.value[2:4]))
+        _, tau, tau_0, f_0, *_ = self.value
+        return bool(self.u[2] < SURE * min(tau_0, tau - tau_0) and self.u[3] < SURE * f_0)
 
 
 def figures(r: AngleResponse, H: float) -> DynamicFigures | None:
@@ -173,7 +196,7 @@ def figures(r: AngleResponse, H: float) -> DynamicFigures | None:
 
 def values_near(r: AngleResponse, H: float, fit: AngleFit) -> Array:
     """Return the figures (7,) of a response close to one with this fit, by the same form; its own where it fails."""
-    again = fitted(r, fit.elastic) or fit
+    again = fitted(r, fit.elastic, fit) or fit
     return read_off(again.p, float(r.f[-1]), H, r.output)
 
 

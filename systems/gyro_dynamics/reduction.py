@@ -56,6 +56,7 @@ STEP = ("tau_step", "time constant from steps: area between table and float over
 STEP_GAIN = ("g_step", "angle of the float over that of the case, from steps", "1", 1.0)
 SMALL = 1e-4  # of an error, by which sensitivities are taken
 LAG = 1e-6  # s, the same
+NO_CURVE = ("response.angle", "response.sense")  # mistakes with which no curve of a float fits
 UNSEEN = "not seen up to {f:.4g} Hz: the bearings are stiff, or higher frequencies are needed"
 NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
 UNSURE = "the elasticity is seen, but leaves this open by more than a tenth"
@@ -82,6 +83,8 @@ class Reduction(MeasureReduction):
         reasons = []
         if points.response is not None:
             reasons = list(mistakes(points.response))
+            if any(reason.id in NO_CURVE for reason in reasons):
+                raise ReductionError([reason.text for reason in reasons])
             self._sines(points.response)
         self._steps()
         self._doubts()

@@ -20,9 +20,10 @@ TEMPLATE = """\
 # instrument = type and number of the gyro
 # operator = who took the record
 #
-# latitude, method (two, four, several, continuous, tilt, strapdown, strapdown two): needed, here or by --set.
-# rough: rough heading, needed by method two, whose sign it gives; sigma_rough: its standard uncertainty, without which
-#   method two passes nothing: no residual shows a rough heading on the wrong side.  gravity, height: optional.
+# latitude, method (two, null, four, several, continuous, tilt, strapdown, strapdown two): needed, here or by --set.
+# rough: rough heading, needed by two and null, whose sign it gives; sigma_rough: its standard uncertainty, without
+#   which these two pass nothing: no residual shows a rough heading on the wrong side.  gravity, height: optional.
+# drift_order: power of time up to which a drift of the bias is estimated with the heading; optional.
 # Head axes: x right, y forward (the heading wanted is that of y at angle 0), z up.
 # phase: number of the position, or of the turning.  angle: of the head, anticlockwise seen from above; positions
 #   clockwise from above have negative angles.

@@ -7,14 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Legendre
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import least_squares
 from gyrobench.reduction.setup.window_checks import ReductionError
 
-LEAST = {"two": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
+LEAST = {"two": 2, "null": 2, "four": 4, "several": 3, "strapdown two": 2}  # positions
 NEEDED = {"tilt": ("f_y",), "strapdown": ("mean_x", "f_x", "f_y"), "strapdown two": ("mean_x", "f_x", "f_y")}
 STEEP = math.radians(85.0)
+NEAR_NULL = math.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,8 @@ class Force:
 @dataclass(frozen=True)
 class HeadingProblem:
     """y = X a + noise over rows of t_start, t_end.  bias: its index in a, -1 without.  along: (n,) angle of y from the
-    reference, clockwise; axis: 1 of rows of y, 0 of x.  force: where the tilt is read.  Raises ReductionError for an
-    attitude that is not one.
+    reference, clockwise; axis: 1 of rows of y, 0 of x.  force: where the tilt is read.  zero: heading at which a cosine
+    alone is 1 (rad).  Raises ReductionError for an attitude that is not one.
     """
 
     names: tuple[str, ...]
@@ -54,6 +57,7 @@ class HeadingProblem:
     axis: Array
     earth: LocalEarth
     force: Force | None = None
+    zero: float = 0.0
 
     def __post_init__(self) -> None:
         if self.force is not None:
@@ -65,9 +69,10 @@ class HeadingProblem:
             # y at the angle q is y cos q - x sin q
             rates = (a[0], a[1]) if np.any(self.axis == 0.0) else (-a[1], a[0])
             return tilted_heading(rates, self.force, self.earth)
-        if a.size == 2:
+        if self.names[0] == "c":
             half = math.acos(float(np.clip(a[0] / self.earth.north, -1.0, 1.0)))
-            return half if self.earth.rough >= 0.0 else -half, math.nan
+            heading = self.zero + (half if self.earth.rough >= 0.0 else -half)
+            return math.remainder(heading, 2.0 * math.pi), math.nan
         return math.atan2(a[1], a[0]), math.hypot(a[0], a[1])
 
 
@@ -92,8 +97,36 @@ def tilted_heading(rates: tuple[float, float], force: Force, place: LocalEarth) 
     return math.atan2(east, north), math.hypot(east, north) / (ct * cg)
 
 
-def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
-    """Return the problem of a method.  Raises ReductionError for windows that do not carry it."""
+def drift_columns(t_start: Array, t_end: Array, order: int) -> Array:
+    """Return window means (n, order) of the Legendre polynomials P_1 .. P_order of time, -1 at the first start and 1 at
+    the last end: the size of each is what it adds at the end.  [NORTH-DRIFT]
+    """
+    first, last = float(np.min(t_start)), float(np.max(t_end))
+    a, b = (2.0 * (t - first) / (last - first) - 1.0 for t in (t_start, t_end))
+    sums = [Legendre.basis(k).integ() for k in range(1, order + 1)]
+    return np.column_stack([(f(b) - f(a)) / (b - a) for f in sums]) if sums else np.zeros((t_start.size, 0))
+
+
+def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth, order: int = 0) -> HeadingProblem:
+    """Return the problem of a method with a drift of the bias up to this power of time.  Raises ReductionError for
+    windows that do not carry it.
+    """
+    problem = _of_method(method, w, earth)
+    if order == 0:
+        return problem
+    if method.startswith("strapdown"):
+        raise ReductionError(f"drift_order = {order}: of the methods with one gyro axis, not of {method}")
+    X = np.column_stack([problem.X, drift_columns(problem.t_start, problem.t_end, order)])
+    if np.linalg.matrix_rank(X) < X.shape[1] or np.linalg.cond(X) > 1e3:
+        raise ReductionError(
+            f"drift_order = {order}: these positions do not tell the drift from the heading; take them more than once, "
+            "or turn the head (method continuous)"
+        )
+    names = (*problem.names, *(f"d_{k}" for k in range(1, order + 1)))
+    return replace(problem, names=names, X=X)
+
+
+def _of_method(method: str, w: Mapping[str, Array], earth: LocalEarth) -> HeadingProblem:
     missing = [n for n in NEEDED.get(method, ()) if n not in w]
     if missing:
         raise ReductionError(f"method {method}: column {', '.join(missing)} is missing")
@@ -108,6 +141,8 @@ def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Headin
     quarters = len({round(math.cos(a), 2) + 1j * round(math.sin(a), 2) for a in middle})
     if least is not None and quarters < least:
         raise ReductionError(f"method {method}: {quarters} positions, at least {least} are needed")
+    if method == "null":
+        return _null(rate, t0, t1, middle, earth)
     if method == "two":
         if float(np.max(np.abs(s))) > 0.01:
             raise ReductionError("method two: positions at the angles 0 and 180° are needed")
@@ -124,6 +159,28 @@ def of_windows(method: str, w: Mapping[str, Array], earth: LocalEarth) -> Headin
     # of the force as of the rate; a bias of the accelerometer is a constant
     f = least_squares(X, np.asarray(w["f_y"], dtype=float), problem.names)
     return replace(problem, force=Force(-float(f.beta[1]), float(f.beta[0]), float(f.u[1]), float(f.u[0])))
+
+
+def at_null(w: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Return which windows of the method null are within NEAR_NULL of the last position, or half a turn from it."""
+    angle = np.asarray(w["angle_end"], dtype=float)
+    out: NDArray[np.bool_] = np.abs(np.sin(angle - angle[-1])) < math.sin(NEAR_NULL)
+    return out
+
+
+def _null(rate: Array, t0: Array, t1: Array, middle: Array, earth: LocalEarth) -> HeadingProblem:
+    """Return the problem of pairs about the null: c = A cos(psi - zero), zero the angle of the last position.
+
+    Across it the rate is +-A, of which a small turn of a pair against the last one takes its sine.  [NORTH-NULL]
+    """
+    side = 1.0 if earth.rough >= 0.0 else -1.0
+    zero = math.remainder(float(middle[-1]), 2.0 * math.pi)
+    if math.cos(zero + side * 0.5 * math.pi - earth.rough) < 0.0:  # of the two positions that of the rough heading
+        zero = math.remainder(zero + math.pi, 2.0 * math.pi)
+    x = middle - zero
+    X = np.column_stack([np.cos(x), np.ones_like(x)])
+    return HeadingProblem(("c", "bias"), X, rate - side * earth.north * np.sin(x), t0, t1, 1, -middle, np.ones_like(x),
+                          earth, zero=zero)  # fmt: skip
 
 
 def _strapdown(two: bool, w: Mapping[str, Array], earth: LocalEarth, c: Array, s: Array) -> HeadingProblem:

@@ -24,6 +24,7 @@ MARGIN = math.radians(30.0)  # heading from north or south, nearer than which tw
 #: method -> part that estimates
 PARTS = {
     "two": "northfinder_two_position",
+    "null": "northfinder_null_seeking",
     "four": "northfinder_four_position",
     "several": "northfinder_multi_position",
     "continuous": "northfinder_continuous",
@@ -31,6 +32,8 @@ PARTS = {
     "strapdown": "northfinder_strapdown",
     "strapdown two": "northfinder_strapdown",
 }
+PAIRS = 4  # of positions of the method null; the first one seeks alone
+SIDED = ("two", "null")  # methods with two headings, of which the rough one chooses
 TURNING = ("continuous", "tilt")
 
 
@@ -45,6 +48,9 @@ def targets(method: str, positions: int = 12, back: bool = False) -> list[float]
 
     back: they are taken forwards and then backwards, 1-2-3-4-4-3-2-1.
     """
+    if method == "null":
+        there = [0.0, -0.5 * TURN]  # a pair the other way round costs no move, and a linear drift cancels
+        return [a for k in range(PAIRS) for a in (there if k % 2 == 0 else there[::-1])]
     n = {"two": 2, "four": 4, "several": positions, "strapdown": 1, "strapdown two": 2}.get(method, 0)
     there = [-TURN * k / n for k in range(n)]
     return there + there[::-1] if back and n > 1 else there
@@ -56,6 +62,8 @@ def overhead(method: str, positions: int, back: bool, settle: float, step: float
     if not at:
         return settle + RATE / ACCELERATION + GUARD * step
     moves = sum(move_time(b - a) for a, b in zip([0.0, *at[:-1]], at, strict=True))
+    if method == "null":
+        moves += move_time(0.25 * TURN)  # at most, to the null
     return moves + len(at) * (settle + GUARD * step)
 
 
@@ -63,6 +71,8 @@ def gain(method: str, rough: float) -> float:
     """Return g of the module's formula for a heading of about ``rough`` (rad)."""
     if method == "two":
         return 1.0 / max(abs(math.sin(rough)), 1e-3)
+    if method == "null":
+        return math.sqrt(PAIRS / (PAIRS - 1.0))
     return 1.0 if method.startswith("strapdown") else math.sqrt(2.0)
 
 

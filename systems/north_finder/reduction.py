@@ -8,7 +8,9 @@ stands beside it.  [NORTH-COMMON; GSP ch. 5, section 5.3.2]
 
 Two positions have two headings, psi and -psi: the rough heading, which no residual shows to be wrong, chooses.
 
-Not modelled: linear drift of the bias unless the nuisance model finds it, motion of the base.
+With drift_order = n the bias is a polynomial of that degree in time, estimated with the heading.  [NORTH-DRIFT]
+
+Not modelled: without it, a drift of the bias unless the nuisance model finds a trend; motion of the base.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import plans
-from .model import LocalEarth, attitude, of_windows
+from .model import LocalEarth, at_null, attitude, of_windows
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
@@ -62,6 +64,11 @@ TILT = Source("head.tilt.{axis}", "tilt of the head about {axis}", "rad", "u_lev
 GYRO_BIAS = Source("gyro.bias.{axis}", "bias of the gyro along {axis}", "rad/s", "u_bias")
 FORCE_NOISE = Source("accelerometers.noise.{axis}", "noise of the accelerometers along {axis}", "m/s2")
 FORCE_BIAS = Source("accelerometers.bias.{axis}", "bias of the accelerometer along {axis}", "m/s2", "u_accelerometer")
+DRIFTS = (
+    "linear drift of the bias, at the end",
+    "quadratic drift of the bias, at the end",
+    "cubic drift of the bias, at the end",
+)
 STATUS = {2.0: "is ill-conditioned", 3.0: "contradicts the latitude", 4.0: "is of a moving base"}  # of the finder
 UNDETERMINED = (
     "the rates do not determine the heading: their horizontal part is below three times its uncertainty; take a longer "
@@ -76,6 +83,7 @@ class NorthFinderSetup(SiteSetup):
     rough_stated: the run is simulated, and knows its heading.  finder: what the estimator of the run says.  unbiased:
     the gyro is simulated without bias, or it is declared that there is none.
 
+    drift_order: highest power of time of a drift of the bias that is estimated with the heading.
     density of the white rate noise (rad/s/sqrt(Hz); 0: unknown), total time and settling (s): for the comparison of the
     methods.
     """
@@ -88,6 +96,7 @@ class NorthFinderSetup(SiteSetup):
     density: float = 0.0
     time: float = 0.0
     settle: float = 0.0
+    drift_order: int = 0
     u_latitude: float = 0.0
     u_angle: float = 0.0
     u_level: float = 0.0
@@ -113,21 +122,28 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
-        return problems + window_problems(self.windows)
+        problems += window_problems(self.windows)
+        if s.method == "null" and not problems:
+            near = at_null(self.windows)
+            self.windows = {n: np.asarray(v)[near] for n, v in self.windows.items()}
+        return problems
 
     def regression(self) -> Regression:
         s = self.setup
         self.north = s.earth.north
-        self.model = p = of_windows(s.method, self.windows, s.earth)
+        self.model = p = of_windows(s.method, self.windows, s.earth, s.drift_order)
         two = p.X.shape[0] > len(self.windows["mean"])
         weighed = nuisances.common(self.windows) if s.nuisances and not two else []
+        if s.drift_order:
+            weighed = [c for c in weighed if c.name != "trend"]
         turning = s.method in plans.TURNING
         clockwise = np.degrees(np.unwrap(p.along)) if turning else np.degrees(p.along)
         dense = None
         if not turning and not s.method.startswith("strapdown"):
             grid = np.linspace(0.0, 360.0, 181)
             curve = [np.cos(np.radians(grid)), -np.sin(np.radians(grid)), np.ones_like(grid)]
-            dense = (grid, np.column_stack(curve if p.X.shape[1] == 3 else curve[::2]))
+            drifts = [np.zeros_like(grid)] * s.drift_order
+            dense = (grid, np.column_stack([*(curve[::2] if p.names[0] == "c" else curve), *drifts]))
         shown = [
             Group(f"rate along {name}", np.flatnonzero(p.axis == a), clockwise[p.axis == a], "head angle", "°", dense)
             for name, a in (("y", 1.0), ("x", 0.0))
@@ -143,7 +159,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         """Return the fit as heading, horizontal rate and bias.  Raises ReductionError where first order does not hold,
         or where the rate is not the Earth's.
         """
-        p, truth = self.model, self.setup.truth or {}
+        p, s, truth = self.model, self.setup, self.setup.truth or {}
         psi, A = p.heading(self.unknowns(found))
         if math.isnan(A):
             self.slope, cosine = self._slope(found, psi), float(self.unknowns(found)[0])
@@ -162,15 +178,16 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             heading, rate = p.heading(a)
             if math.isnan(A):
                 heading = psi + self.slope * (float(a[0]) - cosine) / self.north
-            every = (near(heading), rate, float(a[p.bias]))
+            every = (near(heading), rate, float(a[p.bias]), *(float(d) for d in a[p.bias + 1 :][: s.drift_order]))
             return [v for v, seen in zip(every, there, strict=True) if seen]
 
-        there = (True, not math.isnan(A), p.bias >= 0)
+        there = (True, not math.isnan(A), p.bias >= 0, *[True] * s.drift_order)
         true = near(truth["ψ"]) if "ψ" in truth else None
         wanted = (
             Quantity.of("ψ", "heading of the axis y, clockwise from north", "deg", true),
             Quantity.of("A", "horizontal Earth rate", "deg/h", truth.get("A")),
             Quantity.of("b", "bias of the gyro along y", "deg/h", truth.get("b")),
+            *(Quantity.of(f"d_{k}", DRIFTS[k - 1], "deg/h", truth.get(f"d_{k}")) for k in range(1, s.drift_order + 1)),
         )
         return found.derive([q for q, seen in zip(wanted, there, strict=True) if seen], values)
 
@@ -180,6 +197,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         for a cosine beyond 1.
         """
         s, x = self.setup, float(self.unknowns(found)[0]) / self.north
+        psi = math.remainder(psi - self.model.zero, 2.0 * math.pi)
         half = 0.0 if found.ideal else float(found.reported.half_width[0]) / self.north
         b = (s.u_level * s.earth.up / self.north, s.u_latitude * math.tan(s.latitude))
         U = math.sqrt(half**2 + NORMAL**2 * sum(v * v for v in b))
@@ -213,8 +231,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 if s.method == "strapdown":  # two positions and a turning head take it out
                     out.append(FORCE_BIAS.of(axis=n).effect(s, values=values))
             out.append(LATITUDE.effect(s, values=self._moved(found, latitude=1.0)))
-        elif s.method == "two":  # cos psi = c / A
-            by_latitude = self.slope * math.tan(s.latitude) * math.cos(psi)
+        elif s.method in plans.SIDED:  # cos(psi - zero) = c / A
+            by_latitude = self.slope * math.tan(s.latitude) * math.cos(psi - p.zero)
             out.append(LATITUDE.effect(s, values=by_latitude * one))
         return out
 
@@ -258,7 +276,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             if 2.0 * float(special.ndtr(-off)) < LEVEL:
                 departs = f"departs from that of the latitude by {off:.1f} standard uncertainties"
                 reasons.append(_doubt("earth_rate.departs", f"The horizontal Earth rate {departs}."))
-        if s.method == "two":
+        if s.method in plans.SIDED:
             reasons += self._side(result["ψ"])
         if s.finder and s.finder["status"] != 1.0:
             words = STATUS.get(s.finder["status"], "is not there")
@@ -273,9 +291,14 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             reasons.append(_doubt("gyro.bias", "The bias of the gyro is in the heading, and not in u.", "pass"))
         return replace(result, reasons=[*result.reasons, *reasons])
 
+    def _other(self, psi: float) -> float:
+        """Return the other heading with the same rates of two positions, rad."""
+        return math.remainder(2.0 * self.model.zero - psi, 2.0 * math.pi)
+
     def _side(self, psi: Coefficient) -> list[Reason]:
         """Return what speaks against the heading that the rough one chose, of the two that two positions have."""
-        s, both = self.setup, f"Two positions have two headings, {psi.estimate:.4g}° and {-psi.estimate:.4g}°"
+        s, second = self.setup, self._other(psi.estimate * DEG) / DEG
+        both = f"Two positions have two headings, {psi.estimate:.4g}° and {second:.4g}°"
         if not s.sigma_rough:
             chosen = (
                 f"{both}; the rough one, {s.rough / DEG:.4g}°, chose, and nothing in the record would show that it "
@@ -283,11 +306,11 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             text = f"{chosen}lies on the wrong side. State its standard uncertainty, sigma_rough, or {THIRD}."
             return [] if s.rough_stated else [_doubt("rough.unstated", text, "pass")]
         u = math.hypot(s.sigma_rough, psi.u * DEG)
-        here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, -psi.estimate))
+        here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, second))
         rough = f"the rough one is {s.rough / DEG:.4g}° ± {s.sigma_rough / DEG:.2g}°"
         if here > MOST:
             return [_doubt("rough.contradicts", f"{both}; {rough} (u), {here:.1f} standard uncertainties from it.")]
-        if other < MOST and not psi.interval[0] < -psi.estimate < psi.interval[1]:
+        if other < MOST and not psi.interval[0] < second < psi.interval[1]:
             return [
                 _doubt("rough.open", f"{both}; {rough} (u), which does not choose one. Know it better, or {THIRD}.")
             ]
@@ -311,7 +334,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 ["measured less this, relative", (A / self.north - 1.0) * 100.0, "%"],
             ]
         if math.isnan(A):
-            rows.append(["the other heading with these rates", -psi / DEG, "°"])
+            rows.append(["the other heading with these rates", self._other(psi) / DEG, "°"])
         if p.force is not None:
             theta, gamma = attitude(p.force.x, p.force.y, s.gravity)
             rows += [["pitch, up positive", theta / DEG, "°"], ["roll, right side down positive", gamma / DEG, "°"]]
@@ -359,11 +382,11 @@ def setup_of(record: Record) -> NorthFinderSetup:
     names = {n: f"finder.{n}" for n in ("heading", "sigma", "status")}
     there = all(c in record.channels for c in names.values())
     return NorthFinderSetup.of(
-        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured, truth=_truth(run),
-        sigma_rough=float(o.get("sigma_rough", 0.0)),
+        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured,
+        truth=_truth(run, windows), sigma_rough=float(o.get("sigma_rough", 0.0)),
         finder={n: float(np.asarray(record.channels[c])[-1]) for n, c in names.items()} if there else None,
         time=float(windows["t_end"][-1]) - (float(windows["t_start"][0]) if run.measured else 0.0),
-        settle=float(o.get("settle", 0.0)),
+        settle=float(o.get("settle", 0.0)), drift_order=int(o.get("drift_order", 0)),
         density=float(o.get("density", 0.0)) or float(run.parameters.get("gyro.white_y", 0.0)),
         unbiased=run.type_b == "none" or (
             not np.any(run.parameters.get("gyro.bias", 1.0)) and bias_is_all(run.parameters)
@@ -377,11 +400,19 @@ def method_of(run: RunDocument) -> str:
     return plans.shortest(run.options, float(run.step or 1e-3))[1] if method == "auto" else method
 
 
-def _truth(run: RunDocument) -> dict[str, float] | None:
+def _truth(run: RunDocument, windows: Mapping[str, Array]) -> dict[str, float] | None:
     if run.measured:
         return None
     site, p = Location.of(run), run.parameters
     truth = {"ψ": float(run.options["heading"]), "A": site.earth_rate * math.cos(site.latitude)}
-    if "gyro.bias" in p and bias_is_all(p) and not np.any(np.asarray(p.get("gyro.ramp", 0.0))):
-        truth["b"] = float(np.asarray(p["gyro.bias"])[1])
+    order = int(run.options.get("drift_order", 0))
+    if "gyro.bias" in p and bias_is_all(p):
+        bias, ramp, curve = (float(np.ravel(p.get(f"gyro.{n}", [0.0, 0.0]))[1]) for n in ("bias", "ramp", "curve"))
+        if order >= 2 or (curve == 0.0 and (order == 1 or ramp == 0.0)):
+            # bias + ramp t + curve t2 over t = middle + half x; x2 = (2 P_2 + 1)/3
+            first, last = (float(x) for x in (windows["t_start"][0], windows["t_end"][-1]))
+            middle, half = (first + last) / 2.0, (last - first) / 2.0
+            truth["b"] = bias + ramp * middle + curve * (middle**2 + half**2 / 3.0)
+            terms = (half * (ramp + 2.0 * curve * middle), 2.0 / 3.0 * curve * half**2, 0.0)
+            truth |= {f"d_{k + 1}": x for k, x in enumerate(terms[:order])}
     return truth

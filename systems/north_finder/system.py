@@ -24,6 +24,8 @@ from . import plans
 from .measured import MEASURED
 
 FORCE = "\ntable -> gyro: f"  # of a gyro that feels it
+SOUGHT = "sequencer -> table: mode target face"
+SEEKING = "sequencer -> table: mode face\n    sequencer -> finder: target\n    finder.command -> table.target"
 FACES = {plans.FACE: np.eye(3).tolist()}
 
 
@@ -31,11 +33,12 @@ class NorthFinding(TableTest):
     """The heading of a head from the horizontal Earth rate: two, four or several positions, continuous rotation, with
     the tilt measured, or strapdown.  The method is the estimator in the slot finder, and its plan.
 
-    [NORTH-COMMON, NORTH-2POS, NORTH-4POS, NORTH-CONT, NORTH-TILT, NORTH-STRAPDOWN; GSP ch. 5, section 5.3.2]
+    [NORTH-COMMON, NORTH-2POS, NORTH-4POS, NORTH-CONT, NORTH-TILT, NORTH-STRAPDOWN, NORTH-DRIFT; GSP ch. 5,
+    section 5.3.2]
     """
 
     title = "North finding by gyro"
-    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN")
+    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT")
     reduction = "reduction"
     protocol = "design"
     slots = {
@@ -79,6 +82,7 @@ class NorthFinding(TableTest):
             "positions": Option(12, int, "positions a turn (method several)", 3, 36),
             "back": Option(False, bool, "positions forwards, then backwards: a linear drift of the bias cancels"),
             "turns": Option(5.0, "1", "turns of the head (methods continuous, tilt)", 0.5, 100.0),
+            "drift_order": Option(0, int, "power of time up to which a drift of the bias is estimated", 0, 3),
             "settle": Option(0.5, "s", "wait after each move", 0.0),
             "windows": Option(32, int, "averaging windows of all positions together", 8, 1000),
             "heading": Option("40deg", "rad", "true heading of the head (simulated)", -math.pi, math.pi),
@@ -122,6 +126,8 @@ class NorthFinding(TableTest):
                 "finder": replace(self.slots["finder"], part=part),
                 "site": replace(self.slots["site"], part=moving),
             }
+            wired = (SOUGHT, SEEKING) if self.chosen == "null" else (SEEKING, SOUGHT)
+            vars(self)["wires"] = self.wires.replace(*wired)
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
@@ -171,7 +177,9 @@ class NorthFinding(TableTest):
             "finder.gravity?": gravity,
             "finder.density?": self["density"] or self._density(parts) or 1e-9,
         }
-        if self.chosen == "two":
+        if self["drift_order"]:
+            finder["finder.ramp?"] = self["drift_order"]
+        if self.chosen in plans.SIDED:
             finder["finder.rough?"] = self["rough"]
         moved = {"table.acceleration": plans.ACCELERATION, "table.index_rate": plans.RATE}
         return {**super().parameters(parts), **moved, **BASES.get(self["base"], {}), **finder}
@@ -211,7 +219,9 @@ class NorthFinding(TableTest):
             problems.append(
                 f"time = {self.total:.4g} s: moves and settling take {lost:.4g} s, the readings need {least:.3g} s more"
             )
-        if self.chosen in ("two", "strapdown two") and self["back"]:
+        if self["drift_order"] and (self.chosen.startswith("strapdown") or self.chosen == "null"):
+            problems.append(f"drift_order: of the methods with one gyro axis and fixed positions, not of {self.chosen}")
+        if self.chosen in ("two", "null", "strapdown two") and self["back"]:
             problems.append(f"back: the method {self.chosen} has two positions only; a drift cancels with four")
         return problems
 
@@ -223,14 +233,14 @@ class NorthFinding(TableTest):
         near = min(abs(self["rough"]), math.pi - abs(self["rough"]))
         if self.chosen == "two" and near < plans.MARGIN:
             found.append("Two positions near north or south: the heading is ill-conditioned; take four.")
-        if self.chosen == "two" and math.sin(self["rough"]) * math.sin(self["heading"]) < 0.0:
+        if self.chosen in plans.SIDED and math.sin(self["rough"]) * math.sin(self["heading"]) < 0.0:
             found.append(
                 "Two positions have two headings, ψ and −ψ, and no residual tells them apart: rough lies on the other "
                 "side of the meridian than the heading and will choose the wrong one. Correct rough, or take a third "
                 "position, at 90° to the two (method four or several)."
             )
         tilted = max(abs(self["pitch"]), abs(self["roll"]))
-        if tilted > 1e-5 and self.chosen in ("two", "four", "several", "continuous"):
+        if tilted > 1e-5 and self.chosen in ("two", "null", "four", "several", "continuous"):
             found.append(
                 f"The head is tilted by up to {math.degrees(tilted):.3g}°, the method {self.chosen} takes it for "
                 "level: the heading is wrong by the tilt about north times tan(latitude); take tilt or strapdown."

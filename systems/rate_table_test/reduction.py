@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, LATITUDE, TIME_BASE
@@ -46,8 +47,8 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import DEG, DPH
 
-from . import handling, tables, threshold
-from .steps import cycle_of, direction, levels, scatter
+from . import handling, tables
+from .steps import cycle_of, direction, levels
 
 PPM = 1e-6
 LEAST = 8  # readings of the sweep
@@ -110,9 +111,9 @@ class Reduction(DriftReduction[RateTableSetup]):
         self.w = self.table + self.setup.earth
         self.full = float(np.max(np.abs(self.table)))
         still = np.abs(self.table) < 1e-9 * max(self.full, 1e-12)
-        self.large = still | (np.abs(self.table) > threshold.SMALL * self.full)
-        self.small = threshold.SmallRates.of(
-            self.w[~self.large], self.y[~self.large], scatter(levels(self.table), self.y)
+        self.large = still | (np.abs(self.table) > small_rates.SMALL * self.full)
+        self.small = small_rates.SmallRates.of(
+            self.w[~self.large], self.y[~self.large], small_rates.pooled_std(levels(self.table), self.y)
         )
         if self.small.silent:
             self.large &= ~still

@@ -41,14 +41,6 @@ def direction(rate: Array) -> Array:
     return out
 
 
-def scatter(level: Array, y: Array) -> float:
-    """Return the standard deviation of readings at the same level, pooled; NaN with one reading at each."""
-    n = np.bincount(level)
-    mean = np.bincount(level, weights=y) / n
-    dof = y.size - n.size
-    return math.sqrt(float(np.sum((y - mean[level]) ** 2)) / dof) if dof > 0 else math.nan
-
-
 def cycle_of(phase: Array, steps: int) -> Array:
     """Return the cycle, from 1, of the phases of a run's sweep; the first phase, at rest, is of the first one."""
     out: Array = np.maximum(phase - 2, 0) // (4 * steps) + 1

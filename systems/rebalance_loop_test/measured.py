@@ -23,7 +23,7 @@ TEMPLATE = """\
 # latitude, k (torquer scale factor), range (largest rate; nonlinearities are given there), gate (length of a reading):
 #   needed, here or by --set.
 # phase N: rest, or turning at one rate; the input axis points up along the table axis.  Rates there and back keep a
-#   trend in time out of the nonlinearities.
+#   trend in time out of the nonlinearities.  Rates felt below 2 % of range, in both senses, give the threshold.
 # angle: of the table, right-handed about the upward axis, counted on through the turns.
 # mean: current of the reading, from the counts I (n+ - n-)/(n+ + n-) of a loop that counts, positive where it precesses
 #   positively.  std (of the samples), flagged (suspect samples): optional.

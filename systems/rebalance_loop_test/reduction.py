@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.window_regressors import BelievedGeometry, Turning, axis_rate, wobbles
 from gyrobench.reduction.estimation import nuisances
@@ -81,7 +82,8 @@ MEANINGS = {
 @dataclass(frozen=True, kw_only=True)
 class RebalanceLoopSetup(SiteSetup):
     """k: torquer scale factor, rad/s/A.  largest: rate of the test, rad/s.  gate: length of a reading, s.  labels: of
-    the phases; rest: those at rest.  limit: largest current of the rebalance, A (0: not known).
+    the phases; rest: those at rest.  limit: largest current of the rebalance, A (0: not known).  has_small: readings at
+    small rates are left to the threshold.
     """
 
     k: float
@@ -90,6 +92,7 @@ class RebalanceLoopSetup(SiteSetup):
     labels: Mapping[int, str]
     rest: frozenset[int]
     limit: float = 0.0
+    has_small: bool = False
     pulses: Pulses | None = None
     u_drift: float = 0.0
     u_axis: float = 0.0
@@ -118,6 +121,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             run, k=k, largest=largest, gate=float(run.options["gate"]), pulses=Pulses.of(run),
             labels={n: row.label if row.face == FACE else f"{row.label}, phase {n}" for n, row in plan.items()},
             rest=frozenset(n for n, row in plan.items() if row.mode == "hold"),
+            has_small=run.measured or bool(str(run.options.get("small", "")).strip()),
             limit=float(p.get("rebalance.I") or p.get("rebalance.i_max") or 0.0),
             truth=true_values(p, k, Location.of(run).g, largest / k),
         )  # fmt: skip
@@ -126,15 +130,29 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
         if problems := scale_factor_problems(self.setup.k) + window_problems(self.windows):
             return problems
         missing = [label for p, label in self.setup.labels.items() if p not in self.phase]
-        return [f"no readings of {', '.join(missing)}"] if missing else []
+        if missing:
+            return [f"no readings of {', '.join(missing)}"]
+        self._split()
+        return []
+
+    def _split(self) -> None:
+        """Leave the readings at small rates to the threshold; those at rest too, where a small rate is not answered."""
+        s, w = self.setup, self.windows
+        a0, a1, t0, t1 = (np.asarray(w[n], dtype=float) for n in ("angle_start", "angle_end", "t_start", "t_end"))
+        felt = self._rate(Turning(a0, a1, t0, t1, np.broadcast_to(np.asarray(ON_TABLE), (a0.size, 3, 3))), LEVEL)
+        resting = np.isin(self.phase, list(s.rest))
+        slow = ~resting & (np.abs(felt) < small_rates.SMALL * s.largest) if s.has_small else np.zeros_like(resting)
+        self.still = {n: np.asarray(v)[resting] for n, v in w.items()}  # resolution, noise, ripple
+        indicated = np.asarray(w["mean"], dtype=float) * s.k
+        noise = small_rates.pooled_std(self.phase[slow], indicated[slow]) if slow.any() else 0.0
+        self.small = small_rates.SmallRates.of(felt[slow], indicated[slow], noise, "°/h", DPH)
+        out = slow | (resting & self.small.silent)
+        self.windows = {n: np.asarray(v)[~out] for n, v in w.items()}
+        self.phase = self.phase[~out]
 
     @cached_property
     def phase(self) -> NDArray[np.int_]:
         return np.asarray(self.windows["phase"]).astype(int)
-
-    @cached_property
-    def at_rest(self) -> NDArray[np.bool_]:
-        return np.isin(self.phase, list(self.setup.rest))
 
     @cached_property
     def std(self) -> Array:
@@ -197,26 +215,38 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
                 f"Nonlinearities are given at the largest rate, {s.largest / DPH:.6g} °/h, I = {s.full / MA:.6g} mA.",
                 "The drift rate of the gyro is in the bias.",
             ],
-            tables=[self._levels(found)],
+            tables=[self._levels(found), *self.small.table()],
             reasons=[Reason("samples.std_missing", NO_STD)] if np.any(np.isnan(self.std)) else [],
             random="noise of the loop, random drift",
         )
 
     def _levels(self, found: Findings) -> Table:
         residual = found.y - found.X @ found.est.beta[: found.X.shape[1]]
+        at_zero = -float(found.est.beta[0])  # reading at the rate 0
         rows, labels = [], self.setup.labels
         for label in dict.fromkeys(labels.values()):
             mine = np.isin(self.phase, [p for p, name in labels.items() if name == label])
-            scatter = float(np.std(self.x[mine], ddof=1)) if np.sum(mine) > 1 else 0.0
+            if not mine.any():
+                continue
+            n = int(np.sum(mine))
+            scatter = float(np.std(self.x[mine], ddof=1)) if n > 1 else 0.0
             rate, x, left = (float(np.mean(v[mine])) for v in (self.rate, self.x, residual))
-            rows.append([label, rate / DPH, x / MA, scatter / UA, left / UA, int(np.sum(mine))])
-        caption = "Means of each rate; departure: mean of the residuals of the fit"
-        head = ["rate", "input / (°/h)", "reading / mA", "std of a reading / µA", "departure / µA", "readings"]
+            due = rate / self.setup.k
+            turned = abs(rate) > small_rates.SMALL * self.setup.largest
+            K = 1e6 * ((x - at_zero) / due - 1.0) if turned else math.nan
+            u = 1e6 * scatter / math.sqrt(n) / abs(due) if turned else math.nan
+            rows.append([label, rate / DPH, x / MA, scatter / UA, K, u, left / UA, n])
+        caption = (
+            "Means of each rate; K: reading less that at the rate 0, over the part β of the largest rate, against the "
+            "current of the largest rate [5-75]; departure: mean of the residuals of the fit"
+        )
+        head = ["rate", "input / (°/h)", "reading / mA", "std of a reading / µA", "K less 1 / ppm", "u(K) / ppm",
+                "departure / µA", "readings"]  # fmt: skip
         return Table("readings", "Readings", caption, head, rows)
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         """Return the result with resolution, noise at rest, ripple and dynamic range."""
-        s, x = self.setup, self.x[self.at_rest]
+        s, x = self.setup, np.asarray(self.still["mean"], dtype=float)
         q, noise = quantum(x) * s.k / DPH, float(np.std(x, ddof=1)) * s.k / DPH
         u, closed = noise / math.sqrt(2.0 * (x.size - 1)), None
         if s.pulses is not None and q > 0.0:
@@ -226,8 +256,8 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             _plain("resolution", f"quantum {reading}; 0: none", "°/h", q, closed=closed),
             _plain("noise", f"standard deviation {reading}", "°/h", noise, u),
         ]
-        if "ripple" in self.windows:
-            ripple = np.asarray(self.windows["ripple"], dtype=float)[self.at_rest] / ARCSEC
+        if "ripple" in self.still:
+            ripple = np.asarray(self.still["ripple"], dtype=float) / ARCSEC
             spread = float(np.std(ripple, ddof=1)) / math.sqrt(x.size)
             meaning = "standard deviation of the float angle within a reading at rest"
             found.append(_plain("ripple", meaning, "″", float(np.mean(ripple)), spread))
@@ -235,7 +265,8 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             ratio = s.limit * s.k / DPH / max(q, noise)
             meaning = "full scale over the larger of resolution and noise"
             found.append(_plain("dynamic range", meaning, "1", ratio, ratio * u / noise if noise > q else 0.0))
-        return with_values(result, found)
+        threshold = self.small.coefficient(None)
+        return with_values(result, [*found, *([threshold] if threshold else [])])
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         value = {c.name: c.estimate for c in coefficients}
@@ -244,6 +275,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
         return [
             *told(coefficients, f"Bias {bias:.4g} °/h, I_0 = {{I_0}}; scale-factor error κ = {{κ}}."),
             f"A reading of {self.setup.gate:g} s: {step}, standard deviation at rest {value['noise']:.2g} °/h.",
+            *self.small.sentence(),
             *found.nuisance_sentences(),
         ]
 

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from gyrobench import drift, frames, units
+from gyrobench.reduction.drift.small_rates import SMALL
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.table_test import FACE, ON_TABLE, TableTest, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.units import DPH
 
 from .measured import MEASURED
 
@@ -22,7 +24,7 @@ FLOAT = "float"  # the sampler of the float angle
 class RebalanceLoopTest(RebalanceTest):
     """The gyro stands on a level table with its input axis up, at rest and turning at a row of rates in both senses,
     there and back.  Bias, scale factor and linearity of the loop follow from its readings, the resolution and the
-    limit cycle from those at rest.
+    limit cycle from those at rest, the threshold, on request, from small rates.
 
     [TEST-REBAL-LOOP; Hu 1981, section 5.5, eq. 5-62..5-76]
     """
@@ -44,6 +46,7 @@ class RebalanceLoopTest(RebalanceTest):
             "gate": Option(1.0, "s", "length of a reading", 0.0),
             "rest": Option(30, int, "readings at rest, at the beginning and at the end", 6, 100000),
             "readings": Option(10, int, "readings at each rate, twice", 1, 100000),
+            "small": Option("", str, "small rates for the threshold, deg/h, both senses each, as 0.01 0.1 1"),
             "settle": Option(3.0, "s", "wait before the readings, after each change of rate", 0.0),
         }
         | TORQUER
@@ -71,12 +74,16 @@ class RebalanceLoopTest(RebalanceTest):
         """Return the rates as parts of the largest; raises ValueError for what is not a list of numbers."""
         return [float(x) for x in self["rates"].replace(",", " ").split()]
 
+    def small_rates(self) -> list[float]:
+        """Return the small rates, rad/s; raises ValueError for what is not a list of numbers."""
+        return [float(x) * DPH for x in self["small"].replace(",", " ").split()]
+
     def plan(self) -> Plan:
-        """At rest, each rate in both senses, the same in reverse order, at rest: a trend in time is not taken for one
-        in the rate.
+        """At rest, each rate in both senses, the same in reverse order, the small rates, at rest: a trend in time is
+        not taken for one in the rate.  The table takes the Earth rate off the small ones.
         """
         try:
-            rates = self.rates()
+            rates, small = self.rates(), self.small_rates()
         except ValueError:
             return Plan()  # check() says why
         gate, settle, n = self["gate"], self["settle"], self["readings"]
@@ -85,7 +92,13 @@ class RebalanceLoopTest(RebalanceTest):
         for rate in (sense * part * self["range"] for part in rates for sense in (1.0, -1.0)):
             way, label = abs(rate) * gate, f"{math.degrees(rate):+.6g} °/s".replace("-", "−")
             there.append(Phase(label, "rate", FACE, rate, settle=settle, travel=n * way, window=way))
-        return Plan([rest, *there, *reversed(there), rest], {FACE: ON_TABLE})
+        slow = []
+        for r, sense in ((r, s) for r in small for s in (1.0, -1.0)):
+            rate = sense * r - frames.EARTH_RATE * math.sin(self["latitude"])
+            label = f"{sense * r / DPH:+.6g} °/h felt".replace("-", "−")
+            way = abs(rate) * gate
+            slow.append(Phase(label, "rate", FACE, rate, settle=settle, travel=n * way, window=way))
+        return Plan([rest, *there, *reversed(there), *slow, rest], {FACE: ON_TABLE})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {**super().parameters(parts), **{f"gyro.{name}?": 0.0 for name in drift.NAMES}}  # the float alone
@@ -95,7 +108,18 @@ class RebalanceLoopTest(RebalanceTest):
             rates = self.rates()
         except ValueError:
             return [f"rates = {self['rates']}: numbers are expected, parts of the largest rate, such as 0.1 0.5 1"]
-        problems = [f"rates: {r:g} is not above 0 and up to 1, the largest rate" for r in rates if not 0.0 < r <= 1.0]
+        try:
+            small = self.small_rates()
+        except ValueError:
+            return [f"small = {self['small']}: numbers in deg/h are expected, such as 0.01 0.1 1"]
+        limit = SMALL * self["range"]
+        problems = [f"small: {r / DPH:g} deg/h: must be above 0 and below {limit / DPH:.3g} deg/h, {SMALL:g} of the "
+                    "largest rate" for r in small if not 0.0 < r < limit]  # fmt: skip
+        if small and min(rates, default=1.0) <= SMALL:
+            problems.append(f"rates: beside small rates at least {SMALL:g} of the largest")
+        if sorted(set(small)) != small:
+            problems.append(f"small = {self['small']}: the rates must rise, each once")
+        problems += [f"rates: {r:g} is not above 0 and up to 1, the largest rate" for r in rates if not 0.0 < r <= 1.0]
         if len(set(rates)) < 3 or len(set(rates)) < len(rates):
             problems.append(f"rates = {self['rates']}: at least three different ones are needed for the linearity")
         problems += [f"{name} = 0: must be > 0" for name in ("gate", "range") if not self[name] > 0.0]

@@ -51,7 +51,9 @@ class Reduction(LoopReduction):
         return Account(
             method="Servo mode from an offset of the float, capture law and fine loop",
             sources=["CTRL-CAPTURE; Hu 1981, sections 5.5 (one-1), 6.1 (item 6)"],
-            equation='M = "clip"(-k_p u, plus.minus k_d v_"lim") - k_d w',
+            equation='M = -k_d (w + "sign"(e) (sqrt(2 a abs(e)) - k e_l))'
+            if options.get("law") == "time-optimal"
+            else 'M = "clip"(-k_p u, plus.minus k_d v_"lim") - k_d w',
             conventions=[
                 "Angles are those of the table against the gyro, the float angle times C/H. Time counts from servo "
                 "mode on. The figures are of this run; u: sampling of the record and communication step.",

@@ -15,6 +15,7 @@ from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System
 
 TAU = {1: 4e-4, 2: 1e-3}  # s, of the gyro for which a network is made
+LAWS = ("speed-limited", "time-optimal")  # values of table.capture_law
 MOVE = 0.2  # rad/s and rad/s2 of the table while it sets the offset
 PAUSE = 0.2  # s before servo mode
 
@@ -24,6 +25,7 @@ class TableCapture(System):
 
         capture:  M = clip(-k_p u, +-k_d v_lim) - k_d w        until u and w stay near zero, then the fine loop
 
+    With law = time-optimal the rate wanted is that from which the motor can just brake, up to the range of the pickoff.
     capture = false closes the fine loop at once: far from null it is beyond its linear range, torque_max / K_T, and as
     it is conditionally stable, the limit of the motor makes it unstable.
 
@@ -48,6 +50,7 @@ class TableCapture(System):
         "capture": Option(True, bool, "capture first; false: the fine loop immediately", sets="table.capture"),
         "capture_rate": Option(50.0, "rad/s", "natural frequency while capturing; friction holds the table off null by "
                                "friction / (J capture_rate2)", 1.0, sets="table.capture_rate"),
+        "law": Option(LAWS[0], str, f"how the table returns: {' or '.join(LAWS)}"),
         "friction": Option("1400g.cm", "N.m", "Coulomb friction on the table axis", 0.0, sets="table.friction"),
         "range": Option("0.5deg", "rad", "range of the pickoff, of the float angle"),
         "J": Option(2.56, "kg.m2", "inertia of table and load", sets="table.J"),
@@ -99,6 +102,7 @@ class TableCapture(System):
             **self.plan().parameters(),
             **self.owned(),
             **told,
+            **({"table.capture_law": 1} if self["law"] == LAWS[1] else {}),
             "gyro.J": inertia,
             "gyro.u_max": self["range"] * parts["gyro.K_sg"],
             "table.acceleration": MOVE,
@@ -106,7 +110,8 @@ class TableCapture(System):
         }
 
     def check(self) -> list[str]:
-        return [
+        unknown = [] if self["law"] in LAWS else [f"law = {self['law']}: must be {' or '.join(LAWS)}"]
+        return unknown + [
             f"{n} = {self[n]:g} {self.options[n].unit}: must be > 0"
             for n in ("offset", "null", "range", "J", "H", "C")
             if not self[n] > 0.0

@@ -1,6 +1,6 @@
 """North finding, counted: is the heading unbiased, is sigma right, do the intervals hold; how long ten thousand take.
 
-    python tests/benchmarks/north_finder.py [METHOD ...] [--runs 3000] [--time 300] [--trend] [--population]
+    python tests/benchmarks/north_finder.py [METHOD ...] [--runs 3000] [--time 300] [--trend] [--population] [--drift N]
 
 Each run draws heading, latitude (to 70 deg), bias of the gyro and, for tilt and strapdown, the attitude (tilt: 10 mrad,
 strapdown: 0.5 rad), and is a co-simulation at 1 kHz.  Printed: mean error of the finder over its sigma, and rms over
@@ -8,6 +8,7 @@ sigma, both with the standard error they have by chance, and how often the 95 % 
 heading.  The noise is white; --trend leaves the nuisance model in (a linear drift of the bias may be there).
 --population: noise of the same variance of a window from the population that intervals are made for (README): how often
 they hold, no more, as the sigma of the finder is that of white noise.
+--drift: a linear and a quadratic drift of the bias are drawn and estimated up to the order N (several: there and back).
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ DPH = units.factor("deg/h")
 
 
 def drawn(method: str, rng: np.random.Generator) -> dict[str, Any]:
-    heading = rng.uniform(0.6, math.pi - 0.6) if method == "two" else rng.uniform(-math.pi, math.pi)
+    heading = rng.uniform(0.6, math.pi - 0.6) if method in plans.SIDED else rng.uniform(-math.pi, math.pi)
     values: dict[str, Any] = {"method": method, "heading": float(heading), "latitude": float(rng.uniform(-1.22, 1.22))}
     tilt = {"tilt": 0.01}.get(method, 0.5 if method.startswith("strapdown") else 0.0)
     values |= {"pitch": float(rng.uniform(-tilt, tilt)), "roll": float(rng.uniform(-tilt, tilt))}
@@ -55,9 +56,9 @@ def coloured(windows: dict[str, Any], rng: np.random.Generator) -> dict[str, flo
     } | {f"gyro.markov_{axis}_tau": tau for axis in "xy"}  # fmt: skip
 
 
-def counted(job: tuple[str, int, int, float, bool, bool]) -> list[tuple[float, float, bool]]:
+def counted(job: tuple[str, int, int, float, bool, bool, int]) -> list[tuple[float, float, bool]]:
     """Errors of the finder over its sigma, and whether the interval of the reduction holds."""
-    method, first, runs, total, trend, population = job
+    method, first, runs, total, trend, population, order = job
     windows: dict[str, Any] = {}
     system = load_system("north_finder")
     system.set("method", method)
@@ -66,6 +67,10 @@ def counted(job: tuple[str, int, int, float, bool, bool]) -> list[tuple[float, f
         for k in range(first, first + runs):
             rng = np.random.default_rng(k)
             values = drawn(method, rng) | {"time": total}
+            if order:
+                ramp, curve = (float(rng.normal()) * DPH / total**power for power in (1, 2))
+                values |= {"drift_order": order, "gyro.ramp": [0.0, ramp], "gyro.curve": [0.0, curve * (order > 1)]}
+                values |= {"back": method in ("four", "several")}
             if population:
                 windows = windows or session.run(values, seed=k).windows
                 values |= coloured(windows, rng)
@@ -84,12 +89,13 @@ def main() -> None:
     parser.add_argument("--time", type=float, default=300.0)
     parser.add_argument("--trend", action="store_true")
     parser.add_argument("--population", action="store_true")
+    parser.add_argument("--drift", type=int, default=0, choices=range(4))
     given = parser.parse_args()
     begun = time.perf_counter()
     for method in given.method:
         n = 50
         jobs = [
-            (method, k, min(n, given.runs - k), given.time, given.trend, given.population)
+            (method, k, min(n, given.runs - k), given.time, given.trend, given.population, given.drift)
             for k in range(0, given.runs, n)
         ]
         with Pool(2) as pool:

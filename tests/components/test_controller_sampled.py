@@ -292,3 +292,68 @@ def test_counts_must_be_cumulative(count, text):
     part.count = count
     with pytest.raises(ComponentError, match=text):
         part.do_step(0.0, 5e-3)
+
+
+# ---------------------------------------------------------------------------------------- a plant with viscous friction
+@pytest.mark.parametrize("p", [0.0, 0.5])
+@pytest.mark.parametrize("D", [1e-4, 2.0, 400.0])
+def test_poles_of_an_axis_with_viscous_friction(D, p):
+    """(z - 1)(z - d)(z - b) + n (g z - a) = (z - p)3 with scipy's zero-order hold of 1/(s (J s + D))."""
+    part = Controller(law_viscous=D, law_p=p)
+    part.initialize()
+    num, den, _ = cont2discrete(([1.0], [J, D, 0.0]), 5e-3)
+    closed = np.polyadd(np.polymul(den, [1.0, -part.law_b]),
+                        np.polymul(num.ravel()[-2:] * part.law_scale, [part.law_g, -part.law_a]))  # fmt: skip
+    assert closed == pytest.approx(np.poly([p] * 3), abs=1e-9)
+
+
+def test_step_and_ramp_of_an_axis_with_viscous_friction():
+    """A step without error after three samples, of the design with D alone; of a ramp D w / K is left of either design.
+
+    K = (2 J/T2)(g - a)/(1 - b), the static stiffness: the plant integrates once.
+    """
+    D, w, T = 40.0, 1e-3, 5e-3
+    a, b, *_ = cont2discrete((np.array([[0.0, 1.0], [0.0, -D / J]]), np.array([[0.0], [1.0 / J]]), np.eye(2),
+                              np.zeros((2, 1))), T)  # fmt: skip
+    for viscous in (D, 0.0):
+        loop = Loop(quantum=1e-16, law_viscous=viscous)
+        loop.a, loop.b = a, b[:, 0]
+        angle, *_ = loop.run(lambda t: 1e-6, 0.1)
+        assert (abs(angle[3:] - 1e-6) < 1e-14).all() == (viscous > 0.0)
+        loop = Loop(quantum=1e-16, law_viscous=viscous)
+        loop.a, loop.b = a, b[:, 0]
+        angle, _, reference, _ = loop.run(lambda t: w * t, 0.5)
+        K = loop.part.law_scale * (loop.part.law_g - loop.part.law_a) / (1.0 - loop.part.law_b)
+        assert reference[-1] - angle[-1] == pytest.approx(D * w / K, rel=1e-6)
+
+
+def test_delay_of_an_axis_with_viscous_friction():
+    """The start refuses a delay where an eigenvalue of the sampled states leaves the unit circle, and no other."""
+    T, verdicts = 5e-3, set()
+    for D, p, delay in [(d, p, k * 5e-4) for d in (1e-4, 30.0, 300.0) for p in (0.0, 0.2) for k in range(11)]:
+        part = Controller(law_viscous=D, law_p=p, law_delay=delay, law_quantum=1e-9, step=5e-4)
+        free = Controller(law_viscous=D, law_p=p)
+        free.initialize()
+        plain = np.array([[0.0, 1.0], [0.0, -D / J]]), np.array([[0.0], [1.0 / J]]), np.eye(2), np.zeros((2, 1))
+        new = cont2discrete(plain, max(T - delay, 1e-12))
+        old = cont2discrete(plain, max(delay, 1e-12))
+        A = new[0] @ old[0]
+        gain = free.law_scale
+        # states: angle, rate, last torque, last error; x = -angle, u = b u' + gain (g x - a x')
+        u = np.array([-gain * free.law_g, 0.0, free.law_b, -gain * free.law_a])
+        M = np.zeros((4, 4))
+        M[:2, :2], M[:2, 2] = A, (new[0] @ old[1])[:, 0]
+        M[:2] += np.outer(new[1][:, 0], u)
+        M[2], M[3, 0] = u, -1.0
+        largest = float(np.max(np.abs(np.linalg.eigvals(M))))
+        if abs(largest - 1.0) < 1e-6:
+            continue
+        try:
+            part.initialize()
+            stable = True
+        except ComponentError as error:
+            assert "unstable" in str(error)
+            stable = False
+        assert stable == (largest < 1.0), (D, p, delay, largest)
+        verdicts.add(stable)
+    assert verdicts == {True, False}

@@ -35,7 +35,8 @@ def seen(heading: float, pitch: float, roll: float, latitude: float, angle: floa
 def find(
     part: str, heading: float, latitude: float, *, pitch: float = 0.0, roll: float = 0.0,
     bias: tuple[float, float] = (0.0, 0.0), accelerometer: float = 0.0, drift: float = 0.0,
-    angles: list[float] | None = None, noise: float = 0.0, seed: int = 0, dwell: int = 20, **parameters: float,
+    angles: list[float] | None = None, noise: float = 0.0, seed: int = 0, dwell: int = 20, power: int = 1,
+    **parameters: float,
 ) -> dict[str, float]:  # fmt: skip
     """Outputs of a finder after its plan: positions of ``dwell`` steps of 0.1 s, or one turn of 360 steps."""
     h = 0.1
@@ -51,7 +52,7 @@ def find(
     plain.initialize(0.0)
     for n, (phase, angle) in enumerate(rows):
         w, f = seen(heading, pitch, roll, latitude, angle)
-        rate = w[:2] + np.array(bias) + drift * n * h + noise / math.sqrt(h) * rng.normal(size=2)
+        rate = w[:2] + np.array(bias) + drift * (n * h) ** power + noise / math.sqrt(h) * rng.normal(size=2)
         last = float(n == len(rows) - 1)
         plain.set({"rate[1]": rate[0], "rate[2]": rate[1], "f[1]": f[0] + accelerometer, "f[2]": f[1] + accelerometer,
                    "f[3]": f[2], "angle": angle, "gate": 1.0, "phase": float(phase), "finished": last})  # fmt: skip
@@ -162,6 +163,45 @@ def test_there_and_back_cancels_a_linear_drift() -> None:
 def test_ramp_takes_a_linear_drift() -> None:
     found = find("continuous", -2.0, 0.9, drift=1e-3 * DPH, ramp=1.0)
     assert abs(apart(found["heading"], -2.0)) < 1e-7
+
+
+def test_seeking_the_null_of_two_positions() -> None:
+    """Pairs there and back, the head at the angle commanded; turn = psi - 90 deg after a pair, sigma of three pairs."""
+    latitude, psi, bias, density = 0.7, 0.3, 3e-6, 1e-7
+    plain = Plain(load_part("northfinder_null_seeking"))
+    plain.set({"latitude": latitude, "every": 1e9, "rough": 1.0, "density": density})
+    plain.initialize(0.0)
+    rows = [(p, 0.0 if (p // 2) % 2 == 0 else math.pi, float(j > 2)) for p in range(1, 9) for j in range(24)]
+    angle = 0.0
+    for n, (phase, target, gate) in enumerate([*rows, (8, math.pi, 0.0)]):
+        rate = W * math.cos(latitude) * math.cos(psi - angle) + bias
+        plain.set({"rate[2]": rate, "f[3]": G, "angle": angle, "gate": gate, "phase": float(phase), "target": target,
+                   "finished": float(n == len(rows))})  # fmt: skip
+        plain.step(n * 0.1, 0.1)
+        angle = plain.get(["command"])[0]
+        if n == 2 * 24 + 2:
+            assert apart(angle, psi - math.pi / 2 + math.pi) == pytest.approx(0.0, abs=1e-9)
+    heading, sigma, found, status = plain.get(["heading", "sigma", "bias", "status"])
+    assert heading == pytest.approx(psi, abs=1e-9) and found == pytest.approx(bias, rel=1e-6) and status == 1.0
+    time = 6 * 20 * 0.1  # three pairs; the first sample of a phase is not taken
+    assert sigma == pytest.approx(density / (W * math.cos(latitude) * math.sqrt(time)), rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_drift_of_any_order_is_taken_out(order: int) -> None:
+    """w = A cos + b + r t^order of 1e-3 deg/h at 1 s, by the normal equations of six unknowns; sigma from numpy's."""
+    turn = np.linspace(0.0, -2.0 * math.pi, 361)
+    t = 0.1 * np.arange(361)
+    X = np.column_stack([np.cos(turn), np.sin(turn), *(t**k for k in range(order + 1))])[1:]
+    P = np.linalg.inv(0.1 * X.T @ X)
+    found = find("continuous", -2.0, 0.9, drift=1e-3 * DPH, power=order, ramp=float(order), density=1e-8)
+    assert abs(apart(found["heading"], -2.0)) < 1e-6
+    c, s = math.cos(-2.0), math.sin(-2.0)
+    A = W * math.cos(0.9)
+    expected = 1e-8 * math.sqrt(s * s * P[0, 0] - 2.0 * s * c * P[0, 1] + c * c * P[1, 1]) / A
+    assert found["sigma"] == pytest.approx(expected, rel=0.02)
+    less = find("continuous", -2.0, 0.9, drift=1e-3 * DPH, power=order, ramp=order - 1.0)
+    assert abs(apart(less["heading"], -2.0)) > 1e-5
 
 
 def test_tilt_by_tangent_of_latitude() -> None:

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
+from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.result import DriftTestResult
@@ -65,11 +66,12 @@ def test_random_heads_without_noise(sessions: Callable[[str], Session], method: 
     rng = np.random.default_rng(len(method))
     for _ in range(2):
         values: dict[str, Any] = {"latitude": float(rng.uniform(-1.2, 1.2)), "gyro.bias": [2e-6, -1e-6]}
-        values["heading"] = float(rng.uniform(0.7, 2.4) if method == "two" else rng.uniform(-math.pi, math.pi))
+        values["heading"] = float(rng.uniform(0.7, 2.4) if method in plans.SIDED else rng.uniform(-math.pi, math.pi))
         if method == "strapdown":
             values["gyro.bias"] = [0.0, 0.0]
         if method.startswith("strapdown"):
             values |= {"pitch": float(rng.uniform(-1, 1)), "roll": float(rng.uniform(-1, 1))}
+        values |= {"time": 60.0} if method == "null" else {}
         record = run(sessions, method, **QUIET, **values)
         assert abs(off(record)) < 1e-7 and record.channels["finder.status"][-1] == 1.0
         found = Reduction.from_record(record)
@@ -152,6 +154,60 @@ def test_drift_of_the_bias(sessions: Callable[[str], Session]) -> None:
     drift = {"gyro.ramp": [0.0, 20.0 * DPH / 3600.0], **QUIET}
     once, back = (off(run(sessions, "four", back=b, time=60.0, **drift)) for b in (False, True))
     assert abs(once) > 5 * ARCMIN and abs(back) < 0.01 * abs(once)
+
+
+def test_drift_of_higher_order(sessions: Callable[[str], Session]) -> None:
+    """bias + ramp t + curve t2 of 3 deg/h and 6 deg/h over 60 s is estimated with the heading.
+
+    By hand, t = m + h x with x = -1..1 over the readings: d_1 = h (ramp + 2 curve m), d_2 = 2/3 curve h2.
+    """
+    ramp, curve = 3.0 * DPH / 60.0, 6.0 * DPH / 3600.0
+    drift = {"gyro.ramp": [0.0, ramp], "gyro.curve": [0.0, curve], **QUIET, "time": 60.0, "windows": 64}
+    for method, more in (("continuous", {}), ("several", {"positions": 6, "back": True})):
+        record = run(sessions, method, drift_order=2, **more, **drift)
+        assert abs(off(record)) < 0.01 * ARCMIN, method
+        found = Reduction.from_record(record)
+        t0, t1 = float(record.windows["t_start"][0]), float(record.windows["t_end"][-1])
+        m, h = (t0 + t1) / 2.0, (t1 - t0) / 2.0
+        expected = {"ψ": 40.0, "d_1": h * (ramp + 2.0 * curve * m) / DPH, "d_2": 2.0 / 3.0 * curve * h * h / DPH}
+        for name, value in expected.items():
+            assert found[name].estimate == pytest.approx(value, rel=1e-4), (method, name)
+            assert found[name].truth == pytest.approx(value, rel=1e-9)
+        assert found["b"].estimate == pytest.approx(found["b"].truth, rel=1e-4)
+    linear = run(sessions, "continuous", drift_order=1, **drift)
+    assert abs(off(linear)) > ARCMIN
+    with pytest.raises(GyrobenchError, match="one gyro axis"):
+        run(sessions, "strapdown two", drift_order=1)
+
+
+def test_the_null_points_east_or_west(sessions: Callable[[str], Session]) -> None:
+    """EG26: heading 8 deg, rough on its side: the head has turned by 8 - 90 deg, where both rates are the same.
+
+    A scale factor 2 % off makes c1 = 1.02 cos 8 deg = 1.01, so the first pair turns by 90 deg, 8 too many; the second
+    is off by 2 % of that, 0.16 deg, the third by 2 % of this: 0.054 deg in the mean of three.
+    """
+    values = {"heading": math.radians(8.0), "rough": math.radians(20.0), "time": 60.0, **QUIET}
+    record = run(sessions, "null", **values)
+    assert math.degrees(record.windows["angle_end"][-1]) == pytest.approx(8.0 - 90.0, abs=1e-4)
+    rates = [record.windows["mean"][record.windows["phase"] == p].mean() for p in (7, 8)]
+    assert rates[0] == pytest.approx(rates[1], abs=1e-9)
+    wrong = run(sessions, "null", **values | {"gyro.scale": [0.0, 0.02]})
+    assert abs(math.degrees(off(wrong))) == pytest.approx(0.054, abs=0.003)
+    found = Reduction.from_record(wrong)["ψ"]
+    assert found.estimate == pytest.approx(8.0, abs=0.06)
+
+
+def test_interval_of_the_null(sessions: Callable[[str], Session]) -> None:
+    """Headings near north, noise: z of the finder by sigma = N/(A sqrt(T)), T the time of three pairs of four."""
+    z, held = [], 0
+    for seed in range(12):
+        heading = math.radians(2.0 + seed)
+        record = run(sessions, "null", seed=seed, nuisances="none", heading=heading, rough=0.1, time=60.0)
+        z.append(off(record) / float(record.channels["finder.sigma"][-1]))
+        found = Reduction.from_record(record)["ψ"]
+        held += found.interval[0] <= found.truth <= found.interval[1]
+    assert abs(float(np.mean(z))) < 3.5 / math.sqrt(12) and float(np.std(z)) < 1.7
+    assert held >= 9
 
 
 def test_a_moving_base_does_not_pass_for_noise(

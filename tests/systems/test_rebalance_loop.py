@@ -241,3 +241,29 @@ def test_record_without_the_optional_column(command: Any, tmp_path: Any) -> None
         for found in values.values():
             assert abs(found[name]["estimate"] - truth) < 4.0 * found[name]["u"], name
             assert found[name]["estimate"] == pytest.approx(values["all"][name]["estimate"], abs=0.1 * found[name]["u"])
+
+
+def test_threshold_and_scale_factor_at_each_rate(pwm: Session) -> None:
+    """A band d = 0.5 deg/h put into the small rates: sqrt(r2 - d2) passes, half of r at d/sqrt(3/4) = 0.577 deg/h.
+
+    Both currents 1e-4 too large: the reading is 100 ppm less than what flows, K - 1 = -100 ppm at every rate.
+    """
+    small = {"small": "0.2 0.5 0.7 2", "readings": 10}
+    record = pwm.run({**QUICK, **STILL, **small, "rebalance.dI_plus": 1e-4 * I, "rebalance.dI_minus": 1e-4 * I}, 2)
+    system = load_system(NAME).with_values(small)
+    plain = system.reduce(record)
+    assert "below" in plain["threshold"].no_value  # an integrating loop answers any rate
+    rows = next(t for t in plain.tables if t.id == "readings").rows
+    fastest = [r for r in rows if abs(r[1]) > 3000.0]
+    assert len(fastest) == 2 and all(abs(r[4] + 100.0) < 4.0 * r[5] + 2.0 for r in fastest)
+    w, k, d = record.windows, 17.2 * ARCSEC / 1e-3, 0.5 * ARCSEC
+    earth = 7.2921159e-5 * math.sin(math.radians(45.75))
+    felt = (w["angle_end"] - w["angle_start"]) / (w["t_end"] - w["t_start"]) + earth
+    slow = (np.abs(felt) < 3.0 * ARCSEC) & (np.abs(felt - earth) > 1e-9)
+    passed = np.sign(felt) * np.sqrt(np.maximum(felt**2 - d**2, 0.0))
+    w["mean"] = np.where(slow, w["mean"] + (passed - felt) / k, w["mean"])
+    found = system.reduce(record)
+    assert found["threshold"].interval == pytest.approx((0.5, 0.7))
+    assert found["κ"].estimate == pytest.approx(plain["κ"].estimate, abs=plain["κ"].u)
+    with pytest.raises(GyrobenchError, match="small"):
+        pwm.run({**QUICK, "small": "200"}, 1)

@@ -57,6 +57,36 @@ def test_time_to_the_fine_loop_beside_the_equations(seed):
     assert c["w_max"].estimate == pytest.approx(math.degrees(np.max(np.abs(w[: since + 100]))), rel=5e-3)
 
 
+def test_time_optimal_return():
+    """Beside the equations, and beside the least time of the double integrator, 2 sqrt(e J/M): no law is quicker."""
+    J, C, H, offset, rate = 2.0, 0.03, 0.04, math.radians(2.0), 150.0
+    e_0, M_max = offset * C / H, 9.80665
+    values = {**STILL, "J": J, "C": C, "offset": offset, "friction": 0.0, "range": math.radians(2.5)}
+    c, result = measured(**values, law="time-optimal", capture_rate=rate)
+    k, k_d, a = rate / 2.4, 2.4 * J * rate, 0.8 * M_max / J
+    e_l = a / (2.0 * k * k)
+
+    def slope(t, y):
+        w, b, db = y
+        e = abs(b) * C / H
+        f = k * e if e < e_l else math.sqrt(2.0 * a * e) - k * e_l
+        m = min(max(-k_d * (math.copysign(f, b) + w), -M_max), M_max)
+        return [m / J, db, (H * w - C * db) / (1e-3 * C)]
+
+    found = solve_ivp(slope, (0.0, 1.0), [0.0, offset, 0.0], "LSODA", rtol=1e-8, atol=1e-13, max_step=1e-3,
+                      dense_output=True)  # fmt: skip
+    t = np.arange(0.0, 1.0, 2e-4)
+    w, b, _ = found.sol(t)
+    ready = (np.abs(b) * C / H < 8.0 * ARCSEC) & (np.abs(w) < 3e-5)
+    since = np.flatnonzero(ready & ~np.roll(ready, 1))[0]
+    assert c["t_fine"].estimate == pytest.approx(t[since] + 0.05, abs=3e-3)
+    assert c["w_max"].estimate == pytest.approx(math.degrees(np.max(np.abs(w))), rel=5e-3)
+    least = 2.0 * math.sqrt(e_0 * J / M_max)
+    assert least < c["t_fine"].estimate - 0.05 < 2.0 * least and result.verdict == "pass"
+    slow, _ = measured(**values, capture_rate=rate)
+    assert slow["t_fine"].estimate > 3.0 * c["t_fine"].estimate
+
+
 def test_fine_loop_closed_directly_diverges():
     """The counter-example: void, with conditional stability under saturation as the reason."""
     c, result = measured(capture=False)

@@ -5,28 +5,34 @@ from __future__ import annotations
 from gyrobench.component.blocks.command import ARCSEC
 from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Parameter, State
-from gyrobench.component.math import Number, Vector, clip, fabs, floor, index, pi, sqrt, vector
+from gyrobench.component.math import Number, Vector, clip, exp, fabs, floor, index, pi, sqrt, vector
 
 OFF, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages of the capture
 DEG = pi / 180.0
 
 
 class SampledController(Block):
-    """Sampled controller of an inertia J: all closed-loop poles at p, two degrees of freedom.  [CTRL-SAMPLED]
+    """Sampled controller of a table axis: all closed-loop poles at p, two degrees of freedom.  [CTRL-SAMPLED]
 
         u_k = b u_k-1 + (2 J / T2) (g x_k - a x_k-1)        x = (command count - count) quantum, both cumulative
         b = (p3 + 3 p2 + 3 p - 3) / 4,   g = 2 + b - 3 p,   a = p3 - b
         demand = clip(u_k + J_ff acc, +-M_max)
 
-    p = 0 is the deadbeat design: no error of a constant rate after three samples, no torque between samples.  The
-    demand that was really made, less the feedforward, is the u_k-1 of the next sample: saturation is fed back into the
-    history.  J_ff acc, from the acceleration of the reference over the coming period, moves the table by itself; the
-    feedback is left with what differs.  Static stiffness: (2 J / T2) (g - a) / (1 - b) N.m/rad.
+    With `viscous` D > 0 the plant of the design is 1/(s (J s + D)): viscous friction and back EMF.  y = D T / J,
+    d = e^-y, W(z) = (T2/2J)(n1 z + n0)/((z - 1)(z - d)), n1 = 2 (y - 1 + d)/y2, n0 = 2 (1 - d - y d)/y2, s = 1 + d:
+
+        b = (3 p2 - d + p3 n1/n0 - (s - 3 p) n0/n1) / (n0/n1 + d n1/n0 + s)
+        g = (s + b - 3 p)/n1,   a = (p3 - d b)/n0              D = 0: d = n1 = n0 = 1, the above
+
+    p = 0 is the deadbeat design: no error of a constant rate after three samples (D > 0: of a step), no torque
+    between samples.  The demand that was really made, less the feedforward, is the u_k-1 of the next sample: saturation
+    is fed back into the history.  J_ff acc, from the acceleration of the reference over the coming period, moves the
+    table by itself; the feedback is left with what differs.  Static stiffness: (2 J / T2) (g - a) / (1 - b) N.m/rad.
 
     `delay` is the time from the sample to the new torque; the gains are those for no delay, and the start refuses a
     delay with which a pole leaves the unit circle; with m = delay / T the plant is
 
-        J z (z - 1)2 theta = (T2/2) ((1-m)2 z2 + (1 + 2m - 2m2) z + m2) u
+        J z (z - 1)2 theta = (T2/2) ((1-m)2 z2 + (1 + 2m - 2m2) z + m2) u               (D = 0)
 
     Not modelled: word length of the processor beyond the counts, poles that differ from each other.
     Source: Hu 1981, eq. 6-10..6-19 with ET22; softer poles, delay and feedforward: own design.
@@ -35,6 +41,7 @@ class SampledController(Block):
     period = Parameter(5e-3, "s", "sampling period T", min=1e-3, max=1e-2)
     quantum = Parameter(0.18 * ARCSEC, "rad", "angle of one count (0.18 arcsec)", above=0.0)
     J = Parameter(2.56, "kg.m2", "table inertia of the design", above=0.0)
+    viscous = Parameter(0.0, "N.m.s/rad", "viscous friction and back EMF of the design", min=0.0)
     p = Parameter(0.0, "1", "closed-loop poles, all three; 0: deadbeat", min=0.0, below=1.0)
     J_ff = Parameter(0.0, "kg.m2", "inertia of the feedforward; 0: one degree of freedom", min=0.0)
     M_max = Parameter(9.80665, "N.m", "largest torque that is demanded (1 kg.m)", above=0.0)
@@ -57,6 +64,8 @@ class SampledController(Block):
         self.b = (p * p * p + 3.0 * p * p + 3.0 * p - 3.0) / 4.0
         self.g = 2.0 + self.b - 3.0 * p
         self.a = p * p * p - self.b
+        if self.viscous > 0.0:
+            self.design()
         self.scale = 2.0 * self.J / (self.period * self.period)
         self.refuse(
             self.scale * self.g * self.quantum > self.M_max,
@@ -76,17 +85,53 @@ class SampledController(Block):
         self.e = 0.0
         self.saturated = 0.0
 
+    def turned(self, y: Number) -> Number:
+        """Return 2 (y - 1 + e^-y): the angle of a torque that acts for y J/D, times D2/J over half the torque."""
+        if y < 1e-3:
+            return y * y * (1.0 - y * (1.0 / 3.0 - y * (1.0 / 12.0 - y / 60.0)))
+        return 2.0 * (y - 1.0 + exp(-y))
+
+    def moving(self, y: Number) -> Number:
+        """Return 1 - e^-y: the rate after it, times D over the torque."""
+        if y < 1e-3:
+            return y * (1.0 - y * (0.5 - y * (1.0 / 6.0 - y / 24.0)))
+        return 1.0 - exp(-y)
+
+    def design(self) -> None:
+        """Set b, g, a of an inertia with viscous friction."""
+        p = self.p
+        y = self.viscous * self.period / self.J
+        d = exp(-y)
+        n1 = self.turned(y) / (y * y)
+        n0 = 2.0 * self.moving(y) / y - n1  # n1 + n0 = 2 (1 - d)/y
+        total = 1.0 + d
+        free = 3.0 * p * p - d + p * p * p * n1 / n0 - (total - 3.0 * p) * n0 / n1
+        self.b = free / (n0 / n1 + d * n1 / n0 + total)
+        self.g = (total + self.b - 3.0 * p) / n1
+        self.a = (p * p * p - d * self.b) / n0
+
     def stable(self, m: Number) -> Number:
         """Return 1 where all poles lie inside the unit circle (Schur-Cohn), with a delay of m periods."""
         b0 = (1.0 - m) * (1.0 - m)
         b1 = 1.0 + 2.0 * m - 2.0 * m * m
         b2 = m * m
-        # z (z - 1)2 (z - b) + (b0 z2 + b1 z + b2) (g z - a), highest power first
+        d = 1.0
+        if self.viscous > 0.0:
+            y = self.viscous * self.period / self.J
+            d = exp(-y)
+            new = (1.0 - m) * y
+            q = 2.0 * self.moving(y) / (y * y)
+            old = self.turned(m * y) + 2.0 * self.moving(new) * self.moving(m * y)
+            b0 = self.turned(new) / (y * y)
+            b1 = (old - d * self.turned(new)) / (y * y) + q * self.moving(new)
+            b2 = q * exp(-new) * self.moving(m * y) - d * old / (y * y)
+        total = 1.0 + d
+        # z (z - 1)(z - d)(z - b) + (b0 z2 + b1 z + b2) (g z - a), highest power first
         c = [
             1.0,
-            -2.0 - self.b + b0 * self.g,
-            1.0 + 2.0 * self.b + b1 * self.g - b0 * self.a,
-            -self.b + b2 * self.g - b1 * self.a,
+            -total - self.b + b0 * self.g,
+            d + total * self.b + b1 * self.g - b0 * self.a,
+            -d * self.b + b2 * self.g - b1 * self.a,
             -b2 * self.a,
         ]
         r = [c[4], c[3], c[2], c[1], c[0]]

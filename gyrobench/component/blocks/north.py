@@ -18,6 +18,7 @@ from gyrobench.component.math import Number, atan2, cos, fabs, floor, pi, sin, s
 
 NONE, VALID, ILL, WRONG, MOVING = 0.0, 1.0, 2.0, 3.0, 4.0  # status
 FOUR = [0.0, 0.0, 0.0, 0.0]
+SIX = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 LARGEST = 85.0 * pi / 180.0  # latitude
 NEAR = 0.2  # departure of the horizontal rate from that of the latitude, relative
 STEADY = 0.005  # departure of the specific force from gravity, relative
@@ -117,70 +118,82 @@ class NorthFinder(Component):
 
 
 class HeadingFit(Block):
-    """Least squares of w = C cos(angle) + B sin(angle) + b (+ r t) over time, by normal equations.  [NORTH-CONT]
+    """Least squares of w = C cos(angle) + B sin(angle) + b (+ r t + r2 t2 + r3 t3) over time, by normal equations.
 
     sums: S = integral of phi phi' dt, s = integral of phi w dt.  White noise of density N leaves the covariance
     N2 S^-1.  The constant is always there: without it a bias leaks into a record that is no whole number of turns.
+    [NORTH-CONT, NORTH-DRIFT]
     """
 
     nonlinear = True
-    S = Discrete([FOUR, FOUR, FOUR, FOUR], "1", "normal matrix")
-    s = Discrete(FOUR, "1", "right-hand side")
-    P = Discrete([FOUR, FOUR, FOUR, FOUR], "1", "its inverse")
-    x = Discrete(FOUR, "1", "C, B, b, r")
+    S = Discrete([SIX, SIX, SIX, SIX, SIX, SIX], "1", "normal matrix")
+    s = Discrete(SIX, "1", "right-hand side")
+    P = Discrete([SIX, SIX, SIX, SIX, SIX, SIX], "1", "its inverse")
+    x = Discrete(SIX, "1", "C, B, b, r, r2, r3")
     ok = Discrete(0.0, "1", "1 where the angles determine the unknowns")
 
     def add(self, w: Number, angle: Number, t: Number, dt: Number) -> None:
         """Add a sample of the length dt."""
-        phi = [0.0, 0.0, 0.0, 0.0]
+        phi = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         phi[0] = cos(angle)
         phi[1] = sin(angle)
         phi[2] = 1.0
         phi[3] = t
-        for i in range(4):
+        phi[4] = t * t
+        phi[5] = t * t * t
+        for i in range(6):
             self.s[i] = self.s[i] + dt * phi[i] * w
-            for j in range(4):
+            for j in range(6):
                 self.S[i][j] = self.S[i][j] + dt * phi[i] * phi[j]
 
-    def solved(self, ramp: Number) -> None:
-        """Solve for x and P; ramp: 0 leaves r out.  ok = 0 where a pivot falls below 1e-6 of its diagonal."""
-        a = [[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
+    def solved(self, order: Number) -> None:
+        """Solve for x and P; order: of the drift, higher powers of t are left out.  ok = 0 where a pivot falls below
+        1e-6 of its diagonal.
+        """
+        a = [
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ]
         self.ok = 1.0
-        for i in range(4):
-            for j in range(4):
+        for i in range(6):
+            for j in range(6):
                 a[i][j] = self.S[i][j]
                 self.P[i][j] = 1.0 if i == j else 0.0
-                if ramp == 0.0 and (i == 3 or j == 3):
+                if i > 2.0 + order or j > 2.0 + order:
                     a[i][j] = 1.0 if i == j else 0.0
-        for k in range(4):
+        for k in range(6):
             pivot = a[k][k]
-            whole = self.S[k][k] if ramp != 0.0 or k < 3 else 1.0
+            whole = self.S[k][k] if k < 3.0 + order else 1.0
             if pivot <= 1e-6 * whole:
                 self.ok = 0.0
             if self.ok > 0.5:
-                for j in range(4):
+                for j in range(6):
                     a[k][j] = a[k][j] / pivot
                     self.P[k][j] = self.P[k][j] / pivot
-                for i in range(4):
+                for i in range(6):
                     if i != k:
                         factor = a[i][k]
-                        for j in range(4):
+                        for j in range(6):
                             a[i][j] = a[i][j] - factor * a[k][j]
                             self.P[i][j] = self.P[i][j] - factor * self.P[k][j]
-        for i in range(4):
+        for i in range(6):
             self.x[i] = 0.0
-            if ramp != 0.0 or i < 3:
-                for j in range(4):
-                    if ramp != 0.0 or j < 3:
+            if i < 3.0 + order:
+                for j in range(6):
+                    if j < 3.0 + order:
                         self.x[i] = self.x[i] + self.P[i][j] * self.s[j]
 
 
 class RotatingFinder(NorthFinder):
     """North finder whose head is turned to angles or at a rate: least squares of cos, sin, constant and, on request, a
-    linear drift of the bias.
+    drift of the bias up to the third power of time.
     """
 
-    ramp = Parameter(False, bool, "1: a bias that drifts linearly is estimated too")
+    ramp = Parameter(0, int, "highest power of time of a drift of the bias that is estimated too", min=0, max=3)
     fit = HeadingFit()
 
     def sample(self) -> Number:
@@ -199,7 +212,10 @@ class RotatingFinder(NorthFinder):
             square = c * c + b * b
             self.seen = sqrt(square)
             self.psi = atan2(b, c)
-            self.offset = self.fit_x[2] + (self.fit_x[3] * self.t if self.ramp else 0.0)
+            self.offset = self.fit_x[2]
+            if self.ramp > 0.0:
+                drift = self.fit_x[3] + self.t * (self.fit_x[4] + self.t * self.fit_x[5])
+                self.offset = self.offset + self.t * drift
             along = b * b * self.fit_P[0][0] - 2.0 * b * c * self.fit_P[0][1] + c * c * self.fit_P[1][1]
             self.sd = self.density * sqrt(along) / square
             self.state = VALID
