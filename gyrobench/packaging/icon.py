@@ -48,7 +48,7 @@ WORDS = (
     ("plan", "sequencer|program|command|supervisor|sampler|monitor"), ("motor", "motor|slipring|bearing|tachometer"),
     ("reader", "meter|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
     ("place", "site|ground|surroundings|foundation|thermostat|chamber"),
-    ("source", "source|offset|exciter|motion|manoeuvre|torque|vibration"),
+    ("source", "source|offset|turn_on|exciter|motion|manoeuvre|torque|vibration"),
     ("gyro", "gyro"),
 )  # fmt: skip
 

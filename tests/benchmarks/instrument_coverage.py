@@ -69,8 +69,24 @@ def vibration_rectification(rng: np.random.Generator) -> Drawn:
     }  # fmt: skip
 
 
+def turn_on(rng: np.random.Generator) -> Drawn:
+    """Turn-ons on one to five days, one exponential or two, in half of the runs a rate in both senses."""
+    days = int(rng.integers(1, 6))
+    tau = float(rng.uniform(10.0, 40.0))
+    values: Drawn = {
+        "days": days, "turn_ons": int(rng.integers(3, 6)), "dwell": 300.0, "window": 5.0, "limit": 0.3 * DPH,
+        "rate": 0.02 * rng.integers(2), "gyro.optical": 0.0,
+        "gyro.electronics": 0.003 * DEG / 60.0 * rng.uniform(1.0, 5.0),
+        "switched.between_turn_ons": rng.uniform(0.0, 0.5) * DPH, "switched.between_days": rng.uniform(0.0, 0.5) * DPH,
+        "switched.warm_1": rng.uniform(1.0, 5.0) * DPH, "switched.tau_1": tau,
+        "switched.warm_2": rng.uniform(1.0, 5.0) * DPH * rng.integers(2), "switched.tau_2": 4.0 * tau,
+    }  # fmt: skip
+    return values | ({"switched.scale_warm": rng.uniform(1e-4, 1e-3)} if values["rate"] else {})
+
+
 DRAWN: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "coning_test": coning_test,
+    "turn_on": turn_on,
     "vibration_rectification": vibration_rectification,
 }
 

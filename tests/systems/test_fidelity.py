@@ -96,6 +96,7 @@ TABLES = {
     "stand_alignment",
     "table_position_test",
     "table_rate_test",
+    "turn_on",
     "vibration_rectification",
 }
 
