@@ -32,7 +32,7 @@ class VibrationTable(Component):
     repeat = Parameter(2.0, "s", "time after which the vibration repeats itself", above=0.0)
     ramp = Parameter(0.5, "s", "time in which the level goes to another one", above=0.0)
     read_gain = Parameter(0.0, "1", "relative error of the control accelerometer", min=-0.5, max=0.5)
-    control = Noise(0.0, "m/s2/sqrt(Hz)", "white noise of the control accelerometer")
+    control = Noise(1e-3, "m/s2/sqrt(Hz)", "white noise of the control accelerometer (100 ug/sqrt(Hz))")
     phases = Noise(1.0, "1", "1: phases by the seed", per="start", samples=LINES)
 
     f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")

@@ -65,7 +65,7 @@ class VibrationSetup(SiteSetup):
     u_latitude: float = 0.0
 
 
-class Channel(DriftReduction[VibrationSetup]):
+class VibrationChannel(DriftReduction[VibrationSetup]):
     """Gyro or accelerometer."""
 
     def __init__(self, windows: Mapping[str, Array], setup: VibrationSetup, channel: str) -> None:
@@ -171,7 +171,7 @@ class Reduction(ChannelTests[VibrationSetup]):
     """Gyro and accelerometer from windows with t_start, t_end, up, level (m/s2), rate (rad/s) and force (m/s2)."""
 
     label = "{}"
-    channel = Channel
+    channel = VibrationChannel
     handling = staticmethod(mistakes.candidates)
 
     def __init__(self, windows: Mapping[str, Array], setup: VibrationSetup) -> None:

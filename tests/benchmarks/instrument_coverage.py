@@ -69,7 +69,7 @@ def vibration_rectification(rng: np.random.Generator) -> Drawn:
     }  # fmt: skip
 
 
-def turn_on(rng: np.random.Generator) -> Drawn:
+def turn_on_repeatability(rng: np.random.Generator) -> Drawn:
     """Turn-ons on one to five days, one exponential or two, in half of the runs a rate in both senses."""
     days = int(rng.integers(1, 6))
     tau = float(rng.uniform(10.0, 40.0))
@@ -86,7 +86,7 @@ def turn_on(rng: np.random.Generator) -> Drawn:
 
 DRAWN: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "coning_test": coning_test,
-    "turn_on": turn_on,
+    "turn_on_repeatability": turn_on_repeatability,
     "vibration_rectification": vibration_rectification,
 }
 

@@ -96,7 +96,7 @@ TABLES = {
     "stand_alignment",
     "table_position_test",
     "table_rate_test",
-    "turn_on",
+    "turn_on_repeatability",
     "vibration_rectification",
 }
 

@@ -47,6 +47,7 @@ from .components import Spread, VarianceComponent, spread
 from .warming import Kind, Warming, fitted, means
 
 DRAWS = 2000
+CONDITION = 1e6  # exponentials that are hardly two were left out by then
 FEW = 4  # readings of a turn-on from which on a warm-up is looked for
 SECONDS = "s"
 QUIET = ("flicker_x", "walk_x", "white_x", "markov_x")  # noises of a gyro that move biases beyond the noise model
@@ -127,7 +128,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             for k, n in enumerate(self.numbers.tolist())
         ][:6]  # fmt: skip
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
-        return Regression(quantities, X, y, t0, t1, shown, "drift")
+        return Regression(quantities, X, y, t0, t1, shown, "drift", limit=CONDITION)
 
     def _exponentials(self, tau: Array) -> Array:
         return means(self.since, self.length, tau) if tau.size else np.zeros((self.y.size, 0))
@@ -231,7 +232,6 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
     def account(self, found: Findings) -> Account:
         q = self.tau.size
-        kind = ("no warm-up", "an exponential", "two exponentials")[q]
         return Account(
             method="Readings from the switching on onwards, over turn-ons and days; least squares under an estimated "
             "noise model, components of variance [TEST-TURN-ON]",
@@ -241,7 +241,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             ],
             equation='y - omega = b_i + sum_k A_k e^(-t\\/tau_k)' if q else "y - omega = b_i",
             conventions=[
-                f"Warm-up of the bias: {kind}, the same in all turn-ons.",
+                f"Exponentials of the warm-up of the bias: {q}, the same in all turn-ons.",
                 "σ_on, σ_day: standard deviations of the population, less the noise of the biases; intervals by "
                 "generalized pivotal quantities, 0 where the record shows none.",
                 f"{self.count} turn-ons on {np.unique(self.day).size} days.",
@@ -304,7 +304,7 @@ def true_values(run: RunDocument) -> dict[str, float] | None:
     tau = np.array([float(p[f"switched.tau_{k}"]) for k in (1, 2)])
     there = np.flatnonzero(size)
     order = there[np.argsort(tau[there])]
-    found = {}
+    found: dict[str, float] = {}
     for k, j in enumerate(order.tolist(), 1):
         names = ("A", "τ") if order.size == 1 else (f"A_{k}", f"τ_{k}")
         found |= dict(zip(names, (float(size[j]), float(tau[j])), strict=True))

@@ -85,7 +85,7 @@ class TurnOn(TableTest):
     def plan(self) -> Plan:
         """Return a phase for each turn-on, the senses of the rate by turns."""
         times = {"settle": self["start"], "dwell": self["dwell"], "window": self["window"]}
-        phases = []
+        phases: list[Phase] = []
         for day in range(1, self["days"] + 1):
             for k in range(self["turn_ons"]):
                 sense = 1.0 if (len(phases) + day) % 2 else -1.0

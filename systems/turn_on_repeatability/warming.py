@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -82,24 +83,25 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
     at, of = np.zeros(0), list[int]()
     least = criterion(at, of)
     while True:
-        tried = []
+        tried: list[tuple[float, Array, int]] = []
         for k, kind in enumerate(kinds):
             if of.count(k) < kind.most:
                 more = [*of, k]
                 own = [j for j, o in enumerate(more) if o == k]
-                starts = []
+                starts: list[Array] = []
                 for places in combinations(grid, len(own)):  # those of its kind anew, the others as they are
                     start = np.append(at, 0.0)
                     start[own] = places
                     starts.append(start)
-                starts = sorted(starts, key=lambda s, o=more: criterion(s, o))[:STARTS]
-                refined = [optimize.least_squares(left, s, x_scale=0.3, max_nfev=80, args=(more,)).x for s in starts]
-                found = min(refined, key=lambda s, o=more: criterion(s, o))
-                forced = kind.exact and len(tried) == 0
-                tried.append((criterion(found, [*of, k]) - (math.inf if forced else 0.0), found, k))
+                order = np.argsort([criterion(s, more) for s in starts])[:STARTS]
+                refined = [
+                    optimize.least_squares(left, starts[j], x_scale=0.3, max_nfev=80, args=(more,)).x for j in order
+                ]
+                found = refined[int(np.argmin([criterion(s, more) for s in refined]))]
+                tried.append((-math.inf if kind.exact else criterion(found, more), found, k))
         if not tried:
             break
-        value, found, k = min(tried, key=lambda t: t[0])
+        value, found, k = min(tried, key=operator.itemgetter(0))
         if value > least - BETTER:
             break
         at, of = np.clip(found, low, high), [*of, k]

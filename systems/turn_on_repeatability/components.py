@@ -15,12 +15,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from gyrobench.arrays import Array
 
 DRAWS = 20_000
+Numbers = np.ndarray[Any, np.dtype[np.intp]]  # of the day of each bias, from 0
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def spread(bias: Array, day: Array, noise: Array, temperature: Array | None = No
     return Spread(on, _component((s_day / (D - 1) - s_on / dof) / n_0, drawn, D - 1), slope)
 
 
-def _of_days(x: Array, number: Array, D: int) -> Array:
+def _of_days(x: Array, number: Numbers, D: int) -> Array:
     out: Array = np.bincount(number, weights=x, minlength=D) / np.bincount(number, minlength=D)
     return out
 
