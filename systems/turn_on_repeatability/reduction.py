@@ -116,12 +116,13 @@ class Reduction(DriftReduction[TurnOnSetup]):
         most = 0 if np.min(np.bincount(self.turn)) < FEW else self.setup.exponentials
         turns = bool(np.any(self.w > 0.0) and np.any(self.w < 0.0)) and most != 0
         kinds = [Kind(np.ones_like(y), most if most >= 0 else 2, most >= 0), Kind(self.w, int(turns))]
-        self.tau, self.tau_E = fitted(y, own, self.since, self.length, kinds)
+        self.choice = fitted(y, own, self.since, self.length, kinds)
+        self.tau, self.tau_E = self.choice.tau
         warm = self._exponentials(self.tau)
         scale = self.w[:, None] * self._exponentials(self.tau_E)
         X = np.column_stack([own, warm, scale])
         self.about = np.linalg.lstsq(X, y, rcond=None)[0][self.columns :]
-        X = np.column_stack([X, *self._slopes()])
+        X = np.column_stack([X, *self._slopes(self.tau, self.tau_E, self.about)])
         quantities = [Quantity.of(f"p_{k + 1}", "unknown of the fit", "deg/h") for k in range(X.shape[1])]
         shown = [
             Group(f"turn-on {n}", np.flatnonzero(self.turn == k), self.since[self.turn == k], "time since turn-on", "s")
@@ -133,14 +134,14 @@ class Reduction(DriftReduction[TurnOnSetup]):
     def _exponentials(self, tau: Array) -> Array:
         return means(self.since, self.length, tau) if tau.size else np.zeros((self.y.size, 0))
 
-    def _slopes(self) -> list[Array]:
+    def _slopes(self, tau: Array, tau_E: Array, size: Array) -> list[Array]:
         """Return the columns of ln tau of each exponential, at the sizes found."""
         out = []
-        for k, tau in enumerate([*self.tau, *self.tau_E]):
-            factor = self.w if k >= self.tau.size else 1.0
+        for k, x in enumerate([*tau, *tau_E]):
+            factor = self.w if k >= tau.size else 1.0
             step = 1e-3
-            high, low = (means(self.since, self.length, np.array([tau * math.exp(s)]))[:, 0] for s in (step, -step))
-            out.append(factor * self.about[k] * (high - low) / (2.0 * step))
+            high, low = (means(self.since, self.length, np.array([x * math.exp(s)]))[:, 0] for s in (step, -step))
+            out.append(factor * size[k] * (high - low) / (2.0 * step))
         return out
 
     def derived(self, found: Findings) -> Findings:
@@ -201,27 +202,46 @@ class Reduction(DriftReduction[TurnOnSetup]):
             added.append(Coefficient("b_T", "change of the bias with temperature", "°/h/K", k, u, factor,
                                      (k - factor * u, k + factor * u)))  # fmt: skip
         warm = self._time(truth.get("t_w"))
-        coefficients = [*result.coefficients, *([warm] if warm else []), *added]
+        own = [_in_logarithms(c) if c.name.startswith("τ") else c for c in result.coefficients]
+        coefficients = [*own, *([warm] if warm else []), *added]
         return replace(result, coefficients=coefficients, correlation=result.correlation)
 
     def _time(self, truth: float | None) -> Coefficient | None:
-        """Return the time until the bias is within the limit, its interval by draws of sizes and time constants."""
+        """Return the time until the bias is within the limit; its interval by draws of sizes and time constants, of the
+        model and, as often as it is probable, of the one with an exponential more.
+        """
         q, longest = self.tau.size, 20.0 * float(np.max(self.since))
         meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
         if not q:
             return None
-        found = self.found
-        value = found.value[1 : 1 + 2 * q]
-        covariance = found.reported.covariance[1 : 1 + 2 * q, 1 : 1 + 2 * q]
-        rng = np.random.default_rng(2)
-        drawn = rng.multivariate_normal(value, covariance, DRAWS, method="eigh")
-        times = np.array([_warming(d).time_until(self.setup.limit, longest) for d in [value, *drawn]])
-        low, high = np.quantile(times[1:], [0.025, 0.975])
-        if not math.isfinite(times[0]):
-            return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (float(low), math.inf), truth=truth,
+        found, at = self.found, slice(1, 1 + 2 * q)
+        drawn = _draws(found.value[at], found.reported.covariance[at, at], DRAWS)
+        if self.choice.more is not None and self.choice.probability > 1e-3:
+            drawn += self._drawn_with_more(round(DRAWS * self.choice.probability / (1.0 - self.choice.probability)))
+        own = _warming(found.value[at]).time_until(self.setup.limit, longest)
+        times = np.sort([w.time_until(self.setup.limit, longest) for w in drawn])
+        low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
+        if not math.isfinite(own):
+            return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
                                no_value="not reached within the record")  # fmt: skip
-        u = float(high - low) / (2.0 * NORMAL)
-        return Coefficient("t_w", meaning, SECONDS, float(times[0]), u, NORMAL, (float(low), float(high)), truth=truth)
+        u = (high - low) / (2.0 * NORMAL)
+        return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
+
+    def _drawn_with_more(self, count: int) -> list[Warming]:
+        """Return draws of the model with an exponential more, by its covariance under white noise."""
+        tau, tau_E = self.choice.more or [np.zeros(0), np.zeros(0)]
+        q, e, p = tau.size, tau_E.size, self.columns
+        own = self.found.X[:, :p]
+        y = self.y - self.w
+        X = np.column_stack([own, self._exponentials(tau), self.w[:, None] * self._exponentials(tau_E)])
+        beta = np.linalg.lstsq(X, y, rcond=None)[0]
+        variance = float(np.sum((y - X @ beta) ** 2)) / max(y.size - p - 2 * (q + e), 1)
+        X = np.column_stack([X, *self._slopes(tau, tau_E, beta[p:])])
+        C = variance * np.linalg.pinv(X.T @ X)
+        own = np.array([j for k in range(q) for j in (p + k, p + q + e + k)])
+        C = C[np.ix_(own, own)] * np.outer(step := np.ravel([(1.0, x) for x in tau]), step)
+        value = np.ravel([(beta[p + k], tau[k]) for k in range(q)])
+        return _draws(value, C, min(count, 20 * DRAWS))
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: a slow clock makes the time constants too small; as a share of them, not of the data."""
@@ -271,8 +291,25 @@ class Reduction(DriftReduction[TurnOnSetup]):
 reduce = Reduction.reduce
 
 
+def _draws(value: Array, covariance: Array, count: int) -> list[Warming]:
+    """Return draws of sizes and time constants; these stay above 0 in logarithms."""
+    scale = np.ones(value.size)
+    scale[1::2] = 1.0 / value[1::2]
+    drawn = np.random.default_rng(2).multivariate_normal(np.zeros(value.size), covariance * np.outer(scale, scale),
+                                                         count, method="eigh", check_valid="ignore")  # fmt: skip
+    out = value + drawn
+    out[:, 1::2] = value[1::2] * np.exp(np.clip(drawn[:, 1::2], -3.0, 3.0))
+    return [_warming(row) for row in out]
+
+
 def _warming(value: Array) -> Warming:
     return Warming(value[0::2], np.maximum(value[1::2], 1e-3))
+
+
+def _in_logarithms(c: Coefficient) -> Coefficient:
+    """Return a time constant with an interval that is even in its logarithm, in which it was fitted."""
+    factor = math.exp(min(c.k * c.u / c.estimate, 20.0))
+    return replace(c, interval=(c.estimate / factor, c.estimate * factor))
 
 
 def _of_component(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:

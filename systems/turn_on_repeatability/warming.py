@@ -13,9 +13,7 @@ from scipy import optimize
 
 from gyrobench.arrays import Array
 
-PENALTY = 2.0  # times the Bayesian information criterion's, so that noise makes no exponential
 GRID, STARTS = 13, 4  # time constants tried, and refined
-BETTER = 6.0  # of the criterion
 
 
 @dataclass(frozen=True)
@@ -60,10 +58,22 @@ def means(since: Array, length: Array, tau: Array) -> Array:
     return out
 
 
-def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind]) -> list[Array]:
-    """Return of each kind the time constants (q,), rising, of the best number of exponentials beside the columns X
-    (n, p).  One after another is added where it betters the criterion most, and all are refined together; the residuals
-    are taken as white.
+@dataclass(frozen=True)
+class Found:
+    """Time constants (q,), rising, of each kind, of the least criterion; those of one exponential more of the first
+    kind, beside the others, and its probability against them; none where it is not sought.
+    """
+
+    tau: list[Array]
+    more: list[Array] | None = None
+    probability: float = 0.0
+
+
+def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind]) -> Found:
+    """Return the exponentials beside the columns X (n, p), as many as the Bayesian criterion finds.
+
+    One after another is added where it betters the criterion most, and all are refined together; the residuals are
+    taken as white.
     """
     y = y / (float(np.std(y)) or 1.0)  # the search stops at absolute limits
     low, high = math.log(0.3 * float(np.min(length))), math.log(2.0 * float(np.max(since)))
@@ -77,10 +87,15 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
 
     def criterion(log_tau: Array, of: Sequence[int]) -> float:
         squares = max(float(np.sum(left(log_tau, of) ** 2)), 1e-300)
-        return y.size * math.log(squares / y.size) + PENALTY * 2.0 * len(of) * math.log(y.size)
+        return y.size * math.log(squares / y.size) + 2.0 * len(of) * math.log(y.size)
 
     grid = np.linspace(low, high, GRID)
     at, of = np.zeros(0), list[int]()
+
+    def of_kinds(log_tau: Array, of: Sequence[int]) -> list[Array]:
+        own = np.clip(log_tau, low, high)
+        return [np.exp(np.sort(own[[j for j, o in enumerate(of) if o == k]])) for k in range(len(kinds))]
+
     least = criterion(at, of)
     while True:
         tried: list[tuple[float, Array, int]] = []
@@ -100,10 +115,13 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
                 found = refined[int(np.argmin([criterion(s, more) for s in refined]))]
                 tried.append((-math.inf if kind.exact else criterion(found, more), found, k))
         if not tried:
-            break
+            return Found(of_kinds(at, of))
         value, found, k = min(tried, key=operator.itemgetter(0))
-        if value > least - BETTER:
+        if value >= least:
             break
         at, of = np.clip(found, low, high), [*of, k]
         least = criterion(at, of)
-    return [np.exp(np.sort(at[[j for j, o in enumerate(of) if o == k]])) for k in range(len(kinds))]
+    value, found, k = tried[0]
+    if k:
+        return Found(of_kinds(at, of))
+    return Found(of_kinds(at, of), of_kinds(found, [*of, 0]), 1.0 / (1.0 + math.exp(min(0.5 * (value - least), 700.0))))

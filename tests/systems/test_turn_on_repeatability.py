@@ -83,9 +83,9 @@ def test_time_constants_are_found() -> None:
     y = own @ rng.normal(size=4) + means(since, length, np.array([25.0, 300.0])) @ [3.0, -2.0]
     noise = rng.normal(0.0, 0.01, since.size)
     kind = Kind(np.ones_like(y), 2)
-    assert fitted(1e-6 * (y + noise), own, since, length, [kind])[0] == pytest.approx([25.0, 300.0], rel=0.05)
-    assert not fitted(1e-6 * noise, own, since, length, [kind])[0].size
-    assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)])[0].size == 1
+    assert fitted(1e-6 * (y + noise), own, since, length, [kind]).tau[0] == pytest.approx([25.0, 300.0], rel=0.05)
+    assert not fitted(1e-6 * noise, own, since, length, [kind]).tau[0].size
+    assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)]).tau[0].size == 1
 
 
 # ------------------------------------------------------------------------------------------------ runs

@@ -37,7 +37,7 @@ QUIET = {
 @pytest.mark.parametrize("lines", [1, 12])
 def test_moments_of_the_vibration(lines: int) -> None:
     """Over `repeat`: mean 0, mean square level2, mean cube 0, whatever the phases; the control has its gain."""
-    table = load_part("vibration_table")(seed=7, lines=lines, repeat=1.0, ramp=0.1, read_gain=0.01)
+    table = load_part("vibration_table")(seed=7, lines=lines, repeat=1.0, ramp=0.1, read_gain=0.01, control=0.0)
     table.initialize()
     table.level_wanted = 3.0
     seen = []
