@@ -209,7 +209,7 @@ def main() -> int:
         table = ["| sheet | figure | printed | test | found/printed | reason, note |", "|---|---|---|---|---|---|"]
         body = "\n".join([said + ".", "", *table, *(r.line() for r in every)])
         text = PAGE.read_text(encoding="utf-8")
-        text = re.sub(r"(<!-- table -->\n).*?(\n<!-- /table -->)", lambda m: m[1] + body + m[2], text, flags=re.S)
+        text = re.sub(r"(<!-- table -->).*?(<!-- /table -->)", lambda m: f"{m[1]}\n{body}\n{m[2]}", text, flags=re.S)
         Path(PAGE).write_text(text, encoding="utf-8")
     return int(any(not r.why for r in away))
 

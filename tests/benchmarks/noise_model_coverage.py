@@ -6,6 +6,8 @@ Truths are white noise through a low-pass or a mean, up to three Gauss-Markov pr
 angular frequency, decay of each); unit time is a sample.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
+
+agree: part of the records whose model agrees with them, so that something is stated; the rest is counted over those.
 """
 
 from __future__ import annotations
@@ -75,6 +77,8 @@ def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
         for i in range(records):
             model = fit_noise(simulated(n, truth, kinds, np.random.default_rng([11, i, n])), 1.0, means=False)
             agreed.append(model.agrees)
+            if not model.agrees:  # nothing is stated
+                continue
             for term in "NBKRQ":
                 e, true = model[term], truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
@@ -90,7 +94,8 @@ def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
         print(f"{name}, {n} samples {' '.join(kinds)}: agree {np.mean(agreed):.3f}, "
               f"{(time.process_time() - began) / records:.2f} s")  # fmt: skip
         print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} of {len(v)}" for k, v in inside.items()))
-        print("   stated:", ", ".join(f"{k} {np.sum(v) / records:.3f}" for k, v in stated.items()), flush=True)
+        stating = max(sum(agreed), 1)
+        print("   stated:", ", ".join(f"{k} {np.sum(v) / stating:.3f}" for k, v in stated.items()), flush=True)
 
 
 if __name__ == "__main__":

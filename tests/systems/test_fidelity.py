@@ -93,6 +93,7 @@ TABLES = {
     "angle_system_test",
     "coning_test",
     "gyro_bandwidth",
+    "gyro_dynamics",
     "stand_alignment",
     "table_position_test",
     "table_rate_test",

@@ -27,7 +27,7 @@ from gyrobench.reduction.noise_model.noise_model import Minimum, NoiseModel, Pro
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
-from gyrobench.reduction.noise_model.steps import largest_step
+from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
 from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.deviations import Deviation, deviations
@@ -41,6 +41,7 @@ BARELY = math.log(2.0)  # above the variance that a record just shows: what is b
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
 STEPS = 5
 TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
+DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no model of the record
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -118,12 +119,15 @@ def _without_steps(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]
         better = _one_step(treated, found, means)
         if better is None:
             break
-        treated, found = better
+        data = better.ordinates(means)
+        # what was completed beside the step, bands too, may not be there without it
+        completed = any(s.done.extra is not None for s in treated.stretches)
+        treated, found = better, search(data) if completed else search_again(data, found)
     return treated, found
 
 
-def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treated, ModelSearch] | None:
-    """Return the record without one step more, and its models, or None where the likelihood does not ask for it.
+def _one_step(treated: Treated, found: ModelSearch, means: bool) -> Treated | None:
+    """Return the record without one step more, or None where the likelihood does not ask for it.
 
     Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift;
     the model is fitted again without each of them.
@@ -131,30 +135,24 @@ def _one_step(treated: Treated, found: ModelSearch, means: bool) -> tuple[Treate
     at = found.best
     bound = 2.0 * math.log(treated.samples) + RATIO
     fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
-    tried: list[tuple[float, Treated, Fitted]] = []
+    tried: list[tuple[float, int, LevelStep]] = []
     for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
         parts = [*split(model, p), *found.resonances]
         places, angle = [], sum(float(t.angle(q)) for t, q in parts)
         for i, s in enumerate(treated.stretches):
-            step, ratio = largest_step(s.clean, _spectrum_of(s.own.size, parts, means), angle)
+            step, ratio = largest_step(s.done.x, _spectrum_of(s.own.size, parts, means), angle)
             places.append((ratio, i, step))
         ratio, i, step = max(places, key=lambda c: c[0])
         if ratio < bound:
             continue
-        s = treated.stretches[i]
-        new = replace(treated, stretches=(*treated.stretches[:i], replace(s, steps=(*s.steps, step)),
-                                          *treated.stretches[i + 1 :]))  # fmt: skip
-        data = new.ordinates(means)
+        data = treated.ordinates(means, less=(i, step))
         data.hold(found.resonances)
-        fits = [maximize(data, found.prior, f.model, f.p) for f in found.ranked[:3]]
-        tried.append((min(f.value for f in fits), new, min(fits, key=lambda f: f.value)))
+        tried.append((min(maximize(data, found.prior, f.model, f.p).value for f in found.ranked[:3]), i, step))
     if not tried:
         return None
-    value, new, _ = min(tried, key=lambda t: t[0])
+    value, i, step = min(tried, key=lambda t: t[0])
     least = min(f.value for f in found.ranked[:3])
-    if least - value < bound:
-        return None
-    return new, search_again(new.ordinates(means), found)
+    return None if least - value < bound else treated.without(i, step)
 
 
 def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> Array:
@@ -171,7 +169,7 @@ def _deviations(raw: Array, treated: Treated) -> _Scaled:
     removed = raw - np.where(np.isfinite(clean), clean, 0.0)
     for s in treated.stretches:  # of a wild sample what it exceeds its neighbours' word by
         at = s.start + s.done.wild
-        removed[at] = raw[at] - s.clean[s.done.wild]
+        removed[at] = raw[at] - s.done.x[s.done.wild]
     off = removed - np.nanmean(removed)
     own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
     quiet = float(np.nanmax(np.abs(off))) < 1e-9
@@ -221,6 +219,7 @@ class _Judge:
                 return f
         for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
             order = np.argsort(-cloud.log)[:TRIED]
+            order = order[cloud.log[order] > np.max(cloud.log) - DEEP]
             for p, variance in zip(cloud.p[order], allan(cloud.model, cloud.p[order], tau, self.means), strict=True):
                 share = self.share(variance)
                 if share > max(t[0] for t in tried):

@@ -28,6 +28,7 @@ BULK = 0.97  # of the samples, by which the scatter is measured
 CORE = 3.0  # standard deviations of samples that no wild one is among
 LOCAL, PARTS = 512, 64  # samples, at least, and parts of a stretch, at most, of which the scatter is taken
 SWEEPS, LEAKS = 8, 0.1  # of wild samples; what is less than a part of the largest waits for the next
+AGAIN = 3.0  # of the limit of a sample alone: what is less far off is judged once more
 ROUNDS, MOST_ROUNDS, AVERAGED = 4, 24, 8  # of spectrum and completion, at least, at most; the last that are averaged
 RESTS, STAYS = 0.03, 0.1  # change of the logarithm of a spectrum that needs no more rounds, and after the last
 ONWARD = 1.8  # how far the change of a round is carried on
@@ -224,17 +225,20 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     stays = True
     draws = min(max(DRAWS // x.size, 1), 4)
     for k in range(MOST_ROUNDS):
-        if k == 1:  # what was wild beside a wilder one may be none under its own spectrum
-            wild[:] = False
         now = smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost)
         change = math.inf if S is None else changed(now, S)
         stays = change < STAYS
         if k >= ROUNDS and change < RESTS:
             break
         last = k - (MOST_ROUNDS - AVERAGED)
-        S = now if S is None or last >= 0 else S * (now / S) ** ONWARD
+        S = now if S is None or k == 1 or last >= 0 else S * (now / S) ** ONWARD
         P = _Precision(S)
         y = _filled(x, missing | wild, P)
+        if k == 1 and wild.any():
+            # what was wild beside a wilder one may be none by what the others say of it: it is judged once more
+            far = np.abs(np.where(missing, 0.0, x) - y) * math.sqrt(P.diagonal)
+            wild &= far > AGAIN * float(-special.ndtri(0.5 * FALSE / x.size))
+            y = _filled(x, missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
             z = P(y) / math.sqrt(P.diagonal)
             fresh = _wildest(z, missing, wild) if find_wild else np.zeros(1, dtype=bool)

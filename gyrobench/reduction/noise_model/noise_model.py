@@ -110,7 +110,7 @@ class NoiseModel:
         wild is drawn from the noise around.
         """
         s = max(self.treatment.stretches, key=lambda s: s.own.size)
-        return s.start, self.scale.size * (s.clean + s.done.drawn - s.done.x) + self.scale.level
+        return s.start, self.scale.size * s.done.drawn + self.scale.level
 
     @property
     def lines(self) -> list[SpectralLine]:

@@ -28,6 +28,7 @@ STARTS: dict[str, list[list[float]]] = {
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
 }
+LEAST_COHERENT = 10.0  # samples that a band keeps its phase: what does not is the broadband terms' own
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
 
@@ -259,7 +260,7 @@ class ModelSearch:
                 break
             tried = [self._with(at, NoiseTerm(name), start) for name in PEAKS]
             found = max(tried, key=lambda f: f.evidence)
-            if found.evidence < at.evidence + 2.0:
+            if found.evidence < at.evidence + 2.0 or found.p[-2] < math.log(LEAST_COHERENT):
                 vain.append(start)
                 continue
             self._freeze(found)

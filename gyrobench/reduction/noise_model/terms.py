@@ -37,6 +37,7 @@ from gyrobench.arrays import Array
 PEAKS = ("resonance", "band")
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 LAGS = 4096  # of the covariance of a filter "shape"
+FASTEST = 1e-300  # pole
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
 
@@ -123,8 +124,8 @@ def _second(p: Array, grid: Grid) -> Array:
 
 def _average_parts(p: Array) -> tuple[Array, Array, Array]:
     """Return m = floor(w) and the shares of the triangles over m and m + 1 in max(0, 1 - |h|/w), h whole, p: log w."""
-    w = np.exp(p[..., 0:1])
-    m = np.maximum(np.floor(w), 1.0)
+    w = np.maximum(np.exp(p[..., 0:1]), 1.0)
+    m = np.floor(w)
     upper = (m + 1.0) * (1.0 - m / w)
     return m, 1.0 - upper, upper
 
@@ -284,7 +285,7 @@ def _band(p: Array, grid: Grid) -> Array:
 
 def _allan_pole(z: Any, m: Array) -> Any:
     """Allan variance of covariance z^|h| for means over m samples."""
-    log_z = np.log(z)
+    log_z = np.log(np.where(np.abs(z) < FASTEST, FASTEST, z))  # white, like 0
     power = np.exp(m * log_z)
     q = -np.expm1(log_z)  # 1 - z
     # variance of a mean, and covariance of neighbouring ones

@@ -9,6 +9,7 @@ DRIFT-PERIODIC]
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -34,20 +35,14 @@ CHUNK = 1 << 17  # samples of a sine computed at a time
 
 @dataclass(frozen=True)
 class TreatedStretch:
-    """Samples from ``start`` on without a long gap, lines and steps taken out: x (n,) completed, ``own`` with NaN."""
+    """Samples from ``start`` on without a long gap, lines and steps taken out: ``own`` (n,) with NaN, ``done``
+    completed.
+    """
 
     start: int
     own: Array
     done: Completed
     steps: tuple[LevelStep, ...] = ()
-
-    @property
-    def clean(self) -> Array:
-        """Return the completed samples without the steps."""
-        x = self.done.x
-        for s in self.steps:
-            x = without(x, s)
-        return x
 
 
 @dataclass(frozen=True)
@@ -66,6 +61,19 @@ class Treated:
     spread: float
     levels: Array
     p_level: float
+    find_wild: bool
+
+    def without(self, place: int, step: LevelStep) -> Treated:
+        """Return the record with a step of a stretch taken out and that stretch completed anew.
+
+        A step has power at low frequencies; what was completed beside it has too much of them.
+        """
+        s = self.stretches[place]
+        own = without(s.own, step)
+        new = TreatedStretch(s.start, own, complete(own, self.find_wild), (*s.steps, step))
+        stretches = (*self.stretches[:place], new, *self.stretches[place + 1 :])
+        spread, levels, p_level = _levels(stretches)
+        return replace(self, stretches=stretches, spread=spread, levels=levels, p_level=p_level)
 
     @property
     def there(self) -> int:
@@ -83,23 +91,22 @@ class Treated:
 
     @property
     def settled(self) -> bool:
-        """Return whether what was completed came to an end, and is the lesser part without the steps, in all stretches.
-
-        A step has power at low frequencies, beside which little is lost.
-        """
-        return all(s.done.stays and mostly_known(s.clean, s.done.extra) for s in self.stretches)
+        """Return whether what was completed came to an end, and is the lesser part, in all stretches."""
+        return all(s.done.stays and mostly_known(s.done.x, s.done.extra) for s in self.stretches)
 
     @property
     def steps(self) -> list[LevelStep]:
         """Return the steps, at their place on the grid."""
         return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.steps]
 
-    def ordinates(self, means: bool, keep_wild: bool = False) -> Ordinates:
-        """Return the ordinates of the stretches; keep_wild: with the wild samples left in."""
+    def ordinates(self, means: bool, keep_wild: bool = False, less: tuple[int, LevelStep] | None = None) -> Ordinates:
+        """Return the ordinates of the stretches; keep_wild: with the wild samples left in; less: without a step of a
+        stretch, what was completed as it is.
+        """
         weight = self.there / sum(s.own.size for s in self.stretches) / self.spread
         x, extra = [], list[Array | None]()
-        for s in self.stretches:
-            y = s.clean
+        for i, s in enumerate(self.stretches):
+            y = without(s.done.x, less[1]) if less is not None and less[0] == i else s.done.x
             if keep_wild and s.done.wild.size:
                 y = y.copy()
                 y[s.done.wild] += s.own[s.done.wild] - s.done.x[s.done.wild]
@@ -111,7 +118,7 @@ class Treated:
         """Return the record (samples,) without lines, wild samples and steps, NaN where nothing is or was taken out."""
         out = np.full(self.samples, np.nan)
         for s in self.stretches:
-            y = s.clean.copy()
+            y = s.done.x.copy()
             y[~np.isfinite(s.own)] = np.nan
             y[s.done.wild] = np.nan
             out[s.start : s.start + y.size] = y
@@ -156,7 +163,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
             y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
         done = [complete(y, find_wild) for y in own]
     stretches = tuple(TreatedStretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True))
-    return Treated(rate.size, stretches, lines, full, *_levels(np.concatenate([_inner(d.white) for d in done])))
+    return Treated(rate.size, stretches, lines, full, *_levels(stretches), find_wild)
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
@@ -189,11 +196,11 @@ def _inner(z: Array) -> Array:
     return z[end : z.size - end]
 
 
-def _levels(z: Array) -> tuple[float, Array, float]:
-    """Return the spread of the mean square, the rms of parts over that of all, and p of so large differences of them.
-
-    z (n,): of unit variance and an even spectrum; NaN where a sample is missing.
+def _levels(stretches: Sequence[TreatedStretch]) -> tuple[float, Array, float]:
+    """Return the spread of the mean square, the rms of parts over that of all, and p of so large differences of them,
+    of the stretches with an even spectrum.
     """
+    z = np.concatenate([_inner(s.done.white) for s in stretches])
     z = z[np.isfinite(z)]
     n = z.size
     square = z * z / float(np.mean(z * z))
