@@ -1,4 +1,4 @@
-"""Figures of all data sheets against what the tests find of the parts that they make: docs/data_sheets.md.
+"""Figures of all data sheets of rate gyros against what the tests find of the parts that they make: docs/data_sheets.md.
 
     python tests/benchmarks/data_sheets.py [--write] [NAME ...]
 
@@ -25,12 +25,14 @@ from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import FIGURES, FLOOR, SETTINGS, Instrument, find_instrument, parameters, settings
+from gyrobench.workflow.instruments import Instrument, find_instrument, parameters, settings
+from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
 
 PAGE = standard_folder() / "docs" / "data_sheets.md"
 DEG = math.pi / 180.0
 DPH = DEG / 3600.0
 NEAR = 0.05
+KINDS = ("fibre", "laser", "vibrating")
 ROOM = 0.8  # of the range, up to which the table turns
 NOT_TESTED = {
     "output_rate": "sets nothing: a sample each communication step",
@@ -126,6 +128,8 @@ def rates(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
     more: dict[str, Any] = {"gyro.resolution": 0.0} if "resolution" in load_part(sheet.part).declarations else {}
     if (bias := sheet.si("bias")) is not None:
         more |= {"gyro.bias": [bias, bias]}
+        if "g" in set_by:  # the axis points up
+            more["gyro.g"] = [[0.0] * 3] * 2
     if "axes" in set_by:
         more["gyro.axes"] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     found = coefficients(tests.result("rate_table_test", sheet, options, more, True))
@@ -187,7 +191,7 @@ def rows(tests: Tests, name: str) -> list[Row]:
         limit = printed.reading == "limit" and figure not in SETTINGS
         why = "a limit says nothing of one unit" if limit else NOT_TESTED.get(figure, "no test")
         found[figure] = Row(name, figure, printed.value, "", None, why)
-    return [found[n] for n in FIGURES if n in found]
+    return [found[n] for n in FIGURES[sheet.kind] if n in found]
 
 
 def main() -> int:
@@ -197,7 +201,8 @@ def main() -> int:
     given = parser.parse_args()
     logging.getLogger("gyrobench").setLevel(logging.ERROR)
     tests, every = Tests(), []
-    for name in given.names or sorted(Bench(standard_folder()).instruments()):
+    listed = sorted(Bench(standard_folder()).instruments())
+    for name in given.names or [n for n in listed if find_instrument(n).kind in KINDS]:
         every += rows(tests, name)
         print("\n".join(r.line() for r in every if r.sheet == name), flush=True)
     compared = [r for r in every if r.ratio is not None]
