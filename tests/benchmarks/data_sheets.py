@@ -1,4 +1,4 @@
-"""Figures of all data sheets of rate gyros against what the tests find of the parts that they make: docs/data_sheets.md.
+"""Figures of all data sheets of rate gyros against what the tests find of their parts: docs/data_sheets.md.
 
     python tests/benchmarks/data_sheets.py [--write] [NAME ...]
 
