@@ -20,6 +20,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
+from gyrobench.frames import G0
 from gyrobench.system.system import load_system
 
 DEG = math.pi / 180.0
@@ -48,7 +49,46 @@ def coning_test(rng: np.random.Generator) -> Drawn:
     return values | {"imu.gyro_bias_tau": float(10.0 ** rng.uniform(1.0, 3.0))}
 
 
-DRAWN: dict[str, Callable[[np.random.Generator], Drawn]] = {"coning_test": coning_test}
+def vibration_rectification(rng: np.random.Generator) -> Drawn:
+    """Gyro and accelerometer with coefficients by chance, white noise and, in half of the runs each, flicker, a control
+    accelerometer that is off, one way only.
+    """
+    gain, axis = 0.01 * rng.integers(2), int(rng.integers(3))
+    white, ug = 0.01 * DEG * 10.0 ** rng.uniform(-1.5, 0.0), 1e-6 * G0
+    noise = 70.0 * ug * 10.0 ** rng.uniform(-1.0, 0.3)
+    return {
+        "levels": "0 0.8 1.2 1.6", "readings": 3, "window": 1.0, "settle": 1.0, "axis": "xyz"[axis], "u_gain": gain,
+        "ways": "up down" if rng.integers(2) else "up", "table.read_gain": gain * rng.normal(), "gyro.white": white,
+        "gyro.flicker_x": white / 3.0 * rng.integers(2), "accelerometers.white": noise,
+        f"accelerometers.{'xyz'[axis]}_flicker": noise / 3.0 * rng.integers(2),
+        "gyro.g": (rng.uniform(-20.0, 20.0, (2, 3)) * DPH / G0).tolist(),
+        "gyro.g2": (rng.uniform(-5.0, 5.0, (2, 3)) * DPH / G0**2).tolist(),
+        "accelerometers.square": rng.uniform(-1e-4, 1e-4) / G0,
+        "accelerometers.cubic": rng.uniform(-1e-5, 1e-5) / G0**2 * rng.integers(2),
+        "accelerometers.scale": rng.normal(0.0, 1e-3, 3).tolist(),
+    }  # fmt: skip
+
+
+def turn_on_repeatability(rng: np.random.Generator) -> Drawn:
+    """Turn-ons on one to five days, one exponential or two, in half of the runs a rate in both senses."""
+    days = int(rng.integers(1, 6))
+    tau = float(rng.uniform(10.0, 40.0))
+    values: Drawn = {
+        "days": days, "turn_ons": int(rng.integers(3, 6)), "dwell": 300.0, "window": 5.0, "limit": 0.3 * DPH,
+        "rate": 0.02 * rng.integers(2), "gyro.optical": 0.0,
+        "gyro.electronics": 0.003 * DEG / 60.0 * rng.uniform(1.0, 5.0),
+        "switched.between_turn_ons": rng.uniform(0.0, 0.5) * DPH, "switched.between_days": rng.uniform(0.0, 0.5) * DPH,
+        "switched.warm_1": rng.uniform(1.0, 5.0) * DPH, "switched.tau_1": tau,
+        "switched.warm_2": rng.uniform(1.0, 5.0) * DPH * rng.integers(2), "switched.tau_2": 4.0 * tau,
+    }  # fmt: skip
+    return values | ({"switched.scale_warm": rng.uniform(1e-4, 1e-3)} if values["rate"] else {})
+
+
+DRAWN: dict[str, Callable[[np.random.Generator], Drawn]] = {
+    "coning_test": coning_test,
+    "turn_on_repeatability": turn_on_repeatability,
+    "vibration_rectification": vibration_rectification,
+}
 
 
 def main() -> int:

@@ -97,6 +97,8 @@ TABLES = {
     "stand_alignment",
     "table_position_test",
     "table_rate_test",
+    "turn_on_repeatability",
+    "vibration_rectification",
 }
 
 

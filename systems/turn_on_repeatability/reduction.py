@@ -1,0 +1,352 @@
+"""Reduction of turn-ons: warm-up of the bias (and of the scale factor), bias of each turn-on, how well they repeat.
+
+    y_ij - w_i = b_i + sum_k A_k m(t_ij, tau_k) + E w_i m(t_ij, tau_E) + noise       m: mean of exp(-t/tau) in a reading
+
+i: turn-on, w: rate of the table.  The time constants are found by least squares, as many exponentials as the record
+tells; the model, linear about them, is then fitted under an estimated noise model.  Of the biases b_i come the
+components of variance between turn-ons and between days, less their noise (components.py).  A record with one reading
+of each turn-on has no warm-up.  [TEST-TURN-ON; IEEE 952; Weerahandi 1993]
+
+Not modelled: a warm-up that differs from turn-on to turn-on, biases that depend on the one before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.setup.sources import TIME_BASE
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftReduction,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Record,
+    Regression,
+    RunDocument,
+    Setup,
+    Table,
+    told,
+    window_problems,
+)
+from gyrobench.units import DPH
+
+from . import mistakes
+from .components import Spread, VarianceComponent, spread
+from .warming import Kind, Warming, fitted, means
+
+DRAWS = 2000
+CONDITION = 1e6  # exponentials that are hardly two were left out by then
+FEW = 4  # readings of a turn-on from which on a warm-up is looked for
+SECONDS = "s"
+QUIET = ("flicker_x", "walk_x", "white_x", "markov_x")  # noises of a gyro that move biases beyond the noise model
+
+
+@dataclass(frozen=True, kw_only=True)
+class TurnOnSetup(Setup):
+    """limit: rad/s.  exponentials: 0, 1, 2, or -1, as many as the record tells."""
+
+    limit: float
+    exponentials: int = -1
+    u_time: float = 0.0
+
+
+class Reduction(DriftReduction[TurnOnSetup]):
+    """Windows with t_start, t_end, turn_on, since, mean, and day, rate, temperature where they are there."""
+
+    handling = staticmethod(mistakes.candidates)
+
+    def __init__(self, windows: Mapping[str, Array], setup: TurnOnSetup) -> None:
+        super().__init__(windows, setup)
+        self.tau, self.tau_E = np.zeros(0), np.zeros(0)
+
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        return cls.reduce(labelled(record), cls.setup_of(record.run))
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> TurnOnSetup:
+        o = run.options
+        truth = None if run.measured else true_values(run)
+        return TurnOnSetup.of(run, truth=truth, limit=float(o["limit"]), exponentials=int(o.get("exponentials", -1)))
+
+    def problems(self) -> list[str]:
+        w = self.windows
+        if problems := window_problems(w, ("t_start", "t_end", "since", "mean")):
+            return problems
+        self._read()
+        if self.count < 2:
+            problems.append("fewer than two turn-ons: nothing repeats")
+        elif self.y.size < self.count + 3 and not self.single:
+            problems.append(f"{self.y.size} readings of {self.count} turn-ons: give one of each, or several")
+        if np.any(self.since < 0.0) or np.any(self.since < 0.45 * self.length):
+            problems.append("since: the middle of a reading cannot lie before half of it has passed")
+        if "day" in w and any(np.unique(self.day[self.turn == k]).size > 1 for k in range(self.count)):
+            problems.append("day: a turn-on has rows of two days")
+        return problems
+
+    def _read(self) -> None:
+        w = self.windows
+        self.y, self.since, t0, t1 = (np.asarray(w[n], dtype=float) for n in ("mean", "since", "t_start", "t_end"))
+        self.length = t1 - t0
+        self.numbers, self.turn = np.unique(np.asarray(w["turn_on"]).astype(int), return_inverse=True)
+        self.count = self.numbers.size
+        self.single = self.count == self.y.size
+        self.day = np.asarray(w.get("day", np.ones(self.y.size))).astype(int)
+        self.w = np.asarray(w.get("rate", np.zeros(self.y.size)), dtype=float)
+
+    # ------------------------------------------------------------------------------ the model
+    def regression(self) -> Regression:
+        group = self.turn if not self.single else np.unique(self.day, return_inverse=True)[1]
+        self.columns = int(group.max()) + 1
+        own = np.zeros((self.y.size, self.columns))
+        own[np.arange(self.y.size), group] = 1.0
+        y = self.y - self.w
+        most = 0 if np.min(np.bincount(self.turn)) < FEW else self.setup.exponentials
+        turns = bool(np.any(self.w > 0.0) and np.any(self.w < 0.0)) and most != 0
+        kinds = [Kind(np.ones_like(y), most if most >= 0 else 2, most >= 0), Kind(self.w, int(turns))]
+        self.choice = fitted(y, own, self.since, self.length, kinds)
+        self.tau, self.tau_E = self.choice.tau
+        warm = self._exponentials(self.tau)
+        scale = self.w[:, None] * self._exponentials(self.tau_E)
+        X = np.column_stack([own, warm, scale])
+        self.about = np.linalg.lstsq(X, y, rcond=None)[0][self.columns :]
+        X = np.column_stack([X, *self._slopes(self.tau, self.tau_E, self.about)])
+        quantities = [Quantity.of(f"p_{k + 1}", "unknown of the fit", "deg/h") for k in range(X.shape[1])]
+        shown = [
+            Group(f"turn-on {n}", np.flatnonzero(self.turn == k), self.since[self.turn == k], "time since turn-on", "s")
+            for k, n in enumerate(self.numbers.tolist())
+        ][:6]  # fmt: skip
+        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
+        return Regression(quantities, X, y, t0, t1, shown, "drift", limit=CONDITION)
+
+    def _exponentials(self, tau: Array) -> Array:
+        return means(self.since, self.length, tau) if tau.size else np.zeros((self.y.size, 0))
+
+    def _slopes(self, tau: Array, tau_E: Array, size: Array) -> list[Array]:
+        """Return the columns of ln tau of each exponential, at the sizes found."""
+        out = []
+        for k, x in enumerate([*tau, *tau_E]):
+            factor = self.w if k >= tau.size else 1.0
+            step = 1e-3
+            high, low = (means(self.since, self.length, np.array([x * math.exp(s)]))[:, 0] for s in (step, -step))
+            out.append(factor * size[k] * (high - low) / (2.0 * step))
+        return out
+
+    def derived(self, found: Findings) -> Findings:
+        n, q, e = self.columns, self.tau.size, self.tau_E.size
+        truth = self.setup.truth or {}
+        wanted = [Quantity.of("b", f"bias when warm, mean of these {self.count} turn-ons", "deg/h")]
+        for k in range(q):
+            word = "" if q == 1 else (", fast part", ", slow part")[k]
+            name = "A" if q == 1 else f"A_{k + 1}"
+            tau = "τ" if q == 1 else f"τ_{k + 1}"
+            wanted.append(
+                Quantity.of(name, f"bias at the turn-on, less that when warm{word}", "deg/h", truth.get(name))
+            )
+            wanted.append(Quantity(tau, f"time constant of the warm-up{word}", SECONDS, 1.0, truth.get(tau)))
+        if e:
+            wanted.append(Quantity.of("E", "scale factor at the turn-on, less that when warm", "ppm", truth.get("E")))
+            wanted.append(Quantity("τ_E", "time constant of the scale factor", SECONDS, 1.0, truth.get("τ_E")))
+
+        def function(beta: Array) -> Array:
+            out = [float(beta[:n].mean())]
+            for k, tau in enumerate([*self.tau, *self.tau_E]):
+                out += [float(beta[n + k]), float(tau * np.exp(np.clip(beta[n + q + e + k], -3.0, 3.0)))]
+            return np.array(out)
+
+        r = found.est
+        if self.single:
+            self.biases, self.noise = self.y - self.w, np.zeros(self.count)
+        else:
+            self.biases, C = r.beta[:n], r.covariance[:n, :n]
+            apart = float(C.sum() - np.trace(C)) / (n * (n - 1))
+            self.noise = np.maximum(np.diag(C) - apart, 0.0)
+        return found.derive(wanted, function)
+
+    # ------------------------------------------------------------------------------ what follows from it
+    def spread(self) -> Spread:
+        """Return the components of variance of the biases."""
+        first = [int(np.flatnonzero(self.turn == k)[0]) for k in range(self.count)]
+        T = None
+        if "temperature" in self.windows:
+            every = np.asarray(self.windows["temperature"], dtype=float)
+            T = np.array([every[self.turn == k][-1] for k in range(self.count)])
+        return spread(self.biases, self.day[first], self.noise, T)
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        truth, s = self.setup.truth or {}, self.spread()
+        added = []
+        meanings = (
+            ("σ_on", "repeatability: standard deviation of the bias from turn-on to turn-on", s.turn_on),
+            ("σ_day", "standard deviation of the bias from day to day", s.day),
+        )
+        for name, meaning, part in meanings:
+            if part is not None:
+                added.append(_of_component(name, meaning, part, truth.get(name)))
+        if s.slope is not None:
+            k, u = (x / DPH for x in s.slope)
+            dof = max(self.count - np.unique(self.day).size - 1, 1)
+            factor = float(special.stdtrit(dof, 0.975))
+            added.append(Coefficient("b_T", "change of the bias with temperature", "°/h/K", k, u, factor,
+                                     (k - factor * u, k + factor * u)))  # fmt: skip
+        warm = self._time(truth.get("t_w"))
+        own = [_in_logarithms(c) if c.name.startswith("τ") else c for c in result.coefficients]
+        coefficients = [*own, *([warm] if warm else []), *added]
+        return replace(result, coefficients=coefficients, correlation=result.correlation)
+
+    def _time(self, truth: float | None) -> Coefficient | None:
+        """Return the time until the bias is within the limit; its interval by draws of sizes and time constants, of the
+        model and, as often as it is probable, of the one with an exponential more.
+        """
+        q, longest = self.tau.size, 20.0 * float(np.max(self.since))
+        meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
+        if not q:
+            return None
+        found, at = self.found, slice(1, 1 + 2 * q)
+        drawn = _draws(found.value[at], found.reported.covariance[at, at], DRAWS)
+        if self.choice.more is not None and self.choice.probability > 1e-3:
+            drawn += self._drawn_with_more(round(DRAWS * self.choice.probability / (1.0 - self.choice.probability)))
+        own = _warming(found.value[at]).time_until(self.setup.limit, longest)
+        times = np.sort([w.time_until(self.setup.limit, longest) for w in drawn])
+        low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
+        if not math.isfinite(own):
+            return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
+                               no_value="not reached within the record")  # fmt: skip
+        u = (high - low) / (2.0 * NORMAL)
+        return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
+
+    def _drawn_with_more(self, count: int) -> list[Warming]:
+        """Return draws of the model with an exponential more, by its covariance under white noise."""
+        tau, tau_E = self.choice.more or [np.zeros(0), np.zeros(0)]
+        q, e, p = tau.size, tau_E.size, self.columns
+        own = self.found.X[:, :p]
+        y = self.y - self.w
+        X = np.column_stack([own, self._exponentials(tau), self.w[:, None] * self._exponentials(tau_E)])
+        beta = np.linalg.lstsq(X, y, rcond=None)[0]
+        variance = float(np.sum((y - X @ beta) ** 2)) / max(y.size - p - 2 * (q + e), 1)
+        X = np.column_stack([X, *self._slopes(tau, tau_E, beta[p:])])
+        C = variance * np.linalg.pinv(X.T @ X)
+        own = np.array([j for k in range(q) for j in (p + k, p + q + e + k)])
+        C = C[np.ix_(own, own)] * np.outer(step := np.ravel([(1.0, x) for x in tau]), step)
+        value = np.ravel([(beta[p + k], tau[k]) for k in range(q)])
+        return _draws(value, C, min(count, 20 * DRAWS))
+
+    def effects(self, found: Findings) -> list[Effect]:
+        """Return the sources: a slow clock makes the time constants too small; as a share of them, not of the data."""
+        values = np.array(
+            [-v if q.unit == SECONDS else 0.0 for q, v in zip(found.quantities, found.value, strict=True)]
+        )
+        return [TIME_BASE.effect(self.setup, None, values=values)]
+
+    def account(self, found: Findings) -> Account:
+        q = self.tau.size
+        return Account(
+            method="Readings from the switching on onwards, over turn-ons and days; least squares under an estimated "
+            "noise model, components of variance [TEST-TURN-ON]",
+            sources=[
+                "TEST-TURN-ON; IEEE 952; IEEE 647; IEEE 1431; Weerahandi 1993",
+                "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
+            ],
+            equation='y - omega = b_i + sum_k A_k e^(-t\\/tau_k)' if q else "y - omega = b_i",
+            conventions=[
+                f"Exponentials of the warm-up of the bias: {q}, the same in all turn-ons.",
+                "σ_on, σ_day: standard deviations of the population, less the noise of the biases; intervals by "
+                "generalized pivotal quantities, 0 where the record shows none.",
+                f"{self.count} turn-ons on {np.unique(self.day).size} days.",
+            ],
+            tables=[self._biases()],
+            random="noise of the readings",
+        )  # fmt: skip
+
+    def _biases(self) -> Table:
+        rows = []
+        for k, n in enumerate(self.numbers.tolist()):
+            at = int(np.flatnonzero(self.turn == k)[0])
+            rows.append([n, int(self.day[at]), float(self.biases[k]) / DPH, math.sqrt(float(self.noise[k])) / DPH])
+        caption = "Bias of each turn-on when warm; u: of its noise, without what all have in common"
+        return Table("turn_on.biases", "Turn-ons", caption, ["turn-on", "day", "bias / (°/h)", "u / (°/h)"], rows)
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        names = {c.name for c in coefficients if not c.no_value}
+        said = {
+            "σ_on": "Repeatability of the bias from turn-on to turn-on {σ_on}.", "σ_day": "From day to day {σ_day}.",
+            "t_w": f"Within {self.setup.limit / DPH:.4g} °/h after {{t_w}}.",
+        }  # fmt: skip
+        sentences = told(coefficients, *(text for n, text in said.items() if n in names))
+        return [*sentences, found.noise_sentence("readings")]
+
+
+reduce = Reduction.reduce
+
+
+def _draws(value: Array, covariance: Array, count: int) -> list[Warming]:
+    """Return draws of sizes and time constants; these stay above 0 in logarithms."""
+    scale = np.ones(value.size)
+    scale[1::2] = 1.0 / value[1::2]
+    drawn = np.random.default_rng(2).multivariate_normal(np.zeros(value.size), covariance * np.outer(scale, scale),
+                                                         count, method="eigh", check_valid="ignore")  # fmt: skip
+    out = value + drawn
+    out[:, 1::2] = value[1::2] * np.exp(np.clip(drawn[:, 1::2], -3.0, 3.0))
+    return [_warming(row) for row in out]
+
+
+def _warming(value: Array) -> Warming:
+    return Warming(value[0::2], np.maximum(value[1::2], 1e-3))
+
+
+def _in_logarithms(c: Coefficient) -> Coefficient:
+    """Return a time constant with an interval that is even in its logarithm, in which it was fitted."""
+    factor = math.exp(min(c.k * c.u / c.estimate, 20.0))
+    return replace(c, interval=(c.estimate / factor, c.estimate * factor))
+
+
+def _of_component(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:
+    low, high = part.low / DPH, part.high / DPH
+    shown = None if truth is None else truth / DPH
+    return Coefficient(name, meaning, "°/h", part.rms / DPH, (high - low) / (2.0 * NORMAL), NORMAL, (low, high),
+                       truth=shown)  # fmt: skip
+
+
+def labelled(record: Record) -> dict[str, Array]:
+    """Return the windows with turn_on, day and rate; of a run by its plan."""
+    windows = dict(record.windows)
+    if not record.run.measured:
+        rows = {row.phase: row for row in record.run.plan}
+        phase = np.asarray(windows["phase"]).astype(int).tolist()
+        windows["turn_on"] = np.array(phase)
+        windows["day"] = np.array([round(rows[p].target_y) for p in phase])
+        if record.run.options["rate"]:
+            windows["rate"] = np.array([rows[p].target for p in phase])
+    return windows
+
+
+def true_values(run: RunDocument) -> dict[str, float] | None:
+    """Return what the parameters of simulated turn-ons say, SI; None where they are not the bench's own."""
+    p: dict[str, Any] = dict(run.parameters)
+    if "switched.between_turn_ons" not in p:
+        return None
+    size = np.array([float(p[f"switched.warm_{k}"]) for k in (1, 2)])
+    tau = np.array([float(p[f"switched.tau_{k}"]) for k in (1, 2)])
+    there = np.flatnonzero(size)
+    order = there[np.argsort(tau[there])]
+    found: dict[str, float] = {}
+    for k, j in enumerate(order.tolist(), 1):
+        names = ("A", "τ") if order.size == 1 else (f"A_{k}", f"τ_{k}")
+        found |= dict(zip(names, (float(size[j]), float(tau[j])), strict=True))
+    found["t_w"] = Warming(size[order], tau[order]).time_until(float(run.options["limit"]), 1e9)
+    if not any(float(p.get(f"gyro.{n}", 0.0)) for n in QUIET):
+        found |= {"σ_on": float(p["switched.between_turn_ons"]), "σ_day": float(p["switched.between_days"])}
+    scale = 1.0 + float(np.ravel(p.get("gyro.scale", 0.0))[0])
+    return found | {"E": float(p["switched.scale_warm"]) * scale, "τ_E": float(p["switched.scale_tau"])}

@@ -1,0 +1,36 @@
+"""Mistakes in a vibration test: positions reversed, units, rows exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gyrobench.record.record import Record
+from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
+from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
+from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
+from gyrobench.result import Coefficient, Reason
+
+FAR = 1e5  # ppm, scale factor error from which on something else than the accelerometer is meant
+
+
+def candidates(record: Record) -> Iterator[HandlingCandidate]:
+    """Levels or readings of two rows exchanged, up and down reversed, times in another unit."""
+    if not record.run.measured:
+        return
+    w = record.windows
+    yield from exchanged_rows(record, ["level"], "the levels of rows", far=12)
+    yield from exchanged_rows(record, [n for n in ("rate", "force") if n in w], "the readings of rows", far=0)
+    if np.unique(w["up"]).size == 2:
+        yield from exchanged_rows(record, ["up"], "the positions of rows", far=12)
+        yield HandlingCandidate("up and down exchanged", changed(record, up=-np.asarray(w["up"])))
+    for words, f in TIME.items():
+        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+
+
+def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:
+    """Yield why a scale factor error beyond 10 % is that of no accelerometer."""
+    for c in found:
+        if c.name == "S" and abs(c.estimate) > FAR:
+            yield Reason("force.factor", factor_sentence(1.0 + c.estimate * 1e-6), ("pass", "fail"), severity="doubt")

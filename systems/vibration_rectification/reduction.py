@@ -1,0 +1,270 @@
+"""Reduction of the vibration test: g-sensitivity and rectification, from means against gravity and mean squares.
+
+    gyro            rate - w  = b_g + G f + G2 (f2 + s2) + noise
+    accelerometer   force - f = b_a + S f + K2 (f2 + s2) + K3 (f3 + 3 f s2) + noise
+
+f = +-g by the way the axis points, s the rms of the vibration that the control accelerometer reads, less its noise at
+rest; w the part of the Earth rate along the axis of the gyro.  With the axis one way only, G (S) and K3 are not seen:
+then b is that with gravity, and K2 has 3 K3 f in it.  [TEST-RECTIFICATION; IEEE 1293; IEEE 1431]
+
+Not modelled: vibration across the axis and about it, change of the rectification with frequency, a mean specific force
+of the table, fifth and higher powers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gyrobench import frames
+from gyrobench.frames import G0
+from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
+from gyrobench.reduction.setup.sources import GRAVITY, LATITUDE
+from gyrobench.reduction.toolkit import (
+    Account,
+    Array,
+    Coefficient,
+    DriftReduction,
+    DriftTestResult,
+    Effect,
+    Findings,
+    Group,
+    Quantity,
+    Record,
+    Regression,
+    RunDocument,
+    SiteSetup,
+    Source,
+    told,
+    window_problems,
+)
+from gyrobench.units import DPH
+
+from . import mistakes
+
+GYRO, FORCE = "gyro", "accelerometer"
+COLUMN = {GYRO: "rate", FORCE: "force"}
+LEAST = 3  # levels, rest included
+CONTROL = Source("table.control.gain", "control accelerometer", "1", "u_gain", "relative, positive where it reads more")
+UG = 1e-6 * G0
+
+
+@dataclass(frozen=True, kw_only=True)
+class VibrationSetup(SiteSetup):
+    """axis: of the case, along the vibration."""
+
+    axis: str
+    u_gain: float = 0.0
+    u_gravity: float = 0.0
+    u_latitude: float = 0.0
+
+
+class VibrationChannel(DriftReduction[VibrationSetup]):
+    """Gyro or accelerometer."""
+
+    def __init__(self, windows: Mapping[str, Array], setup: VibrationSetup, channel: str) -> None:
+        super().__init__(windows, setup)
+        self.channel = channel
+        self.up = np.asarray(windows["up"], dtype=float)
+        self.f = self.up * setup.gravity
+        self.s2 = np.asarray(windows["level"], dtype=float) ** 2
+        self.both = np.unique(self.up).size == 2
+
+    @property
+    def earth(self) -> Array:
+        """Earth rate along the axis of the gyro, rad/s: x points up, down, or east."""
+        s = self.setup
+        return self.up * (s.earth_rate * math.sin(s.latitude) if s.axis == "x" else 0.0)
+
+    def columns(self, f: Array, s2: Array) -> Array:
+        """Return the regressors of bias, linear, square and cube."""
+        one, square, cube = np.ones_like(f), f * f + s2, f**3 + 3.0 * f * s2
+        if self.channel == GYRO:
+            return np.column_stack([one, f, square] if self.both else [one, s2])
+        return np.column_stack([one, f, square, cube] if self.both else [one, s2])
+
+    def quantities(self) -> list[Quantity]:
+        s, truth = self.setup, self.setup.truth or {}
+        if self.channel == GYRO:
+            rows = [
+                ("b_g", "bias of the gyro" if self.both else "bias of the gyro, with gravity", "deg/h"),
+                ("G", f"g-sensitivity of the gyro, {s.axis} axis", "deg/h/g"),
+                ("G2", f"rectification of the gyro, {s.axis} axis", "deg/h/g2"),
+            ]
+        else:
+            rows = [
+                ("b_a", "bias of the accelerometer" if self.both else "bias of the accelerometer, with gravity", "ug"),
+                ("S", "scale factor error of the accelerometer", "ppm"),
+                ("K2", "vibration rectification of the accelerometer", "ug/g2"),
+                ("K3", "cubic nonlinearity of the accelerometer", "ug/g3"),
+            ]
+        if not self.both:
+            rows = [rows[0], rows[2]]
+        return [Quantity.of(n, meaning, unit, truth.get(n)) for n, meaning, unit in rows]
+
+    def regression(self) -> Regression:
+        gyro = self.channel == GYRO
+        read = np.asarray(self.windows[COLUMN[self.channel]], dtype=float)
+        y = read - (self.earth if gyro else self.f)
+        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
+        shown = [
+            Group(f"{self.setup.axis} {way}", np.flatnonzero(self.up == sign), self.s2[self.up == sign] / G0**2,
+                  "mean square of the vibration", "g²")
+            for way, sign in (("up", 1.0), ("down", -1.0)) if np.any(self.up == sign)
+        ]  # fmt: skip
+        unit = ("drift", "°/h", DPH) if gyro else ("departure of the specific force", "µg", UG)
+        weighed = nuisances.common(self.windows, f" {self.channel}") if self.setup.nuisances and gyro else ()
+        X = self.columns(self.f, self.s2)
+        return Regression(self.quantities(), X, y, t0, t1, shown, *unit, candidates=weighed)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        s, X = self.setup, self.columns(self.f, self.s2)
+        out = [CONTROL.effect(s, found.error(0.0, self.columns(self.f, self.s2 * (1.0 + 2e-4)) / 1e-4 - X / 1e-4))]
+        if self.channel == FORCE:
+            more = self.columns(self.f + 1e-4 * self.up, self.s2) / 1e-4 - X / 1e-4
+            out.append(GRAVITY.effect(s, found.error(-self.up, more)))
+        elif s.axis == "x":
+            out.append(LATITUDE.effect(s, found.error(-self.up * s.earth_rate * math.cos(s.latitude))))
+        return out
+
+    def test(self, found: Findings) -> None:
+        """Add an F test of the fourth power of the level."""
+        power = np.column_stack([self.s2**2 / float(np.max(self.s2)) ** 2])
+        found.f_test(
+            "level.fourth", "fourth power of the level", power, "shape over the level",
+            "the readings do not go with the mean square of the vibration",
+            "the readings go with the mean square of the vibration",
+        )  # fmt: skip
+
+    def account(self, found: Findings) -> Account:
+        if self.channel == GYRO:
+            equation = '"rate" - omega = b_g + G f + G_2 (f^2 + s^2)' if self.both else '"rate" - omega = b_g + G_2 s^2'
+        elif self.both:
+            equation = '"force" - f = b_a + S f + K_2 (f^2 + s^2) + K_3 (f^3 + 3 f s^2)'
+        else:
+            equation = '"force" - f = b_a + K_2 s^2'
+        one_way = "With the axis one way only the bias has gravity in it, and the rectification 3 K3 g."
+        return Account(
+            method="Mean readings on a shaker at levels, axis up and down; least squares under an estimated noise "
+            "model [TEST-RECTIFICATION]",
+            sources=["TEST-RECTIFICATION; IEEE 1293; IEEE 1431", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
+            equation=equation,
+            conventions=[
+                "f: gravity along the axis, +1 g where it points up; s: rms of the vibration as the control "
+                "accelerometer reads it.",
+                *([] if self.both else [one_way]),
+            ],
+            random="noise of the instrument",
+        )
+
+    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
+        return [found.noise_sentence("readings"), *found.nuisance_sentences()]
+
+
+class Reduction(ChannelTests[VibrationSetup]):
+    """Gyro and accelerometer from windows with t_start, t_end, up, level (m/s2), rate (rad/s) and force (m/s2)."""
+
+    label = "{}"
+    channel = VibrationChannel
+    handling = staticmethod(mistakes.candidates)
+
+    def __init__(self, windows: Mapping[str, Array], setup: VibrationSetup) -> None:
+        super().__init__(windows, setup)
+        vars(self)["names"] = tuple(n for n, column in COLUMN.items() if column in windows)
+
+    @classmethod
+    def of_record(cls, record: Record) -> DriftTestResult:
+        return cls.reduce(labelled(record), cls.setup_of(record.run))
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> VibrationSetup:
+        axis = str(run.options["axis"])
+        return VibrationSetup.of(run, axis=axis, truth=None if run.measured else true_values(run, axis))
+
+    def problems(self) -> list[str]:
+        s, w = self.setup, self.windows
+        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        if not self.names:
+            return [*problems, "neither rate nor force: one of the columns is needed"]
+        if problems := problems + window_problems(w, ("t_start", "t_end", "level", *(COLUMN[n] for n in self.names))):
+            return problems
+        if s.axis not in "xyz" or not s.axis:
+            problems.append(f"axis = {s.axis}: x, y or z is expected")
+        if np.any(np.abs(np.asarray(w["up"])) != 1):
+            problems.append("up: 1 (the axis points up) or −1 (down) is expected")
+        level = np.asarray(w["level"], dtype=float)
+        if np.any(level < 0.0):
+            problems.append("level: an rms is 0 or above")
+        elif np.unique(np.round(level, 2)).size < LEAST or np.min(level) > 0.1 * np.max(level):
+            problems.append(f"level: at rest and at least {LEAST - 1} levels are needed")
+        return problems
+
+    def result(self) -> DriftTestResult:
+        found = super().result()
+        return replace(found, reasons=[*found.reasons, *mistakes.implausible(found.coefficients)])
+
+    def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
+        every = [c for r in results.values() for c in r.coefficients]
+        names = {c.name for c in every}
+        said = {
+            "G": "g-sensitivity of the gyro {G}.", "G2": "Rectification of the gyro {G2}.",
+            "K2": "Vibration rectification of the accelerometer {K2}.",
+        }  # fmt: skip
+        return told(every, *(text for name, text in said.items() if name in names))
+
+
+reduce = Reduction.reduce
+
+
+def labelled(record: Record) -> dict[str, Array]:
+    """Return the windows with up, level and force; of a run by its plan, its noise at rest taken off the level."""
+    windows = dict(record.windows)
+    if record.run.measured:
+        return windows
+    rows = {row.phase: row for row in record.run.plan}
+    phase = np.asarray(windows["phase"]).astype(int).tolist()
+    windows["up"] = np.array([-1 if rows[p].face.endswith("down") else 1 for p in phase])
+    n = np.asarray(windows["n"], dtype=float)
+    read = np.asarray(windows["level"], dtype=float) ** 2 * (n - 1.0) / n  # the mean of whole periods is known: 0
+    rest = np.array([rows[p].target == 0.0 for p in phase])
+    windows["level"] = np.where(rest, 0.0, np.sqrt(np.maximum(read - float(np.mean(read[rest])), 0.0)))
+    windows["flagged"] = np.maximum(windows["flagged"], windows.pop("flagged_force"))
+    windows["force"] = windows[f"force_{record.run.options['axis']}"]
+    return windows
+
+
+def true_values(run: RunDocument, axis: str) -> dict[str, float]:
+    """Return what the parameters of simulated instruments make of the coefficients, SI; those that are known."""
+    p: dict[str, Any] = dict(run.parameters)
+    k = "xyz".index(axis)
+    found: dict[str, float] = {}
+    if "gyro.g" in p and "gyro.readout_mismatch" not in p and float(p.get("gyro.closed", 1.0)) > 0.5:
+        seen = math.cos(float(np.ravel(p.get("gyro.phase_error", 0.0))[0]))
+        linear, square = (np.reshape(np.asarray(p.get(f"gyro.{n}", np.zeros((2, 3))), dtype=float), (2, 3))[0]
+                          for n in ("g", "g2"))  # fmt: skip
+        found |= {"G": float(linear[k]) * seen, "G2": float(square[k]) * seen}
+        alone = {n: v for n, v in p.items() if n not in ("gyro.g", "gyro.g2")}
+        if bias_is_all(alone) and len(str(run.options["ways"]).split()) == 2:
+            found["b_g"] = float(np.ravel(p["gyro.bias"])[0]) * seen
+    if "accelerometers.square" in p:
+        found |= _accelerometer(p, k, run)
+    return found
+
+
+def _accelerometer(p: Mapping[str, Any], k: int, run: RunDocument) -> dict[str, float]:
+    """Return those of the accelerometer k.  a = axes f; an axis that leans feels its cosine."""
+    felt = float(np.reshape(np.asarray(p.get("accelerometers.axes", np.eye(3)), dtype=float), (3, 3))[k, k])
+    scale = (1.0 + float(np.ravel(p["accelerometers.scale"])[k])) * felt - 1.0
+    square, cube = (float(p[f"accelerometers.{n}"]) for n in ("square", "cubic"))
+    if len(str(run.options["ways"]).split()) == 2:
+        bias = float(np.ravel(p["accelerometers.bias"])[k])
+        drifting = ("turn_on", *(f"{'xyz'[k]}_{n}" for n in ("flicker", "walk")))
+        steady = not any(np.any(np.asarray(p.get(f"accelerometers.{n}", 0.0))) for n in drifting)
+        return {"S": scale, "K2": square * felt**2, "K3": cube * felt**3} | ({"b_a": bias} if steady else {})
+    return {} if cube else {"K2": square * felt**2}

@@ -1,0 +1,223 @@
+"""Figures of all data sheets of rate gyros against what the tests find of their parts: docs/data_sheets.md.
+
+    python tests/benchmarks/data_sheets.py [--write] [NAME ...]
+
+Each sheet becomes a part; `drift_record` (an hour, 0.1 s), `rate_table_test`, `gyro_bandwidth` and
+`vibration_rectification` measure it, noise off where the figure is none of noise, so that a difference is one of the
+way from the sheet to the part and of the test.  --write: the table of docs/data_sheets.md anew; some minutes for all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import math
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gyrobench.bench import Bench, standard_folder
+from gyrobench.engine.session import Session
+from gyrobench.frames import G0
+from gyrobench.packaging import load_part
+from gyrobench.system.families.rate_reading import RATE_NOISES
+from gyrobench.system.system import load_system
+from gyrobench.workflow.instruments import Instrument, find_instrument, parameters, settings
+from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
+
+PAGE = standard_folder() / "docs" / "data_sheets.md"
+DEG = math.pi / 180.0
+DPH = DEG / 3600.0
+NEAR = 0.05
+KINDS = ("fibre", "laser", "vibrating")
+ROOM = 0.8  # of the range, up to which the table turns
+NOT_TESTED = {
+    "output_rate": "sets nothing: a sample each communication step",
+    "bias_temperature": "the coefficient of the part; `imu_positions` with a chamber tests units, not single gyros",
+    "scale_temperature": "the coefficient of the part; `imu_positions` with a chamber tests units, not single gyros",
+    "misalignment": "needs turns about other axes: `imu_positions` tests units, not single gyros",
+    "cross_axis": "needs turns about other axes: `imu_positions` tests units, not single gyros",
+    "range": "the part clips there; readings beyond it are refused",
+    "resolution": "steps of the word are averaged out by the noise",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A figure: as printed, the test, found over expected, or why there is none."""
+
+    sheet: str
+    figure: str
+    printed: str
+    test: str
+    ratio: float | None = None
+    why: str = ""
+
+    @property
+    def near(self) -> bool:
+        return self.ratio is not None and abs(self.ratio - 1.0) <= NEAR
+
+    def line(self) -> str:
+        found = "" if self.ratio is None else f"{self.ratio:.3f}"
+        return f"| {self.sheet} | {self.figure} | {self.printed} | {self.test} | {found} | {self.why} |"
+
+
+class Tests:
+    """Sessions of the tests by part, kept open."""
+
+    def __init__(self) -> None:
+        self.open: dict[tuple[str, str], Session] = {}
+
+    def result(self, test: str, sheet: Instrument, options: dict[str, Any], more: dict[str, Any], quiet: bool) -> Any:
+        """Return what a test finds; quiet: without noise."""
+        key = (test, sheet.part)
+        if key not in self.open:
+            self.open[key] = Session(test, {"gyro": sheet.part})
+        declared = load_part(sheet.part).declarations
+        off = {n: 0.0 for n in RATE_NOISES if quiet and n.removeprefix("gyro.") in declared}
+        record = self.open[key].run({**options, **settings(sheet), **off, **more}, seed=3)
+        return load_system(test).with_values(options).reduce(record)
+
+
+def coefficients(result: Any) -> dict[str, Any]:
+    return {c.name: c for c in result.coefficients}
+
+
+def noise(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    """Yield random walk and bias instability, of an hour."""
+    asked = [n for n in ("angle_random_walk", "noise_density", "bias_instability") if sheet.si(n) is not None]
+    if not asked:
+        return
+    found = coefficients(
+        tests.result("drift_record", sheet, {"duration": 3600.0, "window": 0.1, "settle": 1.0}, {}, False)
+    )
+    for figure in asked:
+        value = sheet.si(figure)
+        assert value is not None
+        if figure == "bias_instability":
+            c, expected = found["B"], value / FLOOR / DPH
+        else:
+            walk = value / (math.sqrt(2.0) if figure == "noise_density" else 1.0)
+            c, expected = found["N"], walk / (DEG / 60.0)
+        low, high = c.interval
+        inside = low <= expected <= high
+        ratio = None if c.no_value else c.estimate / expected
+        why = ""
+        if ratio is None:
+            why = f"an hour does not tell it from the white noise: 95 % {low / expected:.2f} to {high / expected:.2f}"
+        elif abs(ratio - 1.0) > NEAR:
+            spread = f"95 % {low / expected:.2f} to {high / expected:.2f} of it in an hour"
+            why = spread if inside else f"{spread}: does not contain it"
+        if figure == "noise_density" and "angle_random_walk" in asked:
+            why = "the random walk of the same sheet goes before it"
+        yield Row(name, figure, sheet.figures[figure].value, "drift_record", ratio, why)
+
+
+def rates(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    """Yield scale factor error, bias and nonlinearity, without noise, up to 0.8 of the range."""
+    asked = [n for n in ("scale_error", "nonlinearity", "bias") if sheet.si(n) is not None]
+    set_by = parameters(sheet)
+    if not asked:
+        return
+    limit = sheet.si("range") or 100.0 * DEG
+    full = min(ROOM * limit, 500.0 * DEG)
+    options = {"full_scale": full, "steps": 10, "cycles": 1, "dwell": 0.5, "settle": 0.2, "nuisances": "none"}
+    more: dict[str, Any] = {"gyro.resolution": 0.0} if "resolution" in load_part(sheet.part).declarations else {}
+    if (bias := sheet.si("bias")) is not None:
+        more |= {"gyro.bias": [bias, bias]}
+        if "g" in set_by:  # the axis points up
+            more["gyro.g"] = [[0.0] * 3] * 2
+    if "axes" in set_by:
+        more["gyro.axes"] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    found = coefficients(tests.result("rate_table_test", sheet, options, more, True))
+    for figure in asked:
+        value, printed = sheet.si(figure), sheet.figures[figure].value
+        assert value is not None
+        if figure == "bias":
+            yield Row(name, figure, printed, "rate_table_test", found["b"].estimate * DPH / value,
+                      "rms of the turn-on bias, here as a bias of that size")  # fmt: skip
+        elif figure == "scale_error":
+            if "scale" not in set_by:
+                yield Row(name, figure, printed, "", None, f"{sheet.part} has no scale factor error")
+            else:
+                yield Row(name, figure, printed, "rate_table_test", found["e"].estimate * 1e-6 / value)
+        elif "cubic" not in set_by:
+            why = "no range printed" if sheet.si("range") is None else f"{sheet.part} has no such nonlinearity"
+            yield Row(name, figure, printed, "", None, f"sets nothing: {why}")
+        else:  # 0.4 c R^2, the departure from the best line over the whole range
+            c = found["c"].estimate * 1e-6 * (limit / full) ** 2
+            yield Row(name, figure, printed, "rate_table_test", 0.4 * c / value)
+
+
+def bandwidth(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    value = sheet.si("bandwidth")
+    if value is None:
+        return
+    if "bandwidth" not in parameters(sheet):
+        yield Row(name, "bandwidth", sheet.figures["bandwidth"].value, "", None, f"{sheet.part} has no filter")
+        return
+    highest = min(2.0 * value, 490.0)
+    options = {"lowest": max(value / 20.0, 1.0), "highest": highest, "points": 14, "dwell": 0.2, "settle": 0.1}
+    more = {"gyro.resolution": 0.0}
+    c = coefficients(tests.result("gyro_bandwidth", sheet, options, more, True))["f_3dB"]
+    printed = sheet.figures["bandwidth"].value
+    if c.no_value:
+        yield Row(name, "bandwidth", printed, "gyro_bandwidth", None, f"above {highest:g} Hz, the highest of the test")
+    else:
+        yield Row(name, "bandwidth", printed, "gyro_bandwidth", c.estimate / value)
+
+
+def sensitivity(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    value = sheet.si("g_sensitivity")
+    if value is None:
+        return
+    options = {"levels": "0 0.5 1", "readings": 2, "cycles": 1, "window": 1.0, "settle": 1.0, "nuisances": "none"}
+    more = {"gyro.resolution": 0.0}
+    c = coefficients(tests.result("vibration_rectification", sheet, options, more, True))["G"]
+    printed = sheet.figures["g_sensitivity"].value
+    yield Row(name, "g_sensitivity", printed, "vibration_rectification", c.estimate * DPH / G0 / value)
+
+
+def rows(tests: Tests, name: str) -> list[Row]:
+    """Return a row for each figure of a sheet, in the order of FIGURES."""
+    sheet = find_instrument(name)
+    found = {r.figure: r for test in (noise, rates, bandwidth, sensitivity) for r in test(tests, name, sheet)}
+    for figure, printed in sheet.figures.items():
+        if figure in found:
+            continue
+        limit = printed.reading == "limit" and figure not in SETTINGS
+        why = "a limit says nothing of one unit" if limit else NOT_TESTED.get(figure, "no test")
+        found[figure] = Row(name, figure, printed.value, "", None, why)
+    return [found[n] for n in FIGURES[sheet.kind] if n in found]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--write", action="store_true")
+    given = parser.parse_args()
+    logging.getLogger("gyrobench").setLevel(logging.ERROR)
+    tests, every = Tests(), []
+    listed = sorted(Bench(standard_folder()).instruments())
+    for name in given.names or [n for n in listed if find_instrument(n).kind in KINDS]:
+        every += rows(tests, name)
+        print("\n".join(r.line() for r in every if r.sheet == name), flush=True)
+    compared = [r for r in every if r.ratio is not None]
+    away = [r for r in compared if not r.near]
+    said = f"{len(every)} figures of {len({r.sheet for r in every})} sheets, {len(compared)} compared, "
+    said += f"{len(compared) - len(away)} within 5 %"
+    print(said)
+    if given.write:
+        table = ["| sheet | figure | printed | test | found/printed | reason, note |", "|---|---|---|---|---|---|"]
+        body = "\n".join([said + ".", "", *table, *(r.line() for r in every)])
+        text = PAGE.read_text(encoding="utf-8")
+        text = re.sub(r"(<!-- table -->).*?(<!-- /table -->)", lambda m: f"{m[1]}\n{body}\n{m[2]}", text, flags=re.S)
+        Path(PAGE).write_text(text, encoding="utf-8")
+    return int(any(not r.why for r in away))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,189 @@
+"""Turn-ons: components of variance that cover, warm-ups that come back, files, mistakes, refusals.  [TEST-TURN-ON]"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.engine.session import Session
+from gyrobench.packaging import load_part
+from gyrobench.reduction.toolkit import ReductionError
+from gyrobench.system.system import load_system
+from systems.turn_on_repeatability import components
+from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
+from systems.turn_on_repeatability.warming import Kind, Warming, fitted, means
+
+Command = Callable[..., tuple[int, str, str]]
+NAME = "turn_on_repeatability"
+DPH = math.pi / 648000.0
+
+
+# ------------------------------------------------------------------------------------------------ by themselves
+def test_biases_are_drawn_anew() -> None:
+    """b_on at each turn-on, b_day with each day; the time since the turn-on; exponentials by hand."""
+    part = load_part("turn_on_errors")(seed=3, warm_2=2e-6, scale_warm=0.01)
+    part.rate = [0.1, 0.0]
+    part.initialize()
+    seen: dict[float, set[tuple[float, float]]] = {}
+    for k in range(600):
+        part.phase, part.day = 1.0 + k // 100, 1.0 + k // 300
+        part.do_step(0.01 * k, 0.01)
+        t = part.since
+        warm = 3.0 * DPH * math.exp(-t / 120.0) + 2e-6 * math.exp(-t / 600.0)
+        left = part.rate_out - 0.1 * (1.0 + 0.01 * math.exp(-t / 120.0)) - warm
+        seen.setdefault(part.phase, set()).add((round(left, 15), part.day))
+        assert t == pytest.approx(0.01 * (k % 100) + (0.01 if k < 100 else 0.0), abs=0.011)
+    assert all(len(s) == 1 for s in seen.values())
+    assert len({s for each in seen.values() for s, _ in each}) == 6
+
+
+def test_components_by_hand_and_their_coverage() -> None:
+    """Two days of two: means 1, 5; S_on = 2 + 8 = 10 of 2 degrees, S_day = 2 (4 + 4) = 16 of 1, n_0 = 2; then 400
+    random designs, with noise, with a temperature.
+    """
+    found = components.spread(np.array([0.0, 2.0, 3.0, 7.0]), np.array([1, 1, 2, 2]), np.full(4, 0.5))
+    assert found.turn_on is not None and found.day is not None
+    assert found.turn_on.rms == pytest.approx(math.sqrt(10.0 / 2.0 - 0.5))
+    assert found.day.rms == pytest.approx(math.sqrt((16.0 - 5.0) / 2.0))
+    rng = np.random.default_rng(5)
+    held = []
+    for _ in range(400):
+        days, each = int(rng.integers(3, 8)), int(rng.integers(2, 6))
+        day = np.repeat(np.arange(days), each)
+        on, between, noise = rng.uniform(0.1, 1.0), rng.uniform(0.0, 1.0), rng.uniform(0.0, 0.3)
+        T = rng.normal(0.0, 3.0, day.size)
+        b = between * rng.normal(size=days)[day] + np.hypot(on, noise) * rng.normal(size=day.size) + 0.1 * T
+        s = components.spread(b, day, np.full(day.size, noise**2), T)
+        assert s.turn_on is not None and s.day is not None and s.slope is not None
+        held += [s.turn_on.low <= on <= s.turn_on.high, s.day.low <= between <= s.day.high]
+        held.append(abs(s.slope[0] - 0.1) < 2.3 * s.slope[1])
+    assert np.mean(held) == pytest.approx(0.95, abs=0.02)
+
+
+def test_time_until_it_is_warm() -> None:
+    """One exponential: tau ln(A/limit); two of opposite sign cross the limit late, once more after zero."""
+    assert Warming(np.array([5.0]), np.array([100.0])).time_until(1.0, 1e6) == pytest.approx(100.0 * math.log(5.0))
+    assert Warming(np.array([0.5]), np.array([100.0])).time_until(1.0, 1e6) == 0.0
+    both = Warming(np.array([10.0, -3.0]), np.array([20.0, 200.0]))
+    t = both.time_until(0.5, 1e6)
+    assert 10.0 * math.exp(-t / 20.0) - 3.0 * math.exp(-t / 200.0) == pytest.approx(-0.5)
+
+
+def test_time_constants_are_found() -> None:
+    """Two, of readings that are as long as the fast one: the mean over a reading counts; none of noise alone."""
+    rng = np.random.default_rng(2)
+    since = np.tile(np.arange(10.0, 1200.0, 20.0), 4)
+    length, own = np.full(since.size, 20.0), np.kron(np.eye(4), np.ones((since.size // 4, 1)))
+    y = own @ rng.normal(size=4) + means(since, length, np.array([25.0, 300.0])) @ [3.0, -2.0]
+    noise = rng.normal(0.0, 0.01, since.size)
+    kind = Kind(np.ones_like(y), 2)
+    assert fitted(1e-6 * (y + noise), own, since, length, [kind]).tau[0] == pytest.approx([25.0, 300.0], rel=0.05)
+    assert not fitted(1e-6 * noise, own, since, length, [kind]).tau[0].size
+    assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)]).tau[0].size == 1
+
+
+# ------------------------------------------------------------------------------------------------ runs
+def test_a_gyro_that_warms_up_comes_back() -> None:
+    """At a rate in both senses, two exponentials, scale factor: without noise of the gyro to 1 %."""
+    options = {"days": 2, "turn_ons": 2, "dwell": 400.0, "window": 10.0, "rate": 0.1, "limit": 0.5 * DPH}
+    true = {"warm_1": 4.0 * DPH, "tau_1": 15.0, "warm_2": -2.0 * DPH, "tau_2": 90.0, "scale_warm": 2e-3,
+            "scale_tau": 40.0}  # fmt: skip
+    gyro = load_part("gyro_fog").declarations
+    quiet = {n: 0.0 for n in load_system(NAME).noises if n.startswith("gyro.") and n[5:] in gyro}
+    with Session(NAME) as session:
+        record = session.run({**options, **quiet, **{f"switched.{n}": v for n, v in true.items()}}, seed=4)
+    result = load_system(NAME).with_values(options).reduce(record)
+    found = {c.name: c for c in result.coefficients}
+    shown = {"A_1": 4.0, "τ_1": 15.0, "A_2": -2.0, "τ_2": 90.0, "E": 2000.0, "τ_E": 40.0}
+    for name, value in shown.items():
+        assert found[name].truth == pytest.approx(value)
+        assert found[name].estimate == pytest.approx(value, rel=1e-2), name
+    late = 90.0 * math.log(4.0)  # 2 exp(-t/90) = 0.5, the fast one is long gone
+    assert found["t_w"].estimate == pytest.approx(late, rel=1e-2)
+    assert found["t_w"].truth == pytest.approx(late, rel=3e-3)
+    assert found["σ_on"].truth == pytest.approx(0.3) and found["σ_day"].truth == pytest.approx(0.2)
+    biases = next(t for t in result.tables if t.id == "turn_on.biases").rows
+    assert [row[:2] for row in biases] == [[1, 1], [2, 1], [3, 2], [4, 2]]
+
+
+# ------------------------------------------------------------------------------------------------ files
+def rows(noise: float = 0.02) -> list[list[float]]:
+    """t0, t1, turn_on, day, since (s), mean (deg/h), temperature: 6 turn-ons on 3 days, 2 exp(-t/60), 0.1 deg/h/K."""
+    rng = np.random.default_rng(8)
+    out, t = [], 0.0
+    for k in range(6):
+        T = 20.0 + 3.0 * rng.normal()
+        own = 5.0 + 0.3 * rng.normal() + 0.1 * (T - 20.0)
+        for j in range(25):
+            since = 5.0 + 10.0 * j
+            mean = own + 2.0 * 6.0 * (math.exp(-(since - 5.0) / 60.0) - math.exp(-(since + 5.0) / 60.0))
+            out.append([t + since - 5.0, t + since + 5.0, k + 1, 1 + k // 2, since, mean + noise * rng.normal(), T])
+        t += 5000.0
+    return out
+
+
+NAMES = ("t_start [s]", "t_end [s]", "turn_on", "day", "since [s]", "mean [deg/h]", "temperature [degC]")
+
+
+def reduced(command: Command, folder: Path, table: list[list[float]]) -> tuple[int, str, Any]:
+    file = folder / "turn_ons.csv"
+    file.write_text("\n".join(["# limit = 0.2deg/h", "# type_b = none", ",".join(NAMES),
+                               *(",".join(f"{v:.9g}" for v in row) for row in table)]) + "\n")  # fmt: skip
+    code, _, err = command("reduce", NAME, "--data", str(file), "--out", str(folder / "r"), "--force")
+    return code, err, json.loads((folder / "r" / "result.json").read_text()) if code == 0 else None
+
+
+def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
+    code, err, result = reduced(command, tmp_path, rows())
+    assert code == 0, err
+    found = {c["name"]: c for c in result["coefficients"]}
+    for name, value in {"A": 2.0, "τ": 60.0, "t_w": 60.0 * math.log(10.0), "b_T": 0.1, "σ_on": 0.3}.items():
+        low, high = found[name]["interval"]
+        assert low < value < high, name
+    assert found["τ"]["u"] < 1.0 and found["t_w"]["u"] < 2.0
+
+
+def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:
+    """No warm-up, no noise: the biases as they are, sample standard deviation within days."""
+    table = [row for row in rows(0.0) if row[4] == 245.0]
+    code, err, result = reduced(command, tmp_path, [[*row[:6], 20.0] for row in table])
+    assert code == 0, err
+    found = {c["name"]: c for c in result["coefficients"]}
+    mean = np.array([row[5] for row in table]).reshape(3, 2)
+    expected = math.sqrt(float(np.sum((mean - mean.mean(axis=1)[:, None]) ** 2)) / 3.0)
+    assert found["σ_on"]["estimate"] == pytest.approx(expected, rel=1e-3)
+    assert "A" not in found and "t_w" not in found
+
+
+def test_mistakes_are_named() -> None:
+    units = (1.0, 1.0, 1.0, 1.0, 1.0, DPH)
+    names = ("t_start", "t_end", "turn_on", "day", "since", "mean")
+
+    def problems(**changed: Any) -> str:
+        table = {n: np.array(c) * u for n, u, c in zip(names, units, zip(*rows(), strict=True), strict=False)}
+        with pytest.raises(ReductionError) as caught:
+            Reduction.reduce({**table, **changed}, TurnOnSetup(limit=DPH))
+        return str(caught.value)
+
+    count = len(rows())
+    assert "fewer than two turn-ons" in problems(turn_on=np.ones(count))
+    assert "two days" in problems(day=np.arange(count) % 2)
+    assert "since" in problems(since=np.zeros(count))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"days": 20, "turn_ons": 10}, "turn-ons are possible"),
+        ({"days": 1, "turn_ons": 1}, "turn-ons are possible"),
+        ({"dwell": 30.0}, "at least four readings"),
+    ],
+)
+def test_refused(values: dict[str, Any], said: str) -> None:
+    assert any(said in p for p in load_system(NAME).with_values(values).check())

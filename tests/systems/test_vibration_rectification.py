@@ -1,0 +1,178 @@
+"""Vibration test: the shaker's moments, random instruments that come back, files, mistakes.  [TEST-RECTIFICATION]"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench.component import ComponentError
+from gyrobench.engine.session import Session
+from gyrobench.packaging import load_part
+from gyrobench.reduction.toolkit import ReductionError
+from gyrobench.system.system import load_system
+from systems.vibration_rectification.reduction import Reduction, VibrationSetup
+
+Command = Callable[..., tuple[int, str, str]]
+NAME = "vibration_rectification"
+DPH = math.pi / 648000.0
+G0 = 9.80665
+SHORT: dict[str, Any] = {"levels": "0 0.8 1.5", "cycles": 1, "readings": 2, "window": 1.0, "settle": 1.0,
+                         "nuisances": "none"}  # fmt: skip
+
+
+QUIET = {
+    n: 0.0
+    for n in load_system(NAME).noises
+    if not n.startswith("gyro.") or n[5:] in load_part("gyro_vibratory").declarations
+}
+
+
+# ------------------------------------------------------------------------------------------------ the shaker
+@pytest.mark.parametrize("lines", [1, 12])
+def test_moments_of_the_vibration(lines: int) -> None:
+    """Over `repeat`: mean 0, mean square level2, mean cube 0, whatever the phases; the control has its gain."""
+    table = load_part("vibration_table")(seed=7, lines=lines, repeat=1.0, ramp=0.1, read_gain=0.01, control=0.0)
+    table.initialize()
+    table.level_wanted = 3.0
+    seen = []
+    for k in range(2400):
+        table.do_step(k * 5e-4, 5e-4)
+        seen.append((table.f[2] - table.f_local[2], table.f_control))
+    s, control = np.array(seen[400:]).T
+    assert np.mean(s) == pytest.approx(0.0, abs=1e-12)
+    assert np.mean(s**2) == pytest.approx(9.0, rel=1e-12)
+    assert np.mean(s**3) == pytest.approx(0.0, abs=1e-10)
+    assert control == pytest.approx(1.01 * s, abs=1e-12)
+
+
+def test_frequencies_that_fall_together_are_refused() -> None:
+    with pytest.raises(ComponentError, match="too short to tell the frequencies"):
+        load_part("vibration_table")(low=20.0, high=30.0, repeat=0.5).initialize()
+
+
+# ------------------------------------------------------------------------------------------------ runs
+@pytest.fixture(scope="module")
+def session() -> Any:
+    with Session(NAME) as prepared:
+        yield prepared
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_random_instruments_come_back(session: Session, axis: str) -> None:
+    """Noise off; coefficients by chance, those across the vibration too; by hand from the parameters."""
+    rng = np.random.default_rng("xyz".index(axis))
+    k = "xyz".index(axis)
+    g = rng.uniform(-20.0, 20.0, (2, 3)) * DPH / G0
+    g2 = rng.uniform(-5.0, 5.0, (2, 3)) * DPH / G0**2
+    square, cube = rng.uniform(-1e-4, 1e-4) / G0, rng.uniform(-1e-5, 1e-5) / G0**2
+    bias, scale = rng.normal(0.0, 1e-3 * G0, 3), rng.normal(0.0, 1e-3, 3)
+    values = {
+        "gyro.g": g.tolist(), "gyro.g2": g2.tolist(), "gyro.bias": [30.0 * DPH, 0.0], "accelerometers.square": square,
+        "accelerometers.cubic": cube, "accelerometers.bias": bias.tolist(), "accelerometers.scale": scale.tolist(),
+    }  # fmt: skip
+    record = session.run({**SHORT, "axis": axis, **QUIET, **values})
+    found = {c.name: c for c in load_system(NAME).with_values({**SHORT, "axis": axis}).reduce(record).coefficients}
+    ug = 1e-6 * G0
+    true = {
+        "b_g": 30.0, "G": g[0, k] / DPH * G0, "G2": g2[0, k] / DPH * G0**2, "b_a": bias[k] / ug,
+        "S": scale[k] * 1e6, "K2": square * G0 * 1e6, "K3": cube * G0**2 * 1e6,
+    }  # fmt: skip
+    for name, value in true.items():
+        assert found[name].estimate == pytest.approx(value, rel=1e-4, abs=2e-3), name
+    for name in set(true) - {"b_g"}:
+        assert found[name].truth == pytest.approx(true[name], rel=1e-9), name
+
+
+def test_a_control_accelerometer_that_reads_too_much(session: Session) -> None:
+    """By 1 %: K2 seems 2 % too small where the level makes it; the report's table of shifts says so."""
+    values = {**SHORT, "ways": "up"}
+    record = session.run({**values, **QUIET, "table.read_gain": 0.01})
+    result = load_system(NAME).with_values(values).reduce(record)
+    found = {c.name: c for c in result.coefficients}
+    assert set(found) == {"b_g", "G2", "b_a", "K2"}
+    shift = {row[0]: row[-3] for t in result.tables if t.id.startswith("budget.predicted") for row in t.rows}
+    for name, true in (("K2", 50.0), ("G2", 5.0)):
+        assert found[name].truth == pytest.approx(true, rel=1e-9)
+        assert found[name].estimate == pytest.approx(true / 1.01**2, rel=1e-4)
+        assert found[name].estimate - true == pytest.approx(shift[name], rel=0.03)
+
+
+@pytest.mark.parametrize("limit", ["gyro.range_max", "accelerometers.range_max"])
+def test_clipping_is_refused(session: Session, limit: str) -> None:
+    values = {**SHORT, "ways": "up"}
+    with pytest.raises(ReductionError, match="flagged windows"):
+        load_system(NAME).with_values(values).reduce(session.run({**values, limit: 1e-5}))
+
+
+# ------------------------------------------------------------------------------------------------ files
+def rows(noise: float = 1.0, up: tuple[float, ...] = (1.0, -1.0)) -> list[list[float]]:
+    """t0, t1, up, level (g), rate (deg/h), force (g), by hand: axis y (no Earth rate), 4 + 12 f + 3 (f2 + s2) deg/h."""
+    rng = np.random.default_rng(3)
+    out, t = [], 0.0
+    for way in up:
+        for s in (0.0, 1.0, 2.0, 3.0) * 2:
+            rate = 4.0 + 12.0 * way + 3.0 * (1.0 + s * s) + noise * 0.1 * rng.normal()
+            force = way + 2e-3 + 5e-4 * way + 8e-5 * (1.0 + s * s) + 1e-6 * (way + 3.0 * way * s * s)
+            out.append([t, t + 10.0, way, s, rate, force + noise * 2e-6 * rng.normal()])
+            t += 12.0
+    return out
+
+
+def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
+    head = "# latitude = 0deg\n# gravity = 9.80665\n# axis = y\n# type_b = none\n"
+    names = "t_start [s],t_end [s],up,level [g],rate [deg/h],force [g]\n"
+    file = tmp_path / "levels.csv"
+    file.write_text(head + names + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows()) + "\n")
+    code, _, err = command("reduce", NAME, "--data", str(file), "--out", str(tmp_path / "r"))
+    assert code == 0, err
+    result = json.loads((tmp_path / "r" / "result.json").read_text())
+    found = {c["name"]: c for c in result["coefficients"]}
+    for name, value in {"b_g": 4.0, "G": 12.0, "G2": 3.0, "b_a": 2000.0, "S": 500.0, "K2": 80.0, "K3": 1.0}.items():
+        low, high = found[name]["interval"]
+        assert low < value < high, name
+        assert high - low < 0.5 * max(abs(value), 3.0), name
+
+
+def reduced(table: list[list[float]], **columns: Any) -> Any:
+    names, units = ("t_start", "t_end", "up", "level", "rate", "force"), (1.0, 1.0, 1.0, G0, DPH, G0)
+    windows = {n: np.array(v) * u for n, v, u in zip(names, zip(*table, strict=True), units, strict=True)} | columns
+    return Reduction.reduce(windows, VibrationSetup(axis="y", latitude=0.0, gravity=G0))
+
+
+def test_gyro_or_accelerometer_alone_and_one_way() -> None:
+    table = rows(0.0, (1.0,))
+    both = {c.name: c.estimate for c in reduced(table).coefficients}
+    assert both["K2"] == pytest.approx(80.0 + 3.0 * 1.0, rel=1e-6)  # 3 K3 f at f = 1 g
+    assert both["G2"] == pytest.approx(3.0, rel=1e-6)
+
+
+def test_mistakes_are_named() -> None:
+    swapped = [[*row[:2], -row[2], *row[3:]] for row in rows()]
+    assert any(r.id == "force.factor" for r in reduced(swapped).reasons)
+    assert any("levels are needed" in p for p in problems([row for row in rows() if row[3] < 1.5]))
+    assert any("up: 1" in p for p in problems([[*row[:2], 2.0, *row[3:]] for row in rows()]))
+
+
+def problems(table: list[list[float]]) -> list[str]:
+    with pytest.raises(ReductionError) as caught:
+        reduced(table)
+    return str(caught.value).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"axis": "w"}, "x, y or z"),
+        ({"low": 250.0}, "below high"),
+        ({"high": 900.0}, "nine communication steps"),
+        ({"window": 0.2}, "20 periods"),
+    ],
+)
+def test_refused(values: dict[str, Any], said: str) -> None:
+    assert any(said in p for p in load_system(NAME).with_values(values).check())
