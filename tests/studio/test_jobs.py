@@ -18,7 +18,7 @@ import pytest
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.studio import job_process
-from gyrobench.studio.job_process import LIVE, REQUEST
+from gyrobench.studio.job_process import LIVE, REQUEST, STARTED
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
 
@@ -109,6 +109,18 @@ def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs
     assert on.state == "running", on
     new.stop(on.key)
     assert until(new, on.key, ended).state == "stopped"
+
+
+def test_a_run_that_a_killed_studio_has_just_started_is_not_lost(jobs: StudioJobs) -> None:
+    """A new studio gives it the time to take its lock; one that never began, or was killed, is lost and goes on."""
+    jobs.most = 0
+    key = jobs.submit(SHORT)
+    (jobs.folder / key / STARTED).touch()  # the studio before was killed here
+    assert StudioJobs(Bench.find()).find(key).state == "starting"
+    os.utime(jobs.folder / key / STARTED, (0.0, 0.0))
+    assert jobs.find(key).state == "lost" and jobs.find(key).resumable
+    jobs.most = 1
+    assert until(jobs, jobs.resume(key), ended).state == "done", "there is nothing yet to go on from"
 
 
 def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:
