@@ -69,6 +69,18 @@ def test_the_gallery_needs_no_answer_of_the_studio(page: Any, studio: tuple[str,
     page.wait_for_url("**/system/fixed_position")
 
 
+def test_what_is_typed_before_there_is_a_connection_counts(page: Any, studio: tuple[str, Path]) -> None:
+    held: list[Any] = []
+    page.route_web_socket("**", lambda socket: held.append(socket))  # it opens, and the studio does not know yet
+    page.goto(base_of(studio) + "/system/fixed_position")
+    page.get_by_label("latitude", exact=True).fill("12deg")
+    page.get_by_label("dwell", exact=True).fill("60s")
+    assert page.locator(".code").first.text_content() == "gyrobench run fixed_position" and len(held) == 1
+    held[0].connect_to_server()
+    said = "gyrobench run fixed_position --set latitude=12deg --set dwell=60s"
+    page.wait_for_function("text => document.querySelector('.code').textContent === text", arg=said)
+
+
 def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("latitude", exact=True).fill("3 kg")
