@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from short_plans import SHORT as SHORT_PLANS
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.studio import job_process
@@ -67,6 +68,20 @@ def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> N
     assert json.loads((folder / "run.json").read_text())["tables"] == digest, "another run, or in another folder"
     subprocess.run([sys.executable, "-c", SHORT.python()], check=True, capture_output=True)
     assert json.loads(Path("report/run.json").read_text())["tables"] == digest, "the lines of Python are another run"
+
+
+def test_systems_of_other_kinds_run_by_their_shortest_plan(jobs: StudioJobs) -> None:
+    """A loop that is captured, an alignment by sights; all the others: tests/benchmarks/studio_systems.py."""
+    jobs.most = 2
+    keys = [
+        jobs.submit(JobRequest(name, SHORT_PLANS.get(name, {}), seed=1))
+        for name in ("table_capture", "stand_alignment")
+    ]
+    for key in keys:
+        done = until(jobs, key, ended)
+        assert done.state == "done", done.report
+        assert (Path(done.report.folder) / "report.html").is_file()
+    assert set(SHORT_PLANS) <= set(Bench.find().systems())
 
 
 def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
