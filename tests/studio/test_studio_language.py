@@ -45,6 +45,10 @@ STAY = {
     "set",
     "auto",  # values of options
     "none",
+    "down",
+    "both",
+    "gyro",
+    "coefficients",  # a slot
 }
 VALUES = {"current", "rate"}  # of an option of the system that is looked at
 
