@@ -49,6 +49,7 @@ STAY = {
     "both",
     "gyro",
     "coefficients",  # a slot
+    "by",  # an option
 }
 VALUES = {"current", "rate"}  # of an option of the system that is looked at
 
