@@ -118,23 +118,32 @@ class LiveChart:
             changed = self.file.stat().st_mtime_ns
         except OSError:
             return
-        content = stored(self.file) if changed != self.read else None
-        if content is None or not content["time"]:
+        options = _live(self.file, changed, say.code) if changed != self.read else None
+        if options is None:
             return
         self.read = changed
-        names, time = content["names"], content["time"]
-        options = panels([f"{n}, SI" for n in names], time[0], time[-1])
-        options["legend"] = {"show": False}
-        options["series"] = [
-            {"type": "line", "name": n, "id": n, "showSymbol": False, "xAxisIndex": k, "yAxisIndex": k,
-             "lineStyle": {"width": 1.2}, "data": [list(point) for point in zip(time, values, strict=True)]}
-            for k, (n, values) in enumerate(zip(names, content["values"], strict=True))
-        ]  # fmt: skip
         self.chart.set_visibility(True)
-        self.chart.style(height_of(len(names)))
+        self.chart.style(height_of(len(options["series"])))
         self.chart.options.clear()
         self.chart.options.update(options)
         self.chart.update()
+
+
+@functools.lru_cache(maxsize=8)
+def _live(file: Path, _changed: int, _language: str) -> dict[str, Any] | None:
+    """Return the options of a chart of the signals so far, made once for all tabs that look at them."""
+    content = stored(file)
+    if content is None or not content["time"]:
+        return None
+    names, time = content["names"], content["time"]
+    options = panels([f"{n}, SI" for n in names], time[0], time[-1])
+    options["legend"] = {"show": False}
+    options["series"] = [
+        {"type": "line", "name": n, "id": n, "showSymbol": False, "xAxisIndex": k, "yAxisIndex": k,
+         "lineStyle": {"width": 1.2}, "data": [list(point) for point in zip(time, values, strict=True)]}
+        for k, (n, values) in enumerate(zip(names, content["values"], strict=True))
+    ]  # fmt: skip
+    return options
 
 
 class SignalChart:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import hashlib
 from dataclasses import dataclass, replace
 from html import escape
@@ -18,9 +19,8 @@ from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem, told
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
 from gyrobench.studio.words import heading, say
-from gyrobench.system.system import System
 from gyrobench.tuning.tune_loop import tunable
-from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.gallery import gallery
 from gyrobench.workflow.run_list import list_runs
 
 PAGES = ("tuning.html", "tuning.pdf", "site/index.html")  # that a command writes; certificates have names of their own
@@ -121,18 +121,18 @@ SWEEP = CommandForm(
 
 def systems_of(studio: Studio, form: CommandForm) -> dict[str, str]:
     """Return name -> title of the systems that a form is for."""
-    able = set(tunable()) if form is TUNE else None
-    found = {}
-    for name in studio.bench.systems():
-        try:
-            test = load_test(name)
-        except Exception:  # it says what is wrong with it in the gallery
-            continue
-        runs = not isinstance(test, System) or bool(test.slots)
-        designs = form is not DESIGN or not isinstance(test, System) or bool(test.protocol)
-        if runs and designs and (able is None or name in able):
-            found[name] = f"{say(test.title, name)} ({name})"
-    return found
+    files = (f / "system.py" for f in studio.bench.systems().values())
+    able = _tunable(tuple(f.stat().st_mtime_ns for f in files)) if form is TUNE else ()
+    return {
+        e.name: f"{say(e.title, e.name)} ({e.name})"
+        for e in gallery(studio.bench)
+        if (e.suite or e.slots) and (form is not DESIGN or e.designs) and (form is not TUNE or e.name in able)
+    }
+
+
+@functools.lru_cache(maxsize=4)
+def _tunable(_changed: tuple[int, ...]) -> tuple[str, ...]:
+    return tuple(tunable())
 
 
 def _field(f: FormField, studio: Studio) -> Any:

@@ -25,7 +25,7 @@ from gyrobench.studio.request import JobRequest
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.system import System
 from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
-from gyrobench.workflow.inputs import load_test
+from gyrobench.workflow.gallery import gallery
 from gyrobench.workflow.measured_run import find_faults
 from gyrobench.workflow.user_errors import user_message
 
@@ -53,15 +53,7 @@ def keep(studio: Studio, name: str, content: bytes) -> Path:
 
 def tests_of_data(studio: Studio) -> dict[str, str]:
     """Return name -> title of the systems that reduce measured data."""
-    found = {}
-    for name in studio.bench.systems():
-        try:
-            test = load_test(name)
-        except Exception:  # it says what is wrong with it in the gallery
-            continue
-        if isinstance(test, System) and test.measured_data is not None:
-            found[name] = f"{say(test.title, name)} ({name})"
-    return found
+    return {e.name: f"{say(e.title, e.name)} ({e.name})" for e in gallery(studio.bench) if e.measured}
 
 
 @dataclass

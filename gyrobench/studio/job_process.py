@@ -145,6 +145,16 @@ def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     return execute_run(run, test, feedback)
 
 
+def _resumed(request: JobRequest, writer: _Writer) -> Any:
+    """Return the outcome of a request that goes on where it was; killed before there was anything, it begins anew."""
+    from gyrobench.workflow.run_folders import NothingToResumeError
+
+    try:
+        return _execute(request, True, writer)
+    except NothingToResumeError:
+        return _execute(request, False, writer)
+
+
 def _command(report: JobReport, request: CommandRequest, writer: _Writer) -> None:
     """Execute a command and keep the lines that it prints as notes; exit code 1 is an answer, too."""
     import subprocess
@@ -176,7 +186,7 @@ def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: boo
     try:
         if isinstance(request, CommandRequest):
             return _command(report, request, writer)
-        outcome = _execute(request, resume, writer)
+        outcome = _resumed(request, writer) if resume else _execute(request, False, writer)
         report.folder = str(outcome.folder or "")
         report.verdict = getattr(outcome, "verdict", "") or getattr(outcome.result, "verdict", "") or ""
         stopped = outcome.stopped

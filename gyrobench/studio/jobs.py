@@ -25,6 +25,7 @@ from gyrobench.studio.request import CommandRequest, JobRequest, read_request
 
 FOLDER = Path("studio", "jobs")  # below reports/out
 ENDED = ("done", "stopped", "failed", "lost")
+BEGIN = 20.0  # s in which a process that was started takes its lock
 SHOWN = 200  # jobs, the newest
 
 
@@ -144,19 +145,20 @@ class StudioJobs:
             state = report.state
         elif not (folder / STARTED).exists():
             state = "waiting"
-        elif self._lives(folder):
+        elif self._lives(folder, report is None):
             state = "starting" if report is None else "running"
         else:
             report = read_report(folder)  # it may have ended between the two looks
             state = report.state if report is not None and report.state in ENDED else "lost"
         return StudioJob(folder.name, request, resume, created, state, report or JobReport(state=state))
 
-    def _lives(self, folder: Path) -> bool:
+    def _lives(self, folder: Path, silent: bool) -> bool:
+        """Return whether the process of a job is there; silent: it has said nothing yet."""
         process = self._started.get(folder.name)
         if process is not None:
             return process.poll() is None
-        if not (folder / LOCK).exists():
-            return False
+        if not (folder / LOCK).exists():  # a studio that is gone has started it: not yet taken, or ended
+            return silent and time.time() < (folder / STARTED).stat().st_mtime + BEGIN
         try:
             FolderLock(folder).release()
         except GyrobenchError:

@@ -55,6 +55,8 @@ class TimeLine:
             f'<span><span class="key mode{i % 6}"></span> {escape(say(m))}</span>' for i, m in enumerate(order)
         )
         total = say(f"{len(phases)} phases, {_time(whole)} without the transitions between them")
+        if len(phases) == 1:
+            total = say(f"1 phase, {_time(whole)}")
         settles = f'<span><span class="key"><i></i></span> {escape(say("settling"))}</span>'
         self.bars.set_content(
             f'<div class="plan" role="img" {spoken(f"Plan over time: {total}")}>{"".join(bars)}'

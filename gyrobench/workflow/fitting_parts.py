@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -60,12 +61,16 @@ def load_parts(bench: Bench) -> dict[str, type[Component]]:
 
 def fitting_parts(system: System, parts: Mapping[str, type[Component]]) -> dict[str, list[str]]:
     """Return the parts that fit each slot, those on request too; the slot's own part first."""
-    found = {}
+    found, every = {}, tuple(parts.items())
     for name, slot in system.all_slots().items():
         wanted = socket(slot.socket).standing_for(slot.quantities)
-        others = [n for n, p in parts.items() if n != slot.part and not mismatch(wanted, p, name)]
-        found[name] = [slot.part, *others]
+        found[name] = [slot.part, *(n for n in _fitting(wanted, every) if n != slot.part)]
     return found
+
+
+@functools.lru_cache(maxsize=512)
+def _fitting(wanted: Socket, parts: tuple[tuple[str, type[Component]], ...]) -> tuple[str, ...]:
+    return tuple(n for n, p in parts if not mismatch(wanted, p))
 
 
 def settable(part: type[Component]) -> dict[str, Declaration]:

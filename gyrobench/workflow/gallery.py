@@ -23,6 +23,7 @@ class GalleryEntry:
     """A system of the gallery.
 
     problem: why it does not load, "" where it does.  picture: a figure of its report, where the bench has one.
+    measured: it reduces measured data; designs: its shortest plan can be asked for.
     """
 
     name: str
@@ -33,6 +34,8 @@ class GalleryEntry:
     suite: bool
     problem: str = ""
     picture: Path | None = None
+    measured: bool = False
+    designs: bool = False
 
 
 def picture_of(bench: Bench, name: str) -> Path | None:
@@ -67,7 +70,11 @@ def entry(bench: Bench, name: str) -> GalleryEntry:
         summary = " ".join(first.split()).partition("  [")[0].partition(" [")[0]
         slots = 0 if isinstance(test, Suite) else len(test.slots)
         suite, title = isinstance(test, Suite), test.title or name
-        return GalleryEntry(name, title, summary, purposes_of(test), slots, suite, picture=picture)
+        measured = isinstance(test, System) and test.measured_data is not None
+        designs = isinstance(test, Suite) or bool(test.protocol)
+        return GalleryEntry(
+            name, title, summary, purposes_of(test), slots, suite, picture=picture, measured=measured, designs=designs
+        )
     except Exception as error:  # of the user's code: the others are shown all the same
         return GalleryEntry(name, name, "", (), 0, False, user_message(error), picture)
 

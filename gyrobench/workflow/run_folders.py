@@ -22,6 +22,10 @@ REPORT = ("result.json", "report.html", "report.pdf")
 MANIFEST, SIGNATURE = "manifest.json", "manifest.json.sig"
 
 
+class NothingToResumeError(UsageError):
+    """There is no run that could go on: none was begun, it is complete, or its parts cannot go on."""
+
+
 def prepare_run_folder(
     session: Any,
     system: System,
@@ -41,7 +45,7 @@ def prepare_run_folder(
 
     With ``resume`` the manager continues from the checkpoint in that folder or in its :func:`incomplete_folder`, once
     it is known to belong to this run; a run that came to its end before its first checkpoint, killed or with an error,
-    begins anew.  Raises UsageError when there is nothing to resume, and when --out holds another run, unless ``force``,
+    begins anew.  Raises NothingToResumeError, and UsageError when --out holds another run, unless ``force``,
     or files that do not belong to a run.
     """
     from gyrobench.system.parameters import resolve
@@ -106,7 +110,9 @@ def _manager(
     obstacle = checkpoint.resume_obstacle(session.assembly.descriptions)
     if complete or obstacle or not (abandoned or (folder / RUN).is_file()):
         state = "the run is complete" if complete else "no checkpoint of a run with these parts and values"
-        raise UsageError("--resume: " + (obstacle or f"nothing to continue in {display_path(folder)}: {state}"))
+        raise NothingToResumeError(
+            "--resume: " + (obstacle or f"nothing to continue in {display_path(folder)}: {state}")
+        )
     prepare_folder(folder, identity, force)
     manager = checkpoint.CheckpointManager(partial_folder(folder))
     manager.remark = f"{display_path(folder)}: the run before ended without a checkpoint; this one begins at t = 0"

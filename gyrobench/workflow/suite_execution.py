@@ -27,7 +27,12 @@ from gyrobench.system.values import InvalidValueError
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, suite_members
 from gyrobench.workflow.run_execution import RunRequest, execute_run
-from gyrobench.workflow.run_folders import has_complete_record, incomplete_folder, prepare_folder
+from gyrobench.workflow.run_folders import (
+    NothingToResumeError,
+    has_complete_record,
+    incomplete_folder,
+    prepare_folder,
+)
 from gyrobench.workflow.saved_run import RunOutcome, reduce_saved_run
 from gyrobench.workflow.suite_report import SuiteOutcome, suite_document, write_suite_report
 from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, user_message
@@ -53,7 +58,9 @@ def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT
     digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:8]
     folder = request.out or Bench.find().out / suite.name / digest
     if request.resume and not (folder / RUN).is_file():
-        raise UsageError(f"--resume: nothing to continue in {folder}: no suite with these tests, parts and values")
+        raise NothingToResumeError(
+            f"--resume: nothing to continue in {folder}: no suite with these tests, parts and values"
+        )
     prepare_folder(folder, identity, request.force)
     document = suite_document(suite, identity)
     document.complete = False

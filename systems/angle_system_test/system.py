@@ -82,6 +82,9 @@ class AngleSystemTest(TableTest):
     noises = tuple(NOISE.split())
     step = 5e-3  # s, the sample of the electronics; the table is known in closed form
     channels = ("reader.angle_read", "reference.angle_read", "table.rate", "reader.lost")
+    bodies = """
+        table: base table.base, x table.tilt[1], y table.tilt[2], z reader.angle_read
+    """
     channel_period = 1.0
     windows = Windows.of(
         "sampler",

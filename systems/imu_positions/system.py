@@ -137,6 +137,11 @@ class ImuPositions(TableTest):
             **{f"{n}_{c.name}": f"sampler_{c.name}.{n}" for n in ("mean", "std") for c in CHANNELS},
         },
     )
+    bodies = """
+        outer ring: base table.base, x table.angle_x
+        plate: outer ring, y table.angle_y
+        instrument: plate, faces sequencer
+    """
     channels = ("table.angle_x", "table.angle_y", *(f"imu.{c.output}[{c.axis + 1}]" for c in CHANNELS))
 
     @property

@@ -119,7 +119,17 @@ class TablePositionTest(System):
     windows = Windows.of("sampler", **{n: f"{n}.mean" for n in SAMPLED if n != "sampler"})
     done = "sequencer.done"
     step = 1e-3
-    channels = ("command.angle", "controller.e", "reference.deviation", "reference.level_x", "drive.torque")
+    channels = (
+        "command.angle",
+        "controller.e",
+        "reference.deviation",
+        "reference.level_x",
+        "drive.torque",
+        "body.angle",
+    )
+    bodies = """
+        table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle
+    """
     channel_period = 0.1
     noises = ("reference.optical", "reference.level_x_noise", "reference.level_y_noise")
 

@@ -96,7 +96,11 @@ class TableRateTest(System):
     )
     done = "sequencer.done"
     step = 1e-3
-    channels = ("command.rate", "controller.e", "controller.demand", "drive.torque", "body.rate")
+    channels = ("command.rate", "controller.e", "controller.demand", "drive.torque", "body.rate", "body.angle")
+    bodies = """
+        table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle
+        instrument: table, faces sequencer
+    """
 
     def rates(self) -> list[float]:
         """Return the rates in rad/s, both senses of each."""

@@ -102,26 +102,33 @@ def ended(jobs: StudioJobs, key: str) -> str:
     return str(until(lambda: "" if (job := jobs.find(key)).active else job.state, f"job {key} to end"))
 
 
-def kill(jobs: StudioJobs, key: str, studio: Studio, whom: str) -> bool:
-    """Kill; return whether the process of the run was alive."""
-    lived = False
-    if whom in ("run", "both") and (process := jobs._process(key)):
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(process, signal.SIGKILL)
-            lived = True
-    if whom in ("studio", "both"):
-        studio.kill()
-    return lived
+def command_of(process: int) -> str:
+    """Return the words of a process."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+    return ""
 
 
-def living(home: Path) -> list[str]:
+def living(home: Path) -> list[int]:
     """Return the processes that work in a bench."""
     found = []
     for link in Path("/proc").glob("[0-9]*/cwd"):
         with contextlib.suppress(OSError):
             if int(link.parent.name) != os.getpid() and link.resolve() == home.resolve():
-                found.append(link.parent.name)
+                found.append(int(link.parent.name))
     return found
+
+
+def kill(jobs: StudioJobs, key: str, studio: Studio, whom: str) -> bool:
+    """Kill; return whether there was something to kill."""
+    folder = str(jobs.folder / key)
+    hit = [p for p in living(studio.home) if folder in command_of(p)] if whom in ("run", "both") else []
+    for process in hit:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+    if whom in ("studio", "both"):
+        studio.kill()
+    return bool(hit) or whom == "studio"
 
 
 def once(home: Path, phase: str, whom: str, wait: float, studio: Studio) -> tuple[str, tuple[object, ...]]:
@@ -137,9 +144,10 @@ def once(home: Path, phase: str, whom: str, wait: float, studio: Studio) -> tupl
 
     until(begun, f"the phase {phase}")
     time.sleep(wait)
-    kill(jobs, key, studio, whom)
+    hit = kill(jobs, key, studio, whom)
     studio.there()
-    way = [state := ended(jobs, key)]
+    way = [] if hit else ["no process there"]
+    way.append(state := ended(jobs, key))
     while state == "lost":  # the button of its page
         jobs.most = 0  # the studio starts it
         key = jobs.resume(key)

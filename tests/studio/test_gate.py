@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -195,3 +196,11 @@ def test_other_addresses_need_a_name() -> None:
         with pytest.raises(UsageError, match="proxy with authentication"):
             refuse_remote(host, None)
         refuse_remote(host, "bench.example.org")
+
+
+def test_the_face_stays_small() -> None:
+    """At most 4,000 lines of Python and 600 of JavaScript: nothing is computed in it."""
+    files = [*Path(gates.__file__).parent.iterdir()]
+    for suffix, most in ((".py", 4000), (".js", 600)):
+        lines = sum(f.read_text(encoding="utf-8").count("\n") for f in files if f.suffix == suffix)
+        assert 0 < lines <= most, f"{suffix}: {lines}"

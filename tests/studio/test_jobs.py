@@ -15,10 +15,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from short_plans import SHORT as SHORT_PLANS
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.studio import job_process
-from gyrobench.studio.job_process import LIVE, REQUEST
+from gyrobench.studio.job_process import LIVE, REQUEST, STARTED
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
 
@@ -69,6 +70,20 @@ def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> N
     assert json.loads(Path("report/run.json").read_text())["tables"] == digest, "the lines of Python are another run"
 
 
+def test_systems_of_other_kinds_run_by_their_shortest_plan(jobs: StudioJobs) -> None:
+    """A loop that is captured, an alignment by sights; all the others: tests/benchmarks/studio_systems.py."""
+    jobs.most = 2
+    keys = [
+        jobs.submit(JobRequest(name, SHORT_PLANS.get(name, {}), seed=1))
+        for name in ("table_capture", "stand_alignment")
+    ]
+    for key in keys:
+        done = until(jobs, key, ended)
+        assert done.state == "done", done.report
+        assert (Path(done.report.folder) / "report.html").is_file()
+    assert set(SHORT_PLANS) <= set(Bench.find().systems())
+
+
 def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     first, second = jobs.submit(LONG), jobs.submit(SHORT)
     file = jobs.folder / first / LIVE
@@ -109,6 +124,18 @@ def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs
     assert on.state == "running", on
     new.stop(on.key)
     assert until(new, on.key, ended).state == "stopped"
+
+
+def test_a_run_that_a_killed_studio_has_just_started_is_not_lost(jobs: StudioJobs) -> None:
+    """A new studio gives it the time to take its lock; one that never began, or was killed, is lost and goes on."""
+    jobs.most = 0
+    key = jobs.submit(SHORT)
+    (jobs.folder / key / STARTED).touch()  # the studio before was killed here
+    assert StudioJobs(Bench.find()).find(key).state == "starting"
+    os.utime(jobs.folder / key / STARTED, (0.0, 0.0))
+    assert jobs.find(key).state == "lost" and jobs.find(key).resumable
+    jobs.most = 1
+    assert until(jobs, jobs.resume(key), ended).state == "done", "there is nothing yet to go on from"
 
 
 def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:

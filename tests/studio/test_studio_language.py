@@ -24,7 +24,7 @@ from gyrobench.studio.frame import DARK, PAGES
 from gyrobench.studio.jobs import ENDED
 from gyrobench.studio.picture import LEGEND
 from gyrobench.studio.run_page import HOW
-from gyrobench.workflow.gallery import PURPOSES
+from gyrobench.workflow.gallery import PURPOSES, entry
 from gyrobench.workflow.inputs import load_test
 
 FOLDER = Path(words.__file__).parent
@@ -45,6 +45,11 @@ STAY = {
     "set",
     "auto",  # values of options
     "none",
+    "down",
+    "both",
+    "gyro",
+    "coefficients",  # a slot
+    "by",  # an option
 }
 VALUES = {"current", "rate"}  # of an option of the system that is looked at
 
@@ -80,10 +85,11 @@ def test_every_label_has_its_line(chinese: None) -> None:
 
 
 @pytest.mark.parametrize("name", Bench(standard_folder()).systems())
-def test_every_option_is_said_in_chinese(chinese: None, name: str) -> None:
-    """What only one system has stands in its zh.toml, what several have in that of the studio."""
-    options = load_test(name).options
-    assert [f"{option}: {o.doc}" for option, o in options.items() if words.say.find(o.doc, name) is None] == []
+def test_every_system_is_said_in_chinese(chinese: None, name: str) -> None:
+    """Title, summary, options: of one system in its zh.toml, of several in that of the studio."""
+    shown = entry(Bench(standard_folder()), name)
+    texts = [shown.title, shown.summary, *(o.doc for o in load_test(name).options.values())]
+    assert [text for text in texts if words.say.find(text, name) is None] == []
 
 
 def test_no_english_word_is_left_in_a_line() -> None:
