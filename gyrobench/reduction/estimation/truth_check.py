@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import Coefficient, Reason, Result
 
 LIMIT = 5.0  # of |z|: by chance once in two million
+
+
+def compared(c: Coefficient, truth: float | None) -> Coefficient:
+    """Return an estimate with its simulated value (printed unit), None where it is not known, and z = error/u."""
+    z = (c.estimate - truth) / c.u if truth is not None and c.u > 0.0 else None
+    return replace(c, truth=truth, z=z)
 
 
 def missed_truth(result: Result, causes: Sequence[str]) -> list[Reason]:
