@@ -254,11 +254,10 @@ def _quantity(c: MeasurandComparison) -> SuiteQuantity:
     if a is not None:
         found = {"mean": WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1, "birge": a.birge, "p": a.p,
                  "largest_E_n": max(p.E_n for p in a.pairs)}  # fmt: skip
-    verdict, deviating = "disagree" if c.disagree else "agree" if a else "–", c.outlier[0] if c.outlier else ""
-    found |= {"p_adjusted": c.p, "verdict": verdict, "words": c.words(), "deviating": deviating}
+    found |= {"p_adjusted": c.p, "words": c.words(), "deviating": c.outlier[0] if c.outlier else ""}
     return SuiteQuantity(
         name=q.name, unit=q.unit, meaning=q.meaning, combination=dict(q.combination), truth=c.truth, values=values,
-        **found,
+        verdict="disagree" if c.disagree else "agree" if a else "–", **found,
     )  # fmt: skip
 
 
