@@ -6,8 +6,8 @@ for readers alone and may be reworded or translated.  Nothing here computes, and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from gyrobench import units
@@ -16,6 +16,7 @@ from gyrobench.result_content import EMPTY
 NO_VERDICT = "no specification given"
 Limit = tuple[float | None, float | None]  # low and high, in the unit of the report; None: that side is open
 Specification = Mapping[str, Limit]  # coefficient -> limit: what a result is judged by
+Column = tuple[Iterable[float], str, str]  # values, name and unit
 
 
 class StatedLimit(tuple[float | None, float | None]):
@@ -87,6 +88,16 @@ class Series:
     t: list[float] = field(default_factory=list)  # mid time of each window, s
     shown_fit_x: list[float] = field(default_factory=list)  # dense curve for the plot
     shown_fit_y: list[float] = field(default_factory=list)
+
+    @classmethod
+    def of(
+        cls, label: str, x: Column, y: Column, fit: Iterable[float], residual: Iterable[float],
+        t: Iterable[float] = (), curve: tuple[Iterable[float], Iterable[float]] = ((), ()),
+    ) -> Series:  # fmt: skip
+        """Return the series of columns as arrays; curve: x and y of the dense one."""
+        at, measured, fitted, left, time, *dense = (list(map(float, c)) for c in (x[0], y[0], fit, residual, t, *curve))
+        first = cls(label, at, x[1], x[2], measured, fitted, left, y[1], y[2])
+        return replace(first, t=time, shown_fit_x=dense[0], shown_fit_y=dense[1])
 
 
 @dataclass(frozen=True)

@@ -324,6 +324,34 @@ def test_no_two_public_classes_of_one_name() -> None:
     assert not twice, f"two classes of one name: {twice}"
 
 
+#: calls of more than ten arguments that stay: flat records of a result or of a fit, each made in one place
+FLAT = {
+    ("reduction/estimation/fit_result.py", "DriftTestResult"),
+    (
+        "reduction/estimation/noise_mixture_fit.py",
+        "NoiseEstimate",
+    ),  # of estimated noise, of white noise
+    ("reduction/suite/method_comparison.py", "SuiteMember"),
+    ("reduction/suite/method_comparison.py", "SuiteValue"),
+    ("drift_record/reduction.py", "RecordChannel"),
+    ("torquer_scale_factor/reduction.py", "DriftTestResult"),
+}
+
+
+def test_no_call_in_a_reduction_takes_more_than_ten_arguments() -> None:
+    long, calls = set(), 0
+    for top in (TOOL / "reduction", standard_folder() / "systems"):
+        for file in sorted(f for f in top.rglob("*.py") if "_bench" not in f.parts):
+            for node in ast.walk(tree(file)):
+                if isinstance(node, ast.Call):
+                    calls += 1
+                    if len(node.args) + len(node.keywords) > 10:
+                        name = file.relative_to(TOOL if top.parent == TOOL else top).as_posix()
+                        long.add((name, ast.unparse(node.func)))
+    assert calls > 10_000, "the calls are read"
+    assert long == FLAT, f"build it in steps, group what belongs together: {long - FLAT}; gone: {FLAT - long}"
+
+
 def test_docstrings_open_with_what_is_returned_or_done() -> None:
     """Not with a fragment: "Return the parameters ...", "Parameters of ...", and not "Of all parts, ..."."""
     fragment = re.compile(r"(What|Of|As|Whether)\b")

@@ -129,10 +129,8 @@ class Reduction(DriftReduction[MultipointSetup]):
         noise = "white" if self.four else "estimated"
         X = self._columns(v)
         back = budget.places(v, X[:, len(self.model.terms) :].sum(axis=1)) if s.nuisances and not s.u_angle else []
-        return Regression(
-            steps, X, v.y, v.t_start, v.t_end, groups, "λi/g₀", "µg", UG, noise, candidates=back,
-            ideal=ROUNDING,
-        )  # fmt: skip
+        unit = ("λi/g₀", "µg", UG)
+        return Regression(steps, X, v.y, v.t_start, v.t_end, groups, *unit, noise, candidates=back, ideal=ROUNDING)
 
     def _columns(self, v: Visits) -> Array:
         where = (v, self.zeros, self.setup.gamma)

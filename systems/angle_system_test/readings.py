@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -50,7 +51,7 @@ class AngleSystemSetup(Setup):
     """What the reduction knows of the set-up; angles in rad, rates in rad/s.
 
     parameters: of the parts.  target, rate: of the phases, 1-based; rate 0 at positions.  turned: phases with the scale
-    turned on its shaft.  quanta: of reader and reference.  lsb, interval: of the inverse rate.  u_rate: relative.
+    turned on its shaft.  u_rate: relative.
     """
 
     parameters: Mapping[str, Any]
@@ -58,37 +59,55 @@ class AngleSystemSetup(Setup):
     rate: Mapping[int, float]
     turned: frozenset[int]
     head: float
-    pole_pairs: int
-    quanta: tuple[float, float]
-    lsb: float
-    interval: float
-    causes: Mapping[int, str]  # order of the reader -> what makes it
-    orders: Sequence[int]  # those of them that the two readings separate
-    reference_orders: Sequence[int]
     reversal: bool = False
     u_rate: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
-        p, head = run.parameters, float(run.options["head"])
-        causes = meanings(p, "reader")
         return super().of(
             run,
-            parameters=p,
+            parameters=run.parameters,
             target={row.phase: row.target for row in run.plan if row.mode == "index"},
             rate={row.phase: row.target if row.mode == "rate" else 0.0 for row in run.plan},
             turned=frozenset(row.phase for row in run.plan if row.label.startswith("turned")),
-            head=head,
-            pole_pairs=int(p.get("reader.pole_pairs", POLE_PAIRS)),
-            quanta=(float(p.get("reader.quantum", QUANTUM)), float(p.get("reference.quantum", QUANTUM))),
-            lsb=float(p.get("inverse.lsb", 1e-4)),
-            interval=float(p.get("inverse.interval", math.pi / 180.0)),
-            causes=causes,
-            orders=[k for k in causes if separation(k, head) >= LEAST],
-            reference_orders=sorted({*meanings(p, "reference"), *causes}),
+            head=float(run.options["head"]),
             reversal=run.options.get("method") == "reversal",
             **own,
         )
+
+    @property
+    def pole_pairs(self) -> int:
+        return int(self.parameters.get("reader.pole_pairs", POLE_PAIRS))
+
+    @property
+    def quanta(self) -> tuple[float, float]:
+        """Return the angles of a count of reader and reference."""
+        read, reference = (float(self.parameters.get(f"{n}.quantum", QUANTUM)) for n in ("reader", "reference"))
+        return read, reference
+
+    @property
+    def lsb(self) -> float:
+        """s, of the inverse rate"""
+        return float(self.parameters.get("inverse.lsb", 1e-4))
+
+    @property
+    def interval(self) -> float:
+        """Angle of a reading of the inverse rate."""
+        return float(self.parameters.get("inverse.interval", math.pi / 180.0))
+
+    @cached_property
+    def causes(self) -> Mapping[int, str]:
+        """Orders of the reader, and what makes each."""
+        return meanings(self.parameters, "reader")
+
+    @cached_property
+    def orders(self) -> Sequence[int]:
+        """Those of them that the two readings separate."""
+        return [k for k in self.causes if separation(k, self.head) >= LEAST]
+
+    @cached_property
+    def reference_orders(self) -> Sequence[int]:
+        return sorted({*meanings(self.parameters, "reference"), *self.causes})
 
     def shift(self, slot: str) -> float:
         """Return mean lag and ripple (s) by the phase shifter of one-phase excitation.  Raises KeyError."""

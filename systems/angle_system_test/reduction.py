@@ -65,10 +65,9 @@ class Reduction(DriftReduction[AngleSystemSetup]):
         self.kind, X = np.array(self.rows.kind), np.vstack(self.rows.X)
         self.seen = np.any(X != 0.0, axis=0)  # no gate, no degree: no clock
         wanted = [q for q, s in zip(quantities(self.setup), self.seen, strict=True) if s]
-        return Regression(
-            wanted, X[:, self.seen], np.concatenate(self.rows.y), None, None, self._groups(), "difference", "″", ARCSEC,
-            noise="white", weights=1.0 / np.concatenate(self.rows.variance),
-        )  # fmt: skip
+        y, weights, unit = np.concatenate(self.rows.y), 1.0 / np.concatenate(self.rows.variance), ("difference", "″")
+        shown = (self._groups(), *unit, ARCSEC)
+        return Regression(wanted, X[:, self.seen], y, None, None, *shown, noise="white", weights=weights)
 
     def _groups(self) -> list[Group]:
         """Return what is drawn: readings at rest against the angle, at rates against the rate (the line: zero, lag)."""

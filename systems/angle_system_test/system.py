@@ -29,6 +29,12 @@ SHARED = (
 )
 NOISE = "reader.encoder_reading reader_2.encoder_reading reference.encoder_reading"
 TURN = 2.0 * math.pi
+#: columns of gates and degrees: gate_start -> "gate.t_start"
+COUNTED = {
+    f"{slot}_{n}": f"{slot}.{output}"
+    for slot in ("gate", "inverse")
+    for n, output in (("number", "number"), ("rate", "rate"), ("start", "t_start"), ("end", "t_end"))
+}
 
 
 class AngleSystemTest(TableTest):
@@ -89,10 +95,7 @@ class AngleSystemTest(TableTest):
     windows = Windows.of(
         "sampler",
         reading="reader.angle_read", t_reading="reader.t_read", reading_2="reader_2.angle_read",
-        reference="reference.angle_read", t_reference="reference.t_read",
-        gate_number="gate.number", gate_rate="gate.rate", gate_start="gate.t_start", gate_end="gate.t_end",
-        inverse_number="inverse.number", inverse_rate="inverse.rate", inverse_start="inverse.t_start",
-        inverse_end="inverse.t_end",
+        reference="reference.angle_read", t_reference="reference.t_read", **COUNTED,
     )  # fmt: skip
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,26 +31,39 @@ OWN = {"phase", "t_start", "t_end", "angle_start", "angle_end", "mean", "std", "
 
 @dataclass(frozen=True)
 class Prepared:
-    """A rate (rad/s) or force (m/s²) on the grid, NaN in gaps, and its noise model; clean: without what columns,
-    lines, steps explain, and without its wild samples.
-
-    stretch: the longest part of ``clean`` without a long gap, for spectra and time-series models; what was missing or
-    wild in it is drawn from the noise around.  step: s.
-    """
+    """A rate (rad/s) or force (m/s²) on the grid, NaN in gaps, and its noise model; step: s."""
 
     name: str
     units: ChannelUnits
     time: Array  # of the first sample on, s
     step: float
     rate: Array
-    clean: Array
     regressions: tuple[RegressionSlope, ...]
     noise: NoiseModel
     model: DriftModel  # of the stretch
-    stretch: Array
-    first: int  # place of the stretch on the grid
     inseparable: list[str]
     explained: float | None  # share of the variance of the samples that the columns taken out explain
+
+    @cached_property
+    def clean(self) -> Array:
+        """The rate without what columns, lines, steps explain, and without its wild samples."""
+        return self.noise.cleaned
+
+    @property
+    def first(self) -> int:
+        """Place of the stretch on the grid."""
+        return self._longest[0]
+
+    @property
+    def stretch(self) -> Array:
+        """The longest part of ``clean`` without a long gap, for spectra and time-series models; what was missing or
+        wild in it is drawn from the noise around.
+        """
+        return self._longest[1]
+
+    @cached_property
+    def _longest(self) -> tuple[int, Array]:
+        return self.noise.longest
 
     @property
     def cleaned(self) -> bool:
@@ -135,13 +149,12 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
     share = float(np.var(taken[there]) / (np.var(rate[there]) or 1.0)) if regressions else None
     try:
         noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
-        first, stretch = noise.longest
-        model = describe(stretch, columns.step)
+        model = describe(noise.longest[1], columns.step)
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None
     return Prepared(
-        name, columns.units.get(name, RATE), columns.time, columns.step, rate, noise.cleaned, regressions,
-        noise, model, stretch, first, columns.inseparable, share,
+        name, columns.units.get(name, RATE), columns.time, columns.step, rate, regressions, noise, model,
+        columns.inseparable, share,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -83,7 +83,7 @@ def from_record(record: Record) -> DriftRecordResult:
     if several:
         shared, common, summary = together.tables(channels, columns.step, run)
         reasons = [*common, *together.merged({c.name: c.reasons for c in channels})]
-    return DriftRecordResult(
+    found = DriftRecordResult(
         method="Noise model of greatest evidence whose deviation is the record's own, deviations, spectrum, models",
         sources=["DRIFT-NOISE-MODEL, DRIFT-ALLAN; IEEE 952, annex C",
                  "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
@@ -91,14 +91,11 @@ def from_record(record: Record) -> DriftRecordResult:
         'K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0)',
         conventions=[*columns.conventions, *description.conventions(run)],
         coefficients=[c for a in channels for c in a.coefficients],
-        reasons=[*reasons, *description.of_rows(run)],
-        summary=summary,
-        tables=shared,
-        instrument=run.instrument,
-        site=run_metadata.Location.of(run).shown() if not run.measured or _stated_site(run) else {},
-        simulated=not run.measured,
         columns=[c.column for c in channels],
     )  # fmt: skip
+    site = run_metadata.Location.of(run).shown() if not run.measured or _stated_site(run) else {}
+    found = replace(found, instrument=run.instrument, site=site, simulated=not run.measured)
+    return replace(found, reasons=[*reasons, *description.of_rows(run)], summary=summary, tables=shared)
 
 
 def _stated_site(run: RunDocument) -> bool:
@@ -208,7 +205,7 @@ def _column(a: Analysed, run: RunDocument) -> DriftColumn:
     f = np.geomspace(1.0 / (m.n * m.dt), 0.5 / m.dt, 120)
     dev, density = a.noise.allan(tau) / si, 2.0 * a.noise.spectrum(f) / si**2
     lags = slice(0, SHOWN_LAGS + 1)
-    return DriftColumn(
+    column = DriftColumn(
         name=p.name,
         unit=p.units.unit,
         quantity=p.units.words,
@@ -218,6 +215,9 @@ def _column(a: Analysed, run: RunDocument) -> DriftColumn:
         model=NoiseModelCurves(tau.tolist(), dev.tolist(), f.tolist(), density.tolist()),
         spectrum=SpectrumBand(s.frequency.tolist(), *((v / si**2).tolist() for v in (s.density, s.low, s.high))),
         correlation=SampleCorrelation(c.lag[lags].tolist(), c.rho[lags].tolist(), c.partial[lags].tolist(), c.bound),
+    )
+    return replace(
+        column,
         tables={
             "acquisition": [description.acquisition(p, run)],
             "regression": description.regression(p),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from gyrobench.attitudes import attitude_problems, parse
+from gyrobench.attitudes import attitude_problems
 from gyrobench.system.families.option_groups import ATTITUDE, SITE, TORQUER, type_b
 from gyrobench.system.families.rate_reading import CURRENT, RATE, RateReading
 from gyrobench.system.families.table_test import TableTest, on_table
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.plan import Phase, Plan
+from gyrobench.system.plan import Plan
 from gyrobench.system.system import OnRequest, Option, Slot
 from gyrobench.units import ARCSEC, DPH, G0
 
@@ -91,16 +91,7 @@ class DriftRecord(RateReading):
             )
 
     def plan(self) -> Plan:
-        """One phase; the mount is the attitude itself, as the table stands level at angle 0."""
-        try:
-            face = parse(self["attitude"], self["latitude"])
-        except ValueError:
-            return Plan()  # check() says why
-        phase = Phase(
-            label=FACE, mode="index", face=FACE, target=0.0, settle=self["settle"], dwell=self["duration"],
-            window=self["window"],
-        )  # fmt: skip
-        return Plan([phase], {FACE: face})
+        return self.in_attitude(FACE, self["duration"], self["window"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         """The random drift of the gyro has the five terms, of sizes that a day shows; other noise is off unless set."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gyrobench.attitudes import attitude_problems, parse
+from gyrobench.attitudes import attitude_problems
 from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rate_reading import RateReading
-from gyrobench.system.plan import Phase, Plan
+from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option
 
 from .measured import ATTITUDE as FACE
@@ -43,16 +43,7 @@ class FixedPosition(RateReading):
     measured_data = MEASURED
 
     def plan(self) -> Plan:
-        """Return one phase; the mount is the attitude itself, as the table stands level at angle 0."""
-        try:
-            face = parse(self["attitude"], self["latitude"])
-        except ValueError:
-            return Plan()  # check() says why
-        phase = Phase(
-            label=FACE, mode="index", face=FACE, target=0.0, settle=self["settle"], dwell=self["dwell"],
-            window=self["dwell"] / self["readings"],
-        )  # fmt: skip
-        return Plan([phase], {FACE: face})
+        return self.in_attitude(FACE, self["dwell"], self["dwell"] / self["readings"])
 
     def check(self) -> list[str]:
         return attitude_problems(self["attitude"], self["latitude"]) + super().check()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -78,25 +78,26 @@ class LinearCompass:
     T: float
     drift_az: float
     drift_el: float
-    swing: float  # rad/s, undamped
+    swing_period: float  # undamped
     swing_damping: float
-    latitude_correction: bool
-    speed_correction: bool
-    latitude_set: float
+    latitude_correction: float  # 1: on
+    speed_correction: float
+    latitude: float  # as set
     earth_rate: float
     radius: float
     gravity: float
 
-    @staticmethod
-    def of(p: Mapping[str, Any]) -> LinearCompass | None:
+    @classmethod
+    def of(cls, p: Mapping[str, Any]) -> LinearCompass | None:
         """Return the compass of the parameters of a run; None where the part in the slot has other ones."""
-        own = "H mgl D C T drift_az drift_el swing_period swing_damping latitude_correction speed_correction latitude"
-        names = [f"compass.{n}" for n in own.split()] + [f"ship.{n}" for n in ("earth_rate", "radius", "gravity")]
-        if any(n not in p for n in names):
-            return None
-        H, mgl, D, C, T, az, el, swing, ratio, latitude_on, speed_on, *place = (float(p[n]) for n in names)
-        return LinearCompass(H, mgl, D, C, T, az, el, 2.0 * math.pi / swing, ratio, latitude_on > 0.5, speed_on > 0.5,
-                             *place)  # fmt: skip
+        ship = ("earth_rate", "radius", "gravity")
+        names = [f"{'ship' if f.name in ship else 'compass'}.{f.name}" for f in fields(cls)]
+        return None if any(n not in p for n in names) else cls(*(float(p[n]) for n in names))
+
+    @property
+    def swing(self) -> float:
+        """rad/s, undamped"""
+        return 2.0 * math.pi / self.swing_period
 
     def rates(self, at: Steaming) -> tuple[float, float, float]:
         """Return w_N, w_U of the level axes of a steaming ship, and 2 w sin L + V_E tan L/R of its Coriolis force."""
@@ -130,10 +131,10 @@ class LinearCompass:
     def shown(self, azimuth: Array | float, at: Steaming) -> Any:
         """Return the heading shown less the true one, with the corrections that are on."""
         error = -np.asarray(azimuth)
-        north = self.earth_rate * math.cos(self.latitude_set)
-        if self.latitude_correction:
-            error = error + self.D * math.tan(self.latitude_set) / (self.mgl + self.H * north)
-        if self.speed_correction:
+        north = self.earth_rate * math.cos(self.latitude)
+        if self.latitude_correction > 0.5:
+            error = error + self.D * math.tan(self.latitude) / (self.mgl + self.H * north)
+        if self.speed_correction > 0.5:
             sine = at.speed * np.cos(at.course + error) / (self.radius * north)
             error = error - np.arcsin(np.clip(sine, -1.0, 1.0))
         return error

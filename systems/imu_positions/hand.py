@@ -197,10 +197,8 @@ class HandGyro(HandChannel):
         group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
         many = y.size >= ESTIMATED
         weighed = [replace(nuisances.trend(at.start, at.end), name=f"trend {c.name}")] if many and s.nuisances else []
-        return Regression(
-            quantities, X, y, at.start, at.end, [group], "rate at rest", "°/h", DPH,
-            "estimated" if many else "white", limit=1e3, candidates=weighed,
-        )  # fmt: skip
+        unit, noise = ("rate at rest", "°/h", DPH), "estimated" if many else "white"
+        return Regression(quantities, X, y, at.start, at.end, [group], *unit, noise, candidates=weighed)
 
     @property
     def middle(self) -> float:

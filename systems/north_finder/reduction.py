@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy import special
@@ -103,6 +103,17 @@ class NorthFinderSetup(SiteSetup):
     u_accelerometer: float = 0.0
     u_bias: float = 0.0
     unbiased: bool = False
+
+    @classmethod
+    def of(cls, run: RunDocument, **own: Any) -> Self:
+        o, p = run.options, run.parameters
+        stated: dict[str, Any] = {n: float(o.get(n, 0.0)) for n in ("rough", "sigma_rough", "settle", "density")}
+        stated["density"] = stated["density"] or float(p.get("gyro.white_y", 0.0))
+        unbiased = run.type_b == "none" or (not np.any(p.get("gyro.bias", 1.0)) and bias_is_all(p))
+        return super().of(
+            run, method=method_of(run), rough_stated=not run.measured, drift_order=int(o.get("drift_order", 0)),
+            unbiased=unbiased, **stated, **own,
+        )  # fmt: skip
 
     @property
     def earth(self) -> LocalEarth:
@@ -378,20 +389,13 @@ def _methods(s: NorthFinderSetup, psi: float) -> list[Table]:
 
 def setup_of(record: Record) -> NorthFinderSetup:
     """Return the setup that a record describes."""
-    run, o, windows = record.run, record.run.options, record.windows
+    run, windows = record.run, record.windows
     names = {n: f"finder.{n}" for n in ("heading", "sigma", "status")}
     there = all(c in record.channels for c in names.values())
-    return NorthFinderSetup.of(
-        run, method=method_of(run), rough=float(o.get("rough", 0.0)), rough_stated=not run.measured,
-        truth=_truth(run, windows), sigma_rough=float(o.get("sigma_rough", 0.0)),
-        finder={n: float(np.asarray(record.channels[c])[-1]) for n, c in names.items()} if there else None,
-        time=float(windows["t_end"][-1]) - (float(windows["t_start"][0]) if run.measured else 0.0),
-        settle=float(o.get("settle", 0.0)), drift_order=int(o.get("drift_order", 0)),
-        density=float(o.get("density", 0.0)) or float(run.parameters.get("gyro.white_y", 0.0)),
-        unbiased=run.type_b == "none" or (
-            not np.any(run.parameters.get("gyro.bias", 1.0)) and bias_is_all(run.parameters)
-        ),
-    )  # fmt: skip
+    finder = {n: float(np.asarray(record.channels[c])[-1]) for n, c in names.items()} if there else None
+    begin = float(windows["t_start"][0]) if run.measured else 0.0
+    time = float(windows["t_end"][-1]) - begin
+    return NorthFinderSetup.of(run, truth=_truth(run, windows), finder=finder, time=time)
 
 
 def method_of(run: RunDocument) -> str:

@@ -77,13 +77,10 @@ class Levels:
     def series(self, dense: Array, seen: Array) -> Series:
         """Return the voltage over angle; dense, seen: of the drawn line."""
         order = np.argsort(self.angle, kind="stable")
-        return Series(
-            label="pickoff voltage", x=(self.angle[order] / ARCMIN).tolist(), x_name="table angle", x_unit="′",
-            y=(self.u[order] * 1e3).tolist(), fit=((self.u - self.departure)[order] * 1e3).tolist(),
-            residual=(self.departure[order] * 1e3).tolist(), y_name="pickoff voltage", y_unit="mV",
-            t=self.t[order].tolist(), shown_fit_x=(dense / ARCMIN).tolist(),
-            shown_fit_y=((self.zero + self.slope * seen) * 1e3).tolist(),
-        )  # fmt: skip
+        u, fit, residual = (v[order] * 1e3 for v in (self.u, self.u - self.departure, self.departure))
+        at, curve = (self.angle[order] / ARCMIN, "table angle", "′"), (self.zero + self.slope * seen) * 1e3
+        measured = (u, "pickoff voltage", "mV")
+        return Series.of("pickoff voltage", at, measured, fit, residual, self.t[order], (dense / ARCMIN, curve))
 
     def table(self) -> Table:
         rows = [

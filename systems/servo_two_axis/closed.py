@@ -12,7 +12,6 @@ mount 2.  Both lines at the middles of the windows are solved by ordinary least 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,8 +98,3 @@ def reduce(
         alpha[k], beta[k] = gyro_rates(x[k], y[k], x_rate[k], y_rate[k], earth_rate * earth)
         forces[k] = force(x[k], y[k], g * down)
     return separate("x", alpha, forces, terms) | separate("y", beta, forces, terms)
-
-
-def in_book(ours: Mapping[str, float], channel: str) -> dict[str, float]:
-    """Return the coefficients of Hu 1981 of a line from ours."""
-    return {b: sign * ours[name] for b, (name, sign) in BOOK[channel].items()}

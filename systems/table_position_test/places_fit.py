@@ -82,7 +82,6 @@ class PlacesFit:
     value: Array
     u: Array
     X: Array
-    residual: Array
     gain: Array  # value = gain y
     V: Array  # covariance of y
     variance: float
@@ -123,9 +122,7 @@ def least_squares(X: Array, y: Array, parts: Sequence[Part]) -> PlacesFit:
     free = max(2.0 * (variances[0] * scale) ** 2 / float(error[0, 0]), 1.0) if told else 1.0
     variance = float(variances[0]) * scale if told else 0.0
     shapes = [p.shape for p, is_found in zip(parts, found, strict=True) if is_found]
-    return PlacesFit(
-        gain @ y, np.sqrt(u2), X, y - X @ gain @ y, gain, V, variance, free, redundant, shapes, error
-    )  # fmt: skip
+    return PlacesFit(gain @ y, np.sqrt(u2), X, gain, V, variance, free, redundant, shapes, error)
 
 
 @dataclass(frozen=True)

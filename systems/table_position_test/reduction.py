@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -310,8 +309,6 @@ class Reduction(MeasureReduction):
         theta, dense, error = self.r.theta[of], np.linspace(0.0, 2 * math.pi, 181), self.error[of] / ARCSEC
         harmonics = self.fit.value[: 2 * len(self.orders)] / ARCSEC
         model, curve = (waves(self.orders, x) @ harmonics for x in (theta, dense))
-        points = Series(
-            f"mount {math.degrees(self.r.azimuth[of][0]):g}°", np.degrees(theta).tolist(), "table angle", "°",
-            error.tolist(), model.tolist(), (error - model).tolist(), "position error", "arcsec",
-        )  # fmt: skip
-        return replace(points, shown_fit_x=np.degrees(dense).tolist(), shown_fit_y=curve.tolist())
+        at, measured = (np.degrees(theta), "table angle", "°"), (error, "position error", "arcsec")
+        label = f"mount {math.degrees(self.r.azimuth[of][0]):g}°"
+        return Series.of(label, at, measured, model, error - model, curve=(np.degrees(dense), curve))

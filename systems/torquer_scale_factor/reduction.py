@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from gyrobench.reduction.diagnosis.examination import examined
 from gyrobench.reduction.estimation import regression, uncertainty
 from gyrobench.reduction.estimation.effects import correction_table, simulated_table, standard_changes
 from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, changes_by_source
+from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
     Array,
@@ -130,14 +132,12 @@ class Reduction:
         if self.e.reported:
             b = (np.vstack([np.zeros((1, 6)), *self.by_source])[:, j] * size).tolist()
         u, U = uncertainty.combine_uncertainties(u_a, half_a, b)
-        t, truth = value / u_a if u_a > 0.0 else None, (s.truth or {}).get(name)
-        return Coefficient(
-            name=name, meaning=meaning, unit=unit, estimate=value, u=u, k=U / u if u > 0.0 else uncertainty.NORMAL,
-            interval=(value - U, value + U), t=t,
-            p=float(2.0 * special.stdtr(min(dof, 1e9), -abs(t))) if t is not None else None, u_a=u_a,
-            dof=float(dof) if math.isfinite(dof) else None,
-            truth=truth, z=(value - truth) / u if truth is not None and u > 0.0 else None,
-        )  # fmt: skip
+        k, free = U / u if u > 0.0 else uncertainty.NORMAL, float(dof) if math.isfinite(dof) else None
+        c = Coefficient(name, meaning, unit, value, u, k, (value - U, value + U), u_a=u_a, dof=free)
+        if u_a > 0.0:
+            t = value / u_a
+            c = replace(c, t=t, p=float(2.0 * special.stdtr(min(dof, 1e9), -abs(t))))
+        return compared(c, (s.truth or {}).get(name))
 
     def result(self) -> DriftTestResult:
         """Return the result, without the checks of the rows."""
@@ -200,13 +200,12 @@ class Reduction:
 
     def _series(self) -> Series:
         dense, e = np.linspace(0.0, 1.0, 101), self.e
-        return Series(
-            label="scale factor of each current", x=(self.i / MA).tolist(), x_name="current", x_unit="mA",
-            y=(self.K_n / KU).tolist(), fit=(e.fitted / KU).tolist(), residual=((self.K_n - e.fitted) / KU).tolist(),
-            y_name="scale factor", y_unit=UNIT, t=np.arange(self.i.size, dtype=float).tolist(),
-            shown_fit_x=np.linspace(0.0, self.full / MA, 101).tolist(),
-            shown_fit_y=((e.beta[0] + e.beta[1] * dense**2) / KU).tolist(),
-        )  # fmt: skip
+        curve = np.linspace(0.0, self.full / MA, 101), (e.beta[0] + e.beta[1] * dense**2) / KU
+        at, measured = (self.i / MA, "current", "mA"), (self.K_n / KU, "scale factor", UNIT)
+        left = (self.K_n - e.fitted) / KU
+        return Series.of(
+            "scale factor of each current", at, measured, e.fitted / KU, left, np.arange(self.i.size), curve
+        )
 
     def _noise(self) -> dict[str, Any]:
         if self.fit is None:

@@ -177,9 +177,9 @@ def test_what_was_set_may_explain_it() -> None:
         parameter="site.latitude", value=-33.86 * DEG, assumed=45.75 * DEG, unit="rad", option="latitude"
     )
     run = RunDocument(
-        changed=["gyro: part", "site.latitude", "gyro.D_I", "rate", "both_senses"],
+        changed=["gyro: part", "site.latitude", "gyro.D_I", "rate", "both_senses", "u_axis", "type_b"],
         parts={"gyro": PartInfo(name="RIG-7")}, parameters={"gyro.D_I": 2e-6},
-        options={"rate": 0.02, "both_senses": True}, setup_errors=[error],
+        options={"rate": 0.02, "both_senses": True, "u_axis": 1e-5, "type_b": "none"}, setup_errors=[error],
     )  # fmt: skip
     assert set_values(run) == [
         f"set-up error {SOUTH}", "part RIG-7 in slot gyro", "gyro.D_I = 2e-06 (SI)", "rate = 0.02 (SI)", "both_senses",

@@ -239,18 +239,13 @@ class Findings:
             x = np.asarray(g.x, dtype=float)
             turn = np.argsort(x, kind="stable")
             x, rows = x[turn], rows[turn]
-            dense, curve = [], []
+            curve = np.empty(0), np.empty(0)
             if g.dense is not None:
-                dense = np.asarray(g.dense[0], dtype=float).tolist()
                 shown = np.asarray(g.dense[1], dtype=float) @ self.est.beta[: self.X.shape[1]]
-                curve = (shown / self.y_scale).tolist()
-            s = Series(
-                label=g.label, x=x.tolist(), x_name=g.x_name, x_unit=g.x_unit, y=(self.y[rows] / self.y_scale).tolist(),
-                fit=(fitted[rows] / self.y_scale).tolist(), residual=(self.est.residual[rows] / self.y_scale).tolist(),
-                y_name=self.data.y_name, y_unit=self.y_unit, t=middle[rows].tolist(),
-                shown_fit_x=dense, shown_fit_y=curve,
-            )  # fmt: skip
-            out.append(s)
+                curve = np.asarray(g.dense[0], dtype=float), shown / self.y_scale
+            y, fit, residual = (v[rows] / self.y_scale for v in (self.y, fitted, self.est.residual))
+            at, measured = (x, g.x_name, g.x_unit), (y, self.data.y_name, self.y_unit)
+            out.append(Series.of(g.label, at, measured, fit, residual, middle[rows], curve))
         return out
 
     def _parts(self, values: Array) -> list[Array]:

@@ -26,6 +26,7 @@ from gyrobench.reduction.estimation.effects import (
 )
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.estimation.verdict import DECISION_RULE, SLOW_RULE
 from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.sources import Effect
@@ -172,22 +173,15 @@ def coefficient(fit: Findings, j: int, contributions: Sequence[float] = ()) -> C
     estimate, u_s, U_s = float(r.value[j]) / q.scale, u / q.scale, U / q.scale
     truth = None if q.truth is None else q.truth / q.scale
     u_a, dof = float(r.u[j]) / q.scale, float(r.dof[j])
-    compared = truth is not None and u_s > 0.0 and not fit.ideal  # u of ideal data is rounding
-    return Coefficient(
-        name=q.title,
-        meaning=q.meaning,
-        unit=q.unit,
-        estimate=estimate,
-        u=u_s,
-        k=U / u if u > 0.0 else uncertainty.NORMAL,
-        interval=(estimate - U_s, estimate + U_s),
+    k, interval = U / u if u > 0.0 else uncertainty.NORMAL, (estimate - U_s, estimate + U_s)
+    free = dof if math.isfinite(dof) else None
+    c = Coefficient(q.title, q.meaning, q.unit, estimate, u_s, k, interval, u_a=u_a, dof=free)
+    c = replace(c, truth=truth) if fit.ideal else compared(c, truth)  # u of ideal data is rounding
+    return replace(
+        c,
         t=estimate / u_a if u_a > 0.0 else None,
         p=float(r.p[j]) if u_a > 0.0 else None,
-        u_a=u_a,
-        dof=dof if math.isfinite(dof) else None,
         closed=None if q.closed is None else q.closed / q.scale,
-        truth=truth,
-        z=(estimate - truth) / u_s if compared and truth is not None else None,
         combination=dict(q.combination or {q.name: 1.0}),
         stands_for=q.name if q.shown else "",
     )

@@ -39,35 +39,40 @@ def merge(
     if len(same) > 1:
         noise["channel of autocorrelation, Allan deviation and spectrum"] = labels[parts.index(loud)]
     equations = list(dict.fromkeys(r.equation for r in parts if r.equation))
-    return replace(
+    said = replace(
         first,
         sources=_once([r.sources for r in parts]),
         equation=" \\ ".join(equations) if equation is None else equation,
         conventions=_shared(labels, [r.conventions for r in parts]),
+        reasons=[*_shared_reasons(results), *reasons],
+        summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
+        simulated=any(r.simulated for r in parts),
+        ideal=all(r.ideal for r in parts),
+    )
+    fitted = replace(
+        said,
         coefficients=coefficients,
-        series=[replace(s, label=f"{n}: {s.label}") for n, r in results.items() for s in r.series],
         correlation=_block([r.correlation for r in parts]),
         condition=max(r.condition for r in parts),
         rank=sum(r.rank for r in parts),
         dof=sum(r.dof for r in parts),
         noise=noise,
-        tests=[replace(t, id=f"{t.id}:{n}", name=f"{t.name}, {n}") for n, r in results.items() for t in r.tests],
         residual_std=spread,
+        budget=[b for r in parts for b in r.budget],
+        type_b=_side_by_side(parts),
+    )
+    every = results.items()
+    named = [replace(t, id=f"{t.id}:{n}", title=f"{t.title}, {n}") for n, r in every for t in r.tables]
+    return replace(
+        fitted,
+        series=[replace(s, label=f"{n}: {s.label}") for n, r in every for s in r.series],
+        tests=[replace(t, id=f"{t.id}:{n}", name=f"{t.name}, {n}") for n, r in every for t in r.tests],
+        harmonics=[replace(h, series=f"{n}: {h.series}") for n, r in every for h in r.harmonics],
+        repeatability={f"{n}: {key}": value for n, r in every for key, value in r.repeatability.items()},
+        tables=[*named, *tables],
         acf=loud.acf,
         allan=loud.allan,
         psd=loud.psd,
-        harmonics=[replace(h, series=f"{n}: {h.series}") for n, r in results.items() for h in r.harmonics],
-        budget=[b for r in parts for b in r.budget],
-        type_b=_side_by_side(parts),
-        repeatability={f"{n}: {key}": value for n, r in results.items() for key, value in r.repeatability.items()},
-        tables=[
-            *(replace(t, id=f"{t.id}:{n}", title=f"{t.title}, {n}") for n, r in results.items() for t in r.tables),
-            *tables,
-        ],
-        reasons=[*_shared_reasons(results), *reasons],
-        summary=[s for r in parts for s in r.summary] if summary is None else list(summary),
-        simulated=any(r.simulated for r in parts),
-        ideal=all(r.ideal for r in parts),
     )
 
 

@@ -267,10 +267,11 @@ def _variances_with_readings(
     known = shared * shared
     squared = f * f
     k0, s0 = last
+    columns = (a, f, squared, n, d, c, shared, known)
     if p.size == 1:
-        return _with_readings_of_one(float(p[0]), float(k0[0]), float(s0[0]), (a, f, squared, n, d, c, shared, known))
+        return _with_readings_of_one(float(p[0]), float(k0[0]), float(s0[0]), columns)
     k, s = np.empty_like(a), np.empty_like(a)
-    for ai, fi, ff, ni, di, ci, hi, gi, ki, si in zip(a, f, squared, n, d, c, shared, known, k, s, strict=True):
+    for ai, fi, ff, ni, di, ci, hi, gi, ki, si in zip(*columns, k, s, strict=True):
         cross = hi * k0
         seen = ai * p
         seen += cross

@@ -40,54 +40,34 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 SLOW = 0.125  # of the record: longer correlation times are slow drift, which a record tells from white noise badly
 
 
-@dataclass(frozen=True)
 class Problem:
     """A fit as it is solved: columns scaled and at right angles, moments under every noise model.
 
-    columns: those of X, then of the blocks, the errors of known size, and what least squares leave of the data.  back
-    (c, c): from its unknowns to the coefficients.  start (c,): of least squares.
+    columns: those of X, then of the blocks, the errors of known size (stated), and what least squares leave of the
+    data.  back (c, c): from its unknowns to the coefficients.  start (c,): of least squares.  scale: of the blocks'
+    columns.
     """
 
-    X: Array
-    y: Array
-    t0: Array
-    t1: Array
-    blocks: Sequence[NuisanceBlock]
-    grid: noise.NoiseGrid
-    columns: Array
-    stated: Array
-    start: Array
-    back: Array
-    scale: Array  # of the blocks' columns
-    absorbed: known_errors.Absorbed
-
-    @classmethod
-    def of(
-        cls,
-        X: Array,
-        y: Array,
-        t0: Array,
-        t1: Array,
-        readings: bool,
-        blocks: Sequence[NuisanceBlock],
+    def __init__(
+        self, X: Array, y: Array, t0: Array, t1: Array, readings: bool, blocks: Sequence[NuisanceBlock],
         known: Array | None,
-    ) -> Problem:
+    ) -> None:  # fmt: skip
+        self.X, self.y, self.t0, self.t1, self.blocks = X, y, t0, t1, blocks
         n, p = X.shape
-        grid = noise.noise_grid(t0, t1, readings)
-        scale = np.linalg.norm(X, axis=0)
-        Q, R = np.linalg.qr(X / scale)
+        self.grid = noise.noise_grid(t0, t1, readings)
+        size = np.linalg.norm(X, axis=0)
+        Q, R = np.linalg.qr(X / size)
         Z = np.column_stack([np.empty((n, 0)), *(b.columns for b in blocks)])
-        z_scale = np.linalg.norm(Z, axis=0)
-        z_scale = np.where(z_scale > 0.0, z_scale, 1.0)  # a mount of which every row is left out
-        start = np.concatenate([Q.T @ y, np.zeros(z_scale.size)])
-        remainder = y - Q @ start[:p]
-        stated = known_errors.columns(known, remainder)
-        both = np.column_stack([Q, Z / z_scale, stated, remainder])
-        back = np.zeros((start.size, start.size))
-        back[:p, :p] = np.linalg.inv(R) / scale[:, None]
-        back[p:, p:] = np.diag(1.0 / z_scale)
-        absorbed = known_errors.absorb(moments(t0, t1, both, grid), start.size, n)
-        return cls(X, y, t0, t1, blocks, grid, both, stated, start, back, z_scale, absorbed)
+        z_size = np.linalg.norm(Z, axis=0)
+        self.scale = np.where(z_size > 0.0, z_size, 1.0)  # a mount of which every row is left out
+        self.start = np.concatenate([Q.T @ y, np.zeros(z_size.size)])
+        remainder = y - Q @ self.start[:p]
+        self.stated = known_errors.columns(known, remainder)
+        self.columns = np.column_stack([Q, Z / self.scale, self.stated, remainder])
+        self.back = np.zeros((self.start.size, self.start.size))
+        self.back[:p, :p] = np.linalg.inv(R) / size[:, None]
+        self.back[p:, p:] = np.diag(1.0 / self.scale)
+        self.absorbed = known_errors.absorb(moments(t0, t1, self.columns, self.grid), self.start.size, n)
 
     @property
     def white_only(self) -> NDArray[np.bool_]:
@@ -124,7 +104,7 @@ def fit(
     """
     design = check_data(X, y, names, limit)
     check_windows(t0, t1)
-    problem = Problem.of(X, y, t0, t1, readings, blocks, known)
+    problem = Problem(X, y, t0, t1, readings, blocks, known)
     weighed = _weigh(problem)
     estimates, beta, counts, mixture = _average(problem, weighed)
     evidence = evidence_of(problem, weighed, estimates, mixture, counts)

@@ -24,6 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import TYPE_A
 from gyrobench.reduction.estimation.nuisances import NUISANCES
+from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Series, Table, Test
 
@@ -105,35 +106,28 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
             tests.append(
                 Test(f"{REPEATS}:{name}", f"{what} to {what}, {name}", q, p, f"change between the {what}s", text)
             )
-        x = [float(k + 1) for k in range(n)]
-        y = table[:, j].tolist()
-        series.append(
-            Series(
-                label=name, x=x, x_name=what, x_unit="", y=y, fit=[stats.mean] * n,
-                residual=(table[:, j] - stats.mean).tolist(), y_name=name, y_unit=per_day[0].unit, t=x,
-            )
-        )  # fmt: skip
-        c = coefficients[-1]
+        c, x, y = coefficients[-1], np.arange(1.0, n + 1.0), table[:, j]
+        series.append(Series.of(name, (x, what, ""), (y, name, c.unit), [stats.mean] * n, y - stats.mean, x))
         note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
-        budget.append(
-            BudgetLine(
-                TYPE_A, f"repeatability from {what} to {what}", stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note
-            )
-        )
+        size = (stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note)
+        budget.append(BudgetLine(TYPE_A, f"repeatability from {what} to {what}", *size))
         budget += [b for b in parts[0].budget if b.coefficient == name and b.id != TYPE_A]
     varying = [t.id.partition(":")[2] for t in tests if t.p is not None and t.p < 0.05]
     variation = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
     first = parts[0]
-    return replace(
+    scatter = replace(  # what the residuals of one day show is not of the mean
         first,
+        dof=float(n - 1),
+        noise={"model": f"standard deviation over {n} {what}s, treated as independent"},
+        residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
+        acf=None, allan=None, psd=None, harmonics=[],
+    )  # fmt: skip
+    return replace(
+        scatter,
         coefficients=coefficients,
         series=series,
         correlation=_correlation(table) if n > 2 else first.correlation,
-        dof=float(n - 1),
-        noise={"model": f"standard deviation over {n} {what}s, treated as independent"},
         tests=tests,
-        residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
-        acf=None, allan=None, psd=None, harmonics=[],
         budget=budget,
         repeatability={f"σ of {c.name} / ({c.unit})": statistics(table[:, j].tolist()).sigma
                        for j, c in enumerate(first.coefficients)},
@@ -186,19 +180,13 @@ def _mean(per_day: list[Coefficient]) -> Coefficient:
     truth = [c.truth for c in per_day if c.truth is not None]
     true = float(np.mean(truth)) if len(truth) == len(per_day) else None
     t = stats.mean / stats.u if stats.u > 0.0 else None
+    k, interval = U / u if u > 0.0 else uncertainty.NORMAL, (stats.mean - U, stats.mean + U)
+    mean = replace(first, estimate=stats.mean, u=u, k=k, interval=interval, u_a=stats.u, dof=float(stats.n - 1))
     return replace(
-        first,
-        estimate=stats.mean,
-        u=u,
-        k=U / u if u > 0.0 else uncertainty.NORMAL,
-        interval=(stats.mean - U, stats.mean + U),
+        compared(mean, true),
         t=t,
         p=None if t is None else float(2.0 * special.stdtr(stats.n - 1, -abs(t))),
-        u_a=stats.u,
-        dof=float(stats.n - 1),
         closed=float(np.mean(closed)) if len(closed) == len(per_day) else None,
-        truth=true,
-        z=(stats.mean - true) / u if true is not None and u > 0.0 else None,
     )
 
 

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import Coefficient, Reason, Result
 
 LIMIT = 5.0  # of |z|: by chance once in two million
+
+
+def compared(c: Coefficient, truth: float | None) -> Coefficient:
+    """Return an estimate with its simulated value (printed unit), None where it is not known, and z = error/u."""
+    z = (c.estimate - truth) / c.u if truth is not None and c.u > 0.0 else None
+    return replace(c, truth=truth, z=z)
 
 
 def missed_truth(result: Result, causes: Sequence[str]) -> list[Reason]:
@@ -42,14 +49,17 @@ def _shown(deviating: Sequence[Coefficient], most: int = 4) -> str:
 
 
 def set_values(run: RunDocument) -> list[str]:
-    """Return what was set in a run: set-up errors first, then parts that were swapped, then values in SI."""
+    """Return what was set in a run: set-up errors first, then parts that were swapped, then values in SI.
+
+    Without what is stated of uncertainties of type B: it widens intervals, and moves no estimate by five u.
+    """
     errors = {e.parameter.partition("[")[0]: e for e in run.setup_errors}
     causes = [f"set-up error {e.comparison()}" for e in run.setup_errors]
     for name in run.changed:
         slot, colon, _ = name.partition(": part")
         if colon:
             causes.append(f"part {run.parts[slot].name} in slot {slot}" if slot in run.parts else name)
-        elif name.partition("[")[0] not in errors:
+        elif name.partition("[")[0] not in errors and name != "type_b" and not name.startswith("u_"):
             value = run.parameters.get(name, run.options.get(name))
             causes.append(f"{name} = {value:.6g} (SI)" if isinstance(value, float) else name)
     return causes

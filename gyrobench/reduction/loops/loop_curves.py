@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -86,16 +87,10 @@ def bode(
     name: str, kind: str, caption: str, points: Sequence[Point], curves: list[Curve], y_name: str, unit: str
 ) -> Response:
     """Return the Bode plot of measured points with the curves of models."""
-    return Response(
-        name=name,
-        kind=kind,
-        caption=caption,
-        x=[p.f for p in points],
-        x_name="frequency",
-        x_unit="Hz",
-        y=[abs(p.value) for p in points],
-        y_name=y_name,
-        y_unit=unit,
+    f, gain = [p.f for p in points], [abs(p.value) for p in points]
+    measured = Response(name, kind, caption, f, "frequency", "Hz", gain, y_name, unit)
+    return replace(
+        measured,
         phase=np.degrees(np.unwrap(np.angle([p.value for p in points]))).tolist(),
         u=[p.u for p in points],
         coherence=[p.coherence for p in points],

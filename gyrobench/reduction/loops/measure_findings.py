@@ -19,6 +19,7 @@ from scipy import special
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.fit_result import Account
+from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.result import NO_VERDICT, BudgetLine, Coefficient, Limit, LoopResult, Reason, Response, Table, Test
@@ -77,14 +78,10 @@ class MeasureFindings:
             k = 0.5 * (interval[1] - interval[0]) / size
         if k is None:
             k = float(special.stdtrit(dof, 0.975)) if math.isfinite(dof) else NORMAL
-        self.coefficients.append(
-            Coefficient(
-                name=name, meaning=meaning, unit=unit, estimate=value, u=size, k=k, u_a=size, closed=known, truth=true,
-                interval=interval or (value - k * size, value + k * size), dof=dof if math.isfinite(dof) else None,
-                z=(value - true) / size if true is not None and size > 0.0 else None, no_value=no_value,
-                limit=limit,
-            )
-        )  # fmt: skip
+        interval = interval or (value - k * size, value + k * size)
+        c = Coefficient(name, meaning, unit, value, size, k, interval, limit=limit, no_value=no_value)
+        free = dof if math.isfinite(dof) else None
+        self.coefficients.append(replace(compared(c, true), u_a=size, dof=free, closed=known))
 
     def add(self, name: str, meaning: str, unit: str, v: UncertainValue, **more: Any) -> None:
         """Add an estimate with degrees of freedom of its own, as :meth:`measure`; one that is not finite has no value.
@@ -119,14 +116,18 @@ class MeasureFindings:
             text = f"The run has no value: {self.unstable}. Its figures show what it did, no measure."
             self.warn("unstable", text, "error")
             summary = [f"No value: {self.unstable}."]
-        facts = {"instrument": self.run.instrument, **self.facts}
-        return LoopResult(
+        found = LoopResult(
             title=account.title,
             method=account.method,
             sources=list(account.sources),
             equation=account.equation,
             conventions=list(account.conventions),
             coefficients=self.coefficients,
+            responses=self.responses,
+            **{"instrument": self.run.instrument, **self.facts},
+        )
+        return replace(
+            found,
             tests=self.tests,
             tables=[*self.tables, *account.tables],
             budget=self.budget,
@@ -134,6 +135,4 @@ class MeasureFindings:
             summary=list(summary),
             simulated=not self.run.measured,
             ranked_by=ranked_by,
-            responses=self.responses,
-            **facts,
         )

@@ -18,7 +18,6 @@ derivation]
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -28,7 +27,8 @@ from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import smooth_spectrum
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, folded_flicker, markov_parts
+from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, markov_parts
+from gyrobench.reduction.series.noise_spectra import flicker
 
 LOW = 16  # first ordinates of each parity that are kept singly
 WIDTH = 0.01  # of a bin of ordinates, of the logarithm of k
@@ -40,24 +40,6 @@ HUGE = 1e30
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
 Model = tuple[NoiseTerm, ...]
-
-
-@functools.cache
-def flicker_covariance(n: int = 1024) -> tuple[Array, Array]:
-    """Return variance over that of the folded spectrum (2 LOW,) and correlation (2 LOW, 2 LOW) of the first ordinates
-    k = 1 .. 2 LOW of flicker.
-
-    From the generalized covariance of means over unit time, -(second difference of t^2 log t)/(2 pi).  They do not
-    depend on n (to 1e-4 from n = 1024 on).
-    """
-    t = np.arange(n + 1.0)
-    g = t * t * np.log(np.maximum(t, 1.0))
-    gram = np.concatenate([[2.0 * g[1] - 2.0 * g[0]], g[2:] - 2.0 * g[1:-1] + g[:-2]]) / (-2.0 * np.pi)
-    index = np.arange(n)
-    cov = fft.dctn(gram[np.abs(index[:, None] - index)], norm="ortho")[1 : 2 * LOW + 1, 1 : 2 * LOW + 1]
-    variance = np.diag(cov)
-    k = np.arange(1.0, 2.0 * LOW + 1.0)
-    return variance / folded_flicker(k / (2 * n)), cov / np.sqrt(np.outer(variance, variance))
 
 
 @dataclass(frozen=True)
@@ -166,7 +148,7 @@ class Ordinates:
         self.low_ends = np.sqrt(2.0 / self.n[:, None]) * np.cos(half_low)
         self.all_ends = np.concatenate([self.ends, self.low_ends.ravel()])
         self.ramp = np.where(self.odd[:, None], -self.low_ends / (2.0 * np.sin(half_low) ** 2), 0.0)
-        ratio, correlation = flicker_covariance()
+        ratio, correlation = flicker(low=2 * LOW)
         self._flicker = np.array([correlation[1 - o :: 2, 1 - o :: 2] for o in self.odd.astype(int)])
         self._flicker_ratio = np.array([ratio[1 - o :: 2] for o in self.odd.astype(int)])
         self.all_count = np.concatenate([self.count, np.ones(self.low_omega.size)])

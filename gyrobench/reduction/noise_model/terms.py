@@ -33,6 +33,7 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.series.noise_spectra import folded
 
 PEAKS = ("resonance", "band")
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
@@ -64,17 +65,11 @@ class Grid:
 
     @functools.cached_property
     def flicker(self) -> Array:
-        return folded_flicker(self.omega / (2.0 * math.pi))
+        return folded(self.omega / (2.0 * math.pi))
 
     @functools.cached_property
     def walk(self) -> Array:
         return 1.0 / self.sine - (1.0 / 6.0 if self.means else 0.0)
-
-
-def folded_flicker(nu: Array) -> Array:
-    """Spectrum of means of flicker of S = 1/(2 pi f) over unit time, sampled at unit time, at 0 < nu <= 1/2."""
-    out: Array = np.sin(np.pi * nu) ** 2 / (2.0 * np.pi**3) * (special.zeta(3.0, nu) + special.zeta(3.0, 1.0 - nu))
-    return out
 
 
 def poisson(z: Any, cos: Array) -> Any:

@@ -9,6 +9,15 @@ lines of the budget, the correction of a measured error, the weights of the fit,
 error.  docs/guides/errors_of_the_set_up.md explains them to a metrologist.
 
 A system has sources of its own by declaring them in its folder, in the same way.
+
+The way of a statement ``--set u_axis=60arcsec``:
+
+1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI.
+2. ``effects`` of the test pairs it with what one unit does to the data: :meth:`Source.effect`.
+3. ``with_set_up`` (estimation.effects) puts size times error into the covariance of the data, but for a source that is
+   relative to the reading, and takes corrections out of the data.
+4. ``fit_result`` (estimation): gain of the fit times error (:meth:`Effect.changes`) times size joins u and interval;
+   ``budget_lines`` prints it.
 """
 
 from __future__ import annotations

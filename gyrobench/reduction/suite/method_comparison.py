@@ -254,10 +254,10 @@ def _quantity(c: MeasurandComparison) -> SuiteQuantity:
     if a is not None:
         found = {"mean": WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1, "birge": a.birge, "p": a.p,
                  "largest_E_n": max(p.E_n for p in a.pairs)}  # fmt: skip
+    found |= {"p_adjusted": c.p, "words": c.words(), "deviating": c.outlier[0] if c.outlier else ""}
     return SuiteQuantity(
         name=q.name, unit=q.unit, meaning=q.meaning, combination=dict(q.combination), truth=c.truth, values=values,
-        p_adjusted=c.p, verdict="disagree" if c.disagree else "agree" if a else "–", words=c.words(),
-        deviating=c.outlier[0] if c.outlier else "", **found,
+        verdict="disagree" if c.disagree else "agree" if a else "–", **found,
     )  # fmt: skip
 
 

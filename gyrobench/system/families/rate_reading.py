@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
+from gyrobench.attitudes import parse
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.table_test import TableTest, on_table
 from gyrobench.system.part_files import has_port
+from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot
 
 CURRENT, RATE = "current", "rate"
@@ -70,6 +72,17 @@ class RateReading(RebalanceTest):
             )
         for slot in asked:
             self.request(slot)
+
+    def in_attitude(self, label: str, dwell: float, window: float) -> Plan:
+        """Return a plan of one phase; the mount is the attitude itself, as the table stands level at angle 0."""
+        try:
+            face = parse(self["attitude"], self["latitude"])
+        except ValueError:
+            return Plan()  # check() says why
+        phase = Phase(
+            label=label, mode="index", face=label, target=0.0, settle=self["settle"], dwell=dwell, window=window
+        )
+        return Plan([phase], {label: face})
 
     def check(self) -> list[str]:
         problems = super().check()
