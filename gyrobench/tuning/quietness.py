@@ -59,14 +59,15 @@ def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
     if best < SURPLUS or not problem.structure.blocks or any(w.name == JITTER for w in problem.wishes):
         return None
     low, high = problem.box.T
+    corners = problem.of(problem.corners)
     loud = effort(problem, problem.controller(x))
 
     def cost(y: Array) -> float:
         inside = np.clip(y, low, high)
-        lacking = max(KEPT * best - problem.worst(inside), 0.0)
+        lacking = max(KEPT * best - corners.worst(inside), 0.0)
         if lacking > KEPT * best:  # a wish is missed, or the loop is not stable
             return PRICE * lacking + float(np.sum(np.abs(y - inside)))
-        return float(np.log(effort(problem, problem.controller(inside)) / loud)) + PRICE * lacking + float(
+        return float(np.log(effort(corners, problem.controller(inside)) / loud)) + PRICE * lacking + float(
             np.sum(np.abs(y - inside))
         )  # fmt: skip
 
@@ -81,6 +82,7 @@ def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
             options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
         )  # fmt: skip
         now = np.clip(found.x, low, high)
+    problem.evaluations += corners.evaluations
     less = loud / effort(problem, problem.controller(now))
     if less < WORTH or problem.worst(now) < 0.0:
         return None
