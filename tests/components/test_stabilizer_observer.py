@@ -1,4 +1,4 @@
-"""Disturbance observer and friction compensation: transfer functions by hand, the contact against scipy, limits; in a loop."""
+"""Disturbance observer and friction compensation: transfer functions by hand, the contact against scipy, limits."""
 
 from __future__ import annotations
 
