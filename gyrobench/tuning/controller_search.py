@@ -73,10 +73,15 @@ class TuningProblem:
             self.evaluations += 1
             return np.full((len(self.plants), len(self.wishes)), 100.0 * UNSTABLE)
 
-    def judged(self, controller: Controller) -> Array:
-        self.evaluations += 1
+    def responses(self) -> list[Complex]:
+        """Return the responses of the plants over f."""
         while len(self._responses) < len(self.plants):
             self._responses.append(self.plants[len(self._responses)].response(self.f))
+        return self._responses
+
+    def judged(self, controller: Controller) -> Array:
+        """Return ln ratio of each loop and wish; below UNSTABLE where a loop is not stable."""
+        self.evaluations += 1
         step = self.plants[0].step
         held = HeldController(controller, step)
         shape = len(self.plants), len(self.wishes)
@@ -86,7 +91,7 @@ class TuningProblem:
         while len(self._ways) < min(len(self.sights), len(self.plants)):
             self._ways.append(self.sights[len(self._ways)].at(self.f))
         response = held.response(np.exp(2j * np.pi * self.f * step))
-        loops = np.array(self._responses) * response
+        loops = np.array(self.responses()) * response
         got = with_jitter(self.wishes, measured(self.wishes, self.f, loops), self._ways, response)
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])

@@ -38,6 +38,9 @@ NEXT = 1.5  # times the smallest gain margin: limits of the gain up to it are me
 SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
+REST = "rest"  # phase without a test signal
+NOISE = "noise alone"
+CUT = 1e-3  # of the time: more is said
 FEW = 6  # sines that count: fewer are no measurement
 
 
@@ -140,7 +143,7 @@ def loop_plan(
         return min(float(near.amplitude) if near else AMPLITUDE, largest(f))
 
     slowest = min(frequencies)
-    rest = LoopPhase("rest", "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
+    rest = LoopPhase(REST, "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
     steps = [replace(load, dwell=min(load.dwell, 20.0 / slowest), settle=2.0 / slowest)] if load else []
     fast = [f for f in frequencies if f * SLOWER > max(frequencies)]
     slow = [f for f in frequencies if f not in fast]
@@ -162,7 +165,7 @@ def proof_of(
     step = system.step
     chosen = sine_frequencies(f, L, wishes, step)
     known = session.prepare(settings, seed)[2].parameters
-    v_max = min(float(np.min(known.get(f"{slot}.v_max", np.inf))) for slot in (ports.slot, "platform"))
+    v_max = known_limit(known, ports.slot)
     effort = np.abs(G / (1.0 + L))
     found = None
     for share in SMALLER:
@@ -175,8 +178,8 @@ def proof_of(
         tried = _read(record, at, f, L, wishes, load, ports, sight)
         if found is None or not (tried.limits or tried.why_not):
             found = tried
-        if not found.limits or tried.why_not:
-            break
+        if not found.limits or tried.why_not or NOISE in found.limits:
+            break  # what noise does alone no smaller sine takes away
     assert found is not None
     return found
 
@@ -203,7 +206,8 @@ def _read(
     sines = [g for g in phases if g.kind == "test"]
     judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
-    friction, limits = friction_of(record.run), ", ".join(limits_hit(sines))
+    noise = _cut(phases, ports.slot, known_limit(record.run.parameters, ports.slot))
+    friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *noise])
     step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
     if len(points) < FEW:
         why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"
@@ -219,6 +223,19 @@ def _read(
     return Proof(
         at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load
     )  # fmt: skip
+
+
+def known_limit(parameters: Mapping[str, Any], slot: str) -> float:
+    """Return the largest voltage of the motor, V: of controller or platform, what is less."""
+    return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
+
+
+def _cut(phases: Sequence[Gate], slot: str, limit: float) -> list[str]:
+    """Return how much of the time noise alone has the voltage at its limit, where it has."""
+    at_rest = [g[f"{slot}.v"] for g in phases if g.label == REST and f"{slot}.v" in g.channels]
+    share = float(np.mean(np.abs(at_rest[0]) >= (1.0 - 1e-9) * limit)) if at_rest else 0.0
+    text = f"{slot} ({NOISE} has its voltage at the limit of {limit:.3g} V {100.0 * share:.2g} % of the time)"
+    return [text + ", which takes gain from the loop"] if share > CUT else []
 
 
 def _jitter(wish: Wish, phases: Sequence[Gate], ports: LoopPorts, sight: ExpectedJitter) -> ProvenWish:

@@ -11,7 +11,8 @@ w-plane s = (2/h)(z - 1)/(z + 1), where its step and delays are rational; plant 
 truncation of (A - e I), which leaves integrators and what is slower than e alone.
 
 Not modelled: the spread of the parts in the synthesis itself (the search over it judges each controller).
-Source: Doyle 1979 (recovery), Skogestad 2005, sections 2.7.2, 9.2.2 and 11.3.  H-infinity takes slycot (SB10AD).
+Source: Doyle 1979 (recovery), SLICOT 2020 (examples), Skogestad 2005, sections 2.7.2, 9.2.2 and 11.3.
+H-infinity takes slycot (SB10AD).
 """
 
 from __future__ import annotations
@@ -97,15 +98,15 @@ def reduced(system: StateSpace, order: int, e: float) -> StateSpace:
 
 
 def regulator_gain(a: Array, b: Array, q: Array, r: float) -> Array:
-    """Return F of u = -F x that minimizes int x'q x + r u2, (1, n).  Raises SynthesisError."""
+    """Return F of u = -F x that minimizes int x'q x + r u'u, (inputs, n).  Raises SynthesisError."""
     try:
-        return np.asarray(b.T @ linalg.solve_continuous_are(a, b, q, np.array([[r]])) / r)
+        return np.asarray(b.T @ linalg.solve_continuous_are(a, b, q, r * np.eye(b.shape[1])) / r)
     except (ValueError, linalg.LinAlgError) as error:
         raise SynthesisError(str(error)) from None
 
 
 def filter_gain(a: Array, c: Array, w: Array, v: float) -> Array:
-    """Return the gain of the Kalman filter for intensities w of the states and v of the reading, (n, 1)."""
+    """Return the gain of the Kalman filter for intensities w of the states and v of each reading, (n, readings)."""
     return regulator_gain(a.T, c.T, w, v).T
 
 

@@ -27,6 +27,7 @@ from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, 
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.plant import HeldController, Plant, plants
 from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
+from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
 from gyrobench.tuning.sight_jitter import SightModel, SightWays, sight_models
@@ -35,7 +36,7 @@ from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
-from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes
+from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
 from gyrobench.tuning.written_loop import TunedLoop
 
 ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
@@ -70,7 +71,8 @@ def tune(
     pareto: names of two wishes whose trade is wanted.
     Raises UsageError, TuningError, and what a session raises.
     """
-    wishes, shape = parse_wishes(want), structure_of(structure)
+    wishes, implied = with_margin(parse_wishes(want))
+    shape = structure_of(structure)
     pair = traded(pareto, wishes)
     ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
@@ -90,6 +92,8 @@ def tune(
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
+        quiet_one = quieted(problem, x)
+        x = quiet_one.x if quiet_one else x
         exchanged = trade(problem, x, pair) if pair else None
     try:
         controller = problem.controller(x)
@@ -131,7 +135,9 @@ def tune(
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
-        notes=(*_slips(sources), *_driven(ways, responses, nominal, ports.slot), *_notes(proofs)),
+        best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
+        notes=(*implied, *about(quiet_one), *_slips(sources), *_driven(ways, responses, nominal, ports.slot),
+               *_notes(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
 

@@ -41,7 +41,7 @@ class LoopTuning:
     swaps, maps: parts and mapping files of other slots that were given.
 
     reasons: why what is wanted cannot be had, else ().  loops: L over f (Hz) at each point of the spread, nominal
-    first.
+    first.  best: the largest worst ratio of got to wanted that was found, from which quietness was bought.
     """
 
     system: str
@@ -65,6 +65,7 @@ class LoopTuning:
     slot: str = "stabilizer"  # of the controller
     loop: str = ""  # name of the loop, of a system with several
     trade: Trade | None = None
+    best: float = 0.0
 
     @property
     def name(self) -> str:

@@ -30,6 +30,9 @@ MEASURES: dict[str, tuple[str, bool, str]] = {
     "jitter": ("rad", False, "rms of the line of sight, of a system that states what moves it"),
 }
 JITTER = "jitter"
+#: measures of which one at least keeps a loop from its limit of stability
+MARGINS = ("phase margin", "gain margin", "delay margin", "disk margin", "peak S", "peak T")
+IMPLIED = "peak S<6dB"  # where none of them is wanted
 AT = "S at "  # "S at 1Hz": |S| at a frequency, at most
 
 
@@ -85,6 +88,15 @@ def parse_wishes(texts: Sequence[str]) -> list[Wish]:
             '--want "bandwidth>20Hz" or --want "S at 1Hz<-40dB"'
         )
     return wishes
+
+
+def with_margin(wishes: Sequence[Wish]) -> tuple[list[Wish], list[str]]:
+    """Return the wishes with a margin among them, and the note where it was not wanted in words."""
+    if any(w.name in MARGINS for w in wishes):
+        return list(wishes), []
+    return [*wishes, _wish(IMPLIED)], [
+        f'no margin is wanted, and without one the loop may stand at its limit of stability: "{IMPLIED}" was taken'
+    ]
 
 
 def _known() -> str:

@@ -42,6 +42,7 @@ class PlatformSingleAxisLoop(OneAxisTest):
         rebalance.i_read -> estimator.z
         estimator.estimate -> stabilizer.u
         platform.i_motor -> stabilizer.i_motor
+        platform.theta -> stabilizer.theta
     """  # fmt: skip
     on_request = {
         "channel": OnRequest(
@@ -147,7 +148,8 @@ class PlatformSingleAxisLoop(OneAxisTest):
         J, J_motor, n, viscous, k_t, k_e, R, L = (parts[f"platform.{name}"] for name in names)
         motor = n * k_t / ((L * s + R) * ((J + n * n * J_motor) * s + viscous) + n * n * k_t * k_e)
         loop = g * (1.0 + found["integral"] / s) / k * wr / (s + wr) * motor
-        return {"K": 1.0 / abs(loop), **found}
+        observed = {"gain": abs(g) / abs(loop), "observer": wc / 10.0, "J": J + n * n * J_motor, "k_t": n * k_t, "R": R}
+        return {"K": 1.0 / abs(loop), **found, **observed}
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         k = parts.given("gyro.k", data_sheet(parts["gyro.k"]))

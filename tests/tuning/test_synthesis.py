@@ -81,6 +81,68 @@ def test_regulator_and_filter_of_doyle_and_stein() -> None:
         assert filter_gain(A, C, W, 1.0) == pytest.approx(X @ C.T, rel=1e-8)
 
 
+#: data of the example programs of SB10HD and SB10FD (SLICOT 2020): six states, three disturbances, two inputs
+SLICOT_A = np.array(
+    [[-1, 0, 4, 5, -3, -2], [-2, 4, -7, -2, 0, 3], [-6, 9, -5, 0, 2, -1], [-8, 4, 7, -1, -3, 0], [2, 5, 8, -9, 1, -4],
+     [3, -5, 8, 0, 2, -6]], float,
+)  # fmt: skip
+SLICOT_B = np.array(
+    [
+        [-3, -4, -2, 1, 0],
+        [2, 0, 1, -5, 2],
+        [-5, -7, 0, 7, -2],
+        [4, -6, 1, 1, -2],
+        [-3, 9, -8, 0, 5],
+        [1, -2, 3, -6, -2],
+    ],
+    float,
+)
+SLICOT_C = np.array(
+    [[1, -1, 2, -4, 0, -3], [-3, 0, 5, -1, 1, 1], [-7, 5, 0, -8, 2, -2], [9, -3, 4, 0, 3, 7], [0, 1, -2, 1, -6, -2]],
+    float,
+)
+
+
+def test_regulator_and_filter_make_the_printed_controllers_of_slicot() -> None:
+    """SB02OD: X = (1.7321 1; 1 1.7321) of a double integrator, F its second row.  SB10HD: the H2 controller, to four
+    decimals as printed; its costs have products of x and u, which a change of the input takes out.
+    """
+    double = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    assert regulator_gain(*double, np.eye(2), 1.0)[0] == pytest.approx([1.0, 1.7321], abs=5e-5)
+    D = np.array([[0, 0, 0, -4, -1], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1], [3, 1, 0, 1, -3], [-2, 0, 1, 7, 1]], float)
+
+    def gain(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, solve) -> np.ndarray:
+        """Return F of u = -F x for |c x + d u|2: with d'd = R, u = R^(-1/2) v - R^-1 d'c x."""
+        R, cross = d.T @ d, d.T @ c
+        root = np.linalg.inv(np.linalg.cholesky(R)).T
+        shift = np.linalg.solve(R, cross)
+        return root @ solve(a - b @ shift, b @ root, c.T @ c - cross.T @ shift) + shift
+
+    F = gain(SLICOT_A, SLICOT_B[:, 3:], SLICOT_C[:3], D[:3, 3:], lambda a, b, q: regulator_gain(a, b, q, 1.0))
+    H = gain(
+        SLICOT_A.T, SLICOT_C[3:].T, SLICOT_B[:, :3].T, D[3:, :3].T, lambda a, b, q: filter_gain(a.T, b.T, q, 1.0).T
+    ).T
+    AK = SLICOT_A - SLICOT_B[:, 3:] @ F - H @ SLICOT_C[3:] + H @ D[3:, 3:] @ F
+    printed = [[88.0015, -145.7298, -46.2424, 82.2168, -45.2996, -31.1407],
+               [59.0362, -101.8471, -20.1052, 36.7834, -16.1063, -26.4309]]  # fmt: skip
+    assert AK[[0, 5]] == pytest.approx(np.array(printed), abs=1e-4)
+    assert H[:, 0] == pytest.approx([3.7345, -0.3020, 3.4735, 4.3198, -3.9424, 2.1784], abs=6e-5)
+    assert -F[1] == pytest.approx([7.6899, -8.4558, -2.9642, 7.0365, -4.2844, 0.1390], abs=6e-5)
+
+
+@needs_slycot
+def test_slycot_makes_the_printed_controller_of_slicot() -> None:
+    """SB10FD, gamma = 15: the library whose bisection `hinf` uses, to the four decimals that are printed."""
+    from slycot import sb10fd
+
+    D = np.array([[1, -2, -3, 0, 0], [0, 4, 0, 1, 0], [5, -3, -4, 0, 1], [0, 1, 0, 1, -3], [0, 0, 1, 7, 1]], float)
+    AK, BK, CK, DK, _ = sb10fd(6, 5, 5, 2, 2, 15.0, SLICOT_A, SLICOT_B, SLICOT_C, D)
+    assert AK[0] == pytest.approx([-2.8043, 14.7367, 4.6658, 8.1596, 0.0848, 2.5290], abs=6e-5)
+    assert BK[:, 1] == pytest.approx([-0.0793, -0.5718, 0.6627, 0.1496, -0.2376, -0.7598], abs=6e-5)
+    assert CK[1] == pytest.approx([2.8810, -0.3658, 1.3007, 0.3945, 1.2244, 2.5690], abs=6e-5)
+    assert DK.ravel() == pytest.approx([0.0554, 0.1334, -0.3195, 0.0333], abs=6e-5)
+
+
 @needs_slycot
 def test_mixed_sensitivity() -> None:
     """Skogestad 2005, example 2.17: 1.37.  The norm that is told is that of the closed loop, taken on a grid."""

@@ -9,7 +9,7 @@ import pytest
 from gyrobench.bench import UsageError
 from gyrobench.tuning.spread import parse_spread, points
 from gyrobench.tuning.structures import ControllerStructure
-from gyrobench.tuning.wishes import parse_wishes
+from gyrobench.tuning.wishes import parse_wishes, with_margin
 
 FAST = "bandwidth>20Hz"
 
@@ -105,3 +105,9 @@ def test_spreads_refused(text: str, message: str) -> None:
 def test_structures_refused(name: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         ControllerStructure(name)
+
+
+def test_a_loop_without_a_margin_gets_one() -> None:
+    wishes, notes = with_margin(parse_wishes(["bandwidth>20Hz"]))
+    assert [str(w) for w in wishes] == ["bandwidth at least 20 Hz", "peak S at most 6 dB"] and len(notes) == 1
+    assert with_margin(wishes) == (wishes, [])

@@ -87,6 +87,13 @@ class Presliding(Block):
             self.z = sign(v) * limit
             self.ahead = self.torque(self.z, v, limit)
 
+    def follow(self, x: Number) -> None:
+        """Take the deflection to the angle x, for a model of the contact that only looks on."""
+        if self.coulomb > 0.0:
+            dx = x - self.x_last
+            self.z = self.after(dx, self.limit(dx / self.h))
+        self.x_last = x
+
     def slide(self, x: Number, v: Number, acc: Number, per_J: Number) -> None:
         """Take the contact to the angle x and the rate v; acc without friction and 1 / inertia tell the next step."""
         if self.coulomb > 0.0:

@@ -1,0 +1,99 @@
+"""The price of effort: of what a controller does better than wanted, half is given away for less noise at the motor.
+
+    minimize  rms of |G / (1 + L)| up to half the frequency of the steps      worst over the spread
+    subject to  worst ln ratio >= KEPT times that of the best controller
+
+A wish alone that more gain serves (a bandwidth) would else be answered by all the gain that the structure has.  What is
+wanted stays fulfilled.  Noise of the signal is taken for white: V/rad times rad.  Source: Skogestad 2005, 2.4.5 and 9.3
+(size of K S).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.tuning.controller_search import TuningProblem
+from gyrobench.tuning.plant import HeldController
+from gyrobench.tuning.structures import Controller
+from gyrobench.tuning.wishes import JITTER
+
+KEPT = 0.5  # of ln ratio
+SURPLUS = 0.02  # ln ratio: less of it is not given away
+PRICE = 30.0  # of ln ratio that is missing, in ln rms
+SIZES = (0.25, 0.1, 0.05)  # of the first simplex, share of the box
+SIMPLEX = 200  # evaluations of one
+WORTH = 1.1  # times less noise: for less the best controller stays
+
+
+@dataclass(frozen=True)
+class Quieting:
+    """ratio: worst of got to wanted of the best controller; less: its noise at the motor over that of this one."""
+
+    x: Array
+    ratio: float
+    less: float
+
+
+def effort(problem: TuningProblem, controller: Controller) -> float:
+    """Return the rms of |G / (1 + L)| over frequency, the largest of the spread."""
+    step = problem.plants[0].step
+    response = HeldController(controller, step).response(np.exp(2j * np.pi * problem.f * step))
+    found = 0.0
+    for plant in problem.responses():
+        density = np.abs(response / (1.0 + plant * response)) ** 2
+        found = max(found, float(np.trapezoid(density, problem.f) / problem.f[-1]))
+    return float(np.sqrt(found))
+
+
+def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
+    """Return the controller with less noise, from the best one; None where nothing is to be given away.
+
+    Computed structures have a price of the voltage of their own, and a jitter holds the noise already.
+    """
+    from scipy.optimize import minimize
+
+    best = problem.worst(x)
+    if best < SURPLUS or not problem.structure.blocks or any(w.name == JITTER for w in problem.wishes):
+        return None
+    low, high = problem.box.T
+    corners = problem.of(problem.corners)
+    loud = effort(problem, problem.controller(x))
+
+    def cost(y: Array) -> float:
+        inside = np.clip(y, low, high)
+        lacking = max(KEPT * best - corners.worst(inside), 0.0)
+        if lacking > KEPT * best:  # a wish is missed, or the loop is not stable
+            return PRICE * lacking + float(np.sum(np.abs(y - inside)))
+        return float(np.log(effort(corners, problem.controller(inside)) / loud)) + PRICE * lacking + float(
+            np.sum(np.abs(y - inside))
+        )  # fmt: skip
+
+    now = np.asarray(x, float)
+    for size in SIZES:
+        simplex = np.vstack([now, now + size * np.diag(high - low)])
+        for k in range(len(now)):
+            if simplex[k + 1, k] > high[k]:
+                simplex[k + 1, k] = now[k] - size * (high - low)[k]
+        found = minimize(
+            cost, now, method="Nelder-Mead",
+            options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
+        )  # fmt: skip
+        now = np.clip(found.x, low, high)
+    problem.evaluations += corners.evaluations
+    less = loud / effort(problem, problem.controller(now))
+    if less < WORTH or problem.worst(now) < 0.0:
+        return None
+    return Quieting(now, float(np.exp(best)), less)
+
+
+def about(found: Quieting | None) -> list[str]:
+    """Return what was given away for less noise at the motor."""
+    if found is None:
+        return []
+    return [
+        f"a controller with {found.ratio:.3g} times what is wanted gives {found.less:.3g} times as much noise of the "
+        "sensor to the motor; half of what was left over was given away for this one: wish for more if you need it"
+    ]
