@@ -2,9 +2,10 @@
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV ?= .venv
 BIN := $(VENV)/bin
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check style bench docs studio clean
+.PHONY: demo test test-long check style bench docs studio clean
 
 # The whole single-axis tumble test of the standard gyro: FMUs, run, step check, coefficients, report.
 demo: $(VENV)/demo.stamp
@@ -17,8 +18,14 @@ demo: $(VENV)/demo.stamp
 test: export PYTHONDONTWRITEBYTECODE =
 test: style
 	@$(BIN)/mypy > $(VENV)/mypy.log 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder; failed=$$?; \
+	$(PYTEST) -m "not long"; failed=$$?; \
 	wait $$types || failed=1; cat $(VENV)/mypy.log; exit $$failed
+
+# What takes seconds and has quick tests beside it: counts, attacks, the commands of the guides.  Before a release, and in
+# the continuous integration.
+test-long: export PYTHONDONTWRITEBYTECODE =
+test-long: $(VENV)/test.stamp
+	$(PYTEST) -m long
 
 check: style
 	$(BIN)/mypy

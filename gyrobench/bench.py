@@ -137,7 +137,7 @@ class Bench:
 
     def _listing(self, room: str, file: str) -> dict[str, Path]:
         found: dict[str, Path] = {}
-        for root in (standard_folder(), self.folder):
+        for root in dict.fromkeys((standard_folder(), self.folder)):
             for f in sorted((root / room).glob(f"*/{file}")):
                 found[f.parent.name] = f.parent
         return found

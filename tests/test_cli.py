@@ -30,7 +30,7 @@ def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
     names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
-    assert len(names) == 24
+    assert len(names) == 25
     for name in names:
         code, text, _ = gyrobench(name, "--help")
         assert code == 0

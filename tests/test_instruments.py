@@ -13,9 +13,12 @@ from gyrobench.bench import Bench, UsageError, standard_folder
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instrument
+from gyrobench.units import EARTH_RATE
+from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instruments
 
-SHEETS = sorted(Bench(standard_folder()).instruments())
+ALL = sorted(Bench(standard_folder()).instruments())
+TABLES = [n for n in ALL if find_instrument(n).kind == "turntable"]
+SHEETS = [n for n in ALL if find_instrument(n).kind in ("fibre", "laser", "vibrating")]
 DEG = math.pi / 180.0
 PER_ROOT_HOUR = DEG / 60.0  # 1 deg/sqrt(h), rad/sqrt(s)
 MINE = """\
@@ -75,6 +78,12 @@ def test_limits_set_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", SHEETS)
+def test_the_white_noise_of_a_sheet_is_that_of_its_part(name: str) -> None:
+    sheet = find_instrument(name)
+    assert parameters(sheet)[load_part(sheet.part).white_noise] == sheet.density
+
+
+@pytest.mark.parametrize("name", ["adis16405", "gg1320", "kvh1750"])  # one of each part
 def test_drift_record_returns_the_random_walk(name: str) -> None:
     sheet = find_instrument(name)
     system = load_system("drift_record").with_values({"duration": 120.0, "window": 0.1, "settle": 1.0})
@@ -121,7 +130,7 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         (tmp_path / room).mkdir()
     (tmp_path / "instruments" / "mine.toml").write_text(MINE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    title, values = with_instrument("mine", {})
+    title, values = with_instruments("mine", {})
     assert title == "Me Mine (own sheet, 2020), simulated"
     assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
@@ -141,6 +150,8 @@ def test_from_python() -> None:
         (MINE.replace("noise_density", "noise"), "figures.noise: unknown"),
         (MINE.replace('"typical"', '"about"'), "reading"),
         (MINE.replace('maker = "Me"\n', ""), "maker"),
+        (MINE.replace('part = "gyro_mems"\n', ""), "part: missing"),
+        (MINE.replace('"vibrating"', '"turntable"').replace("noise_density", "wobble"), "a turntable names none"),
     ],
 )
 def test_refused(tmp_path: Path, text: str, said: str) -> None:
@@ -154,8 +165,95 @@ def test_refused_parts(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such data sheet; did you mean"):
         find_instrument("adis1640")
     with pytest.raises(UsageError, match="name no part for it"):
-        with_instrument("adis16405", {"gyro": "floated_gyro"})
+        with_instruments("adis16405", {"gyro": "floated_gyro"})
     file = tmp_path / "mine.toml"
     file.write_text(MINE.replace("gyro_mems", "floated_gyro"), encoding="utf-8")
     with pytest.raises(UsageError, match="takes no data sheets"):
         parameters(read_instrument(file))
+
+
+TABLE = """\
+title = "Mine"
+maker = "Me"
+kind = "turntable"
+source = "own sheet"
+date = "2020"
+
+[figures.height]
+value = "1 m"
+reading = "typical"
+"""
+
+
+def test_a_table_by_hand() -> None:
+    """Fecker 352: 0.0001 deg, 10 deg/s, 5 lbf.ft, 1.5 lbf.ft/arcsec = 20738 g.cm/arcsec; limits of 0.5, 1, 0.5 arcsec.
+
+    The inertia is that which keeps 13209 g.cm/arcsec at 2.56 kg.m2; the capture ends within torque / stiffness.
+    """
+    arcsec = DEG / 3600.0
+    title, found = with_instruments("fecker352", {}, load_system("servo_polar"))
+    assert title == "Fecker 352 (Hu 1981, tables 5-1 to 5-3, 1963 to 1964), simulated"
+    stiffness = 20738.0 * 9.80665e-5 / arcsec
+    assert found == {
+        "table.quantum": pytest.approx(0.36 * arcsec),
+        "table.rate_max": pytest.approx(10.0 * DEG),
+        "table.torque_max": pytest.approx(5.0 * 1.3558179, rel=1e-7),
+        "table.stiffness": pytest.approx(stiffness, rel=1e-4),
+        "table.J": pytest.approx(2.56 * 20738.0 / 13209.0, rel=1e-3),
+        "table.capture_angle": pytest.approx(5.0 * 1.3558179 / stiffness, rel=1e-4),
+        "u_wobble": pytest.approx(0.5 * arcsec / math.sqrt(3.0)),
+        "u_axis": pytest.approx(1.0 * arcsec / math.sqrt(3.0)),
+        "u_angle1": pytest.approx(0.5 * arcsec / math.sqrt(3.0)),
+    }
+    assert with_instruments("fecker352", {}, load_system("table_servo_loop"))[1]["J"] == found["table.J"]
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_servo_with_the_stiffness_of_a_sheet_starts(name: str) -> None:
+    """table_servo takes the parameters: a loop that were unstable, or captured nothing, is refused at the start."""
+    values = with_instruments(name, {}, load_system("servo_polar"))[1]
+    table = load_part("table_servo", standard_folder())()
+    for key, value in values.items():
+        slot, _, parameter = key.partition(".")
+        if slot == "table":
+            setattr(table, parameter, value)
+    table.initialize()
+    assert table.gain > 0.0
+
+
+def test_the_gyro_of_the_table_of_sensitivities() -> None:
+    """Table 5-5 follows from its coefficients: 0.1e-6 ERU/ug along I and S, 50e-6 ERU/g2 along I (ET19)."""
+    found = with_instruments("draper", {})[1]
+    assert found["gyro.D_I"] * 1e-6 == pytest.approx(0.1e-6 * EARTH_RATE)
+    assert found["gyro.D_S"] == found["gyro.D_I"] and found["gyro.D_IS"] == pytest.approx(1e-3 * EARTH_RATE)
+    assert found["gyro.D_II"] == found["gyro.D_SS"] == pytest.approx(50e-6 * EARTH_RATE)
+    assert found["gyro.D_F"] == found["gyro.D_O"] == found["gyro.white"] == found["gyro.walk"] == 0.0
+    assert found["gyro.markov"] == pytest.approx(1.5e-7 * DEG / 3600.0)
+    assert found["gyro.D_T"] == pytest.approx(0.4e-3 * 1.8 * EARTH_RATE)  # per K, printed per degree Fahrenheit
+    assert found["gyro.D_B"] == pytest.approx([40e-6 * EARTH_RATE / 1e-4] * 3)
+
+
+def test_gyro_and_table_in_one_run() -> None:
+    """A fast tumble returns the unbalances of the gyro's sheet; the report names both."""
+    values = {"rate": "5deg/s", "dwell": 60.0, "windows": 24}
+    test = gb.load("tumble_single_axis", values, instrument=["draper", "fecker352"])
+    result = test.run(seed=1).result
+    assert result.instrument.count("; Fecker 352 (") == 1 and result.instrument.startswith("Charles Stark Draper")
+    found = {c.name: c for c in result.coefficients}
+    assert found["D_S"].truth == pytest.approx(0.1 * EARTH_RATE / DEG * 3600.0)
+    assert abs(found["D_S"].estimate - found["D_S"].truth) < 4.0 * found["D_S"].u < 0.1
+    ids = {line.id.partition("[")[0] for line in result.budget}
+    assert any(i.startswith("table.wobble") for i in ids) and any(i.startswith("table.axis.pole") for i in ids)
+
+
+def test_tables_that_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(TABLE, encoding="utf-8")
+    with pytest.raises(UsageError, match="no figure of it sets anything in servo_polar"):
+        with_instruments(str(file), {}, load_system("servo_polar"))
+    with pytest.raises(UsageError, match="attitude_estimator has no slot for one"):
+        with_instruments("mit_e", {}, load_system("attitude_estimator"))
+    with pytest.raises(UsageError, match="mit_e is a turntable too; name one"):
+        with_instruments(["mit_e", "mit_a"], {}, load_system("servo_polar"))
+    with pytest.raises(UsageError, match="not for a suite"):
+        with_instruments("mit_e", {})

@@ -15,12 +15,13 @@ class RateTableVibrating(AxisTable):
         rate_read = (1 + read_gain) (rate - read_lag acc) + noise
 
     omega is the mean of the step, so that what integrates it loses no angle, and a gyro that holds it sees a sine of
-    the right phase, smaller by (pi f h)2/6.  read_lag: the reading is late by it, to first order in 2 pi f read_lag.
+    the right phase, smaller by (pi f h)2/6; alpha likewise, (rate - rate of the step before) / h along the axis.
+    read_lag: the reading is late by it, to first order in 2 pi f read_lag.
     Not modelled: servo and resonances of the table, motion about other axes, distance of the gyro from the axis.
     Source: IEEE 1431, frequency response; frames: CONV-FRAMES.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     simulates = (each("read_gain", ("table.reading.gain",)), each("read_lag", ("table.reading.lag",)))
 
@@ -38,15 +39,21 @@ class RateTableVibrating(AxisTable):
 
     before = Discrete(0.0, "rad", "angle of the step before")
     mean = Discrete(0.0, "rad/s", "mean rate of the step")
+    rate_before = Discrete(0.0, "rad/s", "rate of the step before")
+    mean_acc = Discrete(0.0, "rad/s2", "mean acceleration of the step")
 
     def start(self) -> None:
         self.before = self.motion_angle[2]
         self.mean = self.motion_rate[2]
+        self.rate_before = self.motion_rate[2]
+        self.mean_acc = self.motion_acceleration[2]
 
     @sampled(every=1)
     def tick(self) -> None:
         self.mean = (self.motion_angle[2] - self.before) / self.h
         self.before = self.motion_angle[2]
+        self.mean_acc = (self.motion_rate[2] - self.rate_before) / self.h
+        self.rate_before = self.motion_rate[2]
 
     def outputs(self) -> None:
         self.angle = self.motion_angle[2]
@@ -54,6 +61,6 @@ class RateTableVibrating(AxisTable):
         c = cos(self.angle)
         s = sin(self.angle)
         acc = self.motion_acceleration[2]
-        self.feel(c, s, self.tilted[2] @ self.omega_local + self.mean, self.rate, acc)
+        self.feel(c, s, self.tilted[2] @ self.omega_local + self.mean, self.rate, self.mean_acc)
         self.angle_read = self.angle
         self.rate_read = (1.0 + self.read_gain) * (self.rate - self.read_lag * acc) + self.noise.reading

@@ -189,7 +189,7 @@ def sensor() -> list[Example]:
         Example("Table 5-5", "square, along the input axis", "50e-6", "ERU/g²", by, one(["D_II"], 1.0, 0.0, 0.0),
                 "ET19"),
         Example("Table 5-5", "square, 1 g along input and spin axis each", "1e-3", "ERU/g²", by,
-                one(["D_IS", "D_II", "D_SS"], 1.0, 0.0, 1.0)),
+                one(["D_IS", "D_II", "D_SS"], 1.0, 0.0, 1.0), "ET24"),
         Example("5.6.2", "random drift of 1e-8 ERU", "1.5e-7", "°/h", "`units.convert`",
                 units.convert(1e-8, "ERU", "deg/h")),
         Example("Table 5-7", "tilt about north at 45.75°", "3e-4", "″", run, at["north"] / ARCSEC),

@@ -15,7 +15,7 @@ from gyrobench.reading import visible
 from gyrobench.workflow.user_errors import exit_code, user_message
 
 for module in (
-    "bench", "run", "campaign", "tuning", "identification", "exchange", "learn", "studio",
+    "bench", "run", "campaign", "tuning", "identification", "bearing", "exchange", "learn", "studio",
 ):  # in the order of the help  # fmt: skip
     importlib.import_module(f"gyrobench.commands.{module}_commands")
 

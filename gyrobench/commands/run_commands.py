@@ -42,9 +42,9 @@ def run(
     part: Part = None,
     mapping: Map = None,
     instrument: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            metavar="NAME", help="Data sheet of a rate gyro (instruments/NAME.toml, or a file) for the slot gyro."
+            metavar="NAME", help="Data sheet (instruments/NAME.toml, or a file) of a gyro, of a turntable.  Repeatable."
         ),
     ] = None,
     from_run: FromRun = None,
@@ -85,6 +85,7 @@ def run(
       gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml
       gyrobench run tumble_single_axis --spec floated_gyro --strict
       gyrobench run drift_record --instrument adis16405
+      gyrobench run servo_polar --instrument draper --instrument fecker352
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench.commands import print_runs
@@ -94,13 +95,13 @@ def run(
     from gyrobench.system.suite import Suite
     from gyrobench.workflow.handover import handed_over
     from gyrobench.workflow.inputs import load_test
-    from gyrobench.workflow.instruments import with_instrument
+    from gyrobench.workflow.instruments import with_instruments
     from gyrobench.workflow.run_execution import RunRequest
     from gyrobench.workflow.settings import load_with_values
 
     parts, maps = parse_swaps(part, mapping)
     time_step = parse_time("--step", step)
-    title, sheet = with_instrument(instrument, parts) if instrument else ("", {})
+    title, sheet = with_instruments(instrument, parts, load_test(system)) if instrument else ("", {})
     taken = handed_over(load_test(system), from_run) if from_run else {}
     test = load_with_values(system, {**sheet, **taken, **parse_settings(values)}, time_step, coupling.value)
     if not isinstance(test, Suite):

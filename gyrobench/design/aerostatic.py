@@ -23,6 +23,7 @@ GAMMA = 1.4
 CRITICAL = (2.0 / (GAMMA + 1.0)) ** (GAMMA / (GAMMA - 1.0))
 SMALL = 1e-3  # eccentricity at which the stiffness is taken
 WIDE = 1e-4  # m
+RANGE = (math.log(1e-6), math.log(WIDE))  # of the gaps that are looked at
 
 
 class BearingError(GyrobenchError):
@@ -105,21 +106,27 @@ class AerostaticBearing:
         """Return dM/dphi, N.m/rad: two rows, each half the bearing, a quarter of the length from the middle."""
         return self.stiffness() * self.length**2 / 16.0
 
-    def with_stiffness(self, wanted: float) -> AerostaticBearing:
-        """Return this bearing with the wider of the two gaps that have the wanted stiffness (N/m).
+    def stiffest(self) -> AerostaticBearing:
+        """Return this bearing with the gap of the greatest stiffness: with the gap it rises to a maximum and falls."""
+        from scipy.optimize import minimize_scalar
 
-        The stiffness rises with the gap to a maximum and falls again.
-        """
-        from scipy.optimize import brentq, minimize_scalar
+        def softness(log_gap: float) -> float:
+            return -replace(self, gap=math.exp(log_gap)).stiffness()
+
+        best = minimize_scalar(softness, bounds=RANGE, method="bounded", options={"xatol": 1e-6})
+        return replace(self, gap=math.exp(best.x))
+
+    def with_stiffness(self, wanted: float) -> AerostaticBearing:
+        """Return this bearing with the wider of the two gaps that have the wanted stiffness (N/m)."""
+        from scipy.optimize import brentq
 
         def at(log_gap: float) -> float:
             return replace(self, gap=math.exp(log_gap)).stiffness()
 
-        low, high = math.log(1e-6), math.log(WIDE)
-        best = minimize_scalar(lambda x: -at(x), bounds=(low, high), method="bounded", options={"xatol": 1e-6})
-        if not at(high) < wanted <= -best.fun:
+        best, high = self.stiffest(), RANGE[1]
+        if not at(high) < wanted <= best.stiffness():
             raise BearingError(
                 f"bearing: stiffness = {wanted:g} N/m: gaps up to {WIDE * 1e6:g} um have {at(high):.3g} to "
-                f"{-best.fun:.3g} N/m (at {math.exp(best.x) * 1e6:.3g} um)"
+                f"{best.stiffness():.3g} N/m (at {best.gap * 1e6:.3g} um)"
             )
-        return replace(self, gap=math.exp(brentq(lambda x: at(x) - wanted, best.x, high, xtol=1e-9)))
+        return replace(self, gap=math.exp(brentq(lambda x: at(x) - wanted, math.log(best.gap), high, xtol=1e-9)))

@@ -38,7 +38,7 @@ from gyrobench.result import Result
 from gyrobench.system.suite import Suite
 from gyrobench.workflow.handover import handed_over
 from gyrobench.workflow.inputs import load_test
-from gyrobench.workflow.instruments import with_instrument
+from gyrobench.workflow.instruments import with_instruments
 from gyrobench.workflow.run_comparison import Comparison, compare_results, read_result
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def load(
     parts: Mapping[str, File] | None = None,
     maps: Mapping[str, File] | None = None,
     coupling: str = "sequential",
-    instrument: str = "",
+    instrument: str | Sequence[str] = "",
     from_run: Sequence[File] = (),
     **options: Any,
 ) -> Experiment:
@@ -87,7 +87,7 @@ def load(
 
     values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
     mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  instrument: data sheet of a rate gyro (``instruments/NAME.toml``, or a file) for the slot gyro.
+    before.  instrument: data sheet (``instruments/NAME.toml``, or a file) of a gyro, of a turntable, or both.
     from_run: folders of runs of other tests whose results give values of this one; values and options go before them.
     Raises errors of type GyrobenchError; UsageError for a suite.
     """
@@ -98,7 +98,7 @@ def load(
         raise UsageError(f"coupling = '{coupling}': one of sequential, parallel")
     test.coupling = "parallel" if coupling == "parallel" else ""
     swaps: dict[str, Any] = dict(parts or {})
-    title, sheet = with_instrument(instrument, swaps) if instrument else ("", {})
+    title, sheet = with_instruments(instrument, swaps, test) if instrument else ("", {})
     test.instrument = title
     experiment = Experiment(test, swaps, maps or {})
     taken = handed_over(test, [Path(run) for run in from_run]) if from_run else {}

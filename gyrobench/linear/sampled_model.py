@@ -23,6 +23,7 @@ from gyrobench.linear.part_linearization import jacobians
 
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
+ALIKE = 1e-3  # relative change of a coefficient between two steps that are alike
 FINE = 1e-3  # of the step, where it is to be none
 MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the same one step later
 
@@ -41,6 +42,11 @@ class SampledStep:
     c: Array
     d: Array
     within: bool = False
+
+    def is_like(self, other: SampledStep, change: float) -> bool:
+        """Return whether no coefficient of another step differs by more than a relative change."""
+        pairs = [(getattr(self, m), getattr(other, m)) for m in "abcd"]
+        return all(np.allclose(x, y, rtol=change, atol=1e-6 * np.abs(x).max(initial=0.0)) for x, y in pairs)
 
 
 def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: float) -> SampledStep | None:
@@ -67,17 +73,18 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     if first.within:
         return first
     try:
-        for k in range(SETTLED):
+        twin.do_step(0.0, step)
+        if first.is_like(_differences(twin, inputs, outputs, step, discrete), ALIKE / SETTLED):
+            return first
+        for k in range(1, SETTLED):
             twin.do_step(k * step, step)
         last = _differences(twin, inputs, outputs, step, discrete)
         twin.do_step(SETTLED * step, step)
         after = _differences(twin, inputs, outputs, step, discrete)
     except ComponentError as error:
         raise ValueError(str(error)) from error
-    for m in "abcd":
-        x, y = getattr(last, m), getattr(after, m)
-        if not np.allclose(x, y, rtol=1e-3, atol=1e-6 * (np.abs(x).max() if x.size else 0.0)):
-            raise ValueError("its one step is not like the next (a memory, or a sampling period of several steps)")
+    if not last.is_like(after, ALIKE):
+        raise ValueError("its one step is not like the next (a memory, or a sampling period of several steps)")
     return last
 
 

@@ -46,7 +46,7 @@ WORDS = (
     ("table", "table_(?!command|program)|table$|fixture|index|bracket|wobble"), ("platform", "platform|gimbal"),
     ("controller", "controller|stabilizer|rebalance|servo|decoupler|cage|slaving|current|coupling"),
     ("plan", "sequencer|program|command|supervisor|sampler|monitor"), ("motor", "motor|slipring|bearing|tachometer"),
-    ("reader", "meter|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
+    ("reader", "meter|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
     ("place", "site|ground|surroundings|foundation|thermostat|chamber"),
     ("source", "source|offset|exciter|motion|manoeuvre|torque|vibration"),
     ("gyro", "gyro"),

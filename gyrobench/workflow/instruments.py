@@ -1,25 +1,24 @@
-"""Data sheets of instruments, ``instruments/NAME.toml``, and the parameters of a part that they make.
+"""Data sheets of instruments, ``instruments/NAME.toml``, and the values of a system that they make.
 
     title = "ADIS16405"
     maker = "Analog Devices"
-    kind = "vibrating"                     # fibre, laser, vibrating
-    part = "gyro_mems"                     # the part that takes the figures
+    kind = "vibrating"                     # fibre, laser, vibrating, floated, turntable
+    part = "gyro_mems"                     # the part that takes the figures; of a turntable: left out
     source = "data sheet ADIS16400/ADIS16405"
     date = "2009"                          # of the source
 
-    [figures.noise_density]                # the figures that FIGURES knows
+    [figures.noise_density]                # the figures that gyrobench.workflow.sheet_values knows for this kind
     value = "0.05 deg/s/sqrt(Hz)"          # as printed, with its unit
     reading = "typical"                    # typical, one_sigma, maximum, minimum, or limit: plus or minus, of all units
     note = "rms in 1 Hz, one-sided"
 
-What becomes of the figures is written in :func:`parameters`.  A limit of an error says nothing about one instrument and
-sets nothing.  Not modelled: figures that no part has (vibration, ageing).  [GYRO-SHEET]
+What becomes of the figures is written in :mod:`gyrobench.workflow.sheet_values`.  A gyro goes into the slot gyro; a
+turntable changes no part: it sets what the system's table has, and what is believed of it.  [GYRO-SHEET, TABLE-PRESETS]
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,39 +28,14 @@ from gyrobench import reading
 from gyrobench.bench import Bench, UsageError, suggest_names
 from gyrobench.boundary import faults_of
 from gyrobench.packaging import load_part
+from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError, parse_number
+from gyrobench.workflow import sheet_values
+from gyrobench.workflow.sheet_values import FIGURES, SETTINGS, SIGNED
 
-#: figure -> unit
-FIGURES: dict[str, str] = {
-    "range": "rad/s",
-    "resolution": "rad/s",
-    "bandwidth": "Hz",
-    "output_rate": "Hz",
-    "noise_density": "rad/s/sqrt(Hz)",
-    "angle_random_walk": "rad/sqrt(s)",
-    "bias_instability": "rad/s",
-    "bias": "rad/s",
-    "bias_temperature": "rad/s/K",
-    "scale_error": "1",
-    "scale_temperature": "1/K",
-    "nonlinearity": "1",
-    "misalignment": "rad",
-    "cross_axis": "1",
-    "g_sensitivity": "rad.s/m",
-}
-SETTINGS = ("range", "resolution", "bandwidth", "output_rate")  # no errors: a limit of one is what it is
-#: least Allan deviation over the coefficient B of flicker noise, (2 ln 2 / pi)^0.5
-FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
-#: figure -> parameter of a part, of each axis where it has two
-DIRECT = {
-    "range": "range_max",
-    "bandwidth": "bandwidth",
-    "resolution": "resolution",
-    "bias": "turn_on",
-    "bias_temperature": "bias_T",
-    "scale_error": "scale",
-    "scale_temperature": "scale_T",
-}
+TABLE_SLOTS = ("table", "outer", "inner")
+TABLE_SOCKETS = ("Table", "ServoTable", "TwoAxisTable")
 
 
 class Figure(BaseModel):
@@ -81,24 +55,35 @@ class Instrument(BaseModel):
 
     title: str = Field(min_length=1)
     maker: str = Field(min_length=1)
-    kind: Literal["fibre", "laser", "vibrating"]
-    part: str = Field(min_length=1)
+    kind: Literal["fibre", "laser", "vibrating", "floated", "turntable"]
+    part: str = ""
     source: str = Field(min_length=1)
     date: str = Field(min_length=4)
     figures: dict[str, Figure] = Field(min_length=1)
+
+    @property
+    def label(self) -> str:
+        """Return what a report calls it."""
+        return f"{self.maker} {self.title} ({self.source}, {self.date}), simulated"
 
     def si(self, name: str) -> float | None:
         """Return a figure in SI; None where the sheet has none, or only a limit of an error."""
         figure = self.figures.get(name)
         if figure is None or (figure.reading == "limit" and name not in SETTINGS):
             return None
-        return float(parse_number(name, figure.value, FIGURES[name]))
+        return float(parse_number(name, figure.value, FIGURES[self.kind][name]))
+
+    def limit(self, name: str) -> float | None:
+        """Return the size that no unit exceeds, SI; None where the sheet has no limit of this figure."""
+        figure = self.figures.get(name)
+        if figure is None or figure.reading not in ("limit", "maximum"):
+            return None
+        return float(parse_number(name, figure.value, FIGURES[self.kind][name]))
 
     @property
     def density(self) -> float | None:
         """Return N, the two-sided density of the white noise: the angle random walk, or the density over sqrt 2."""
-        walk, density = self.si("angle_random_walk"), self.si("noise_density")
-        return walk if walk is not None else None if density is None else density / math.sqrt(2.0)
+        return sheet_values.density(self)
 
 
 def find_instrument(name: str) -> Instrument:
@@ -119,12 +104,19 @@ def read_instrument(file: Path) -> Instrument:
     except ValidationError as error:
         found = faults_of(error, lambda place: Figure if place[0] == "figures" and len(place) > 2 else Instrument)
         raise UsageError("\n".join([f"{file}: not a data sheet:", *(f"  - {p}" for p in found)])) from None
-    problems = [f"figures.{n}: unknown; {suggest_names(n, FIGURES)}" for n in sheet.figures if n not in FIGURES]
+    known = FIGURES[sheet.kind]
+    problems = [f"figures.{n}: unknown; {suggest_names(n, known)}" for n in sheet.figures if n not in known]
+    if (sheet.kind == "turntable") == bool(sheet.part):
+        problems.append(
+            "part: a turntable names none, its figures go to the table of the system"
+            if sheet.part
+            else "part: missing; the part that takes the figures"
+        )
     for name, figure in sheet.figures.items():
-        if name in FIGURES:
+        if name in known:
             try:
-                value = float(parse_number(f"figures.{name}", figure.value, FIGURES[name]))
-                if not value > 0.0:
+                value = float(parse_number(f"figures.{name}", figure.value, known[name]))
+                if not value > 0.0 and name not in SIGNED:
                     problems.append(f"figures.{name} = {figure.value}: a size is expected, above 0")
             except (InvalidValueError, TypeError, ValueError) as error:
                 problems.append(str(error))
@@ -134,48 +126,68 @@ def read_instrument(file: Path) -> Instrument:
 
 
 def parameters(sheet: Instrument) -> dict[str, Any]:
-    """Return the parameters of the part, SI: those that it has; sizes of errors are set positive, on both axes.
+    """Return the parameters of the part of a gyro's sheet, SI, those that it has.
 
-    angle random walk, or the one-sided noise density over sqrt 2: white noise.  bias instability, the least Allan
-    deviation: flicker noise of that floor.  bias: rms of the turn-on bias.  nonlinearity, largest departure from the
-    best line over the range: a cubic, whose least-squares line over +-range leaves 0.4 c range3 at the ends.  The
-    output rate sets nothing: a sample is taken every communication step (held over several, `gyro.period`, samples are
-    used twice here and there).
     Raises UsageError for a part that takes no data sheets.
     """
     part = load_part(sheet.part, Bench.find().folder)
-    white = getattr(part, "white_noise", "")
-    if not white:
-        raise UsageError(f"{sheet.title}: the part {sheet.part} takes no data sheets: it names no white_noise")
-    found: dict[str, Any] = {}
-    if (density := sheet.density) is not None:
-        found |= {white: density, **part.without_own_noise}  # type: ignore[attr-defined]
-    if (floor := sheet.si("bias_instability")) is not None:
-        found |= {"flicker_x": floor / FLOOR, "flicker_y": floor / FLOOR}
-    for name, parameter in DIRECT.items():
-        declared = part.declarations.get(parameter)
-        if declared is not None and declared.unit == FIGURES[name] and sheet.si(name) is not None:
-            found[parameter] = [sheet.si(name)] * 2 if declared.shape else sheet.si(name)
-    if (g := sheet.si("g_sensitivity")) is not None:
-        found["g"] = [[g, 0.0, 0.0], [0.0, g, 0.0]]
-    if (nonlinearity := sheet.si("nonlinearity")) is not None and (full := sheet.si("range")) is not None:
-        found["cubic"] = nonlinearity / 0.4 / full**2
-    if lean := sheet.si("misalignment") or sheet.si("cross_axis"):
-        found["axes"] = [[1.0, lean, 0.0], [0.0, 1.0, lean]]
+    found = sheet_values.floated(sheet) if sheet.kind == "floated" else sheet_values.rate_gyro(sheet, part)
+    if sheet.kind == "floated" and not found.keys() <= part.declarations.keys():
+        raise UsageError(f"{sheet.title}: the part {sheet.part} takes no data sheets of a floated gyro")
     return {n: v for n, v in found.items() if n in part.declarations}
 
 
-def settings(sheet: Instrument, slot: str = "gyro") -> Mapping[str, Any]:
+def settings(sheet: Instrument, slot: str = "gyro") -> dict[str, Any]:
     """Return the parameters as values of a system: "gyro.white" -> value."""
     return {f"{slot}.{n}": v for n, v in parameters(sheet).items()}
 
 
-def with_instrument(name: str, parts: dict[str, str]) -> tuple[str, dict[str, Any]]:
-    """Put the part of a data sheet into the slot gyro; return what a report calls it, and the values of its parameters.
+def table_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dict[str, Any]:
+    """Return what a turntable's sheet sets in a system: parameters of its tables, and options of what is believed.
 
-    Raises UsageError.
+    Raises UsageError where the system has no table, or none that takes a figure of the sheet.
     """
-    sheet = find_instrument(name)
-    if parts.setdefault("gyro", sheet.part) != sheet.part:
-        raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
-    return f"{sheet.maker} {sheet.title} ({sheet.source}, {sheet.date}), simulated", dict(settings(sheet))
+    bench, found = Bench.find(), dict[str, Any]()
+    tables = [s for s in TABLE_SLOTS if s in test.slots and test.slots[s].socket in TABLE_SOCKETS]
+    if not tables:
+        raise UsageError(f"the data sheet {sheet.title} is of a turntable: {test.name} has no slot for one")
+    for slot in tables:
+        name = parts.get(slot, test.slots[slot].part)
+        if name in bench.parts():  # an FMU of another tool keeps what it has
+            declared = load_part(name, bench.folder).declarations
+            found |= {f"{slot}.{n}": v for n, v in sheet_values.turntable(sheet, declared).items()}
+    owner = {target: name for name, option in test.options.items() for target in option.sets.split()}
+    found = {owner.get(n, n): v for n, v in found.items()}  # what the plan follows is set by its option
+    found |= {n: v for n, v in sheet_values.beliefs(sheet).items() if n in test.options}
+    if not found:
+        raise UsageError(f"the data sheet {sheet.title}: no figure of it sets anything in {test.name}")
+    return found
+
+
+def with_instruments(
+    names: str | Sequence[str], parts: dict[str, str], test: System | Suite | None = None
+) -> tuple[str, dict[str, Any]]:
+    """Put the parts of data sheets into their slots; return what a report calls them, and the values that they set.
+
+    names: one name or several, a gyro and a turntable at most.  Raises UsageError.
+    """
+    found: dict[str, Any] = {}
+    titles, taken = [], dict[bool, str]()
+    for name in [names] if isinstance(names, str) else names:
+        sheet = find_instrument(name)
+        table = sheet.kind == "turntable"
+        if table in taken:
+            raise UsageError(
+                f"--instrument {name}: {taken[table]} is a {'turntable' if table else 'gyro'} too; name one"
+            )
+        taken[table] = name
+        titles.append(sheet.label)
+        if table:
+            if not isinstance(test, System):
+                raise UsageError(f"--instrument {name}: a turntable is for one test, not for a suite")
+            found |= table_settings(sheet, test, parts)
+            continue
+        if parts.setdefault("gyro", sheet.part) != sheet.part:
+            raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
+        found |= settings(sheet)
+    return "; ".join(titles), found

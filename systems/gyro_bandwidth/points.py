@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy import special
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_measures import Gate, gates, neighbour_noise, phasor, response
+from gyrobench.reduction.loops.loop_measures import gates
+from gyrobench.reduction.loops.response_errors import line_ratios
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = 8  # frequencies
 TABLE, GYRO = "table.rate_read", "gyro.rate[1]"
-ROUNDING = 1e-6  # least relative uncertainty of a point
 UNKNOWN = 1e-3  # of the points of a record that states none: any, the scatter about the curve takes its place
-LINES = 12  # numbers from which neighbour_noise estimates
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class Points:
     """Frequencies (n,), Hz; gyro over table; relative u; amplitude of the table, rad/s; whether u is known."""
 
     f: Array
-    value: np.ndarray[tuple[int], np.dtype[np.complex128]]
+    value: NDArray[Any]
     u: Array
     table: Array
     known: bool = True
@@ -58,20 +56,7 @@ def _of_rows(record: Record) -> Points:
 
 
 def _of_phases(record: Record) -> Points:
-    rows = [(g.f, *_ratio(g), abs(phasor(g.t, g[TABLE], g.f))) for g in gates(record) if g.kind == "motion"]
-    over = tuple(g.f for g in gates(record) if g.kind == "motion" and np.any(g["gyro.saturated"] > 0.5))
-    f, value, u, table = (np.array(column) for column in zip(*rows, strict=True))
-    return Points(f, value, u, table, True, over)
-
-
-def _ratio(gate: Gate) -> tuple[complex, float]:
-    """Return gyro over table, and its relative uncertainty by the lines beside the frequency."""
-    t, x, y = gate.t, gate[TABLE], gate[GYRO]
-    point = response(t, x, y, gate.f)
-    noise = [neighbour_noise(t, signal, gate.f) for signal in (y, x)]
-    if any(n is None for n in noise):
-        return point.value, max(point.u or 0.0, ROUNDING)
-    few = float(special.stdtrit(LINES, 0.975)) / NORMAL  # many points together: no allowance for few numbers
-    sizes = [abs(phasor(t, signal, gate.f)) for signal in (y, x)]
-    u = math.hypot(*(float(n or 0.0) / few / size for n, size in zip(noise, sizes, strict=True)))
-    return point.value, max(u, ROUNDING)
+    shaken = [g for g in gates(record) if g.kind == "motion"]
+    over = tuple(g.f for g in shaken if np.any(g["gyro.saturated"] > 0.5))
+    r = line_ratios(shaken, TABLE, GYRO)
+    return Points(r.f, r.value, r.u, r.x, True, over)

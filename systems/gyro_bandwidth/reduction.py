@@ -12,13 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from gyrobench import units
-from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.loops.loop_curves import bode, curve
-from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.loops.loop_toolkit import Account, MeasureReduction, Point, ReductionError, Table, told
+from gyrobench.reduction.loops.response_errors import (
+    COSINE,
+    READING_GAIN,
+    READING_LAG,
+    Sensitivity,
+    predicted_shifts,
+)
 from gyrobench.reduction.setup.sources import TIME_BASE, Source
-from gyrobench.result import BudgetLine
 from gyrobench.units import DEG
 
 from .mistakes import mistakes
@@ -26,9 +29,6 @@ from .points import points_of
 from .response import GyroResponse, figures, logarithm
 from .truth import true_values
 
-READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
-READING_LAG = Source("table.reading.lag", "lag of the reading of the table rate", "s", "u_lag", "reading late")
-COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
 #: name, meaning, unit, SI per unit
 FIGURES = (
     ("K", "gain at low frequency: rate indicated over rate of the table", "1", 1.0),
@@ -94,13 +94,16 @@ class Reduction(MeasureReduction):
             if not math.isfinite(value):
                 found.measure(name, meaning, unit, None, no_value=NOT_REACHED.format(f=highest))
                 continue
-            shares = [float(np.nan_to_num(row[k])) * u for _, u, row in by]
-            u = math.hypot(float(self.figures.u[k]), *shares)
+            u = math.hypot(float(self.figures.u[k]), *(s.share(k) for s in by))
             true = float(truth[k]) if truth is not None and math.isfinite(truth[k]) else None
             found.measure(name, meaning, unit, value, u, scale=scale, truth=true)
             found.coefficients[-1] = replace(found.coefficients[-1], u_a=float(self.figures.u[k]) / scale)
-            self._budget(name, unit, scale, k, by, shares)
-        self._predicted(by)
+            found.budget += [s.line(name, unit, scale, k) for s in by if s.u > 0.0]
+        known = [k for k in range(len(FIGURES)) if math.isfinite(self.figures.value[k])]
+        shifts = predicted_shifts(
+            self.run, by, [(k, FIGURES[k][0], *FIGURES[k][2:], float(self.figures.u[k])) for k in known]
+        )
+        found.tables += [shifts] if shifts else []
         self._doubts()
         span = np.geomspace(points.f[0], highest, 200)
         fitted = logarithm(curve_of.p, span)
@@ -137,7 +140,7 @@ class Reduction(MeasureReduction):
             (COSINE, cosine, r.moved(cosine * one + 0j)),
         ]
 
-    def _sensitivities(self) -> list[tuple[Source, float, Array]]:
+    def _sensitivities(self) -> list[Sensitivity]:
         """Return of each source its standard uncertainty and the change (5,) of the figures for one unit of it, SI."""
         base = self.figures
         out = []
@@ -145,37 +148,8 @@ class Reduction(MeasureReduction):
             again = figures(moved, lambda curves: next((c for c in curves if c.poles == base.curve.poles), curves[-1]))
             change = np.zeros(5) if again is None else (again.value - base.value) / step
             u = float(self.run.options.get(source.option, 0.0)) if source.option in self.run.options else 0.0
-            out.append((source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
+            out.append(Sensitivity(source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
         return out
-
-    def _budget(self, name: str, unit: str, scale: float, k: int, by: list[tuple[Source, float, Array]],
-                shares: list[float]) -> None:  # fmt: skip
-        for (source, u, row), share in zip(by, shares, strict=True):
-            if u > 0.0:
-                per = unit if source.unit == "1" else f"{unit}/{source.unit}"
-                self.found.budget.append(
-                    BudgetLine(source.id, source.name, u, source.unit, float(np.nan_to_num(row[k])) / scale, per,
-                               abs(share) / scale, unit, name, source.note)
-                )  # fmt: skip
-
-    def _predicted(self, by: list[tuple[Source, float, Array]]) -> None:
-        """Show by how much each figure is off by the simulated errors of the set-up."""
-        errors = simulated_errors(self.run)
-        known = [(s, float(e), row) for s, _, row in by if isinstance(e := errors.get(s.id), float) and e]
-        if not known:
-            return
-        rows = []
-        for k, (name, _, unit, scale) in enumerate(FIGURES):
-            if math.isfinite(self.figures.value[k]):
-                each = [error * float(row[k]) / scale for _, error, row in known]
-                rows.append([name, *each, sum(each), float(self.figures.u[k]) / scale, unit])
-        said = [f"({n}) {s.name}, {units.format_quantity(e, s.unit)}" for n, (s, e, _) in enumerate(known, 1)]
-        caption = (
-            "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
-            f"{'; '.join(said)}."
-        )
-        head = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
-        self.found.tables.append(Table(PREDICTED, "Predicted shifts by simulated errors", caption, head, rows))
 
     def _doubts(self) -> None:
         found, points, c = self.found, self.points, self.figures.curve
@@ -183,7 +157,7 @@ class Reduction(MeasureReduction):
             at = ", ".join(f"{f:.3g} Hz" for f in points.saturated)
             found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
                                           "smaller rate.")  # fmt: skip
-        stated = any(u > 0.0 for _, u, _ in self._sensitivities())
+        stated = any(s.u > 0.0 for s in self._sensitivities())
         if self.run.measured and not stated and self.run.type_b != "none":
             found.doubt("type_b.unstated", "No uncertainty of the table or its reading is stated: u is of the points "
                                            "alone. State u_gain, u_lag ..., or declare type_b = none.")  # fmt: skip

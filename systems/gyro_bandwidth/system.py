@@ -7,10 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.families.table_test import ON_TABLE
+from gyrobench.system.families.vibrating_table import (
+    FREQUENCIES,
+    MOUNT,
+    SHAKEN,
+    STATED,
+    TABLE,
+    TIMES,
+    frequency_problems,
+)
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
@@ -18,20 +26,6 @@ from gyrobench.units import DEG
 
 from .measured import MEASURED
 
-TABLE = Socket(
-    "VibratingTable",
-    "table that follows an angular vibration about its axis: motion in, rates and forces on its face out",
-    (
-        inp("motion_angle", "rad", "angle asked for, the third about its axis", 3),
-        inp("motion_rate", "rad/s", "its rate", 3),
-        inp("motion_acceleration", "rad/s2", "its acceleration", 3, optional=True),
-        inp("f_local", "m/s2", "specific force at the site, ENU", 3),
-        inp("omega_local", "rad/s", "Earth rate at the site, ENU", 3),
-        out("omega", "rad/s", "inertial rate, face axes", 3),
-        out("f", "m/s2", "specific force, face axes", 3),
-        out("rate_read", "rad/s", "table rate as read"),
-    ),
-)
 WAY = 0.5  # rad, largest angle of the table
 
 
@@ -51,25 +45,15 @@ class GyroBandwidth(System):
         "table": Slot(TABLE, "rate_table_vibrating"),
         "gyro": Slot("RateGyro", "gyro_vibratory"),
     }
-    wires = """
-        site -> table: f=f_local omega=omega_local
-        exciter -> table: motion_angle motion_rate motion_acceleration
-        table -> gyro: omega f
-    """
-    options = SITE | {
-        "lowest": Option("1Hz", "Hz", "lowest frequency", 1e-3),
-        "highest": Option("200Hz", "Hz", "highest frequency", 1e-2),
-        "points": Option(25, int, "frequencies, in equal ratios", 8, 90),
-        "rate": Option("10deg/s", "rad/s", "amplitude of the table rate", 1e-9),
-        "periods": Option(20, int, "periods measured at each frequency, at least", 10, 100_000),
-        "dwell": Option(1.0, "s", "time measured at each frequency, at least", 1e-3),
-        "settle": Option(0.5, "s", "time in which the vibration sets in", 1e-3),
-        "u_gain": Option(0.0, "1", "relative standard uncertainty of the reading of the table rate", 0.0),
-        "u_lag": Option(0.0, "s", "standard uncertainty of the time by which that reading is late", 0.0),
-        "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
-        "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the table axis, about each axis "
-                          "across it", 0.0),
-    }  # fmt: skip
+    wires = SHAKEN + "table -> gyro: omega f"
+    options = (
+        SITE
+        | FREQUENCIES
+        | {"rate": Option("10deg/s", "rad/s", "amplitude of the table rate", 1e-9)}
+        | TIMES
+        | STATED
+        | MOUNT
+    )
     assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
     noises = ("table.reading", "gyro.pickoff", *RATE_NOISES)
     done = "exciter.done"
@@ -100,13 +84,7 @@ class GyroBandwidth(System):
         return {**self.plan().parameters(), **self.owned(), "table.base": np.eye(3), "table.face": np.array(ON_TABLE)}
 
     def check(self) -> list[str]:
-        problems = []
-        if not self["lowest"] < self["highest"]:
-            problems.append(f"lowest = {self['lowest']:g} Hz: must be below highest = {self['highest']:g} Hz")
-        if self["highest"] * self.step > 0.05:
-            problems.append(
-                f"highest = {self['highest']:g} Hz: a period needs 20 communication steps of {self.step:g} s"
-            )
+        problems = frequency_problems(self["lowest"], self["highest"], self.step)
         way = self["rate"] / (2.0 * math.pi * self["lowest"])
         if way > WAY:
             problems.append(

@@ -29,12 +29,13 @@ from gyrobench.reduction.loops.margins import interpolate_response, measured_val
 from gyrobench.result import Table
 from gyrobench.units import ARCSEC
 
-from .closed import LagLeadLoop
+from .closed import DoubleLoop, LagLeadLoop, rc_values
 from .system import loop_of
 
 ANGLE, RATE = "platform.attitude", "platform.omega[1]"
 ENOUGH = 45.0  # degrees of phase margin that GSP ch. 5 asks for
-NO_CLOSED = "The closed forms are those of the lag-lead network: the figures stand alone."
+NO_CLOSED = "The closed forms are those of the lag-lead network and of the double loop: the figures stand alone."
+C2 = 1e-5  # F, of the network that is printed
 
 
 class Reduction(LoopReduction):
@@ -120,10 +121,12 @@ class Reduction(LoopReduction):
         found, hold = self.found, self.hold
         own = drift(hold.t, hold[ANGLE]) if hold is not None else None
         a = found.loaded(gate, ANGLE, own, scale=ARCSEC, unit="″", y_name="platform θ", quiet=hold)
-        M, loop, why = gate.amplitude, self.loop, a.unsettled
+        M, why = gate.amplitude, a.unsettled
+        rest = None if self.loop is None else self.loop.rest
         found.measure("θ*", "platform angle under the load, at rest", "″", a.change, a.u_change, scale=ARCSEC,
-                      closed=None if loop is None else M / loop.K, unsettled=why)  # fmt: skip
-        common.stiffness(found, "S", "stiffness at rest, M / θ*", M, a, None if loop is None else loop.K)
+                      closed=None if rest is None else M / rest, unsettled=why)  # fmt: skip
+        if rest is not None or self.loop is None:  # an integral part leaves no angle
+            common.stiffness(found, "S", "stiffness at rest, M / θ*", M, a, rest)
         y = gate[ANGLE] - a.initial
         meaning = "largest platform angle after the load step"
         found.measure("θ_max", meaning, "″", float(y[np.argmax(np.abs(y))]), common.late_noise(y), scale=ARCSEC)
@@ -151,6 +154,8 @@ class Reduction(LoopReduction):
         common.lower_limit(found, values, share, w)
         if loop is not None and points:
             found.tables.append(_forms(loop, values))
+        if isinstance(loop, LagLeadLoop):
+            found.tables += _network(loop, float(self.run.options.get("C2") or C2))
 
     def _transmission(self, f: float) -> complex | None:
         """Return what friction carries over of the base, and the back EMF of a motor that has one."""
@@ -192,13 +197,13 @@ class Reduction(LoopReduction):
         return [f"After a blow of {size} the loop comes back to rest."]
 
 
-def _secant(loop: LagLeadLoop, w: float) -> float:
+def _secant(loop: LagLeadLoop | DoubleLoop, w: float) -> float:
     """Return the slope of |L| between w/1.25 and 1.25 w, dB per decade: what is measured."""
     ends = [abs(loop.gain(1j * w * x)) for x in (1.0 / 1.25, 1.25)]
     return 20.0 * math.log10(ends[1] / ends[0]) / math.log10(1.25**2)
 
 
-def _forms(loop: LagLeadLoop, values: Mapping[str, tuple[float, float]]) -> Table:
+def _forms(loop: LagLeadLoop | DoubleLoop, values: Mapping[str, tuple[float, float]]) -> Table:
     w, pm = loop.margin()
     at = loop.limit()
     rows: list[list[Any]] = [
@@ -209,8 +214,30 @@ def _forms(loop: LagLeadLoop, values: Mapping[str, tuple[float, float]]) -> Tabl
     if at is not None:
         rows.append(["gain limit, share of K", at[1], values.get("lower" if at[1] < 1.0 else "upper", (None,))[0], "1"])
     caption = (
-        "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The "
+        "Of K(1 + ω_i/s)/(s(J_x s + D)), D the tachometer's: a motor that is a torque at once, no friction, no step, "
+        "no delay. The measured loop has them."
+        if isinstance(loop, DoubleLoop)
+        else "Of K_m K_x G/(J_x s²): a motor that is a torque at once, no friction, no step, no delay. The "
         "measured loop has them."
     )
     columns = ["of the loop", "closed form", "measured", "unit"]
     return Table("loop.closed", "Closed forms of the loop", caption, columns, rows)
+
+
+def _network(loop: LagLeadLoop, C2: float) -> list[Table]:
+    """Return the passive RC network that has the time constants, with this capacitor to ground; none has others."""
+    found = rc_values(loop.tau1, loop.T1, loop.tau2, loop.T2, C2)
+    if found is None:
+        return []
+    R1, C1, R2 = found
+    rows: list[list[Any]] = [
+        ["R1", R1 * 1e-3, "kΩ"],
+        ["C1", C1 * 1e6, "μF"],
+        ["R2", R2 * 1e-3, "kΩ"],
+        ["C2", C2 * 1e6, "μF"],
+    ]
+    caption = (
+        "R1 beside C1 in series, R2 with C2 to ground, driven by a voltage and without load: its times are those of "
+        "the loop, with T1 T2 = τ1 τ2."
+    )
+    return [Table("loop.rc", "RC network", caption, ["element", "value", "unit"], rows)]

@@ -122,6 +122,31 @@ def test_table_lists_a_not_phi() -> None:
     assert radius[0] == pytest.approx(0.647, abs=1e-3) and radius[1] == pytest.approx(1.290, abs=1e-3)
 
 
+def test_variance_of_the_third_order() -> None:
+    """EX30: the recursion s2(p) = s2(p - 1) (1 - a_p2) with half a unit of the last printed digit everywhere."""
+    low, high = (TABLE[2][1] + d * 5e-11 for d in (-1.0, 1.0))
+    from_second = [low * (1.0 - 0.25385**2), high * (1.0 - 0.25375**2)]
+    from_third = [(3.2440e-6 + d * 5e-11) / (1.0 - (0.1930 + d * 5e-5) ** 2) for d in (-1.0, 1.0)]
+    assert from_second[0] < 3.3696e-6 < from_second[1]
+    assert from_third[0] < 3.3696e-6 < from_third[1] < 3.3697e-6 - 5e-11
+
+
+def test_final_prediction_errors_of_the_table() -> None:
+    """EX31: FPE = s2 (N + p + 1)/(N - p - 1), the formula above the table."""
+    printed = {1: 4.0623e-6, 2: 3.6025e-6, 3: 3.3710e-6, 4: 3.2459e-6, 5: 3.1615e-6, 6: 3.1007e-6}
+    right = {1: 4.0627e-6, 2: 3.6029e-6, 3: 3.3712e-6}
+    variance = {p: v for p, (_, v) in TABLE.items()} | {3: 3.3696e-6}
+    lengths = []
+    for p, said in printed.items():
+        fpe = variance[p] * (LENGTH + p + 1) / (LENGTH - p - 1)
+        room = 5e-11 + 5e-11  # of the printed value, of the variance
+        assert (abs(fpe - said) > room) == (p < 4), p
+        assert abs(fpe - right.get(p, said)) < room, p
+        lengths.append(2.0 * (p + 1) / (said / TABLE[p][1] - 1.0))
+    assert lengths[:3] == pytest.approx([27_100, 24_000, 20_700], rel=0.01)
+    assert lengths[3:] == pytest.approx([LENGTH] * 3, rel=0.05)
+
+
 def test_ljung_box_of_the_table() -> None:
     """EX15: with r_1 = -0.4947 and n = 17158 LB(6) exceeds 4000; the printed 44.91 needs a record of some 184."""
     assert LENGTH * (LENGTH + 2) * 0.4947**2 / (LENGTH - 1) > 4000.0

@@ -157,3 +157,13 @@ def test_sampled_loop() -> None:
     D = a2 * s * s + a1 * s + a0
     assert transform == pytest.approx((a2 * s * x + a2 * v + a1 * x) / D, rel=1e-6)
     assert transform != pytest.approx((a2 * s * x + a2 * v + a0 * x) / D, rel=0.01)
+
+
+def test_vibration_along_the_bisector() -> None:
+    """ET24: 1 g along the bisector of I and S is cos 45 degrees of it along each; D_II with ET19."""
+    D_IS, D_II, D_SS = 1e-3, 5e-5, 5e-5  # ERU/g2
+    of = lambda x, z: D_IS * x * z + D_II * x * x + D_SS * z * z  # noqa: E731
+    along = of(np.cos(np.pi / 4.0), np.sin(np.pi / 4.0))
+    assert along == pytest.approx(5.5e-4) and of(1.0, 1.0) == pytest.approx(1.1e-3)
+    greatest = max(of(np.cos(a), np.sin(a)) for a in np.linspace(0.0, np.pi, 721))
+    assert greatest == pytest.approx(along)  # so no direction has the printed 1e-3

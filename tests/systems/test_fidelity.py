@@ -89,7 +89,15 @@ def test_dynamic_is_quasi_static(name: str) -> None:
 
 NOISE_IS_THE_RESULT = {"drift_record"}  # without noise there is nothing to estimate
 #: their own tests put errors in and get them back; nothing is quasi-static about a table, or a vibration
-TABLES = {"angle_system_test", "gyro_bandwidth", "stand_alignment", "table_position_test", "table_rate_test"}
+TABLES = {
+    "angle_system_test",
+    "coning_test",
+    "gyro_bandwidth",
+    "gyro_dynamics",
+    "stand_alignment",
+    "table_position_test",
+    "table_rate_test",
+}
 
 
 def test_every_method_is_here() -> None:

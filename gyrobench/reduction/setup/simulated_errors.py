@@ -21,8 +21,10 @@ def simulated_errors(run: RunDocument) -> Errors:
     Of a source in several parts: part -> error.  Parts that the bench does not have say nothing.
     """
     found: Errors = {}
+    if run.measured:
+        return found
     folder = {name.replace("_", ""): name for name in Bench.find().parts()}  # a run names the class of a part
-    for slot, info in {} if run.measured else run.parts.items():
+    for slot, info in run.parts.items():
         values = {n.removeprefix(f"{slot}."): v for n, v in run.parameters.items() if n.startswith(f"{slot}.")}
         try:
             errors = set_up_errors(load_part(folder[info.name.lower()]), values)

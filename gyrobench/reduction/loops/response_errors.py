@@ -1,0 +1,115 @@
+"""A frequency response on a vibrating table: its points with their noise, sources of error, what these do to figures.
+
+The sensitivity of a figure is taken by moving the points and taking the figures anew.  [TEST-BANDWIDTH]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from gyrobench import units
+from gyrobench.arrays import Array
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.effects import PREDICTED
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor, response
+from gyrobench.reduction.setup.simulated_errors import simulated_errors
+from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.result import BudgetLine, Table
+
+READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
+READING_LAG = Source("table.reading.lag", "lag of the reading of the table rate", "s", "u_lag", "reading late")
+COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
+ROUNDING = 1e-6  # least relative uncertainty of a point
+LINES = 12  # numbers from which neighbour_noise estimates
+BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
+ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
+
+
+@dataclass(frozen=True)
+class LineRatios:
+    """Frequencies (n,), Hz; ratios of two channels, complex; their relative standard uncertainties; amplitudes of x."""
+
+    f: Array
+    value: NDArray[Any]
+    u: Array
+    x: Array
+
+
+def line_ratios(gates: Sequence[Gate], x: str, y: str) -> LineRatios:
+    """Return channel y over channel x at the frequencies of gates, with the noise beside their lines.
+
+    The noise of a channel over frequency is smooth: a polynomial through the logarithms of what each gate shows of it,
+    of 12 numbers, has many more.  Weights from 12 numbers each would make u a fifth too small.
+    """
+    f = np.array([g.f for g in gates])
+    time = np.array([g.t[-1] - g.t[0] for g in gates])
+    sizes = np.array([[abs(phasor(g.t, g[c], g.f)) for c in (x, y)] for g in gates])
+    value = np.array([response(g.t, g[x], g[y], g.f).value for g in gates])
+    noise = np.array([[_noise(g, c) for c in (x, y)] for g in gates])
+    few = float(special.stdtrit(LINES, 0.975)) / NORMAL  # many points together: no allowance for few numbers
+    shown = np.maximum(noise / few, 1e-3 * ROUNDING * sizes) * np.sqrt(time)[:, None]
+    at = np.log(f / f.mean())
+    degree = min(BEND, max(0, f.size // 3 - 1))
+    smooth = np.column_stack([np.exp(np.polyval(np.polyfit(at, c, degree), at)) for c in np.log(shown).T])
+    u = np.linalg.norm(ROOT_POWER * smooth / np.sqrt(time)[:, None] / sizes, axis=1)
+    return LineRatios(f, value, np.maximum(u, ROUNDING), sizes[:, 0])
+
+
+def _noise(gate: Gate, channel: str) -> float:
+    found = neighbour_noise(gate.t, gate[channel], gate.f)
+    if found is None:
+        raise ReductionError(f"{gate.f:g} Hz: too few periods to see the noise beside the line")
+    return found
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A source, its standard uncertainty u, SI, and the change (n,) of the figures, SI, for one unit of it."""
+
+    source: Source
+    u: float
+    change: Array
+
+    def share(self, k: int) -> float:
+        """Return what this source makes uncertain of figure k, with its sign, SI."""
+        return float(np.nan_to_num(self.change[k])) * self.u
+
+    def line(self, name: str, unit: str, scale: float, k: int) -> BudgetLine:
+        """Return the line of the budget of figure k, called ``name``; scale: SI per printed unit."""
+        s = self.source
+        per = unit if s.unit == "1" else f"{unit}/{s.unit}"
+        slope = float(np.nan_to_num(self.change[k])) / scale
+        return BudgetLine(s.id, s.name, self.u, s.unit, slope, per, abs(self.share(k)) / scale, unit, name, s.note)
+
+
+def predicted_shifts(
+    run: RunDocument, by: Sequence[Sensitivity], figures: Sequence[tuple[int, str, str, float, float]]
+) -> Table | None:
+    """Return by how much each figure is off by the simulated errors of the set-up; None without one.
+
+    figures: place among the sensitivities, name, printed unit, SI per unit, standard uncertainty in SI.
+    """
+    errors = simulated_errors(run)
+    known = [(s, float(e)) for s in by if isinstance(e := errors.get(s.source.id), float) and e]
+    if not known:
+        return None
+    rows = []
+    for k, name, unit, scale, u in figures:
+        each = [error * float(s.change[k]) / scale for s, error in known]
+        rows.append([name, *each, sum(each), u / scale, unit])
+    said = [f"({n}) {s.source.name}, {units.format_quantity(e, s.source.unit)}" for n, (s, e) in enumerate(known, 1)]
+    caption = (
+        "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
+        f"{'; '.join(said)}."
+    )
+    head = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
+    return Table(PREDICTED, "Predicted shifts by simulated errors", caption, head, rows)

@@ -1,0 +1,56 @@
+"""A table that shakes a gyro about its input or output axis: socket, options and checks of its tests."""
+
+from __future__ import annotations
+
+from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.system import Option
+
+TABLE = Socket(
+    "VibratingTable",
+    "table that follows an angular vibration about its axis: motion in, rates and forces on its face out",
+    (
+        inp("motion_angle", "rad", "angle asked for, the third about its axis", 3),
+        inp("motion_rate", "rad/s", "its rate", 3),
+        inp("motion_acceleration", "rad/s2", "its acceleration", 3, optional=True),
+        inp("f_local", "m/s2", "specific force at the site, ENU", 3),
+        inp("omega_local", "rad/s", "Earth rate at the site, ENU", 3),
+        out("omega", "rad/s", "inertial rate, face axes", 3),
+        out("alpha", "rad/s2", "its derivative, face axes", 3, optional=True),
+        out("f", "m/s2", "specific force, face axes", 3),
+        out("rate_read", "rad/s", "table rate as read"),
+    ),
+)
+#: what moves it
+SHAKEN = """
+    site -> table: f=f_local omega=omega_local
+    exciter -> table: motion_angle motion_rate motion_acceleration
+"""
+FREQUENCIES = {
+    "lowest": Option("1Hz", "Hz", "lowest frequency", 1e-3),
+    "highest": Option("200Hz", "Hz", "highest frequency", 1e-2),
+    "points": Option(25, int, "frequencies, in equal ratios", 8, 90),
+}
+TIMES = {
+    "periods": Option(20, int, "periods measured at each frequency, at least", 10, 100_000),
+    "dwell": Option(1.0, "s", "time measured at each frequency, at least", 1e-3),
+    "settle": Option(0.5, "s", "time in which the vibration sets in", 1e-3),
+}
+STATED = {
+    "u_gain": Option(0.0, "1", "relative standard uncertainty of the reading of the table rate", 0.0),
+    "u_lag": Option(0.0, "s", "standard uncertainty of the time by which that reading is late", 0.0),
+    "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
+}
+MOUNT = {
+    "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the table axis, about each axis "
+                      "across it", 0.0),
+}  # fmt: skip
+
+
+def frequency_problems(lowest: float, highest: float, step: float) -> list[str]:
+    """Return what is wrong with the frequencies (Hz) for a communication step (s)."""
+    problems = []
+    if not lowest < highest:
+        problems.append(f"lowest = {lowest:g} Hz: must be below highest = {highest:g} Hz")
+    if highest * step > 0.05:
+        problems.append(f"highest = {highest:g} Hz: a period needs 20 communication steps of {step:g} s")
+    return problems

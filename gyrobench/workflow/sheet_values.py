@@ -1,0 +1,184 @@
+"""From the figures of a data sheet to parameters of parts and to what a test believes.  [GYRO-SHEET, TABLE-PRESETS]
+
+A limit of an error says nothing about one instrument and sets no parameter; of a turntable it is what one believes of
+its errors, u = limit/sqrt 3.  Not modelled: figures that no part has (vibration, ageing, size, load).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gyrobench.bench import UsageError
+
+if TYPE_CHECKING:
+    from gyrobench.workflow.instruments import Instrument
+
+#: figure -> unit
+RATE_GYRO: dict[str, str] = {
+    "range": "rad/s",
+    "resolution": "rad/s",
+    "bandwidth": "Hz",
+    "output_rate": "Hz",
+    "noise_density": "rad/s/sqrt(Hz)",
+    "angle_random_walk": "rad/sqrt(s)",
+    "bias_instability": "rad/s",
+    "bias": "rad/s",
+    "bias_temperature": "rad/s/K",
+    "scale_error": "1",
+    "scale_temperature": "1/K",
+    "nonlinearity": "1",
+    "misalignment": "rad",
+    "cross_axis": "1",
+    "g_sensitivity": "rad.s/m",
+}
+#: figure of a floated gyro -> its unit and parameter
+COEFFICIENTS = tuple(f"D_{n}" for n in ("F", "I", "O", "S", "II", "OO", "SS", "IO", "OS", "IS"))
+FLOATED: dict[str, tuple[str, str]] = {
+    **{n: ("rad/s", n) for n in COEFFICIENTS},
+    "angular_momentum": ("N.m.s", "H"),
+    "float_inertia": ("kg.m2", "J"),
+    "float_damping": ("N.m.s/rad", "C"),
+    "torquer": ("rad/s/A", "k"),
+    "pickoff_gain": ("V/rad", "K_sg"),
+    "turn_on": ("rad/s", "turn_on"),
+    "random_drift": ("rad/s", "markov"),
+    "temperature": ("rad/s/K", "D_T"),
+    "field": ("rad/s/T", "D_B"),
+    "field_difference": ("rad/s/T", "D_dB"),
+}
+#: figure of a turntable -> its unit, the parameter that it sets and the option that its limit states
+TURNTABLE: dict[str, tuple[str, str, str]] = {
+    "rate_max": ("rad/s", "rate_max", ""),
+    "resolution": ("rad", "quantum", ""),
+    "torque": ("N.m", "torque_max", ""),
+    "servo_stiffness": ("N.m/rad", "stiffness", ""),
+    "friction": ("N.m", "friction", ""),
+    "wobble": ("rad", "wobble", "u_wobble"),
+    "axis_accuracy": ("rad", "", "u_axis"),
+    "position_accuracy": ("rad", "", "u_angle1"),
+    "perpendicularity": ("rad", "squareness", ""),
+    "servo_error": ("rad", "", ""),
+    "sector_accuracy": ("rad", "", ""),
+    "repeatability": ("rad", "", ""),
+    "tilt_wobble": ("rad", "", ""),
+    "tilt_range": ("rad", "", ""),
+    "azimuth_range": ("rad", "", ""),
+    "height": ("m", "", ""),
+    "tilt_height": ("m", "", ""),
+    "plate_diameter": ("m", "", ""),
+    "mass": ("kg", "", ""),
+    "axial_load": ("kg", "", ""),
+    "radial_load": ("kg", "", ""),
+    "angular_stiffness": ("N.m/rad", "", ""),
+    "radial_stiffness": ("N/m", "", ""),
+    "slip_rings": ("1", "", ""),
+}
+#: kind -> figure -> unit
+FIGURES: dict[str, dict[str, str]] = {
+    **dict.fromkeys(("fibre", "laser", "vibrating"), RATE_GYRO),
+    "floated": {n: unit for n, (unit, _) in FLOATED.items()},
+    "turntable": {n: unit for n, (unit, _, _) in TURNTABLE.items()},
+}
+#: no errors: a limit of one is what it is
+SETTINGS = ("range", "resolution", "bandwidth", "output_rate", "rate_max", "torque", "servo_stiffness")
+SIGNED = COEFFICIENTS
+#: network 2 of table_servo, which crosses over at 50 Hz: K_T (N.m/rad) of its inertia (kg.m2)
+STIFFNESS, INERTIA = 2.672e5, 2.56
+#: least Allan deviation over the coefficient B of flicker noise, (2 ln 2 / pi)^0.5
+FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
+#: figure -> parameter of a part, of each axis where it has two
+DIRECT = {
+    "range": "range_max",
+    "bandwidth": "bandwidth",
+    "resolution": "resolution",
+    "bias": "turn_on",
+    "bias_temperature": "bias_T",
+    "scale_error": "scale",
+    "scale_temperature": "scale_T",
+}
+
+
+def density(sheet: Instrument) -> float | None:
+    """Return N of a rate gyro, the two-sided density of the white noise; None where the sheet has none."""
+    if sheet.kind not in ("fibre", "laser", "vibrating"):
+        return None
+    walk, noise = sheet.si("angle_random_walk"), sheet.si("noise_density")
+    return walk if walk is not None else None if noise is None else noise / math.sqrt(2.0)
+
+
+def rate_gyro(sheet: Instrument, part: type) -> dict[str, Any]:
+    """Return the parameters of the part, SI; sizes of errors are set positive, on both axes.
+
+    angle random walk, or the one-sided noise density over sqrt 2: white noise.  bias instability, the least Allan
+    deviation: flicker noise of that floor.  bias: rms of the turn-on bias.  nonlinearity, largest departure from the
+    best line over the range: a cubic, whose least-squares line over +-range leaves 0.4 c range3 at the ends.  The
+    output rate sets nothing: a sample is taken every communication step (held over several, `gyro.period`, samples are
+    used twice here and there).
+    Raises UsageError for a part that takes no data sheets.
+    """
+    white = getattr(part, "white_noise", "")
+    if not white:
+        raise UsageError(f"{sheet.title}: the part {sheet.part} takes no data sheets: it names no white_noise")
+    declarations: Mapping[str, Any] = part.declarations  # type: ignore[attr-defined]
+    found: dict[str, Any] = {}
+    if (noise := density(sheet)) is not None:
+        found |= {white: noise, **part.without_own_noise}  # type: ignore[attr-defined]
+    if (floor := sheet.si("bias_instability")) is not None:
+        found |= {"flicker_x": floor / FLOOR, "flicker_y": floor / FLOOR}
+    for name, parameter in DIRECT.items():
+        declared = declarations.get(parameter)
+        if declared is not None and declared.unit == RATE_GYRO[name] and sheet.si(name) is not None:
+            found[parameter] = [sheet.si(name)] * 2 if declared.shape else sheet.si(name)
+    if (g := sheet.si("g_sensitivity")) is not None:
+        found["g"] = [[g, 0.0, 0.0], [0.0, g, 0.0]]
+    if (nonlinearity := sheet.si("nonlinearity")) is not None and (full := sheet.si("range")) is not None:
+        found["cubic"] = nonlinearity / 0.4 / full**2
+    if lean := sheet.si("misalignment") or sheet.si("cross_axis"):
+        found["axes"] = [[1.0, lean, 0.0], [0.0, 1.0, lean]]
+    return found
+
+
+def floated(sheet: Instrument) -> dict[str, Any]:
+    """Return the parameters of a floated gyro, SI: the sheet is the whole of its drift.
+
+    Drift coefficients that it lacks are 0, and so is the random drift beside the one that it states, an rms that the
+    part has as Gauss-Markov drift; sizes per field are set along each axis.
+    """
+    found: dict[str, Any] = dict.fromkeys(COEFFICIENTS, 0.0)
+    if sheet.si("D_OO"):
+        found["terms"] = 10
+    if "random_drift" in sheet.figures:
+        found |= {"white": 0.0, "flicker": 0.0, "walk": 0.0}
+    for name, (_, parameter) in FLOATED.items():
+        if (value := sheet.si(name)) is not None:
+            found[parameter] = [value] * 3 if parameter in ("D_B", "D_dB") else value
+    return found
+
+
+def turntable(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a part that is a table, SI: those that it declares, of each axis where it has two.
+
+    A stiffness sets the inertia, too, which no sheet has: that which keeps the crossover of the loop where it is; and
+    the capture ends where the fine loop is linear, within torque / stiffness.
+    """
+    found: dict[str, Any] = {}
+    for name, (unit, parameter, _) in TURNTABLE.items():
+        declared = declarations.get(parameter)
+        if declared is not None and declared.unit == unit and (value := sheet.si(name)) is not None:
+            found[parameter] = [value] * declared.shape[0] if declared.shape else value
+    if "stiffness" in found and "J" in declarations:
+        found["J"] = found["stiffness"] * INERTIA / STIFFNESS
+    if "torque_max" in found and (capture := declarations.get("capture_angle")) is not None:
+        found["capture_angle"] = min(capture.start, found["torque_max"] / found.get("stiffness", STIFFNESS))
+    return found
+
+
+def beliefs(sheet: Instrument) -> dict[str, float]:
+    """Return options u_... of the limits of a turntable: even between plus and minus the limit, limit / sqrt 3."""
+    found = {}
+    for name, (_, _, option) in TURNTABLE.items():
+        if option and (limit := sheet.limit(name)) is not None:
+            found[option] = limit / math.sqrt(3.0)
+    return found
