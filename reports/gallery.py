@@ -27,6 +27,7 @@ SHOWN = {
     "platform_three_axis": "open loop",
     "stabilizer_floated_2dof": "open loop",
     "stabilizer_power_2dof": "open loop",
+    "stabilizer_power_two_axis": "platform α_x",
     "table_environment": "Recorded channels",
     "table_supervision": "Recorded channels",
     "table_rate_test": "largest change of rate",

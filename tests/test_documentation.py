@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import subprocess
 import sys
@@ -22,6 +23,7 @@ import equations  # noqa: E402
 import figures  # noqa: E402
 import front_picture  # noqa: E402
 import links  # noqa: E402
+import notebook  # noqa: E402
 
 PAGES = links.pages(ROOT)
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
@@ -137,11 +139,32 @@ def test_equations_have_subscripts_and_keep_their_columns() -> None:
     assert equations.with_subscripts(command) == command and equations.with_subscripts("<p>D_IO</p>") == "<p>D_IO</p>"
 
 
+def test_the_notebook_has_the_outputs_of_its_code() -> None:
+    """Stored by docs/site/notebook.py --write; each cell shows something, the tumble curve is a picture."""
+    stored = json.loads(notebook.FILE.read_text(encoding="utf-8"))
+    assert stored["metadata"]["gyrobench"]["sources"] == notebook.sources(stored), "its code has changed since"
+    cells = [c for c in stored["cells"] if c["cell_type"] == "code"]
+    assert all(c["outputs"] for c in cells) and [c["execution_count"] for c in cells] == [*range(1, len(cells) + 1)]
+    assert sum("image/png" in o.get("data", ()) for c in cells for o in c["outputs"]) == 1
+    page = notebook.markdown(notebook.FILE)
+    assert page.count("```python") == len(cells) and page.count('class="output"') == len(cells)
+    assert "pandas" in page and "jupyter lab" in page
+
+
+def test_a_cell_shows_what_it_prints_and_its_last_value() -> None:
+    names: dict[str, object] = {}
+    assert notebook.shown("a = 2", names) == []
+    printed, value = notebook.shown("print('<x>')\na + 1", names)
+    assert notebook.html(printed) == "<pre>&lt;x&gt;\n</pre>" and value["data"]["text/plain"] == ["3"]
+    figure = notebook.shown("import matplotlib.pyplot as plt\nplt.figure()", names)[0]
+    assert notebook.html(figure).startswith('<img alt="figure" src="data:image/png;base64,iVBOR')
+
+
 @pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("myst_parser", "furo"))), reason='needs the extra: pip install -e ".[docs]"'
 )
 def test_the_site_is_built_without_a_warning_and_without_network(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "docs/site/build.py"), "--no-notebook", "--out", str(tmp_path / "site")]
+    command = [sys.executable, str(ROOT / "docs/site/build.py"), "--out", str(tmp_path / "site")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     listed = re.findall(r'href="(live/\w+\.html)"', (tmp_path / "site" / "live.html").read_text(encoding="utf-8"))

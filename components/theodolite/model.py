@@ -4,7 +4,7 @@ from gyrobench.component import Component, Input, Noise, Output, Parameter, samp
 from gyrobench.component.math import Number, atan2, cos, fabs, floor, pi, sin, sqrt, tan
 
 ARCSEC = pi / 648000.0
-STAR, MIRROR, AXIS = 1.0, 2.0, 3.0
+STAR, MIRROR, AXIS, HEAD = 1.0, 2.0, 3.0, 4.0
 
 
 class Theodolite(Component):
@@ -17,6 +17,7 @@ class Theodolite(Component):
         2  the mirror  on the stand: its normal has the azimuth `azimuth` of the stand's axis, at the horizon
         0  as 2, at the end of a plan
         3  the axis    by the inclinometer: latitude + elevation + face inclinometer_zero
+        4  a mirror    on the head of a north finder: its normal has the azimuth `head`, at the horizon
 
     Azimuths A from north to east, h the altitude with refraction, all in radians:
 
@@ -34,7 +35,7 @@ class Theodolite(Component):
     Source: Hu 1981, section 5.7; Meeus 1998, chapters 13, 16, 23.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     latitude = Parameter(45.75 * pi / 180.0, "rad", "latitude, north positive", min=-1.5533, max=1.5533)
@@ -45,6 +46,7 @@ class Theodolite(Component):
     temperature = Parameter(283.15, "K", "temperature of the air", above=200.0)
     azimuth = Parameter(0.0, "rad", "azimuth of the stand's axis, from north to east", min=-0.1, max=0.1)
     elevation = Parameter(0.0, "rad", "elevation of the stand's axis above the latitude", min=-0.1, max=0.1)
+    head = Parameter(0.0, "rad", "azimuth of the normal of the mirror on a north finder's head")
     circle_zero = Parameter(0.3, "rad", "azimuth of the zero of the circle")
     collimation = Parameter(0.0, "rad", "collimation error", min=-0.01, max=0.01)
     trunnion = Parameter(0.0, "rad", "tilt of the trunnion axis", min=-0.01, max=0.01)
@@ -55,7 +57,7 @@ class Theodolite(Component):
     pointing = Noise(4.8e-6, "rad/sqrt(Hz)", "noise density of a sight, and of the inclinometer")
     bubble = Noise(1e-6, "rad/sqrt(Hz)", "noise density of the plate level")
 
-    target = Input(1.0, "1", "what is sighted: 1 star, 2 mirror, 3 axis; negative: face right")
+    target = Input(1.0, "1", "what is sighted: 1 star, 2 mirror, 3 axis, 4 head; negative: face right")
 
     reading = Output("rad", "horizontal circle, face right less half a turn; or the inclinometer")
     level = Output("rad", "plate level across the line of sight")
@@ -87,7 +89,9 @@ class Theodolite(Component):
     def tick(self) -> None:
         kind = fabs(self.target)
         whole = fabs(kind - floor(kind + 0.5)) < 1e-9
-        self.refuse(not whole or kind > AXIS, "target = {target}: must be 1 star, 2 mirror, 3 axis, or 0 at the end")
+        self.refuse(
+            not whole or kind > HEAD, "target = {target}: must be 1 star, 2 mirror, 3 axis, 4 head, or 0 at the end"
+        )
         self.refuse(kind == STAR and self.height() < 0.0873, "the star is below 5 deg")
 
     def outputs(self) -> None:
@@ -98,6 +102,8 @@ class Theodolite(Component):
         if kind == STAR:
             A = self.direction()
             h = self.height()
+        if kind == HEAD:
+            A = self.head
         across = self.lean[1] * cos(A) + self.lean[0] * sin(A)
         # against the leaning axis: v - lean x v
         e = cos(h) * sin(A) - self.lean[1] * sin(h)

@@ -1,7 +1,7 @@
-"""Build the documentation site:  python docs/site/build.py [--out build/site] [--no-notebook]
+"""Build the documentation site:  python docs/site/build.py [--out build/site]
 
-Copies the Markdown pages and what they link to, adds a page for each module of gyrobench, the executed notebook and
-systems that run in a page, and runs Sphinx in strict mode.  Nothing is fetched: neither here nor when a page is opened.
+Copies the Markdown pages and what they link to, adds a page for each module of gyrobench, the notebook with its outputs
+and systems that run in a page, and runs Sphinx in strict mode.  Nothing is fetched: neither here nor by an opened page.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def contents(source: Path, written: set[Path]) -> str:
     return "\n".join(text)
 
 
-def stage(source: Path, run_notebook: bool) -> None:
+def stage(source: Path) -> None:
     """Copy pages and what they link to into the folder that Sphinx reads, and remove what is no longer there."""
     written: set[Path] = set()
     for page in pages(ROOT):
@@ -136,7 +136,7 @@ def stage(source: Path, run_notebook: bool) -> None:
             write(copy, rewritten(page, text))
     api(source, written)
     copy = source / NOTEBOOK.with_suffix(".md")
-    write(copy, markdown(ROOT / NOTEBOOK, run_notebook))
+    write(copy, markdown(ROOT / NOTEBOOK))
     written.add(copy)
     write(source / PAGE, live_page())
     written.add(source / PAGE)
@@ -150,10 +150,9 @@ def stage(source: Path, run_notebook: bool) -> None:
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     options.add_argument("--out", type=Path, default=ROOT / "build" / "site")
-    options.add_argument("--no-notebook", action="store_true", help="show the notebook without running it")
     given = options.parse_args()
     source = given.out.with_name(given.out.name + "-source")
-    stage(source, not given.no_notebook)
+    stage(source)
     # not by -W: with it a warning ends Sphinx while its workers still write to it, and both wait for ever
     warnings = source / "warnings.txt"
     command = [sys.executable, "-m", "sphinx", "-q", "-j", "auto", "-w", str(warnings), "-b", "html", "-c", str(HERE)]

@@ -85,7 +85,7 @@ def run(
       gyrobench run tumble_single_axis --part gyro=vendor.fmu --map gyro=vendor.toml
       gyrobench run tumble_single_axis --spec floated_gyro --strict
       gyrobench run drift_record --instrument adis16405
-      gyrobench run servo_polar --instrument draper --instrument fecker352
+      gyrobench run tumble_single_axis --instrument draper --instrument fecker352
       gyrobench run drift_test_suite --set tests="tumble_single_axis servo_polar" --set gyro.D_I=0.9deg/h/g
     """
     from gyrobench.commands import print_runs

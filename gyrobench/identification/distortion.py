@@ -20,6 +20,7 @@ from gyrobench.identification.line_spectrum import LineAmplitudes
 
 LEAST = 4  # lines left out, for a statement
 NEIGHBOURS = 8  # lines left out whose mean is the level at an excited one
+COURSE = 12  # lines left out, for a level that changes over frequency
 SIGNIFICANT = 1e-3
 SIGNALS = ("input", "output")
 
@@ -86,9 +87,19 @@ def _of(kind: str, lines: LineAmplitudes, excited: LineAmplitudes) -> Distortion
 
 
 def with_distortion(excited: LineAmplitudes, omitted: LineAmplitudes, period: float) -> LineAmplitudes:
-    """Return the excited lines with the level of the odd ones left out beside them as their covariance."""
+    """Return the excited lines with the level of the odd ones left out beside them as their covariance.
+
+    Over frequency the level goes as a parabola of its logarithm, about which the lines beside one are averaged.
+    """
     odd = omitted.take(harmonics(omitted, period) % 2 == 1)
-    products = odd.z[:, :, None] * np.conj(odd.z[:, None, :])
+    size = np.abs(odd.z)
+    log = np.log(np.maximum(size, 1e-12 * size.max(axis=0) + 1e-300))
+    course = np.polynomial.polynomial.polyfit(np.log(odd.f), log, 2 if odd.f.size >= COURSE else 0)
+    inside = np.clip(excited.f, odd.f[1], odd.f[-2])  # beyond its last lines the parabola is not asked
+    here, there = (np.exp(np.polynomial.polynomial.polyval(np.log(x), course)).T for x in (inside, odd.f))
+    level = odd.z / there
+    products = level[:, :, None] * np.conj(level[:, None, :])
     count = min(NEIGHBOURS, odd.f.size)
     near = np.argsort(np.abs(np.log(excited.f)[:, None] - np.log(odd.f)[None, :]), axis=1)[:, :count]
-    return replace(excited, cov=products[near].mean(axis=1), dof=np.full(excited.f.size, float(count)))
+    cov = products[near].mean(axis=1) * here[:, :, None] * here[:, None, :]
+    return replace(excited, cov=cov, dof=np.full(excited.f.size, float(count)))

@@ -28,9 +28,12 @@ from gyrobench.record.frequency_response import Complex
 ORDER = 2  # of the local polynomials
 BINS = 12  # at least, of noise at either side, of a periodic excitation
 NARROW = 10  # bins at least to either side, of another
-SHARE = 0.02  # of the frequency to either side, where that is more
+SHARE = (
+    0.005  # of the frequency to either side, where that is more: less than half of what a mode damped by 1 % is wide
+)
 EXCITED = 1e-3  # of the largest amplitude of r: smaller ones are no excitation
-SMOOTH = 1e-4  # smallest over largest singular value of a band
+INFLATED = 10.0  # times the variance of a mean of the band (2.3 is the least): r is nearly as smooth as a transient
+ROUNDING = 1e-12
 EDGE = 0.1  # of its rms in a band: where its median is less the excitation begins or ends there
 ABOVE = 5.0  # times the noise of r
 PERIODS = 3  # at least
@@ -190,7 +193,8 @@ def broadband_lines(record: LoopRecord, low: float = 0.0, high: float = np.inf) 
 def _band(spectra: Complex, k: int, half: int) -> tuple[Complex, Complex, float] | None:
     """Return response (3,), covariance (3, 3) and degrees of freedom of the band of bins k - half to k + half.
 
-    None where the spectrum of r is as smooth as that of a transient, from which its response cannot be told then.
+    None where the spectrum of r is nearly as smooth as that of a transient, from which its response is told badly then:
+    at the ends of a sweep.
     """
     d = np.arange(-half, half + 1)
     powers = np.vander(d / half, ORDER + 1, increasing=True)
@@ -200,13 +204,14 @@ def _band(spectra: Complex, k: int, half: int) -> tuple[Complex, Complex, float]
     if not np.all(size > 0.0):
         return None
     left, singular, right = np.linalg.svd(x / size, full_matrices=False)
-    if singular[-1] < SMOOTH * singular[0]:
+    solve = np.conj(right.T) @ (np.conj(left.T) / np.maximum(singular, ROUNDING * singular[0])[:, None])
+    inflation = float(np.sum(np.abs(solve[0]) ** 2))
+    if inflation > INFLATED:
         return None
-    solve = np.conj(right.T) @ (np.conj(left.T) / singular[:, None])
     found = solve @ around[:, 1:]
     v = around[:, 1:] - (x / size) @ found
     dof = float(d.size - 2 * (ORDER + 1))
-    share = float(np.sum(np.abs(solve[0]) ** 2)) / size[0] ** 2
+    share = inflation / size[0] ** 2
     cov = np.zeros((3, 3), complex)
     cov[1:, 1:] = v.T @ np.conj(v) / dof * share
     return np.array([1.0, *(found[0] / size[0])]), cov, dof

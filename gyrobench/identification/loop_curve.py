@@ -30,6 +30,7 @@ WINDOWS = (41, 29, 21, 15, 11, 8)  # points
 NARROWER = 3  # windows than the widest that passes
 PASSES = 0.1  # p of the residuals
 NEARLY = 0.01  # p of a narrower window than the widest that passes
+CERTAIN = 0.03  # of |S|: a resonance that is known to that stands, however much less certain than its neighbours
 UNSOUND, NEIGHBOURS = 3.0, 4  # times the median u of so many measured frequencies to either side
 MISFIT = 1e-6  # p, below which the best window is no noise
 RESOLVED = 0.02  # of |S|, the largest misfit: 0.17 dB, 1.1 degrees
@@ -72,7 +73,8 @@ class LoopCurve:
         u = self.u.reshape(-1, BETWEEN)
         about = np.pad(np.median(u, axis=1), NEIGHBOURS, mode="edge")
         windows = np.lib.stride_tricks.sliding_window_view(about, 2 * NEIGHBOURS + 1)
-        return np.asarray((u < UNSOUND * np.median(windows, axis=1)[:, None]).ravel())
+        usual = (u < UNSOUND * np.median(windows, axis=1)[:, None]).ravel()
+        return np.asarray(usual | (self.u < CERTAIN * np.abs(self.S)))
 
     @property
     def slope_L(self) -> Complex:

@@ -7,6 +7,9 @@ makes none.  With g = ln|L|, p = arg L, slopes over f, and equal and independent
     gain margin    u2(-g at p = -pi) = u2 (1 + (g'/p')2)
     peaks          u2(max)           = u2                      (the slope is 0 there)
 
+Where the curve is flat at a crossing, all places at which it is not told from the limit may be it, and the interval
+reaches over the values there.
+
 Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
 """
 
@@ -84,46 +87,66 @@ def margins(c: LoopCurve) -> tuple[list[Margin], list[str]]:
         peak = _peak(name, c, value, invert)
         if peak is None:
             why.append(f"no {name}: the largest |{of}| is at an end of the frequencies")
+        elif name == "peak T" and peak.high < 1.0:  # with an integral action |T| is 1 at frequencies below
+            why.append("no peak T: |T| stays below 1 between the frequencies")
         else:
             found.append(peak)
     return found, why
 
 
 def _phase_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
-    size = np.log(np.abs(c.L))
+    size, turn = np.log(np.abs(c.L)), np.angle(-c.L)
     found = []
     for k, f in _crossings(size, c.u_L, known, c.f):
         slope, u = c.slope_L[k], c.u_L[k]
-        phase = _wrapped(float(np.angle(-c.L[k])) + slope.imag * (f - c.f[k]))
+        phase = _wrapped(float(turn[k]) + slope.imag * (f - c.f[k]))
         late = phase % TURN / (TURN * f)
         by_gain = (1.0 / f - slope.imag / (phase % TURN)) / slope.real if phase else 0.0
-        halves = (
-            math.hypot(1.0, slope.imag / slope.real),
-            1.0 / abs(slope.real),
-            late * math.hypot(1.0 / (phase % TURN or 1.0), by_gain),
-        )
-        found.append((f, phase, late, *(NORMAL * u * h for h in halves)))
+        near = _near(size, c.u_L, known, k)
+        phases = phase + np.unwrap(np.concatenate([[phase], turn[near]]))[1:] - phase
+        of_f = _interval(f, NORMAL * u / abs(slope.real), c.f[near], 0.0)
+        of_phase = _interval(phase, NORMAL * u * abs(slope.imag / slope.real), phases, NORMAL * u)
+        lates = late + (phases - phase) / (TURN * c.f[near]) + phase % TURN / TURN * (1.0 / c.f[near] - 1.0 / f)
+        of_late = _interval(late, NORMAL * u * late * abs(by_gain), lates, NORMAL * u * late / (phase % TURN or 1.0))
+        found.append((f, phase, late, of_f, of_phase, of_late))
     if not found:
         return
-    f, phase, _, U, U_f, _ = min(found, key=lambda m: abs(m[1]))
-    yield Margin("phase margin", phase, phase - U, phase + U, f, "rad")
-    yield Margin("crossover", f, f - U_f, f + U_f, f, "Hz")
-    f, _, late, _, _, U = min(found, key=lambda m: m[2])
-    yield Margin("delay margin", late, late - U, late + U, f, "s")
+    f, phase, _, of_f, of_phase, _ = min(found, key=lambda m: abs(m[1]))
+    yield Margin("phase margin", phase, *of_phase, f, "rad")
+    yield Margin("crossover", f, *of_f, f, "Hz")
+    f, _, late, _, _, of_late = min(found, key=lambda m: m[2])
+    yield Margin("delay margin", late, *of_late, f, "s")
 
 
 def _gain_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
-    turn = np.angle(-c.L)
+    size, turn = np.log(np.abs(c.L)), np.angle(-c.L)
+    counts = known & (np.abs(turn) < 0.25 * TURN)
     found = []
-    for k, f in _crossings(turn, c.u_L, known & (np.abs(turn) < 0.25 * TURN), c.f):
+    for k, f in _crossings(turn, c.u_L, counts, c.f):
         slope, u = c.slope_L[k], c.u_L[k]
-        log = -float(np.log(np.abs(c.L[k]))) - slope.real * (f - c.f[k])
+        log = -float(size[k]) - slope.real * (f - c.f[k])
         if abs(log) < math.log(LARGEST):
-            found.append((abs(log), log, NORMAL * u * math.hypot(1.0, slope.real / slope.imag), f))
+            near = _near(turn, c.u_L, counts, k)
+            found.append((abs(log), log, f, _interval(log, NORMAL * u * abs(slope.real / slope.imag), -size[near],
+                                                      NORMAL * u)))  # fmt: skip
     for name, up in (("gain margin", True), ("gain-reduction margin", False)):
         if of_side := [m for m in found if (m[1] > 0.0) == up]:
-            _, log, U, f = min(of_side)
-            yield Margin(name, math.exp(log), math.exp(log - U), math.exp(log + U), f, "factor")
+            _, log, f, (low, high) = min(of_side)
+            yield Margin(name, math.exp(log), math.exp(low), math.exp(high), f, "factor")
+
+
+def _near(value: Array, u: Array, counts: NDArray[np.bool_], k: int) -> slice:
+    """Return the places about a crossing of 0 at k that may be it, at 95 %: more than one where the curve is flat."""
+    may = counts & (np.abs(value) <= NORMAL * u)
+    may[k] = True
+    first = k - int(np.argmin(np.append(may[k::-1], False))) + 1
+    return slice(first, k + int(np.argmin(np.append(may[k:], False))))
+
+
+def _interval(value: float, U: float, near: Array, own: float) -> tuple[float, float]:
+    """Return the interval of a value by the slope, U, or by values near the crossing; own: U of the value itself."""
+    down, up = max(U, value - float(near.min())), max(U, float(near.max()) - value)
+    return value - math.hypot(down, own), value + math.hypot(up, own)
 
 
 def _crossings(value: Array, u: Array, counts: NDArray[np.bool_], f: Array) -> Iterator[tuple[int, float]]:
@@ -151,10 +174,11 @@ def _peak(name: str, c: LoopCurve, value: Complex, invert: bool) -> Margin | Non
     this correction is as uncertain as it is large.
     """
     counts = (c.u < LARGEST_U * np.abs(value)) & c.sound
-    counts[:BETWEEN] = counts[-BETWEEN:] = False
-    if not np.any(counts):
+    inside = counts.copy()
+    inside[:BETWEEN] = inside[-BETWEEN:] = False
+    if not np.any(inside):
         return None
-    size = np.where(counts, np.abs(value), 0.0)
+    size = np.where(inside, np.abs(value), 0.0)
     k = int(np.argmax(size))
     if np.abs(value)[[0, -1]].max() >= size[k]:
         return None

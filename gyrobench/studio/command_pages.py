@@ -257,7 +257,7 @@ def _add_laboratory_page(studio: Studio) -> None:
                 with ui.element("div").classes("form"):
                     heading("Certificate", 2)
                     names = {
-                        r.place: f"{say(r.title or r.system, r.system)}, {r.instrument or r.place}"
+                        r.place: ", ".join(filter(None, (say(r.title or r.system, r.system), r.instrument, r.place)))
                         for r in entries[:LISTED]
                         if r.report
                     }

@@ -21,6 +21,8 @@ from gyrobench.workflow.user_errors import user_message
 
 MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
+NARROW = Path(__file__).with_name("narrow.js")
+NUMBER = "987654"  # stands for the number in the words of a count
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
     ("Campaign", "/campaign"), ("Laboratory", "/laboratory"), ("Learn", "/learn"),
@@ -73,6 +75,7 @@ def frame(studio: Studio, title: str) -> Iterator[None]:
     ui.page_title(f"{say(title)}: gyrobench")
     ui.add_css(STYLE)
     ui.add_head_html(f'<script>document.documentElement.lang = "{say.html}";</script>')
+    ui.add_head_html(f"<script>{NARROW.read_text(encoding='utf-8')}</script>")
     ui.colors(primary=MARK)
     mode = ui.dark_mode(studio.dark)
 
@@ -140,6 +143,19 @@ def dropped(text: str, taken: Handler[UploadEventArguments], label: str, accept:
         <q-btn flat dense round icon="attach_file" {spoken(f"{label}: choose a file")} @click="props.pickFiles"
         /></div>""",
     )
+
+
+def search_field(label: str, items: str, classes: str = "") -> ui.input:
+    """Add a field whose text narrows, in the page itself, the items of a list; see narrow.js."""
+    field = ui.input(say(label)).props("dense outlined clearable").classes(classes)
+    return field.on("update:model-value", js_handler=f"(text) => narrow('{items}', {{ text }})")
+
+
+def counted(items: str, said: Callable[[str], str], count: int) -> None:
+    """Add how many items of a list are shown.  said: the words for a number."""
+    words = escape(said(NUMBER).replace(NUMBER, "#"))  # the catalogue asks for a number
+    now = words.replace("#", str(count))
+    ui.html(f'<span class="soft" data-counts="{items}" data-said="{words}">{now}</span>', sanitize=False)
 
 
 class CopyLines:

@@ -14,7 +14,7 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
-from gyrobench.studio.frame import CopyLines, Studio, address, frame, inside, told
+from gyrobench.studio.frame import CopyLines, Studio, address, counted, frame, inside, search_field, told
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
@@ -233,20 +233,17 @@ def _add_runs_page(studio: Studio) -> None:
             active = ui.element("div").classes("rows")
             entries = await asyncio.to_thread(list_runs, studio.bench.out)
             with ui.element("div").classes("bar"):
-                search = ui.input(say("Filter")).props("dense outlined clearable").mark("filter")
+                search_field("Filter", ".runs").mark("filter")
                 compare = ui.button(say("Compare"), icon="compare_arrows").mark("compare")
-                count = ui.label().classes("soft")
-            chosen: dict[str, ui.checkbox] = {}
-            rows = _table(entries, chosen)
-
-            def narrow() -> None:
-                words = (search.value or "").lower().split()
-                shown = [all(w in text for w in words) for text, _ in rows]
-                for (_, row), there in zip(rows, shown, strict=True):
-                    row.set_visibility(there)
-                count.set_text(
-                    say(f"{sum(shown)} of {len(entries)} runs; tick two or more to compare, the oldest is the baseline")
+                counted(
+                    ".runs",
+                    lambda n: say(
+                        f"{n} of {len(entries)} runs; tick two or more to compare, the oldest is the baseline"
+                    ),
+                    min(len(entries), LISTED),
                 )
+            chosen: dict[str, ui.checkbox] = {}
+            _table(entries, chosen)
 
             def go() -> None:
                 places = [r.place for r in reversed(entries) if r.place in chosen and chosen[r.place].value]
@@ -254,14 +251,11 @@ def _add_runs_page(studio: Studio) -> None:
                     raise UsageError("tick two runs or more to compare them")
                 ui.navigate.to("/compare?" + "&".join(f"run={quote(p)}" for p in places))
 
-            search.on_value_change(narrow)
             compare.on_click(told(go))
-            narrow()
             _watch(studio, active)
 
 
-def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> list[tuple[str, ui.element]]:
-    rows = []
+def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> None:
     with ui.element("div").classes("scroll"), ui.element("table").classes("runs"):
         with ui.element("thead"), ui.element("tr"):
             for text in ("", "Run", "Test", "Verdict", "Date", "Changed"):
@@ -285,27 +279,26 @@ def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> list[tupl
                     with ui.element("td"):
                         seed = [say(f"seed {r.seed}")] if r.seed is not None else []
                         ui.label(", ".join([*seed, *r.changed[:8]])).classes("soft")
-                rows.append((f"{r.place} {r.title} {r.verdict} {r.date} {' '.join(r.changed)}".lower(), row))
-    return rows
+                row.props["data-text"] = f"{r.place} {r.title} {r.verdict} {r.date} {' '.join(r.changed)}".lower()
 
 
 def _watch(studio: Studio, place: ui.element) -> None:
     """Show the jobs that have not ended, as they are now."""
-    known: list[str] = []
+    rows: dict[str, tuple[ui.element, ui.label, ui.label]] = {}  # kept while the job is under way: its link is clicked
 
     def look() -> None:
-        jobs = [j for j in studio.jobs.all() if j.active]
-        now = [f"{j.key} {j.state} {j.report.fraction:.2f}" for j in jobs]
-        if now == known:
-            return
-        known[:] = now
-        place.clear()
-        with place:
-            for j in jobs:
-                with ui.element("div").classes("bar"):
-                    ui.label(say(j.state)).classes("tag")
-                    ui.link(j.request.system, f"/job/{j.key}")
-                    ui.label(f"{100.0 * j.report.fraction:.0f} %").classes("soft")
+        jobs = {j.key: j for j in studio.jobs.all() if j.active}
+        for key in [*rows]:
+            if key not in jobs:
+                rows.pop(key)[0].delete()
+        for key, job in jobs.items():
+            if key not in rows:
+                with place, ui.element("div").classes("bar") as row:
+                    state = ui.label().classes("tag")
+                    ui.link(job.request.system, f"/job/{key}")
+                    rows[key] = row, state, ui.label().classes("soft")
+            rows[key][1].set_text(say(job.state))
+            rows[key][2].set_text(f"{100.0 * job.report.fraction:.0f} %")
 
     look()
     ui.timer(1.0, look)

@@ -15,7 +15,7 @@ from nicegui import ui
 from gyrobench.component.declarations import Declaration
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import wiring_figure
-from gyrobench.studio.frame import CopyLines, Studio, frame, told
+from gyrobench.studio.frame import CopyLines, Studio, frame, search_field, told
 from gyrobench.studio.request import JobRequest
 from gyrobench.studio.slot_fmu import drop_fmu
 from gyrobench.studio.time_line import TimeLine
@@ -125,7 +125,7 @@ def _row(
         given = choice.request.values.get(name, "")
         field = ui.input(placeholder=shown, value=given, validation=lambda text: choice.set(name, text, check))
         field.props("dense outlined hide-bottom-space debounce=250").props(f'aria-label="{escape(name)}"')
-    return f"{name} {doc}".lower(), row
+    return f"{name} {doc} {say(doc, choice.test.name)}".lower(), row
 
 
 def _option_check(name: str, option: Option) -> Callable[[str], Any]:
@@ -144,16 +144,10 @@ def _parameter_check(name: str, d: Declaration) -> Callable[[str], Any]:
 def _searched_options(choice: _Choice) -> None:
     """Add the options, and a field that narrows them."""
     heading("Options", 2)
-    search = ui.input(say("Search the options")).props("dense outlined clearable").classes("full")
-    with ui.element("div").classes("rows"):
-        rows = _options(choice)
-
-    def narrow() -> None:
-        words = (search.value or "").lower().split()
-        for text, row in rows:
-            row.set_visibility(all(w in text for w in words))
-
-    search.on_value_change(narrow)
+    search_field("Search the options", ".options", "full")
+    with ui.element("div").classes("rows options"):
+        for text, row in _options(choice):
+            row.props["data-text"] = text
 
 
 def _options(choice: _Choice) -> list[tuple[str, ui.element]]:

@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import asyncio
+from html import escape
 
 from nicegui import ui
 
-from gyrobench.studio.frame import Studio, frame
-from gyrobench.studio.words import content, heading, say
+from gyrobench.studio.frame import Studio, counted, frame, search_field
+from gyrobench.studio.words import heading, marked, say
 from gyrobench.workflow.gallery import PURPOSES, GalleryEntry, gallery
 
-
-def _card(entry: GalleryEntry) -> ui.link:
-    with ui.link(target=f"/system/{entry.name}").classes("card") as card:
-        ui.html(f'<img src="/picture/{entry.name}" alt="" loading="lazy">', sanitize=False)
-        with ui.element("div").classes("text"):
-            content(entry.title, entry.name).classes("title")
-            ui.label(entry.name).classes("name")
-            if entry.problem:
-                content(entry.problem).classes("problem")
-            else:
-                content(entry.summary, entry.name).classes("summary")
-    return card
+CHOICES = ("All", *PURPOSES)
 
 
-def _found(entry: GalleryEntry, purpose: str, words: list[str]) -> bool:
-    said = f"{say(entry.title, entry.name)} {say(entry.summary, entry.name)}"
-    text = f"{entry.name} {entry.title} {entry.summary} {said}".lower()
-    return purpose in ("All", *entry.purposes) and all(word in text for word in words)
+def _card(entry: GalleryEntry) -> str:
+    """Return the card of a system: a plain link, with the text that the search looks through."""
+    said = (entry.name, entry.title, entry.summary, say(entry.title, entry.name), say(entry.summary, entry.name))
+    purposes = " ".join(str(k) for k, name in enumerate(CHOICES) if name in ("All", *entry.purposes))
+    about = ("problem", entry.problem) if entry.problem else ("summary", entry.summary)
+    return f"""<a class="card" href="/system/{escape(entry.name)}" data-purposes="{purposes}"
+        data-text="{escape(" ".join(said).lower())}"><img src="/picture/{escape(entry.name)}" alt="" loading="lazy">
+        <div class="text">{marked(entry.title, entry.name, "title")}<div class="name">{escape(entry.name)}</div>
+        {marked(about[1], entry.name, about[0])}</div></a>"""
 
 
 def add_systems_page(studio: Studio) -> None:
@@ -40,19 +35,9 @@ def add_systems_page(studio: Studio) -> None:
             heading("Systems")
             ui.label(say("A system is a test method or a loop: parts in slots, wired, run and reduced to a report."))
             with ui.element("div").classes("bar"):
-                purpose = ui.toggle(
-                    {p: say(p) for p in ("All", *PURPOSES)}, value="All", on_change=lambda: show()
-                ).props("no-caps")
-                search = ui.input(say("Search"), on_change=lambda: show()).props("dense outlined clearable")
-                count = ui.label().classes("soft")
-            with ui.element("div").classes("gallery"):
-                cards = [(entry, _card(entry)) for entry in entries]
-
-            def show() -> None:
-                words = (search.value or "").lower().split()
-                shown = [_found(entry, purpose.value, words) for entry, _ in cards]
-                for (_, card), there in zip(cards, shown, strict=True):
-                    card.set_visibility(there)
-                count.set_text(say(f"{sum(shown)} of {len(shown)}"))
-
-            show()
+                purpose = ui.toggle({p: say(p) for p in CHOICES}, value="All").props("no-caps")
+                pressed = f"mounted_app.elements[{purpose.id}].props['model-value'] = k"  # at once
+                purpose.on("update:model-value", js_handler=f"(k) => narrow('.gallery', {{ purpose: {pressed} }})")
+                search_field("Search", ".gallery")
+                counted(".gallery", lambda n: f"{n} / {len(entries)}", len(entries))
+            ui.html("".join(map(_card, entries)), sanitize=False).classes("gallery")

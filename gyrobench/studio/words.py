@@ -1,7 +1,8 @@
 """The language of the studio: its labels by the catalogue that reports use, with the texts of the face beside.
 
-Code writes English.  ``zh.toml`` in this folder has the labels, ``systems/NAME/zh.toml`` titles and summaries; what a
-system or a part says of its options and parameters stays English and is marked as such (lang="en").
+Code writes English.  ``zh.toml`` in this folder has the labels and what options of several systems mean,
+``systems/NAME/zh.toml`` titles, summaries and options; what a part says of its parameters stays English and is marked
+as such (lang="en").
 """
 
 from __future__ import annotations
@@ -61,6 +62,13 @@ def content(text: str, system: str = "") -> ui.label:
     found = say.find(text, system)
     label = ui.label(text if found is None else found)
     return label.props('lang="en"') if found is None else label
+
+
+def marked(text: str, system: str, classes: str) -> str:
+    """Return the HTML of what a system says, in the language; where it stays English it is marked so."""
+    found = say.find(text, system)
+    english = ' lang="en"' if found is None else ""
+    return f'<div class="{classes}"{english}>{escape(text if found is None else found)}</div>'
 
 
 def spoken(text: str) -> str:

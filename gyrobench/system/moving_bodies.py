@@ -116,7 +116,7 @@ def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
     """Return the mounts of the plan at rows of the channels."""
     parameters = nest(record.run.parameters)
     faces, order = parameters.get(f"{slot}.faces"), parameters.get(f"{slot}.face_of")
-    phases = _phases(record, at)
+    phases = _phases(slot, record, at)
     if not faces or not order or phases is None:
         return None
     mounts = np.asarray(faces, dtype=float).reshape(-1, 3, 3)
@@ -128,7 +128,7 @@ def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
     """Return the axes of what stands on a stand at rows of the channels: the phase is the number of its mount."""
     parameters = nest(record.run.parameters)
     numbers, latitude = parameters.get(f"{slot}.mounts"), parameters.get(f"{slot}.latitude")
-    phases = _phases(record, at)
+    phases = _phases(slot, record, at)
     if not numbers or latitude is None or phases is None:
         return None
     pole = frames.pole(float(latitude))
@@ -142,8 +142,12 @@ def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
     return found
 
 
-def _phases(record: Record, at: AnyArray) -> AnyArray | None:
-    """Return the phase of each row of the channels, which lasts until the end of its last window; None without any."""
+def _phases(slot: str, record: Record, at: AnyArray) -> AnyArray | None:
+    """Return the phase of each row of the channels, as the slot says or until the end of its last window, or None."""
+    said = record.channels.get(f"{slot}.phase")
+    if said is not None:
+        own: AnyArray = np.maximum(np.asarray(said)[at].astype(int), 1)
+        return own
     if not {"phase", "t_end"} <= set(record.windows) or not len(record.windows["phase"]):
         return None
     phases = np.asarray(record.windows["phase"], dtype=int)

@@ -1,4 +1,4 @@
-"""A laboratory's sights of Polaris, of a mirror on the stand, and of its axis by an inclinometer."""
+"""A laboratory's sights of Polaris or a north finder, of a mirror on the stand, and of its axis by an inclinometer."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ TEMPLATE = """\
 # operator = who took the sights
 #
 # latitude, longitude (east positive), start (UTC from which the times count): needed, here or by --set.
-# target: 1 Polaris, 2 the mirror by autocollimation, 3 the axis by the inclinometer; negative: face right, and the
-#   inclinometer turned round.  As many of each sign, two at least.
+# target: 1 Polaris, 2 the mirror by autocollimation, 3 the axis by the inclinometer, 4 (in place of 1) the mirror on a
+#   north finder's head, of the azimuth "heading"; negative: face right, and the inclinometer turned round.  As many of
+#   each sign, two at least.
 # mean: horizontal circle, from north to east, face right less 180 deg; of target 3 the inclinometer, the elevation of
 #   the axis.  level: plate level across the line of sight, positive where the right of the instrument is low; 0 with 3.
 # Units in brackets may be others of the same kind (min, rad, arcsec ...).
@@ -36,11 +37,11 @@ COLUMNS = (
     CsvColumn("phase", "1", "number of the sight"),
     CsvColumn("t_start", "s", "begin of the sight"),
     CsvColumn("t_end", "s", "end of the sight"),
-    CsvColumn("target", "1", "1 star, 2 mirror, 3 axis; negative: face right"),
+    CsvColumn("target", "1", "1 star, 2 mirror, 3 axis, 4 head; negative: face right"),
     CsvColumn("mean", "rad", "horizontal circle, or inclinometer"),
     CsvColumn("level", "rad", "plate level across the line of sight"),
 )
-NAMES = {1: "star", 2: "mirror", 3: "axis"}
+NAMES = {1: "star", 2: "mirror", 3: "axis", 4: "head"}
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:

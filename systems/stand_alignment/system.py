@@ -1,4 +1,4 @@
-"""Azimuth and elevation of a table's axis against the pole: Polaris, mirror and inclinometer."""
+"""Azimuth and elevation of a table's axis against the pole: Polaris or a north finder, mirror and inclinometer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gyrobench.result import Result
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import CORRECTIONS
 from gyrobench.system.families.table_test import sampled
@@ -19,14 +20,15 @@ from gyrobench.units import DEG
 from . import polaris
 from .measured import MEASURED
 
-STAR, MIRROR, AXIS = 1.0, 2.0, 3.0
+STAR, MIRROR, AXIS, HEAD = 1.0, 2.0, 3.0, 4.0
+BY = {"star": STAR, "gyro": HEAD}  # what the azimuth is from
 FACE = "stand"
 LOWEST = 8.0 * DEG  # of Polaris, for a refraction that holds
 SIGHTS = Socket(
     "Theodolite",
     "sights of a star, a mirror and an axis by a plan: target in, circle and level out",
     (
-        inp("target", "1", "1 star, 2 mirror, 3 axis; negative: face right"),
+        inp("target", "1", "1 star, 2 mirror, 3 axis, 4 head of a north finder; negative: face right"),
         out("reading", "rad", "horizontal circle, face right less half a turn; or the inclinometer"),
         out("level", "rad", "plate level across the line of sight"),
         out("angle_read", "rad", "the target, as an angle"),
@@ -35,9 +37,21 @@ SIGHTS = Socket(
 )
 
 
+def heading_of(result: Result) -> dict[str, str]:
+    """Return the options that a north finding gives: its heading and the uncertainty of it.
+
+    Raises LookupError where it has no value.
+    """
+    found = next((c for c in result.coefficients if c.name == "ψ"), None)
+    if found is None or found.no_value:
+        raise LookupError("no value of the heading ψ")
+    return {"by": "gyro", "heading": f"{found.estimate:.12g}deg", "u_heading": f"{found.u:.6g}deg"}
+
+
 class StandAlignment(System):
     """A theodolite before a test stand sights Polaris and a mirror on the stand, in both faces, and an inclinometer
-    reads the stand's axis, turned round: how far the axis is off the pole, about east and across.
+    reads the stand's axis, turned round: how far the axis is off the pole, about east and across.  Where the sky is not
+    to be seen, by = gyro: a mirror on the head of a north finder in place of Polaris.
 
     [STAND-ALIGNMENT; Hu 1981, section 5.7]
     """
@@ -60,6 +74,8 @@ class StandAlignment(System):
         {sampled("level_reader", "theodolite: angle_read")}
     """
     options = {
+        "by": Option("star", str, "where the azimuth is from: star, or gyro: the head of a north finder"),
+        "heading": Option("20deg", "rad", "azimuth of the mirror on that head, as found", sets="theodolite.head"),
         "latitude": Option(
             "45.75deg", "rad", "geographic latitude, north positive", -89 * DEG, 89 * DEG, sets="theodolite.latitude"
         ),
@@ -75,11 +91,13 @@ class StandAlignment(System):
         "u_time": Option(0.0, "s", "standard uncertainty of the clock", 0.0),
         "u_latitude": Option(0.0, "rad", "standard uncertainty of the latitude, deflection of the vertical in it", 0.0),
         "u_star": Option(0.0, "rad", "standard uncertainty of the place of Polaris, each way", 0.0),
+        "u_heading": Option(0.0, "rad", "standard uncertainty of the heading of the north finder's mirror", 0.0),
         "u_level": Option(0.0, "1", "relative standard uncertainty of the scale of the plate level", 0.0),
         "u_circle": Option(0.0, "rad", "error of the circle once a turn, std. unc. of its amplitude", 0.0),
         "u_mirror": Option(0.0, "rad", "std. unc. of the mirror's normal against the axis, in azimuth", 0.0),
         "u_inclinometer": Option(0.0, "rad", "std. unc. of the inclinometer that turning does not show", 0.0),
     }  # fmt: skip
+    takes: ClassVar[Mapping[str, Any]] = {"north_finder": heading_of}
     measured_data = MEASURED
     noises = ("theodolite.pointing", "theodolite.bubble")
     windows = Windows.of("sampler", level="level_reader.mean")
@@ -91,8 +109,9 @@ class StandAlignment(System):
 
     def plan(self) -> Plan:
         each = {"settle": self["settle"], "dwell": self["dwell"], "window": self["dwell"]}
-        names = {STAR: "star", MIRROR: "mirror", AXIS: "axis"}
-        order = (MIRROR, STAR, -STAR, -MIRROR, AXIS, -AXIS)
+        names = {STAR: "star", MIRROR: "mirror", AXIS: "axis", HEAD: "head"}
+        sight = BY.get(self["by"], STAR)
+        order = (MIRROR, sight, -sight, -MIRROR, AXIS, -AXIS)
         phases = [
             Phase(f"set {k + 1}: {names[abs(t)]}, {'left' if t > 0 else 'right'}", "index", FACE, t, **each)
             for k in range(self["sets"])
@@ -106,13 +125,14 @@ class StandAlignment(System):
         return {**self.plan().parameters(), **self.owned(), **place}
 
     def check(self) -> list[str]:
-        problems = []
+        problems = [] if self["by"] in BY else [f"by = {self['by']}: must be one of {', '.join(BY)}"]
         try:
             polaris.julian(self["start"])
         except ValueError:
             problems.append(f"start = {self['start']}: write it as 2026-11-28T12:00, in UTC")
-        if self["latitude"] < LOWEST:
+        if self["latitude"] < LOWEST and self["by"] == "star":
             problems.append(
-                f"latitude = {math.degrees(self['latitude']):.4g}°: Polaris stands too low; from 8° north on"
+                f"latitude = {math.degrees(self['latitude']):.4g}°: Polaris stands too low; from 8° north on, or take "
+                "by=gyro"
             )
         return problems

@@ -65,6 +65,10 @@ class TableCapture(System):
         "sequencer.phase", "sequencer.gate", "table.angle", "table.omega[1]", "table.in_position", "table.saturated",
         "gyro.b", "gyro.u", "gyro.saturated",
     )  # fmt: skip
+    bodies = """
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table, faces sequencer
+    """
     shown = ("gyro.b", "table.omega", "table.in_position", "table.saturated gyro.saturated")
 
     def turn(self) -> float:

@@ -82,6 +82,10 @@ class TableMotorTest(LoopTest):
         "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.torque[2]", "reader.angle_read",
         "voltmeter.reading", "ammeter.reading", "drive.saturated",
     )  # fmt: skip
+    bodies = """
+        table: base body.base, x body.tilt[1], y body.tilt[2], z reader.angle_read
+        instrument: table, base body.face
+    """
     shown = ("reader.angle_read", "voltmeter.reading", "ammeter.reading", "exciter.torque")
 
     def phases(self) -> list[LoopPhase]:

@@ -81,6 +81,10 @@ class TableServoLoop(LoopTest):
         "exciter.phase", "exciter.gate", "exciter.torque[1]", "exciter.command[1]", "table.angle", "table.omega[1]",
         "gyro.u", "gyro.b", "rings.M",
     )  # fmt: skip
+    bodies = """
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table, base table.face
+    """
     shown = ("table.angle", "gyro.u", "exciter.torque", "exciter.command", "rings.M", "table.saturated gyro.saturated")
 
     open = ("table.mode", "table.target", "table.face")

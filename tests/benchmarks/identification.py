@@ -14,19 +14,21 @@ import argparse
 import sys
 import time
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy import signal
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
-from friction_loops import random_friction
+from friction_loops import MeasuredLoop, random_friction
 from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_fit import fit_plant
+from gyrobench.identification.written_identification import Identification
 
 BAND = (1.0, 150.0)  # Hz
 PERIOD = 4000  # samples
@@ -104,6 +106,13 @@ def excitation(kind: str, rng: np.random.Generator) -> np.ndarray:
     return signal.lfilter(*signal.butter(2, 0.3), rng.standard_normal(60000)) * 1.8
 
 
+def timed(record: LoopRecord) -> Identification:
+    """Return what is identified in the band, with its seconds."""
+    begin = time.perf_counter()
+    found = identify_record(record, BAND)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
 def linear(runs: int, kind: str, noise: float, first: int) -> Count:
     """Count random platforms; noise: rms of the sensor's and of the disturbance, over that of the response."""
     counted = Count()
@@ -119,9 +128,7 @@ def linear(runs: int, kind: str, noise: float, first: int) -> Count:
         torque *= noise * u.std() / torque.std()
         sensor = noise * y.std() * (rng.standard_normal(r.size) + 0.002 * np.cumsum(rng.standard_normal(r.size)))
         record = LoopRecord("random platform", H, r, *loop.run(r, at, torque, sensor), at, UNITS)
-        begin = time.perf_counter()
-        found = identify_record(record, BAND)
-        object.__setattr__(found, "seconds", time.perf_counter() - begin)
+        found = timed(record)
         L, P = loop.responses(found.f)
         counted.responses(found, {"L": L, "S": 1.0 / (1.0 + L), "T": L / (1.0 + L), "P": P})
         counted.margins(found, margins_of(loop, found.f[0], found.f[-1]))
@@ -143,17 +150,19 @@ def friction(runs: int, noise: float, first: int, periods: int = 6, realizations
         means.append(np.fft.rfft(u[samples:], axis=0))
     x = np.stack(lines)
     S = np.einsum("mk,mkn->kn", np.conj(x), np.stack(means)) / np.maximum(np.sum(np.abs(x) ** 2, 0), 1e-9)[:, None]
+    excited = np.flatnonzero(np.abs(x[0]) > 1e-6 * np.abs(x[0]).max())
     r = np.stack([np.tile(odd_multisine(samples, rng, *BAND), periods + 1) for _ in range(runs)], 1)
     u, y = platforms.run(r, np.zeros_like(r), np.zeros_like(r))
     torque, sensor = (rng.standard_normal(r.shape) * noise * s for s in (np.ones(runs), y.std(axis=0)))
     u, y = platforms.run(r, torque, sensor)
     for k in range(runs):
-        found = identify_record(LoopRecord("friction", H, r[:, k], u[:, k], y[:, k], "plant input", UNITS), BAND)
+        found = timed(LoopRecord("friction", H, r[:, k], u[:, k], y[:, k], "plant input", UNITS))
         s = S[np.round(found.f * samples * H).astype(int), k]
         counted.responses(found, {"L": 1.0 / s - 1.0, "S": s, "T": 1.0 - s})
         counted.all["odd distortion seen"] += 1
         counted.held["odd distortion seen"] += any(d.kind == "odd" and d.significant for d in found.distortions)
-        counted.margins(found, {})
+        truth = MeasuredLoop(excited / (samples * H), S[excited, k])
+        counted.margins(found, margins_of(truth, found.f[0], found.f[-1]))
     return counted
 
 

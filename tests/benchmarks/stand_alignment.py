@@ -1,7 +1,7 @@
-"""Coverage of the intervals of stand_alignment:  python tests/benchmarks/stand_alignment.py [--runs N]
+"""Coverage of the intervals of stand_alignment:  python tests/benchmarks/stand_alignment.py [--runs N] [--gyro]
 
 Random stands, theodolites, dates and latitudes (12 to 70 deg), co-simulated with noise; the share of 95 % intervals
-that hold the truth, by coefficient.
+that hold the truth, by coefficient.  --gyro: a north finder in place of Polaris, its heading drawn with its u.
 """
 
 from __future__ import annotations
@@ -32,10 +32,15 @@ def main() -> None:
     """Count, and print a line for each coefficient."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200)
-    runs, rng, held = parser.parse_args().runs, np.random.default_rng(1), dict[str, int]()
+    parser.add_argument("--gyro", action="store_true")
+    given = parser.parse_args()
+    runs, rng, held = given.runs, np.random.default_rng(1), dict[str, int]()
     with Session("stand_alignment") as session:
         for seed in range(runs):
             values = drawn(rng)
+            if given.gyro:
+                off, u = float(rng.normal()) * 3.0 * ARCSEC, 3.0 * ARCSEC
+                values |= {"by": "gyro", "heading": 0.3, "theodolite.head": 0.3 + off, "u_heading": u}
             result = session.system.with_values(values).reduce(session.run(values, seed=seed + 1))
             for c in result.coefficients:
                 assert c.truth is not None

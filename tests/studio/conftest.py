@@ -12,10 +12,14 @@ from typing import Any
 import pytest
 from studio_pages import CHROMIUM, LIMIT
 
+import gyrobench as gb
 
-@pytest.fixture(scope="module")
+VIEW = {"width": 1300, "height": 900}
+
+
+@pytest.fixture(scope="session")
 def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """The first address of a studio, and the folder it was started in."""
+    """The first address of a studio, and the folder it was started in; one for all tests that run in a process."""
     home = tmp_path_factory.mktemp("bench")
     command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0"]
     process = subprocess.Popen(command, cwd=home, stdout=subprocess.PIPE, text=True)
@@ -28,7 +32,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
     process.wait(20)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="module")  # not of the session: while it lives, no other test could run an event loop
 def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
@@ -38,12 +42,24 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
+@pytest.fixture(scope="module")
+def context(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
+    """A browser that has opened the first address once: it has the cookie and keeps the scripts of the front end."""
+    made = browser.new_context(viewport=VIEW)
+    page = made.new_page()
+    page.set_default_timeout(LIMIT)
+    page.goto(studio[0])
+    page.close()
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def page(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
-    """A page at the first address; every request, and every complaint of the page, is looked at in the end."""
-    context = browser.new_context(viewport={"width": 1300, "height": 900})
+def page(studio: tuple[str, Path], context: Any) -> Iterator[Any]:
+    """An empty page; every request, and every complaint of the page, is looked at in the end."""
     page = context.new_page()
     page.set_default_timeout(LIMIT)
+    page.set_viewport_size(VIEW)
     base = studio[0].partition("/?")[0]
     outside: list[str] = []
     complaints: list[str] = []
@@ -51,7 +67,16 @@ def page(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
     page.on("websocket", lambda w: None if w.url.startswith(base.replace("http", "ws")) else outside.append(w.url))
     page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda e: complaints.append(str(e)))
-    page.goto(studio[0])
     yield page
-    context.close()
+    page.close()
     assert outside == [] and complaints == []
+
+
+@pytest.fixture(scope="session")
+def two_runs(studio: tuple[str, Path]) -> list[Path]:
+    """Folders of two short runs of the studio's bench, with their reports."""
+    out = studio[1] / "reports" / "out" / "fixed_position"
+    folders = [out / "run1", out / "run2"]
+    for seed, folder in enumerate(folders, 1):
+        gb.load("fixed_position", {"dwell": "60s"}).run(seed, check_step=False).report(folder)
+    return folders

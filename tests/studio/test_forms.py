@@ -12,8 +12,6 @@ import foreign_fmus
 import pytest
 from studio_pages import CHROMIUM, NONE, TESTS, base_of, run_of
 
-import gyrobench as gb
-
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NONE)
 
 
@@ -59,20 +57,17 @@ def test_a_campaign_is_watched_and_its_site_opened(page: Any, studio: tuple[str,
     opened.value.get_by_text("fixed_position", exact=False).first.wait_for()
 
 
-def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, Path]) -> None:
-    gb.load("fixed_position", {"dwell": "60s"}).run().report(studio[1] / "reports" / "out" / "fixed_position" / "mine")
+def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, Path], two_runs: list[Path]) -> None:
     page.goto(base_of(studio) + "/laboratory")
     page.get_by_label("Name", exact=True).fill('Labor "Nord"')
     page.get_by_label("Address, one line each").fill("Street 1\n12345 Town")
     page.get_by_label("Signatories, ROLE: NAME, one a line").fill("Head: A. B.")
     page.get_by_label("Country, two letters").fill("Germany")
-    page.wait_for_timeout(400)
     page.get_by_role("button", name="Save").click()
     page.locator(".q-notification").get_by_text(re.compile("country")).wait_for()
     page.get_by_role("button", name="Close").click()
     assert not (studio[1] / "laboratory.toml").exists(), "what is wrong is not kept"
     page.get_by_label("Country, two letters").fill("DE")
-    page.wait_for_timeout(400)
     page.get_by_role("button", name="Save").click()
     page.get_by_text("Saved:").wait_for()
     profile = tomllib.loads((studio[1] / "laboratory.toml").read_text(encoding="utf-8"))
@@ -81,7 +76,7 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     page.goto(base_of(studio) + "/laboratory")
     assert page.get_by_label("Name", exact=True).input_value() == 'Labor "Nord"'
     page.get_by_label("Run of an instrument, runs of a lot").click()
-    page.get_by_role("option").first.click()
+    page.get_by_role("option", name="fixed_position/run1").click()
     page.keyboard.press("Escape")
     page.get_by_label("Number of the certificate").fill("2026-7")
     page.wait_for_function("document.querySelector('.code').textContent.includes('--number=2026-7')")
@@ -101,7 +96,6 @@ def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[st
     assert "into the socket SdfGyro" in mapping.input_value()
     page.wait_for_function("document.querySelector('.code').textContent.includes('--map gyro=')")
     mapping.fill((TESTS / "foreign" / "vendor_gyro.toml").read_text(encoding="utf-8"))
-    page.wait_for_timeout(500)
     page.get_by_role("button", name="Run").click()
     run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
     assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studio_pages import CHROMIUM, LIMIT, NONE, base_of
+from studio_pages import CHROMIUM, NONE, base_of, settled
+from studio_requests import Door
 
 import gyrobench as gb
+from gyrobench.bench import Bench, standard_folder
 from gyrobench.report.language import PLACEHOLDER, WORD, catalogue
 from gyrobench.studio import words
 from gyrobench.studio.command_pages import DESIGN, PROFILE, SIGNATORIES, SWEEP, TUNE
@@ -23,6 +25,7 @@ from gyrobench.studio.jobs import ENDED
 from gyrobench.studio.picture import LEGEND
 from gyrobench.studio.run_page import HOW
 from gyrobench.workflow.gallery import PURPOSES
+from gyrobench.workflow.inputs import load_test
 
 FOLDER = Path(words.__file__).parent
 SAID = ("say", "heading", "spoken")
@@ -40,7 +43,10 @@ STAY = {
     "NAME",
     "VALUE",
     "set",
+    "auto",  # values of options
+    "none",
 }
+VALUES = {"current", "rate"}  # of an option of the system that is looked at
 
 
 @pytest.fixture
@@ -73,6 +79,13 @@ def test_every_label_has_its_line(chinese: None) -> None:
     assert [text for text in sorted(every) if words.say.find(text) is None] == []
 
 
+@pytest.mark.parametrize("name", Bench(standard_folder()).systems())
+def test_every_option_is_said_in_chinese(chinese: None, name: str) -> None:
+    """What only one system has stands in its zh.toml, what several have in that of the studio."""
+    options = load_test(name).options
+    assert [f"{option}: {o.doc}" for option, o in options.items() if words.say.find(o.doc, name) is None] == []
+
+
 def test_no_english_word_is_left_in_a_line() -> None:
     chinese = catalogue("zh", FOLDER)
     own = {e: s for e, s in chinese.texts.items() if catalogue("zh").texts.get(e) != s}
@@ -98,42 +111,40 @@ TEXTS = """() => {
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason=NONE)
-def test_no_english_label_on_a_page_in_chinese(browser: Any, tmp_path: Path) -> None:
-    """In Chinese from the start; the switch leads to English and back."""
+def test_no_english_label_on_a_page_in_chinese(page: Any, studio: tuple[str, Path], two_runs: list[Path]) -> None:
+    """The switch leads to Chinese and back."""
+    base, left = base_of(studio), {}
     slots = set(gb.load("fixed_position").system.all_slots())
-    out = tmp_path / "reports" / "out" / "fixed_position"
-    for seed in (1, 2):
-        gb.load("fixed_position", {"dwell": "60s"}).run(seed, check_step=False).report(out / f"run{seed}")
-    command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0", "--language", "zh"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto(base + "/runs")
+    page.get_by_role("button", name="中文").click()
     try:
-        assert process.stdout is not None
-        address = re.search(r"http://\S+", process.stdout.readline())
-        assert address
-        context = browser.new_context(viewport={"width": 390, "height": 844})
-        page = context.new_page()
-        page.set_default_timeout(LIMIT)
-        page.goto(address[0])
-        base, left = base_of((address[0], tmp_path)), {}
+        page.get_by_role("heading", name="运行记录").wait_for()
         for path in (
             "/", "/system/fixed_position", "/data", "/data?test=drift_record", "/runs", "/tune", "/design", "/campaign",
             "/laboratory", "/learn", "/run/fixed_position/run1",
             "/compare?run=fixed_position/run1&run=fixed_position/run2",
         ):  # fmt: skip
             page.goto(base + path)
-            page.locator("h1").first.wait_for()
-            page.wait_for_timeout(500)
+            settled(page)
             assert page.evaluate("document.documentElement.lang") == "zh-CN"
             assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
             found = {w for text in page.evaluate(TEXTS) for w in WORD.findall(text)}
-            left[path] = found - STAY - slots - {"English", "reports", "out", "run"}
+            left[path] = found - STAY - slots - VALUES - {"English", "reports", "out", "run"}
         assert {path: found for path, found in left.items() if found} == {}
+    finally:
         page.goto(base + "/runs")
         page.get_by_role("button", name="English").click()
         page.get_by_role("heading", name="Runs").wait_for()
-        assert page.evaluate("document.documentElement.lang").startswith("en")
-        page.get_by_role("button", name="中文").click()
-        page.get_by_role("heading", name="运行记录").wait_for()
-    finally:
+    assert page.evaluate("document.documentElement.lang").startswith("en")
+
+
+def test_a_studio_begins_in_the_language_it_is_asked_for(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0", "--language", "zh"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        address = re.search(r"http://\S+", process.stdout.readline())
+        assert address
+        answer = Door.of(address[0]).get("/laboratory")[2].decode()
         process.terminate()
-        process.wait(20)
+    assert "zh-CN" in answer and "资料" in answer

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from own_loops import H
+from scipy.interpolate import make_smoothing_spline
 
 SUB = 4  # steps of integration in a sample
 
@@ -61,3 +62,17 @@ def random_friction(count: int, rng: np.random.Generator) -> FrictionPlatforms:
         J, J * rng.uniform(0.5, 3.0, count), rng.uniform(0.05, 0.4, count), rng.uniform(0.02, 0.1, count) / (J * wc),
         J * wc * rng.uniform(0.7, 1.0, count), wc / rng.uniform(5.0, 10.0, count), rng.integers(1, 6, count),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MeasuredLoop:
+    """S of a mean over realizations at frequencies, Hz; between them a smoothing spline of ln L over ln f."""
+
+    f: np.ndarray
+    S: np.ndarray
+
+    def responses(self, f: np.ndarray) -> tuple[np.ndarray, None]:
+        """Return L at f, Hz."""
+        x, log = np.log(self.f), np.log(1.0 / self.S - 1.0)
+        parts = [make_smoothing_spline(x, y)(np.log(f)) for y in (log.real, np.unwrap(log.imag))]
+        return np.exp(parts[0] + 1j * parts[1]), None

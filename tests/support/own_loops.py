@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from scipy import signal
@@ -91,19 +92,26 @@ def odd_multisine(samples: int, rng: np.random.Generator, low: float, high: floa
     return np.asarray(r / r.std())
 
 
-def margins_of(loop: SampledLoop, low: float, high: float) -> Mapping[str, float]:
+class HasResponses(Protocol):
+    def responses(self, f: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]: ...
+
+
+def margins_of(loop: HasResponses, low: float, high: float) -> Mapping[str, float]:
     """Return margins between two frequencies, Hz, on a grid of 40000: SI, gains as factors."""
     f = np.geomspace(low, high, 40000)
     L = loop.responses(f)[0]
     g, p = np.log(np.abs(L)), np.angle(-L)
     found: dict[str, float] = {}
     crossed = [_at(f, g, k) for k in np.flatnonzero((g[1:] > 0.0) != (g[:-1] > 0.0))]
-    phases = [(float(np.angle(-loop.responses(np.array([x]))[0][0])), x) for x in crossed]
+    phases = (
+        list(zip(np.angle(-loop.responses(np.array(crossed))[0]).tolist(), crossed, strict=True)) if crossed else []
+    )
     if phases:
         found["phase margin"], found["crossover"] = min(phases, key=lambda m: abs(m[0]))
         found["delay margin"] = min(a % (2.0 * np.pi) / (2.0 * np.pi * x) for a, x in phases)
     turned = np.flatnonzero(((p[1:] > 0.0) != (p[:-1] > 0.0)) & (np.abs(p[1:]) < 1.0) & (np.abs(p[:-1]) < 1.0))
-    gains = [1.0 / abs(loop.responses(np.array([_at(f, p, k)]))[0][0]) for k in turned]
+    turns = np.array([_at(f, p, k) for k in turned])
+    gains = (1.0 / np.abs(loop.responses(turns)[0])).tolist() if turns.size else []
     if up := [x for x in gains if 1.0 < x < 1e3]:
         found["gain margin"] = float(min(up))
     if down := [x for x in gains if x < 1.0]:

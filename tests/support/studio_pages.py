@@ -20,3 +20,14 @@ def run_of(page: Any, home: Path) -> Path:
     """Return the folder of the run that a page shows."""
     page.wait_for_url("**/run/**")
     return home / "reports" / "out" / page.url.partition("/run/")[2]
+
+
+#: the page has its connection, and nothing on it moves any more
+AT_REST = """() => window.did_handshake
+  && document.getAnimations().every((a) => a.playState !== 'running')"""
+
+
+def settled(page: Any) -> None:
+    """Wait until a page has its heading, its connection and no movement."""
+    page.locator("h1").first.wait_for()
+    page.wait_for_function(AT_REST)

@@ -77,6 +77,22 @@ def test_the_table_turns_earth_rate_as_its_axes_say() -> None:
     assert np.abs(vector(record, "table.omega") - expected)[away].max() < 1e-12
 
 
+def test_a_captured_table_turns_as_its_axes_say() -> None:
+    """omega = C omega_E + mount (0, 0, rate), f = C (0, 0, g): the mount by the phase that the sequencer records."""
+    names = [f"table.{what}[{k}]" for what in ("omega", "f") for k in (1, 2, 3)]
+    record = run("table_capture", {}, *names, "table.rate")
+    found = attitudes(
+        parse_bodies(gb.load("table_capture").system.bodies), record, np.arange(len(record.channels["time"]))
+    )
+    axes, f = found["instrument"], vector(record, "table.f")
+    mount = axes @ np.swapaxes(found["table"], 1, 2)
+    earth = frames.earth_rate_local(float(record.run.parameters["site.latitude"]))
+    expected = axes @ earth + mount[:, :, 2] * record.channels["table.rate"][:, None]
+    assert np.ptp(record.channels["table.angle"]) > 0.01
+    assert np.abs(vector(record, "table.omega") - expected).max() < 1e-12
+    assert np.abs(f - np.linalg.norm(f[0]) * axes[:, :, 2]).max() < 1e-9 * np.linalg.norm(f[0])
+
+
 def test_the_inner_element_feels_the_force_of_its_base() -> None:
     """f of the platform is that of the base through roll, pitch and azimuth gimbal; of the base, C (0, 0, g)."""
     names = [f"{slot}.f[{k}]" for slot in ("platform", "motion") for k in (1, 2, 3)]

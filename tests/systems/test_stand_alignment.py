@@ -197,7 +197,8 @@ def test_records_that_are_not_of_this_test() -> None:
     setup = R.AlignmentSetup(latitude=LAT, longitude=LONG, jd=2461000.0)
     for change, text in (
         ({"angle_start": np.where(code == -1.0, 1.0, code)}, "star: 4 sights left, 0 right"),
-        ({"angle_start": np.where(code == 3.0, 4.0, code)}, "target 4: 1 star, 2 mirror, 3 axis"),
+        ({"angle_start": np.where(code == 3.0, 5.0, code)}, "target 5: 1 star, 2 mirror, 3 axis"),
+        ({"angle_start": np.where(code == 3.0, 4.0, code)}, "the azimuth is from one of both"),
         ({"level": None}, "column level is missing"),
     ):
         rows = {n: v for n, v in {**windows, **change}.items() if v is not None}

@@ -73,7 +73,8 @@ def notebook(names: Names, page: str) -> None:
     """Every cell shows something; the normalized errors at the end are those of valid uncertainties."""
     shown, inner = names["SHOWN"], names["NAMES"]
     assert len(shown) == len(names["CELLS"]) and all(shown)
-    assert "mass unbalance" in shown[1] and "<svg" in shown[1] and "significant" in shown[5]
+    assert "mass unbalance" in shown[1] and "<svg" in shown[1] and "significant" in shown[6]
+    assert inner["run"].result.warnings == [], "the first result is without an alarm"
     assert 0.5 < float(inner["np"].sqrt((inner["z"] ** 2).mean().mean())) < 2.0
     assert {f.name for f in Path("first_report").iterdir()} >= {"report.html", "report.pdf", "run.json"}
 
