@@ -44,6 +44,8 @@ NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
 NUMBER = r"(?:[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]|e(?=[+-]\d))+(?: UTC)?"
 #: English words: letters that are no symbol and no part of an identifier (table.angle, u_a, --set, x.csv)
 WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as|eq|ch)(?![\w\\@]|[./-]\w)")
+#: three words that follow one another
+PROSE = re.compile(r"(?<![\w./\\@-])[a-z]{2,}(?: [a-z]{2,}){2}(?![\w\\@]|[./-]\w)")
 SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(:])")
 DATE = re.compile(r"\b(\d{4})-(\d\d)-(\d\d)\b")
 
@@ -190,10 +192,14 @@ class Language:
     def _filled(self, said: str, match: re.Match[str]) -> str | None:
         if any(v.count(a) != v.count(b) for v in match.groupdict().values() for a, b in ("“”", "()")):
             return None  # not a part of one text and of the next
-        parts = {n: v if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
+        parts = {n: self._kept(v) if VERBATIM.fullmatch(n) else self.find(v) for n, v in match.groupdict().items()}
         if None in parts.values():
             return None
         return PLACEHOLDER.sub(lambda m: str(parts[m[1]]), said)
+
+    def _kept(self, text: str) -> str | None:
+        """Return a name or a value that stays as it is; None of words that make a sentence, half English."""
+        return None if PROSE.search(text) and not (self.own | self.names).issuperset([text]) else text
 
     def _apart(self, text: str) -> str | None:
         """Return a text that is made of others: sentences, clauses, name and text, a list, a remark in brackets."""

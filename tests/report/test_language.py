@@ -13,6 +13,7 @@ from option_texts import option_texts
 from reading import pdf_text
 
 from gyrobench.bench import UsageError, standard_folder
+from gyrobench.record.run_document import SetupError
 from gyrobench.report import fonts, language, write
 from gyrobench.report.certificate_page import page
 from gyrobench.report.laboratory import Laboratory, read_laboratory
@@ -87,6 +88,38 @@ def test_a_text_is_said_whole_or_not_at_all(english: str, said: str | None) -> N
 def test_texts_of_the_user_stay_names_stay_where_they_are_no_text() -> None:
     words = small(own=frozenset({"no value"}), names=frozenset({"time", "table"}))
     assert (words.text("no value"), words.text("table"), words.text("time")) == ("no value", "table", "时间")
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: f"{f.parent.name}-{f.stem}")
+def test_no_line_lets_a_sentence_of_english_through(file: Path) -> None:
+    """Lines of little but placeholders ("{v} in {v2}") fit parts of many sentences: English in them is refused."""
+    words = Language(catalogue("zh", None if file.parent == language.FOLDER else file.parent))
+    for english in language._read(file)["texts"]:
+        kinds = PLACEHOLDER.findall(english)
+        if all(language.NUMERIC.fullmatch(k) for k in kinds):
+            continue
+        filled = PLACEHOLDER.sub(
+            lambda m: "3" if language.NUMERIC.fullmatch(m[1]) else "the platform wobbles twice a turn", english
+        )
+        assert words.find(filled) is None, english
+
+
+def test_warnings_of_rows_and_of_set_up_errors_in_chinese() -> None:
+    """As outliers.py and run_document.py put them together."""
+    words = Language(catalogue("zh"))
+    error = SetupError(parameter="site.latitude", value=-0.5, assumed=0.8, unit="rad", option="latitude")
+    rows = "4 (+0.3 °/h, 9 standard deviations); 9 (−0.3 °/h, 8 standard deviations)"
+    ask = "Look for the cause, and leave them out only if it is one."
+    said = [
+        error.sentence(),
+        error.model_copy(update={"option": ""}).sentence(),
+        f"Possible causes among the values set: set-up error {error.comparison()}; part gyro_x in slot gyro.",
+        f"Rows {rows} and 3 more lie outside the noise of the others. They are in the estimates; without them "
+        f"Constant drift = 0.25 °/h (u = 0.03) in place of 0.3 (u = 0.05). {ask}",
+    ]
+    for english in said:
+        found = words.find(english)
+        assert found is not None and not english_words(found, {"set", "latitude", "gyro"}), found or english
 
 
 def english_words(text: str, allowed: set[str]) -> set[str]:

@@ -128,7 +128,7 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     if outliers is None:
         return []
     rows, rest = outliers.rows, outliers.without
-    listed = ", ".join(
+    listed = "; ".join(
         f"{row + 1} ({d:+.3g} {found.y_unit}, {abs(t):.0f} standard deviations)".replace("-", "−")
         for row, d, t in zip(rows[:LISTED], outliers.distance, outliers.t, strict=False)
     )
@@ -136,7 +136,7 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     both = _common(found, rest)
     a, b = max(both, key=lambda ab: abs(rest.value[ab[1]] - found.value[ab[0]]) / rest.u[ab[1]])
     q = found.quantities[a]
-    values = f"{rest.value[b] / q.scale:.6g} {q.unit} (u = {rest.u[b] / q.scale:.2g})"
+    values = f"{rest.value[b] / q.scale:.6g}{q.unit and ' '}{q.unit} (u = {rest.u[b] / q.scale:.2g})"
     plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})"
     what, them = ("Row", "it") if rows.size == 1 else ("Rows", "them")
     verb = "lies" if rows.size == 1 else "lie"
