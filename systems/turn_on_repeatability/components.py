@@ -1,14 +1,15 @@
 """Components of variance of biases: between turn-ons and between days, with intervals that hold.
 
-    b = mean + slope (T - mean T) + d_day + o + e          d, o normal with the rms that are sought, e known variance
+    b = mean + slope (T - mean T) + d_day + o + e          d, o normal with the rms that are sought, e known covariance
 
-Of n turn-ons on D days, their means and least squares within days, S_on = sum (b - mean of its day)2 with n - D degrees
-of freedom (one less with a temperature), S_day = sum n_d (mean of day - mean)2 with D - 1.  The generalized pivotal
-quantities of unbalanced one-way designs (Weerahandi 1993) with n_0 = (n - sum n_d2/n)/(D - 1):
+Of n turn-ons on D days, r are the n - D differences within days (one less with a temperature), orthonormal, V their
+part of the covariance of e; S_day = sum n_d (mean of day - mean)2 with D - 1.  The generalized pivotal quantities of
+unbalanced one-way designs (Weerahandi 1993) with n_0 = (n - sum n_d2/n)/(D - 1):
 
-    on2 = S_on/C_1 - v,     day2 = (S_day/C_2 - S_on/C_1)/n_0          C: chi-squared by chance, v: variance of a bias
+    r' (on2 + V)^-1 r = C_1,     day2 = (S_day/C_2 - on2 - v)/n_0        C: chi-squared by chance, v: variance of a bias
 
-negative ones count as 0.  Estimates are those with the degrees of freedom in place of C.
+V is not that of equal, independent noises where the biases share the error of a scale factor, by their sense.  Negative
+ones count as 0.  Estimates are those with the degrees of freedom in place of C.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 
-DRAWS = 20_000
+DRAWS, POINTS = 20_000, 4000
 Numbers = np.ndarray[Any, np.dtype[np.intp]]  # of the day of each bias, from 0
 
 
@@ -45,7 +46,7 @@ class Spread:
 
 
 def spread(bias: Array, day: Array, noise: Array, temperature: Array | None = None) -> Spread:
-    """Return the components of biases (n,) on days (n,) with variances (n,) of their noise."""
+    """Return the components of biases (n,) on days (n,) with the covariance (n, n) of their noise."""
     days, number = np.unique(day, return_inverse=True)
     n, D = bias.size, days.size
     X = np.zeros((n, D))
@@ -61,21 +62,33 @@ def spread(bias: Array, day: Array, noise: Array, temperature: Array | None = No
             left = bias - _of_days(bias, number, D)[number]
             slope = (k, math.sqrt(float(left @ left) / (n - D - 1) / float(within @ within)))
     dof = n - X.shape[1]
-    v = float(noise.mean())
+    apart = float(noise.sum() - np.trace(noise)) / (n * (n - 1))
+    v = max(float(np.trace(noise)) / n - apart, 0.0)
     rng = np.random.default_rng(1)
     mean = _of_days(bias, number, D)
-    s_on = float(np.sum((bias - mean[number]) ** 2))
     if dof < 1:
         return Spread(None, None, slope)
-    chi_on = rng.chisquare(dof, DRAWS)
-    on = _component(s_on / dof - v, s_on / chi_on - v, dof)
+    within = np.linalg.svd(X)[0][:, X.shape[1] :]
+    on_2 = _pivot(within.T @ bias, within.T @ noise @ within, np.append(rng.chisquare(dof, DRAWS), dof))
+    on = _component(float(on_2[-1]), on_2[:-1], dof)
     if D < 2:
         return Spread(on, None, slope)
     count = np.bincount(number)
     n_0 = (n - float(np.sum(count**2)) / n) / (D - 1)
     s_day = float(np.sum(count * (mean - float(bias.mean())) ** 2))
-    drawn = (s_day / rng.chisquare(D - 1, DRAWS) - s_on / chi_on) / n_0
-    return Spread(on, _component((s_day / (D - 1) - s_on / dof) / n_0, drawn, D - 1), slope)
+    drawn = (s_day / rng.chisquare(D - 1, DRAWS) - on_2[:-1] - v) / n_0
+    return Spread(on, _component((s_day / (D - 1) - float(on_2[-1]) - v) / n_0, drawn, D - 1), slope)
+
+
+def _pivot(r: Array, V: Array, chi: Array) -> Array:
+    """Return the on2 at which r' (on2 + V)^-1 r is each of chi; it falls from the pole at less the least of V."""
+    variance, axes = np.linalg.eigh(V)
+    squares, above = (axes.T @ r) ** 2, variance - variance[0]
+    total = max(float(squares.sum()), 1e-300)
+    x = np.geomspace(1e-12, 1e6, POINTS) * (total / r.size + float(above[-1]))
+    falling = np.log(np.maximum((squares / (x[:, None] + above)).sum(axis=1), 1e-300))
+    out: Array = np.exp(np.interp(-np.log(chi), -falling, np.log(x))) - variance[0]
+    return out
 
 
 def _of_days(x: Array, number: Numbers, D: int) -> Array:

@@ -3,7 +3,8 @@
     y_ij - w_i = b_i + sum_k A_k m(t_ij, tau_k) + E w_i m(t_ij, tau_E) + noise       m: mean of exp(-t/tau) in a reading
 
 i: turn-on, w: rate of the table.  The time constants are found by least squares, as many exponentials as the record
-tells; the model, linear about them, is then fitted under an estimated noise model.  Of the biases b_i come the
+tells; the model, linear about them, is then fitted under an estimated noise model.  Intervals of sizes and time
+constants allow for a second exponential that is hardly seen (draws.py).  Of the biases b_i come the
 components of variance between turn-ons and between days, less their noise (components.py).  A record with one reading
 of each turn-on has no warm-up.  [TEST-TURN-ON; IEEE 952; Weerahandi 1993]
 
@@ -44,12 +45,13 @@ from gyrobench.units import DPH
 
 from . import mistakes
 from .components import Spread, VarianceComponent, spread
+from .draws import Posterior
 from .warming import Kind, Warming, fitted, means
 
-DRAWS = 2000
 CONDITION = 1e6  # exponentials that are hardly two were left out by then
 FEW = 4  # readings of a turn-on from which on a warm-up is looked for
 SECONDS = "s"
+HIDDEN = "Intervals of the warm-up allow for a second exponential that the record does not exclude."
 QUIET = ("flicker_x", "walk_x", "white_x", "markov_x")  # noises of a gyro that move biases beyond the noise model
 
 
@@ -146,7 +148,9 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
     def derived(self, found: Findings) -> Findings:
         n, q, e = self.columns, self.tau.size, self.tau_E.size
-        truth = self.setup.truth or {}
+        truth = dict(self.setup.truth or {})
+        if q == 1 and "A_1" in truth:  # this fit is not of the true curve; judged by what allows for the other part
+            truth = {name: x for name, x in truth.items() if name not in ("A", "τ")}
         wanted = [Quantity.of("b", f"bias when warm, mean of these {self.count} turn-ons", "deg/h")]
         for k in range(q):
             word = "" if q == 1 else (", fast part", ", slow part")[k]
@@ -168,11 +172,11 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
         r = found.est
         if self.single:
-            self.biases, self.noise = self.y - self.w, np.zeros(self.count)
+            self.biases, self.shared = self.y - self.w, np.zeros((self.count, self.count))
         else:
-            self.biases, C = r.beta[:n], r.covariance[:n, :n]
-            apart = float(C.sum() - np.trace(C)) / (n * (n - 1))
-            self.noise = np.maximum(np.diag(C) - apart, 0.0)
+            self.biases, self.shared = r.beta[:n], r.covariance[:n, :n]
+        apart = float(self.shared.sum() - np.trace(self.shared)) / (self.count * (self.count - 1))
+        self.noise = np.maximum(np.diag(self.shared) - apart, 0.0)
         return found.derive(wanted, function)
 
     # ------------------------------------------------------------------------------ what follows from it
@@ -183,7 +187,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         if "temperature" in self.windows:
             every = np.asarray(self.windows["temperature"], dtype=float)
             T = np.array([every[self.turn == k][-1] for k in range(self.count)])
-        return spread(self.biases, self.day[first], self.noise, T)
+        return spread(self.biases, self.day[first], self.shared, T)
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth, s = self.setup.truth or {}, self.spread()
@@ -201,47 +205,87 @@ class Reduction(DriftReduction[TurnOnSetup]):
             factor = float(special.stdtrit(dof, 0.975))
             added.append(Coefficient("b_T", "change of the bias with temperature", "°/h/K", k, u, factor,
                                      (k - factor * u, k + factor * u)))  # fmt: skip
+        own = list(result.coefficients)
+        if self.tau.size + self.tau_E.size:
+            self.drawn = self._draws()
+            own = [self._allowed(c) for c in own]
         warm = self._time(truth.get("t_w"))
-        own = [_in_logarithms(c) if c.name.startswith("τ") else c for c in result.coefficients]
         coefficients = [*own, *([warm] if warm else []), *added]
         return replace(result, coefficients=coefficients, correlation=result.correlation)
 
     def _time(self, truth: float | None) -> Coefficient | None:
-        """Return the time until the bias is within the limit; its interval by draws of sizes and time constants, of the
-        model and, as often as it is probable, of the one with an exponential more.
-        """
+        """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""
         q, longest = self.tau.size, 20.0 * float(np.max(self.since))
         meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
         if not q:
             return None
-        found, at = self.found, slice(1, 1 + 2 * q)
-        drawn = _draws(found.value[at], found.reported.covariance[at, at], DRAWS)
-        if self.choice.more is not None and self.choice.probability > 1e-3:
-            drawn += self._drawn_with_more(round(DRAWS * self.choice.probability / (1.0 - self.choice.probability)))
-        own = _warming(found.value[at]).time_until(self.setup.limit, longest)
-        times = np.sort([w.time_until(self.setup.limit, longest) for w in drawn])
+        value, e, (size, tau) = self.found.value, self.tau_E.size, self.drawn
+        own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
+            self.setup.limit, longest
+        )
+        times = np.sort([
+            Warming(size[k, e:], tau[k, e:]).time_until(self.setup.limit, longest) for k in range(0, len(size), 4)
+        ])  # fmt: skip
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
         if not math.isfinite(own):
             return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
                                no_value="not reached within the record")  # fmt: skip
+        low, high = min(low, own), max(high, own)
         u = (high - low) / (2.0 * NORMAL)
         return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
 
-    def _drawn_with_more(self, count: int) -> list[Warming]:
-        """Return draws of the model with an exponential more, by its covariance under white noise."""
-        tau, tau_E = self.choice.more or [np.zeros(0), np.zeros(0)]
-        q, e, p = tau.size, tau_E.size, self.columns
-        own = self.found.X[:, :p]
-        y = self.y - self.w
-        X = np.column_stack([own, self._exponentials(tau), self.w[:, None] * self._exponentials(tau_E)])
-        beta = np.linalg.lstsq(X, y, rcond=None)[0]
-        variance = float(np.sum((y - X @ beta) ** 2)) / max(y.size - p - 2 * (q + e), 1)
-        X = np.column_stack([X, *self._slopes(tau, tau_E, beta[p:])])
-        C = variance * np.linalg.pinv(X.T @ X)
-        own = np.array([j for k in range(q) for j in (p + k, p + q + e + k)])
-        C = C[np.ix_(own, own)] * np.outer(step := np.ravel([(1.0, x) for x in tau]), step)
-        value = np.ravel([(beta[p + k], tau[k]) for k in range(q)])
-        return _draws(value, C, min(count, 20 * DRAWS))
+    def _draws(self) -> tuple[Array, Array]:
+        """Return sizes (m, e + q) and time constants of warm-ups that the record allows, those of the scale factor
+        first; of the bias two unless their number is given.
+
+        The noise is white there; its variance makes no interval of the fit under the estimated noise model wider than
+        it would be here.
+        """
+        q, e, n, X = self.tau.size, self.tau_E.size, self.columns, self.found.X
+        left = self.found.y - X[:, : n + q + e] @ np.linalg.lstsq(X[:, : n + q + e], self.found.y, rcond=None)[0]
+        variance = float(left @ left) / max(self.y.size - n - 2 * (q + e), 1)
+        variance = max(variance, 1e-20 * float(np.mean(self.found.y**2)), 1e-300)
+        size = np.linalg.norm(X, axis=0)
+        white = np.sqrt(variance * np.diag(np.linalg.pinv((X / size).T @ (X / size)))) / size
+        reported = self.found.reported.half_width[1 : 1 + 2 * (q + e)] / NORMAL
+        value = self.found.value[1 : 1 + 2 * (q + e)]
+        amplitude, u_tau = white[n : n + q + e], white[n + q + e : n + 2 * (q + e)]
+        ratio = np.concatenate([reported[0::2] / amplitude, reported[1::2] / value[1::2] / u_tau])
+        factor = max(1.0, float(np.max(ratio)))
+        smaller = None
+        if q and self.setup.exponentials < 0:
+            largest = float(np.max(np.abs(value[0 : 2 * q : 2])))
+            smaller = (min(factor * float(np.min(amplitude[:q])), 0.5 * largest), largest)
+        of = [1] * e + [0] * (2 if smaller else q)
+        posterior = Posterior(self.choice.curves, of, factor**2 * variance, smaller)
+        start, order = np.log(np.concatenate([self.tau_E, self.tau])), np.r_[q : q + e, :q]
+        drawn, log_tau = posterior.drawn(start, np.minimum(factor * u_tau[order], 0.5))
+        return drawn, np.exp(log_tau)
+
+    def _allowed(self, c: Coefficient) -> Coefficient:
+        """Return a size or a time constant of the warm-up with the interval of the warm-ups that the record allows."""
+        q, e, (size, tau) = self.tau.size, self.tau_E.size, self.drawn
+        name, _, number = c.name.partition("_")
+        if name not in ("A", "E", "τ"):
+            return c
+        if number == "E" or name == "E":
+            size, tau, k = size[:, :e], tau[:, :e], 0
+        else:
+            size, tau, k = size[:, e:], tau[:, e:], int(number or 1) - 1
+            order = np.argsort(tau if q > 1 else -np.abs(size), axis=1)
+            size, tau = (np.take_along_axis(x, order, axis=1) for x in (size, tau))
+        unit = next(x.scale for x in self.found.quantities if x.name == c.name)
+        sample = tau[:, k] if name == "τ" else size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
+        low, high = (float(v) / unit for v in np.quantile(sample, (0.025, 0.975)))
+        type_b = NORMAL * math.sqrt(max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0))
+        below, above = max(c.estimate - low, 0.0), max(high - c.estimate, 0.0)
+        u_a = (below + above) / (2.0 * NORMAL)
+        low, high = c.estimate - math.hypot(below, type_b), c.estimate + math.hypot(above, type_b)
+        u = (high - low) / (2.0 * NORMAL)
+        true = (self.setup.truth or {}).get(c.name)
+        true = None if true is None else true / unit
+        z = None if true is None or not u else (c.estimate - true) / u
+        return replace(c, u=u, u_a=u_a, k=NORMAL, interval=(low, high), truth=true, z=z)
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: a slow clock makes the time constants too small; as a share of them, not of the data."""
@@ -262,6 +306,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             equation='y - omega = b_i + sum_k A_k e^(-t\\/tau_k)' if q else "y - omega = b_i",
             conventions=[
                 f"Exponentials of the warm-up of the bias: {q}, the same in all turn-ons.",
+                *([HIDDEN] if q and self.setup.exponentials < 0 else []),
                 "σ_on, σ_day: standard deviations of the population, less the noise of the biases; intervals by "
                 "generalized pivotal quantities, 0 where the record shows none.",
                 f"{self.count} turn-ons on {np.unique(self.day).size} days.",
@@ -289,27 +334,6 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
 
 reduce = Reduction.reduce
-
-
-def _draws(value: Array, covariance: Array, count: int) -> list[Warming]:
-    """Return draws of sizes and time constants; these stay above 0 in logarithms."""
-    scale = np.ones(value.size)
-    scale[1::2] = 1.0 / value[1::2]
-    drawn = np.random.default_rng(2).multivariate_normal(np.zeros(value.size), covariance * np.outer(scale, scale),
-                                                         count, method="eigh", check_valid="ignore")  # fmt: skip
-    out = value + drawn
-    out[:, 1::2] = value[1::2] * np.exp(np.clip(drawn[:, 1::2], -3.0, 3.0))
-    return [_warming(row) for row in out]
-
-
-def _warming(value: Array) -> Warming:
-    return Warming(value[0::2], np.maximum(value[1::2], 1e-3))
-
-
-def _in_logarithms(c: Coefficient) -> Coefficient:
-    """Return a time constant with an interval that is even in its logarithm, in which it was fitted."""
-    factor = math.exp(min(c.k * c.u / c.estimate, 20.0))
-    return replace(c, interval=(c.estimate / factor, c.estimate * factor))
 
 
 def _of_component(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:
@@ -342,9 +366,11 @@ def true_values(run: RunDocument) -> dict[str, float] | None:
     there = np.flatnonzero(size)
     order = there[np.argsort(tau[there])]
     found: dict[str, float] = {}
-    for k, j in enumerate(order.tolist(), 1):
-        names = ("A", "τ") if order.size == 1 else (f"A_{k}", f"τ_{k}")
-        found |= dict(zip(names, (float(size[j]), float(tau[j])), strict=True))
+    if order.size:  # what is one exponential to the record may be two
+        found |= {"A": float(size.sum()), "τ": float(tau[np.argmax(np.abs(size))])}
+    if order.size == 2:
+        for k, j in enumerate(order.tolist(), 1):
+            found |= {f"A_{k}": float(size[j]), f"τ_{k}": float(tau[j])}
     found["t_w"] = Warming(size[order], tau[order]).time_until(float(run.options["limit"]), 1e9)
     if not any(float(p.get(f"gyro.{n}", 0.0)) for n in QUIET):
         found |= {"σ_on": float(p["switched.between_turn_ons"]), "σ_day": float(p["switched.between_days"])}

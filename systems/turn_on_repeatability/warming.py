@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy import optimize
+from scipy import interpolate, linalg, optimize
 
 from gyrobench.arrays import Array
 
 GRID, STARTS = 13, 4  # time constants tried, and refined
+BASIS, STEP = 32, 0.03  # of ln tau: points whose exponentials span all others, step of the splines
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,55 @@ def means(since: Array, length: Array, tau: Array) -> Array:
     return out
 
 
-@dataclass(frozen=True)
-class Found:
-    """Time constants (q,), rising, of each kind, of the least criterion; those of one exponential more of the first
-    kind, beside the others, and its probability against them; none where it is not sought.
+class Curves:
+    """Exponentials of each kind beside the columns X (n, p), by ln tau: coordinates in a basis that all share.
+
+    All exponentials of a record lie in a space of some ten dimensions, and their coordinates there are smooth in
+    ln tau: splines of them serve searches and draws of thousands.  y (d,): coordinates of the data; rest: sum of
+    squares of what no exponential reaches; low, high: limits of ln tau; dof: n - p.
     """
 
+    def __init__(self, y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind]) -> None:
+        self.low, self.high = math.log(0.3 * float(np.min(length))), math.log(2.0 * float(np.max(since)))
+        self.first = max(self.low, math.log(float(np.min(since + 0.5 * length))))  # e-folds in the first reading
+        self.dof = y.size - X.shape[1]
+        Q = np.linalg.qr(X)[0]
+
+        def beside(A: Array) -> Array:
+            out: Array = A - Q @ (Q.T @ A)
+            return out
+
+        def columns(log_tau: Array) -> list[Array]:
+            every = means(since, length, np.exp(log_tau))
+            return [beside(kind.factor[:, None] * every) for kind in kinds if kind.most]
+
+        self.of = [k for k, kind in enumerate(kinds) if kind.most]
+        scale = [float(np.max(np.abs(kinds[k].factor))) or 1.0 for k in self.of]
+        coarse = np.linspace(self.low, self.high, BASIS)
+        every = [c / s for c, s in zip(columns(coarse), scale, strict=True)] or [np.zeros((y.size, 1))]
+        U, R, _ = linalg.qr(np.column_stack(every), mode="economic", pivoting=True, check_finite=False)
+        own = np.abs(np.diag(R))
+        U = U[:, own > 1e-11 * max(float(own[0]), 1e-300)]
+        fine = np.linspace(self.low, self.high, max(round((self.high - self.low) / STEP), BASIS))
+        self.splines = {
+            k: interpolate.CubicSpline(fine, (U.T @ c).T) for k, c in zip(self.of, columns(fine), strict=True)
+        }
+        left = beside(y)
+        self.y = U.T @ left
+        self.rest = float(np.sum((left - U @ self.y) ** 2))
+
+    def at(self, log_tau: Array, of: Sequence[int], order: int = 0) -> Array:
+        """Return (..., d, q) columns at ln tau (..., q) of the kinds of, or their derivatives."""
+        log_tau = np.clip(log_tau, self.low, self.high)
+        return np.stack([self.splines[k](log_tau[..., j], order) for j, k in enumerate(of)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Time constants (q,), rising, of each kind, of the least criterion; the curves they were sought among."""
+
     tau: list[Array]
-    more: list[Array] | None = None
-    probability: float = 0.0
+    curves: Curves
 
 
 def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind]) -> Found:
@@ -75,27 +116,30 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
     One after another is added where it betters the criterion most, and all are refined together; the residuals are
     taken as white.
     """
-    y = y / (float(np.std(y)) or 1.0)  # the search stops at absolute limits
-    low, high = math.log(0.3 * float(np.min(length))), math.log(2.0 * float(np.max(since)))
+    curves = Curves(y, X, since, length, kinds)
+    unit = math.sqrt((curves.rest + float(np.sum(curves.y**2))) / y.size) or 1.0  # the search stops at absolute limits
+    low, high = curves.low, curves.high
 
     def left(log_tau: Array, of: Sequence[int]) -> Array:
-        columns = means(since, length, np.exp(np.clip(log_tau, low, high)))
-        columns = columns * np.array([kinds[k].factor for k in of]).T if of else columns
-        A = np.column_stack([X, columns])
-        out: Array = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
+        out: Array = curves.y / unit
+        if of:
+            A = curves.at(log_tau, of)
+            out = out - A @ np.linalg.lstsq(A, out, rcond=None)[0]
+        return out
+
+    def slopes(log_tau: Array, of: Sequence[int]) -> Array:
+        """Return the slopes of what is left but for those of the sizes.  [Kaufman 1975]"""
+        A, D = curves.at(log_tau, of), curves.at(log_tau, of, 1)
+        found, *_ = np.linalg.lstsq(A, np.column_stack([curves.y, D]), rcond=None)
+        out: Array = -(D - A @ found[:, 1:]) * found[:, 0] / unit
         return out
 
     def criterion(log_tau: Array, of: Sequence[int]) -> float:
-        squares = max(float(np.sum(left(log_tau, of) ** 2)), 1e-300)
+        squares = max(float(np.sum(left(log_tau, of) ** 2)) + curves.rest / unit**2, 1e-300)
         return y.size * math.log(squares / y.size) + 2.0 * len(of) * math.log(y.size)
 
     grid = np.linspace(low, high, GRID)
     at, of = np.zeros(0), list[int]()
-
-    def of_kinds(log_tau: Array, of: Sequence[int]) -> list[Array]:
-        own = np.clip(log_tau, low, high)
-        return [np.exp(np.sort(own[[j for j, o in enumerate(of) if o == k]])) for k in range(len(kinds))]
-
     least = criterion(at, of)
     while True:
         tried: list[tuple[float, Array, int]] = []
@@ -110,18 +154,18 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
                     starts.append(start)
                 order = np.argsort([criterion(s, more) for s in starts])[:STARTS]
                 refined = [
-                    optimize.least_squares(left, starts[j], x_scale=0.3, max_nfev=80, args=(more,)).x for j in order
+                    optimize.least_squares(left, starts[j], slopes, x_scale=0.3, max_nfev=80, args=(more,)).x
+                    for j in order
                 ]
                 found = refined[int(np.argmin([criterion(s, more) for s in refined]))]
                 tried.append((-math.inf if kind.exact else criterion(found, more), found, k))
         if not tried:
-            return Found(of_kinds(at, of))
+            break
         value, found, k = min(tried, key=operator.itemgetter(0))
         if value >= least:
             break
         at, of = np.clip(found, low, high), [*of, k]
         least = criterion(at, of)
-    value, found, k = tried[0]
-    if k:
-        return Found(of_kinds(at, of))
-    return Found(of_kinds(at, of), of_kinds(found, [*of, 0]), 1.0 / (1.0 + math.exp(min(0.5 * (value - least), 700.0))))
+    return Found(
+        [np.exp(np.sort([x for x, o in zip(at, of, strict=True) if o == k])) for k in range(len(kinds))], curves
+    )

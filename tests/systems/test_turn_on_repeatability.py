@@ -45,9 +45,9 @@ def test_biases_are_drawn_anew() -> None:
 
 def test_components_by_hand_and_their_coverage() -> None:
     """Two days of two: means 1, 5; S_on = 2 + 8 = 10 of 2 degrees, S_day = 2 (4 + 4) = 16 of 1, n_0 = 2; then 400
-    random designs, with noise, with a temperature.
+    random designs, with noise of each bias and one that all share by their sense, with a temperature.
     """
-    found = components.spread(np.array([0.0, 2.0, 3.0, 7.0]), np.array([1, 1, 2, 2]), np.full(4, 0.5))
+    found = components.spread(np.array([0.0, 2.0, 3.0, 7.0]), np.array([1, 1, 2, 2]), 0.5 * np.eye(4))
     assert found.turn_on is not None and found.day is not None
     assert found.turn_on.rms == pytest.approx(math.sqrt(10.0 / 2.0 - 0.5))
     assert found.day.rms == pytest.approx(math.sqrt((16.0 - 5.0) / 2.0))
@@ -57,9 +57,10 @@ def test_components_by_hand_and_their_coverage() -> None:
         days, each = int(rng.integers(3, 8)), int(rng.integers(2, 6))
         day = np.repeat(np.arange(days), each)
         on, between, noise = rng.uniform(0.1, 1.0), rng.uniform(0.0, 1.0), rng.uniform(0.0, 0.3)
+        sense = rng.uniform(0.0, 1.0) * (1.0 - 2.0 * (np.arange(day.size) % 2))
         T = rng.normal(0.0, 3.0, day.size)
         b = between * rng.normal(size=days)[day] + np.hypot(on, noise) * rng.normal(size=day.size) + 0.1 * T
-        s = components.spread(b, day, np.full(day.size, noise**2), T)
+        s = components.spread(b + sense * rng.normal(), day, noise**2 * np.eye(day.size) + np.outer(sense, sense), T)
         assert s.turn_on is not None and s.day is not None and s.slope is not None
         held += [s.turn_on.low <= on <= s.turn_on.high, s.day.low <= between <= s.day.high]
         held.append(abs(s.slope[0] - 0.1) < 2.3 * s.slope[1])
@@ -86,6 +87,34 @@ def test_time_constants_are_found() -> None:
     assert fitted(1e-6 * (y + noise), own, since, length, [kind]).tau[0] == pytest.approx([25.0, 300.0], rel=0.05)
     assert not fitted(1e-6 * noise, own, since, length, [kind]).tau[0].size
     assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)]).tau[0].size == 1
+
+
+def test_a_second_exponential_that_is_hardly_seen() -> None:
+    """Records written from the equation, 2 exp(-t/20) + 0.7 exp(-t/80) in noise of 0.2 deg/h: most fits find one
+    exponential, about 2.4 at the turn-on for 2.7.  Intervals must hold what is there; 12 of 12 are held by 0.95 with
+    a probability of 0.54, 9 or more with 0.998, by 0.5, of a fit of one exponential, with 0.07.
+    """
+    rng, held, alone = np.random.default_rng(6), [], 0
+    turns, each = 3, 60
+    since = np.tile(2.5 + 5.0 * np.arange(each), turns)
+    turn = np.repeat(np.arange(turns), each)
+    start = since - 2.5 + 400.0 * turn
+    truth = {"A": 2.7 * DPH, "A_1": 2.0 * DPH, "A_2": 0.7 * DPH, "τ": 20.0, "τ_1": 20.0, "τ_2": 80.0}
+    # at 78.86 s: 2 exp(-3.943) + 0.7 exp(-0.9857) = 0.0388 + 0.2612 = 0.3
+    truth["t_w"] = Warming(np.array([2.0, 0.7]), np.array([20.0, 80.0])).time_until(0.3, 1e4)
+    assert truth["t_w"] == pytest.approx(78.86, abs=0.01)
+    for _ in range(10):
+        curve = means(since, np.full(since.size, 5.0), np.array([20.0, 80.0])) @ [2.0, 0.7]
+        y = (curve + rng.normal(0.0, 0.3, turns)[turn] + rng.normal(0.0, 0.2, since.size)) * DPH
+        windows = {"t_start": start, "t_end": start + 5.0, "turn_on": turn + 1, "since": since, "mean": y}
+        result = Reduction.reduce(windows, TurnOnSetup(limit=0.3 * DPH, truth=truth))
+        found = {c.name: c for c in result.coefficients if c.truth is not None}
+        alone += "A" in found
+        held.append({n: c.interval[0] <= (c.truth or 0.0) <= c.interval[1] for n, c in found.items()})
+    assert alone >= 5
+    for name in ("A", "τ", "t_w"):
+        own = [h[name] for h in held if name in h]
+        assert sum(own) >= len(own) - 2, (name, own)
 
 
 # ------------------------------------------------------------------------------------------------ runs
@@ -146,7 +175,7 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     for name, value in {"A": 2.0, "τ": 60.0, "t_w": 60.0 * math.log(10.0), "b_T": 0.1, "σ_on": 0.3}.items():
         low, high = found[name]["interval"]
         assert low < value < high, name
-    assert found["τ"]["u"] < 1.0 and found["t_w"]["u"] < 2.0
+    assert found["τ"]["u"] < 2.0 and found["t_w"]["u"] < 5.0  # a second one of some percent is not excluded
 
 
 def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:
