@@ -255,8 +255,8 @@ def _step(gate: Gate, angle: str) -> tuple[Array, Array]:
 def _gain_margin(wish: Wish, points: Sequence[Point], lost: Sequence[float], f: Array, L: Complex) -> ProvenWish:
     """Read the gain margin; where a limit drowns in noise, up to the last point whose phase is told from -180.
 
-    lost: frequencies of sines that are not above the noise, Hz.  A limit up lies beyond the points with |L| < 1, a limit
-    down before those with |L| > 1: sines lost on one side say nothing of the other.
+    lost: frequencies of sines that are not above the noise, Hz.  A limit up lies where |L| < 1, a limit down where
+    |L| > 1: sines lost on one side say nothing of the other.
     """
     values = measured_values(points, lost)
     found = [(max(g, 1.0 / g), NORMAL * u * max(1.0, g**-2.0), False) for name, (g, u) in values.items()
