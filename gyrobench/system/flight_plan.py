@@ -1,8 +1,8 @@
 """A flight of a vehicle as a list of legs, for the phases of a loop plan and the rows of the part manoeuvre.
 
 legs = [Leg("roll 90°", 2.5, roll=0.63), Leg("yaw 50°", 5.0, yaw=0.17)]
-LoopPlan([*before, *phases(legs)])
-parameters(legs, first=len(before))                  # of the manoeuvre in the slot "motion"
+plan = LoopPlan([*before, *phases(legs)])
+parameters(legs, plan.phases)                        # of the manoeuvre in the slot "motion"
 """
 
 from __future__ import annotations
@@ -41,11 +41,16 @@ def phases(legs: Sequence[Leg]) -> list[LoopPhase]:
     return [LoopPhase(leg.label, settle=leg.rest, dwell=leg.time) for leg in legs]
 
 
-def parameters(legs: Sequence[Leg], first: int = 0, slot: str = "motion") -> dict[str, float]:
-    """The parameters of the manoeuvre in ``slot`` for legs that are the phases after the ``first`` ones of a plan.
+def parameters(legs: Sequence[Leg], plan: Sequence[LoopPhase], slot: str = "motion") -> dict[str, float]:
+    """The parameters of the manoeuvre in ``slot``: each leg is flown in the phase of a plan that has its label.
 
-    They are set where the part has them ("?"): another part may move the base.
+    A leg that the plan does not have is not flown: a plan of other phases moves the base in none of them.  They are set
+    where the part has them ("?"): another part may move the base.
     """
+    flown = {leg.label: leg for leg in legs}
     return {
-        f"{slot}.{name}[{first + k}]?": float(getattr(leg, name)) for k, leg in enumerate(legs, 1) for name in RATES
+        f"{slot}.{name}[{k}]?": float(getattr(flown[phase.label], name))
+        for k, phase in enumerate(plan, 1)
+        if phase.label in flown
+        for name in RATES
     }

@@ -253,19 +253,24 @@ def _step(gate: Gate, angle: str) -> tuple[Array, Array]:
 
 
 def _gain_margin(wish: Wish, points: Sequence[Point], lost: Sequence[float], f: Array, L: Complex) -> ProvenWish:
-    """Read the gain margin; where the limit drowns in noise, up to the last point whose phase is told from -180.
+    """Read the gain margin; where a limit drowns in noise, up to the last point whose phase is told from -180.
 
-    lost: frequencies of sines that are not above the noise, Hz.
+    lost: frequencies of sines that are not above the noise, Hz.  A limit up lies where |L| < 1, a limit down where
+    |L| > 1: sines lost on one side say nothing of the other.
     """
     values = measured_values(points, lost)
     found = [(max(g, 1.0 / g), NORMAL * u * max(1.0, g**-2.0), False) for name, (g, u) in values.items()
              if name in ("upper", "lower")]  # fmt: skip
     expected = float(measured([wish], f, L[None])[0, 0])
-    ahead = [p for p in points if abs(p.value) < 1.0 and np.angle(-p.value) > NORMAL * (p.u or 0.0)]
+    told = [p for p in points if np.angle(-p.value) > NORMAL * (p.u or 0.0)]
+    ahead, above = [p for p in told if abs(p.value) < 1.0], [p for p in told if abs(p.value) > 1.0]
     behind = any(g > 1.0 and at > points[-1].f for at, g in gain_limits(f, L))
-    if "upper" not in values and ahead and (lost or behind):
+    if "upper" not in values and ahead and (behind or max(lost, default=0.0) > ahead[0].f):
         last = ahead[-1]
         found.append(((1.0 - NORMAL * (last.u or 0.0)) / abs(last.value), 0.0, True))
+    if "lower" not in values and above and min(lost, default=np.inf) < above[0].f:
+        first = above[0]
+        found.append(((1.0 - NORMAL * (first.u or 0.0)) * abs(first.value), 0.0, True))
     value, U, bound = min(found, default=(np.inf, 0.0, False))
     return ProvenWish(wish, float(value), float(U), expected, bound)
 

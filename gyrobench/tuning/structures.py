@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,6 +92,8 @@ class Controller:
 class ControllerStructure:
     """A structure by its name; ``ranges``: decades of the numbers behind the crossover, which is the first."""
 
+    shortest = 0.0  # s, T2 of a lead, at least
+
     def __init__(self, name: str) -> None:
         self.name = name
         self.blocks: list[str] = []
@@ -108,8 +111,15 @@ class ControllerStructure:
         self.ranges = [r for b in self.blocks for r in BLOCKS[b].ranges]
 
     def of(self, plant: Any) -> ControllerStructure:
-        """Return the structure for a nominal plant: for this one it is the same."""
-        return self
+        """Return the structure for a nominal plant: no lead has a T2 below its communication step.
+
+        Such a lead does not reach the voltage at the ends of the steps.  Within them each change of the signal, of the
+        noise too, comes tau2/T2 times as large, beyond the limit of the voltage: the loop has less
+        gain than its linear model (without that limit the same).
+        """
+        found = copy(self)
+        found.shortest = float(plant.step)
+        return found
 
     @property
     def is_lead_lag(self) -> bool:
@@ -123,7 +133,10 @@ class ControllerStructure:
         first = 0
         for k, name in enumerate(self.blocks):
             block = BLOCKS[name]
-            (n, d), named = block.build(w, numbers[first : first + len(block.ranges)])
+            own = list(numbers[first : first + len(block.ranges)])
+            if name == "lead" and self.shortest > 0.0:  # T2 = 1/(w x0 sqrt x1)
+                own[1] = min(own[1], max(1.0, (w * own[0] * self.shortest) ** -2.0))
+            (n, d), named = block.build(w, own)
             first += len(block.ranges)
             num, den = np.polymul(num, n), np.polymul(den, d)
             again = self.blocks[:k].count(name)

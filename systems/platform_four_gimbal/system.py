@@ -68,7 +68,7 @@ class PlatformFourGimbalSystem(TwoGyroTest):
         flown = self.flown()
         return {
             **super().design(parts),
-            **flight_plan.parameters(flown.legs, 0 if flown.inner else len(self.at_rest())),
+            **flight_plan.parameters(flown.legs, self.plan().phases),
             "motion.start_angle[1]?": flown.pitch,
             "platform.gain": LAWS.index(self["law"]) if self["law"] in LAWS else 0,
             "platform.k": self["k"],

@@ -92,7 +92,7 @@ class PlatformThreeGimbal(TwoGyroTest):
         return [*flight_plan.phases(self.legs()), *self.at_rest()]
 
     def design(self, parts: PartValues) -> dict[str, Any]:
-        found = super().design(parts) | flight_plan.parameters(self.legs())
+        found = super().design(parts) | flight_plan.parameters(self.legs(), self.plan().phases)
         found |= {
             "platform.mount?": self["mount"],
             "platform.allow_lock?": int(self["allow_lock"]),

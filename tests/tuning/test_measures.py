@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import control
 import numpy as np
 import pytest
@@ -79,3 +81,18 @@ def test_structures_are_what_their_equations_say() -> None:
     w0 = 2.0 * np.pi * c.values["f_notch"]
     assert w0 == pytest.approx(60.0)
     assert c.response(np.array([1j * w0]))[0] == pytest.approx(0.1 * c.values["K"] / (1.0 + 60j / 150.0), rel=1e-6)
+
+
+def test_no_lead_is_faster_than_the_communication_step() -> None:
+    """w = 50 rad/s, lead about 10 w with T2 = 1/(500 sqrt 100) = 0.2 ms, and a step of 0.5 ms.
+
+    T2 = 0.5 ms, and tau2 = 1/(500^2 T2) = 8 ms about the same 10 w.  A lead all of which is faster than the step, about
+    100 w = 5000 rad/s, is none.  |L| = 1 at w.
+    """
+    shape = ControllerStructure("pi+lead+lead").of(SimpleNamespace(step=5e-4))
+    c = shape.controller(50.0, [0.1, 10.0, 100.0, 100.0, 9.0], lambda f: 0.25j)
+    assert c.values["T2"] == pytest.approx(5e-4) and c.values["tau2"] == pytest.approx(8e-3)
+    assert c.values["T2_2"] == pytest.approx(2e-4) and c.values["tau2_2"] == pytest.approx(2e-4)
+    assert abs(c.response(np.array([50j]))[0]) == pytest.approx(4.0, rel=1e-7)
+    free = ControllerStructure("pi+lead").controller(50.0, [0.1, 10.0, 100.0], lambda f: 0.25j)
+    assert free.values["T2"] == pytest.approx(2e-4)

@@ -1,14 +1,21 @@
-"""Reading of a gain margin from measured points: limits at low gain, limits that drown in noise."""
+"""Gain margins of a proof: limits at low gain, limits that drown in noise, and where a simulation becomes unstable."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import pytest
 
+from gyrobench.bench import Bench
+from gyrobench.engine.session import Session
 from gyrobench.reduction.loops.loop_measures import Point
-from gyrobench.tuning.proof import _gain_margin, sine_frequencies
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.system.system import load_system
+from gyrobench.tuning.loop_ports import loops_of
+from gyrobench.tuning.proof import _gain_margin, _run, proof_of, sine_frequencies
 from gyrobench.tuning.robustness import gain_limits
+from gyrobench.tuning.tune_loop import quiet
 from gyrobench.tuning.wishes import parse_wishes
 
 WISHES = parse_wishes(["gain margin=6dB", "S at 1Hz<-10dB"])
@@ -57,3 +64,51 @@ def test_limits_that_are_measured_are_no_bound() -> None:
     points = [Point(x, complex(v), 1e-5, 1.0) for x, v in zip(f, loop(np.array(f)), strict=True)]
     got = _gain_margin(WISHES[0], points, [], F, L)
     assert not got.bound and abs(got.value / min(1.0 / slow[1], fast[1]) - 1.0) < 0.02
+
+
+def test_sines_lost_on_one_side_bound_that_side_alone() -> None:
+    """A limit down in noise: 1.5 Hz is the slowest sine that counts, |L| there in exact numbers, and nothing of the up.
+
+    |L(1.5 Hz)| = 126/w sqrt(1 + 36/w2) sqrt(1 + 25/w2) with w = 9.4248 rad/s: 13.369 * 1.18545 * 1.13201 = 17.94.
+    """
+    L = loop(F)
+    f = np.array([1.5, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 250.0, 600.0, 800.0, 900.0])
+    points = [Point(x, complex(v), 1e-4, 1.0) for x, v in zip(f, loop(f), strict=True)]
+    lost = _gain_margin(WISHES[0], points, [0.81, 0.87], F, L)
+    assert lost.bound and abs(lost.value / 17.94 - 1.0) < 1e-3
+    short = _gain_margin(WISHES[0], points[:8], [0.81, 0.87], F, L)  # and the limit up lies behind 250 Hz: 12.5
+    assert short.bound and abs(short.value / 12.47 - 1.0) < 0.01
+    # a loop without a limit up: slow sines that are lost do not make one of the fastest, |L(20 Hz)| = 1/0.98
+    F_low = np.geomspace(1e-3, 30.0, 2000)
+    none = _gain_margin(WISHES[0], points[:6], [0.81, 0.87], F_low, loop(F_low))
+    assert none.bound and abs(none.value / 17.94 - 1.0) < 1e-3
+
+
+def test_a_promised_gain_margin_is_where_the_simulation_becomes_unstable() -> None:
+    """Conditionally stable loop of a platform whose own test begins with a flight: the base rests in the proof.
+
+    41.35 dB down, at 0.145 Hz, by another road: L = 10/(s (1 + 2 ms s)) G(s) of scipy's equations, and by runs of the
+    co-simulation 1 dB before and behind it, without a test sine.
+    """
+    system = load_system("platform_three_gimbal").with_values({})
+    K, tau1, T1, tau2, T2, integral = 13.2476832, 1.57941686, 5.89038166, 0.110800607, 0.0964965492, 2.08165792
+    values = {"K": K, "tau1": tau1, "T1": T1, "tau2": tau2, "T2": T2, "integral": integral}
+    settings = {f"pitch.{n}": v for n, v in values.items()}
+    f = np.geomspace(0.02, 900.0, 1500)
+    s = 2j * np.pi * f
+    G = K * (1 + tau1 * s) * (1 + tau2 * s) / ((1 + T1 * s) * (1 + T2 * s)) * (1 + integral / s)
+    L = 10.0 / (s * (1.0 + 2e-3 * s)) * G
+    with quiet(), Session(system, bench=Bench.find().folder, child=True) as session:
+        proof = proof_of(session, settings, {}, f, L, G, WISHES[:1], ports=loops_of(system)["pitch"])
+        margin = proof.wishes[0]
+        assert not proof.limits and not margin.bound and margin.agrees
+        assert 20.0 * math.log10(margin.value) == pytest.approx(41.35, abs=0.05)
+
+        def growth(decibels: float) -> float:
+            """Return how the swing of a load step grows over 100 s, at another gain."""
+            plan = LoopPlan([LoopPhase("kick", "torque", "step", 1, 0.1, settle=0.1, dwell=130.0)])
+            record = _run(session, settings | {"pitch.K": K * 10.0 ** (decibels / 20.0)}, {}, plan, 0.01, 1)
+            angle = record.channels["platform.attitude[1]"]
+            return float(np.std(angle[-3000:]) / np.std(angle[1000:4000]))
+
+        assert growth(-42.35) > 1.5 > 0.75 > growth(-40.35)
