@@ -53,9 +53,10 @@ class Posterior:
         inside = np.all((at >= self.low) & (at <= self.high), axis=1)
         return np.where(inside, log, -np.inf), mean / size, R * (size[:, :, None] * size[:, None, :])
 
-    def drawn(self, start: Array, spread: Array) -> tuple[Array, Array]:
-        """Return sizes (m, q) and ln tau (m, q); start: ln tau (q0,) as found, spread: their standard uncertainties;
-        those not among them start anywhere.
+    def drawn(self, start: Array, spread: Array) -> tuple[Array, Array, Array]:
+        """Return sizes (m, q), ln tau (m, q) and levels (m,), means of the coefficients of X.
+
+        start: ln tau (q0,) as found, spread: their standard uncertainties; those not among them start anywhere.
         """
         rng = np.random.default_rng(2)
         d = self.low.size
@@ -80,4 +81,9 @@ class Posterior:
         _, mean, P = self.of_sizes(at)
         L = np.linalg.cholesky(P)
         z = rng.normal(size=(*mean.shape, 1))
-        return mean + np.linalg.solve(np.swapaxes(L, 1, 2), z)[..., 0], at[:, : self.q]
+        size, log_tau = mean + np.linalg.solve(np.swapaxes(L, 1, 2), z)[..., 0], at[:, : self.q]
+        c = self.curves
+        level = c.level + math.sqrt(self.variance * c.level_variance) * rng.normal(size=len(at))
+        for j, k in enumerate(self.of):
+            level = level - size[:, j] * c.levels[k](log_tau[:, j])
+        return size, log_tau, level

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy import special
@@ -46,13 +45,15 @@ from gyrobench.units import DPH
 from . import mistakes
 from .components import Spread, VarianceComponent, spread
 from .draws import Posterior
+from .truth import true_values
 from .warming import Kind, Warming, fitted, means
 
 CONDITION = 1e6  # exponentials that are hardly two were left out by then
 FEW = 4  # readings of a turn-on from which on a warm-up is looked for
+COMPARABLE = 0.5  # size of the smaller of two exponentials over that of the larger
 SECONDS = "s"
+ENDLESS = "longer than the record tells"
 HIDDEN = "Intervals of the warm-up allow for a second exponential that the record does not exclude."
-QUIET = ("flicker_x", "walk_x", "white_x", "markov_x")  # noises of a gyro that move biases beyond the noise model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,8 +151,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         n, q, e = self.columns, self.tau.size, self.tau_E.size
         truth = dict(self.setup.truth or {})
         if q == 1 and "A_1" in truth:  # this fit is not of the true curve; judged by what allows for the other part
-            truth = {name: x for name, x in truth.items() if name not in ("A", "τ")}
-        wanted = [Quantity.of("b", f"bias when warm, mean of these {self.count} turn-ons", "deg/h")]
+            truth = {name: x for name, x in truth.items() if name not in ("b", "A", "τ")}
+        wanted = [Quantity.of("b", f"bias when warm, mean of these {self.count} turn-ons", "deg/h", truth.get("b"))]
         for k in range(q):
             word = "" if q == 1 else (", fast part", ", slow part")[k]
             name = "A" if q == 1 else f"A_{k + 1}"
@@ -208,6 +209,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         own = list(result.coefficients)
         if self.tau.size + self.tau_E.size:
             self.drawn = self._draws()
+            self.endless = self._endless()
             own = [self._allowed(c) for c in own]
         warm = self._time(truth.get("t_w"))
         coefficients = [*own, *([warm] if warm else []), *added]
@@ -219,7 +221,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
         if not q:
             return None
-        value, e, (size, tau) = self.found.value, self.tau_E.size, self.drawn
+        value, e, (size, tau, _) = self.found.value, self.tau_E.size, self.drawn
         own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
             self.setup.limit, longest
         )
@@ -227,16 +229,16 @@ class Reduction(DriftReduction[TurnOnSetup]):
             Warming(size[k, e:], tau[k, e:]).time_until(self.setup.limit, longest) for k in range(0, len(size), 4)
         ])  # fmt: skip
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
-        if not math.isfinite(own):
+        if self.endless or not math.isfinite(own):
             return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
                                no_value="not reached within the record")  # fmt: skip
         low, high = min(low, own), max(high, own)
         u = (high - low) / (2.0 * NORMAL)
         return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
 
-    def _draws(self) -> tuple[Array, Array]:
+    def _draws(self) -> tuple[Array, Array, Array]:
         """Return sizes (m, e + q) and time constants of warm-ups that the record allows, those of the scale factor
-        first; of the bias two unless their number is given.
+        first, and mean biases (m,) when warm; of the bias two unless their number is given.
 
         The noise is white there; its variance makes no interval of the fit under the estimated noise model wider than
         it would be here.
@@ -259,24 +261,45 @@ class Reduction(DriftReduction[TurnOnSetup]):
         of = [1] * e + [0] * (2 if smaller else q)
         posterior = Posterior(self.choice.curves, of, factor**2 * variance, smaller)
         start, order = np.log(np.concatenate([self.tau_E, self.tau])), np.r_[q : q + e, :q]
-        drawn, log_tau = posterior.drawn(start, np.minimum(factor * u_tau[order], 0.5))
-        return drawn, np.exp(log_tau)
+        drawn, log_tau, level = posterior.drawn(start, np.minimum(factor * u_tau[order], 0.5))
+        return drawn, np.exp(log_tau), level
+
+    def _endless(self) -> bool:
+        """Whether the slowest part found may be slower than any that was sought: its size is not determined then."""
+        q, e, (size, tau, _) = self.tau.size, self.tau_E.size, self.drawn
+        if not q:
+            return False
+        at = np.argmax(np.abs(size[:, e:]) if q == 1 else tau[:, e:], axis=1)
+        slowest = tau[np.arange(len(tau)), e + at]
+        return bool(np.mean(slowest > 0.9 * math.exp(self.choice.curves.high)) > 0.05)
 
     def _allowed(self, c: Coefficient) -> Coefficient:
         """Return a size or a time constant of the warm-up with the interval of the warm-ups that the record allows."""
-        q, e, (size, tau) = self.tau.size, self.tau_E.size, self.drawn
+        q, e, (size, tau, level) = self.tau.size, self.tau_E.size, self.drawn
         name, _, number = c.name.partition("_")
-        if name not in ("A", "E", "τ"):
+        if name not in ("b", "A", "E", "τ") or number == "T":
             return c
-        if number == "E" or name == "E":
+        if name != "b" and "E" in (name, number):
             size, tau, k = size[:, :e], tau[:, :e], 0
         else:
             size, tau, k = size[:, e:], tau[:, e:], int(number or 1) - 1
             order = np.argsort(tau if q > 1 else -np.abs(size), axis=1)
             size, tau = (np.take_along_axis(x, order, axis=1) for x in (size, tau))
         unit = next(x.scale for x in self.found.quantities if x.name == c.name)
-        sample = tau[:, k] if name == "τ" else size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
-        low, high = (float(v) / unit for v in np.quantile(sample, (0.025, 0.975)))
+        tail = 0.025
+        if name == "b":
+            sample = level
+        elif name == "τ":
+            sample = tau[:, k]
+            if q == 1 and size.shape[1] == 2 and number != "E":
+                least = np.min(np.abs(size), axis=1) / np.max(np.abs(size), axis=1)
+                if np.quantile(least, 0.95) > COMPARABLE:  # which is the larger is not known: either
+                    sample, tail = tau.ravel(), 0.5 * tail
+        else:
+            sample = size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
+        low, high = (float(v) / unit for v in np.quantile(sample, (tail, 1.0 - tail)))
+        if name != "τ":  # drift of the bias weighs more in b than in the shape of the warm-up
+            low, high = min(low, c.interval[0]), max(high, c.interval[1])
         type_b = NORMAL * math.sqrt(max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0))
         below, above = max(c.estimate - low, 0.0), max(high - c.estimate, 0.0)
         u_a = (below + above) / (2.0 * NORMAL)
@@ -285,6 +308,11 @@ class Reduction(DriftReduction[TurnOnSetup]):
         true = (self.setup.truth or {}).get(c.name)
         true = None if true is None else true / unit
         z = None if true is None or not u else (c.estimate - true) / u
+        if self.endless and (name == "b" or (number != "E" and name != "E" and k == q - 1)):
+            low, high = (low if name == "τ" else -math.inf), math.inf
+            nan = math.nan
+            return replace(c, estimate=nan, u=nan, u_a=None, k=NORMAL, interval=(low, high), truth=true, z=None, t=None,
+                           p=None, no_value=ENDLESS)  # fmt: skip
         return replace(c, u=u, u_a=u_a, k=NORMAL, interval=(low, high), truth=true, z=z)
 
     def effects(self, found: Findings) -> list[Effect]:
@@ -354,25 +382,3 @@ def labelled(record: Record) -> dict[str, Array]:
         if record.run.options["rate"]:
             windows["rate"] = np.array([rows[p].target for p in phase])
     return windows
-
-
-def true_values(run: RunDocument) -> dict[str, float] | None:
-    """Return what the parameters of simulated turn-ons say, SI; None where they are not the bench's own."""
-    p: dict[str, Any] = dict(run.parameters)
-    if "switched.between_turn_ons" not in p:
-        return None
-    size = np.array([float(p[f"switched.warm_{k}"]) for k in (1, 2)])
-    tau = np.array([float(p[f"switched.tau_{k}"]) for k in (1, 2)])
-    there = np.flatnonzero(size)
-    order = there[np.argsort(tau[there])]
-    found: dict[str, float] = {}
-    if order.size:  # what is one exponential to the record may be two
-        found |= {"A": float(size.sum()), "τ": float(tau[np.argmax(np.abs(size))])}
-    if order.size == 2:
-        for k, j in enumerate(order.tolist(), 1):
-            found |= {f"A_{k}": float(size[j]), f"τ_{k}": float(tau[j])}
-    found["t_w"] = Warming(size[order], tau[order]).time_until(float(run.options["limit"]), 1e9)
-    if not any(float(p.get(f"gyro.{n}", 0.0)) for n in QUIET):
-        found |= {"σ_on": float(p["switched.between_turn_ons"]), "σ_day": float(p["switched.between_days"])}
-    scale = 1.0 + float(np.ravel(p.get("gyro.scale", 0.0))[0])
-    return found | {"E": float(p["switched.scale_warm"]) * scale, "τ_E": float(p["switched.scale_tau"])}

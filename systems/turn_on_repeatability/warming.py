@@ -14,6 +14,8 @@ from scipy import interpolate, linalg, optimize
 from gyrobench.arrays import Array
 
 GRID, STARTS = 13, 4  # time constants tried, and refined
+GONE = 30.0  # time constants before the first reading, of which nothing is left
+APART = 1e-4  # of columns of length 1: the least singular value of those that are
 BASIS, STEP = 32, 0.03  # of ln tau: points whose exponentials span all others, step of the splines
 
 
@@ -64,14 +66,16 @@ class Curves:
 
     All exponentials of a record lie in a space of some ten dimensions, and their coordinates there are smooth in
     ln tau: splines of them serve searches and draws of thousands.  y (d,): coordinates of the data; rest: sum of
-    squares of what no exponential reaches; low, high: limits of ln tau; dof: n - p.
+    squares of what no exponential reaches; low, high: limits of ln tau; level, levels: mean of the coefficients of X
+    in the data and, by kind and ln tau, in an exponential, its variance at unit noise.
     """
 
     def __init__(self, y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind]) -> None:
-        self.low, self.high = math.log(0.3 * float(np.min(length))), math.log(2.0 * float(np.max(since)))
+        self.low = math.log(max(0.3 * float(np.min(length)), float(np.min(since)) / GONE))
+        self.high = math.log(2.0 * float(np.max(since)))
         self.first = max(self.low, math.log(float(np.min(since + 0.5 * length))))  # e-folds in the first reading
-        self.dof = y.size - X.shape[1]
-        Q = np.linalg.qr(X)[0]
+        Q, R = np.linalg.qr(X)
+        mean = Q @ np.linalg.solve(R.T, np.full(X.shape[1], 1.0 / X.shape[1]))
 
         def beside(A: Array) -> Array:
             out: Array = A - Q @ (Q.T @ A)
@@ -79,19 +83,21 @@ class Curves:
 
         def columns(log_tau: Array) -> list[Array]:
             every = means(since, length, np.exp(log_tau))
-            return [beside(kind.factor[:, None] * every) for kind in kinds if kind.most]
+            return [kind.factor[:, None] * every for kind in kinds if kind.most]
 
         self.of = [k for k, kind in enumerate(kinds) if kind.most]
-        scale = [float(np.max(np.abs(kinds[k].factor))) or 1.0 for k in self.of]
         coarse = np.linspace(self.low, self.high, BASIS)
-        every = [c / s for c, s in zip(columns(coarse), scale, strict=True)] or [np.zeros((y.size, 1))]
+        every = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in map(beside, columns(coarse))] or [
+            np.zeros((y.size, 1))
+        ]
         U, R, _ = linalg.qr(np.column_stack(every), mode="economic", pivoting=True, check_finite=False)
         own = np.abs(np.diag(R))
         U = U[:, own > 1e-11 * max(float(own[0]), 1e-300)]
         fine = np.linspace(self.low, self.high, max(round((self.high - self.low) / STEP), BASIS))
-        self.splines = {
-            k: interpolate.CubicSpline(fine, (U.T @ c).T) for k, c in zip(self.of, columns(fine), strict=True)
-        }
+        whole = dict(zip(self.of, columns(fine), strict=True))
+        self.splines = {k: interpolate.CubicSpline(fine, beside(c).T @ U) for k, c in whole.items()}
+        self.levels = {k: interpolate.CubicSpline(fine, mean @ c) for k, c in whole.items()}
+        self.level, self.level_variance = float(mean @ y), float(mean @ mean)
         left = beside(y)
         self.y = U.T @ left
         self.rest = float(np.sum((left - U @ self.y) ** 2))
@@ -138,6 +144,12 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
         squares = max(float(np.sum(left(log_tau, of) ** 2)) + curves.rest / unit**2, 1e-300)
         return y.size * math.log(squares / y.size) + 2.0 * len(of) * math.log(y.size)
 
+    def apart(log_tau: Array, of: Sequence[int]) -> bool:
+        """Whether sizes and time constants can be told from each other: no two in one, none within a reading."""
+        J = np.column_stack([curves.at(log_tau, of), curves.at(log_tau, of, 1)])
+        s = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300), compute_uv=False)
+        return J.shape[0] >= J.shape[1] and bool(s[-1] > APART * s[0])
+
     grid = np.linspace(low, high, GRID)
     at, of = np.zeros(0), list[int]()
     least = criterion(at, of)
@@ -157,8 +169,10 @@ def fitted(y: Array, X: Array, since: Array, length: Array, kinds: Sequence[Kind
                     optimize.least_squares(left, starts[j], slopes, x_scale=0.3, max_nfev=80, args=(more,)).x
                     for j in order
                 ]
-                found = refined[int(np.argmin([criterion(s, more) for s in refined]))]
-                tried.append((-math.inf if kind.exact else criterion(found, more), found, k))
+                refined = [x for x in refined if apart(x, more)] or (refined if kind.exact else [])
+                if refined:
+                    found = refined[int(np.argmin([criterion(s, more) for s in refined]))]
+                    tried.append((-math.inf if kind.exact else criterion(found, more), found, k))
         if not tried:
             break
         value, found, k = min(tried, key=operator.itemgetter(0))

@@ -47,6 +47,7 @@ def written(rng: np.random.Generator, kind: str) -> tuple[dict[str, Array], dict
     there = np.flatnonzero(size)
     truth = {"A": size.sum() * DPH, "τ": taus[np.argmax(np.abs(size))], "σ_on": on * DPH, "σ_day": between * DPH,
              "t_w": Warming(size[there], taus[there]).time_until(LIMIT, 1e9)}  # fmt: skip
+    truth["b"] = bias.mean() * DPH
     if there.size == 2:
         truth |= {"A_1": size[0] * DPH, "A_2": size[1] * DPH, "τ_1": taus[0], "τ_2": taus[1]}
     if kind == "turning":

@@ -117,6 +117,19 @@ def test_a_second_exponential_that_is_hardly_seen() -> None:
         assert sum(own) >= len(own) - 2, (name, own)
 
 
+def test_a_warm_up_longer_than_the_record() -> None:
+    """3 exp(-t/2000) over 300 s is a slope: neither size nor time constant has a value, nor the time until warm."""
+    since = np.tile(2.5 + 5.0 * np.arange(60), 2)
+    turn = np.repeat([1, 2], 60)
+    y = 3.0 * np.exp(-since / 2000.0) + np.random.default_rng(3).normal(0.0, 0.05, since.size)
+    start = since - 2.5 + 1e4 * turn
+    windows = {"t_start": start, "t_end": start + 5.0, "turn_on": turn, "since": since, "mean": DPH * y}
+    found = {c.name: c for c in Reduction.reduce(windows, TurnOnSetup(limit=0.05 * DPH)).coefficients}
+    for name, true in {"b": 0.0, "A": 3.0, "τ": 2000.0, "t_w": 2000.0 * math.log(60.0)}.items():
+        low, high = found[name].interval
+        assert found[name].no_value and low < true < high, name
+
+
 # ------------------------------------------------------------------------------------------------ runs
 def test_a_gyro_that_warms_up_comes_back() -> None:
     """At a rate in both senses, two exponentials, scale factor: without noise of the gyro to 1 %."""
