@@ -298,8 +298,11 @@ class Reduction(DriftReduction[TurnOnSetup]):
         else:
             sample = size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
         low, high = (float(v) / unit for v in np.quantile(sample, (tail, 1.0 - tail)))
-        if name != "τ":  # drift of the bias weighs more in b than in the shape of the warm-up
-            low, high = min(low, c.interval[0]), max(high, c.interval[1])
+        own = c.interval
+        if name == "τ":  # it was fitted in logarithms
+            factor = math.exp(min(c.k * c.u / c.estimate, 20.0))
+            own = c.estimate / factor, c.estimate * factor
+        low, high = min(low, own[0]), max(high, own[1])  # colour of the noise weighs differently on each
         type_b = NORMAL * math.sqrt(max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0))
         below, above = max(c.estimate - low, 0.0), max(high - c.estimate, 0.0)
         u_a = (below + above) / (2.0 * NORMAL)
