@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DPH, Account, Gate, LoopReduction, Table, drift, over_time
+from gyrobench.reduction.loops.slow_drift import slow_drift
 from gyrobench.units import display
 
 from .closed import MovingPlace, SourceOfDrift, budget, led
+from .size import size_of
 
 #: what measures about x, y, z of the platform: the gyro, the row of its mount, its channel
 ROWS = (("gyro_b", 1, "y"), ("gyro_a", 0, "x"), ("gyro_a", 1, "y"))
@@ -44,6 +46,8 @@ class Reduction(LoopReduction):
             conventions=[
                 "Platform axes x east, y north, z up; e: small rotation of the platform against them.",
                 "Drift δ: inertial rate of the platform in its axes less the rate of level and north in theirs.",
+                "u of the drift: noise, and what slow drift of the gyros (turn-on, Gauss-Markov, flicker, random walk) "
+                "moves its mean over the record away from the constant drift.",
                 "After an hour: e with δ constant, by its closed solution; nothing brings the platform back.",
             ],
         )
@@ -56,19 +60,20 @@ class Reduction(LoopReduction):
         spread = np.zeros(3)
         for k, axis in enumerate("xyz"):
             got = drift(gate.t, apart[k])
-            delta[k], spread[k] = got.rate, got.u
+            gyro, _, channel = ROWS[k]
+            slow = slow_drift(self.run.parameters, gyro, f"_{channel}", gate.t)
+            delta[k], spread[k] = got.rate, math.hypot(got.u, slow)
             told = None if truth is None else float(truth[k])
-            found.measure(f"drift {axis}", f"against {NAMES[k]}", "°/h", got.rate, got.u, scale=DPH, truth=told)
+            found.measure(f"drift {axis}", f"against {NAMES[k]}", "°/h", got.rate, spread[k], scale=DPH, truth=told)
         total = None if truth is None else float(np.linalg.norm(truth))
-        size, u = _along(delta, np.diag(spread**2))
-        found.measure("drift", "of the platform against level and north, size", "°/h", size, u, scale=DPH, truth=total)
+        meaning = "of the platform against level and north, size"
+        self._size("drift", meaning, "°/h", delta, np.diag(spread**2), scale=DPH, truth=total)
         rate = self.place.rate()
         leads = np.column_stack([led(axis, rate, HOUR) for axis in np.eye(3)])  # e after an hour, of a unit drift
         hour, cov = leads @ delta, leads @ np.diag(spread**2) @ leads.T
         then = None if truth is None else leads @ truth
-        tilt, u = _along(hour[:2], cov[:2, :2])
         true = None if then is None else math.hypot(then[0], then[1])
-        found.measure("tilt 1 h", "tilt error after an hour", "′", tilt, u, scale=ARCMIN, truth=true)
+        self._size("tilt 1 h", "tilt error after an hour", "′", hour[:2], cov[:2, :2], scale=ARCMIN, truth=true)
         true = None if then is None else float(then[2])
         u = math.sqrt(cov[2, 2])
         found.measure("heading 1 h", "heading error after an hour", "′", float(hour[2]), u, scale=ARCMIN, truth=true)
@@ -76,6 +81,13 @@ class Reduction(LoopReduction):
         curves = {f"{axis}": (a - a[0]) / ARCMIN for axis, a in zip("xyz", apart, strict=True)}
         caption = "Platform less level and north: what it has turned too far about its axes."
         found.responses.append(over_time("platform error", gate.t, curves, caption=caption, unit="′"))
+
+    def _size(self, name: str, meaning: str, unit: str, x: Any, cov: Any, *, scale: float, truth: float | None) -> None:
+        """Measure the size of a vector with covariance cov, SI; scale: SI per printed unit."""
+        u, ends = size_of(x, cov)
+        interval = ends[0] / scale, ends[1] / scale
+        size = float(np.linalg.norm(x))
+        self.found.measure(name, meaning, unit, size, u, scale=scale, truth=truth, interval=interval)
 
     def _truth(self, gate: Gate) -> Any:
         """Return what the simulated errors make of it: R w = (1 + e) w_believed + d, exact; None of other parts."""
@@ -85,7 +97,9 @@ class Reduction(LoopReduction):
         if any(".k_" in name for name in self.run.changed):
             return None  # a torquer set by hand is as it is
         rows = np.array([np.asarray(p[f"{gyro}.mount"], float)[row] for gyro, row, _ in ROWS])
-        drifts = np.array([_static(p, gyro, channel) for gyro, _, channel in ROWS])
+        middle = 0.5 * float(gate.t[0] + gate.t[-1])
+        ramps = np.array([float(p.get(f"{gyro}.ramp_{channel}", 0.0)) for gyro, _, channel in ROWS])
+        drifts = np.array([_static(p, gyro, channel) for gyro, _, channel in ROWS]) + ramps * middle
         rate = np.array([float(np.mean(gate[f"follower.rate[{k}]"])) for k in (1, 2, 3)])
         off = np.asarray(p["follower.velocity_error"], float)
         east, north = self.place.by_velocity()
@@ -117,13 +131,6 @@ class Reduction(LoopReduction):
             f"The platform drifts against level and north by {drift_:.3g} °/h; the budget allows for {total:.3g} °/h.",
             f"After an hour it would be {tilt:.3g}′ off level and {abs(heading):.3g}′ off north.",
         ]
-
-
-def _along(x: Any, cov: Any) -> tuple[float, float]:
-    """Return the size of a vector and its standard uncertainty, to first order: along the vector itself."""
-    size = float(np.linalg.norm(x))
-    unit = x / size if size > 0.0 else np.zeros(x.size)
-    return size, math.sqrt(float(unit @ cov @ unit)) if size > 0.0 else math.sqrt(float(np.max(np.diag(cov))))
 
 
 def _static(p: Mapping[str, Any], gyro: str, channel: str) -> float:

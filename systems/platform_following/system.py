@@ -118,7 +118,6 @@ class PlatformFollowing(TwoGyroTest):
             found[f"{gyro}.mount"] = (np.array(mount, float) @ error).tolist()
             found |= {f"{gyro}.D{c}_{n}?": 0.0 for c in "xy" for n in TERMS}
             found |= {f"{gyro}.D{c}_0?": self["residual"] for c in "xy"}
-            found |= {f"{gyro}.markov_{c}?": 0.0 for c in "xy"}  # what the time does not tell from a constant: u_drift
             found |= {f"{gyro}.{k}": parts[f"{gyro}.{k}"] * (1.0 + self["torquer"]) for k in ("k_x", "k_y")}
         return found
 

@@ -17,7 +17,7 @@ from gyrobench.reduction.loops.loop_toolkit import (
     margins,
     told,
 )
-from gyrobench.reduction.loops.platform_measures import command_step, late_noise, level_drift
+from gyrobench.reduction.loops.platform_measures import command_step, level_drift, peak_noise
 
 from .budget import ride_budget
 from .measures import PURPOSES, bending, disturbed, effort, jitter, lag, level, period
@@ -55,7 +55,7 @@ class Reduction(LoopReduction):
                 caption="Isolation: how much of the base's angle the platform takes over.",
             )  # fmt: skip
         if holds := [g for g in found.of("hold") if g.label == "drift"]:
-            found.drift(holds[-1], ANGLE, truth=level_drift(self.run.parameters))
+            found.drift(holds[-1], ANGLE, truth=level_drift(self.run.parameters), gyro=("gyro", ""))
         known = {c.name for c in found.coefficients}
         found.facts["purposes"] = {name: purpose for name, purpose in PURPOSES.items() if name in known}
         return Account(
@@ -118,7 +118,8 @@ class Reduction(LoopReduction):
         quiet = next(iter(found.of("hold")), None)
         found.step(gate, ANGLE, scale=ARCSEC, unit="″", y_name="attitude", quiet=quiet)
         y = gate[ANGLE] - (float(rest.mean()) if rest.size else 0.0)
-        peak, noise = float(y[np.argmax(np.abs(y))]), late_noise(y)
+        at = int(np.argmax(np.abs(y)))
+        peak, noise = float(y[at]), peak_noise(quiet[ANGLE] if quiet else None, rest.size, at, y)
         found.measure("peak", "largest attitude after the load step", "″", peak, noise, scale=ARCSEC)
         stiff = abs(gate.amplitude / peak)
         found.measure("load/peak", "torque of the step over that attitude", "N·m/rad", stiff, stiff * noise / abs(peak))

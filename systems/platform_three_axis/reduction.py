@@ -13,7 +13,7 @@ from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import cross_axis, response
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Gate, LoopReduction, Point, margins, told
-from gyrobench.reduction.loops.platform_measures import late_noise
+from gyrobench.reduction.loops.platform_measures import peak_noise
 from gyrobench.reduction.loops.rides import share, still
 
 from .budget import budget
@@ -149,7 +149,11 @@ class Reduction(LoopReduction):
         found, quiet = self.found, next(iter(self.found.of("hold")), None)
         rest = [gate.rest(name) for name in ANGLES]
         moved = np.array([gate[n] - (float(r.mean()) if r.size else 0.0) for n, r in zip(ANGLES, rest, strict=True)])
-        peak, u, M = float(np.linalg.norm(moved, axis=0).max()), late_noise(moved), gate.amplitude
+        sizes, M = np.linalg.norm(moved, axis=0), gate.amplitude
+        at = int(np.argmax(sizes))
+        peak, along = float(sizes[at]), moved[:, at] / max(float(sizes[at]), 1e-300)
+        at_rest = None if quiet is None else along @ np.array([quiet[n] for n in ANGLES])
+        u = peak_noise(at_rest, rest[0].size, at, moved)
         axis = AXES[gate.axis - 1]
         found.measure(f"peak {axis}", f"largest attitude after {M:g} N·m about {axis}", "″", peak, u, scale=ARCSEC)
         if peak:
@@ -178,7 +182,7 @@ class Reduction(LoopReduction):
             mount, gravity = p.get(f"{slot}.mount"), p.get("motion.gravity")
             if mount is not None and gravity is not None and len(named) == len(static.NAMES):
                 truth = float(static.drift(-np.asarray(mount, float) @ up * float(gravity) / G0, named))
-            self.found.drift(gate, name, key=f" {axis}", truth=truth)
+            self.found.drift(gate, name, key=f" {axis}", truth=truth, gyro=(slot, ""))
 
     def _lags(self) -> dict[str, dict[str, float]]:
         """Return for each loop the lags of its plant, s: gyro J/C, motor L/R, and the corner of its stabilizer."""

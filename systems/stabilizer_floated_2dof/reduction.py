@@ -97,7 +97,8 @@ class Reduction(LoopReduction):
         it up to some seconds.  Weighted least squares over averaging times from 0.5 s on.
         """
         found, white = self.found, self.run.parameters.get("gyro.white_x")
-        found.drift(gate, ANGLE, truth=self._truth(float(np.mean(gate[ANGLE]))))  # the command has turned it
+        truth = self._truth(float(np.mean(gate[ANGLE])))  # the command has turned it
+        found.drift(gate, ANGLE, truth=truth, gyro=("gyro", "_x"))
         found.coefficients = [c for c in found.coefficients if c.name != "N"]
         if (allan := found.allan) is None:
             return
@@ -127,9 +128,14 @@ class Reduction(LoopReduction):
                       closed=None if rest is None else M / rest, unsettled=why)  # fmt: skip
         if rest is not None or self.loop is None:  # an integral part leaves no angle
             common.stiffness(found, "S", "stiffness at rest, M / θ*", M, a, rest)
-        y = gate[ANGLE] - a.initial
+        time, before = gate.t - gate.t[0], gate.rest(ANGLE).size
+        y = gate[ANGLE] - a.initial - (own.rate * time if own is not None else 0.0)
+        at = int(np.argmax(np.abs(y)))
+        u = common.peak_noise(None if hold is None else hold[ANGLE], before, at, y)
+        if own is not None:
+            u = math.hypot(u, own.u * float(time[at] + 0.5 * before * (time[1] - time[0])))
         meaning = "largest platform angle after the load step"
-        found.measure("θ_max", meaning, "″", float(y[np.argmax(np.abs(y))]), common.late_noise(y), scale=ARCSEC)
+        found.measure("θ_max", meaning, "″", float(y[at]), u, scale=ARCSEC)
         common.settling(found, "", "to {band} of θ*", a, 5, 2)
 
     def _margins(self, points: list[Point]) -> None:

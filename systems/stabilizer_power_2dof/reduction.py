@@ -80,7 +80,8 @@ class Reduction(LoopReduction):
         for gate in found.of("torque", 2):
             self._servo(gate)
         for gate in holds:
-            found.drift(gate, ALPHA, truth=self._truth(), walk=float(p.get("gyro.white_x", 0.0)))
+            walk = float(p.get("gyro.white_x", 0.0))
+            found.drift(gate, ALPHA, truth=self._truth(), walk=walk, gyro=("gyro", "_x"))
         return Account(
             method="Load step, sine sweeps of loop and base, servo torque and drift hold  [STAB-POWER-2DOF]",
             sources=["STAB-POWER-2DOF; GSP ch. 5, eq. 5-1..5-23, corrected by EG1-EG6"],

@@ -12,7 +12,7 @@ import numpy as np
 
 from gyrobench.reduction.loops.loop_measures import Drift, Gate, drift
 from gyrobench.reduction.loops.loop_toolkit import DRIFTS, Account, LoopReduction, Table, isolation, margins, told
-from gyrobench.reduction.loops.platform_measures import stiffness
+from gyrobench.reduction.loops.platform_measures import peak_noise, stiffness
 from gyrobench.units import ARCSEC, DPH
 
 from .closed import TwoAxes, one_axis_limit
@@ -83,11 +83,11 @@ class Reduction(LoopReduction):
         rest = self.own[2 - axis]
         moved = other - other[0] - (rest.rate * (gate.t - gate.t[0]) if rest else 0.0)
         meaning = f"largest angle about {AXES[2 - axis]} by a load about {name}"
-        late = moved[-moved.size // 4 :]  # at rest but for its drift
-        index = np.arange(late.size)
-        noise = float(np.std(late - np.polyval(np.polyfit(index, late, 1), index)))
+        at = int(np.argmax(np.abs(moved)))
+        noise = peak_noise(self.quiet[_angle(3 - axis)] if self.quiet else None, 1, at, moved)
+        u = math.hypot(noise, (rest.u if rest else 0.0) * float(gate.t[at] - gate.t[0]))
         closed = self._cross(M, gate.t[-1] - gate.t[0])
-        found.measure(f"cross {name}", meaning, "″", float(np.abs(moved).max()), noise, scale=ARCSEC, closed=closed)
+        found.measure(f"cross {name}", meaning, "″", float(np.abs(moved[at])), u, scale=ARCSEC, closed=closed)
 
     def _cross(self, M: float, time: float) -> float:
         """Return the largest angle about the other axis, by the residues of M compliance(s)/s."""

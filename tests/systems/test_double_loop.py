@@ -124,3 +124,18 @@ def test_a_part_with_a_tachometer_takes_the_double_loop() -> None:
     system = load_system(NAME)
     system.place("stabilizer", "stabilizer_double_loop")
     assert system["loops"] == "double" and system.crossovers() == {"stabilizer": 10.0}
+
+
+def test_noise_is_in_the_largest_angle() -> None:
+    """Four runs with noise beside one without: the pickoff moves the platform slowly, within the loop's bandwidth."""
+    hold = LoopPhase("drift", "hold", settle=0.5, dwell=4.0)
+    plan = LoopPlan([LoopPhase("load step", "torque", "step", 1, 1.0, settle=0.5, dwell=1.0), hold])
+    with with_methods(NAME, parts={"stabilizer": "stabilizer_double_loop"}, plan=lambda self: plan) as s:
+
+        def largest(values: dict[str, float], seed: int = 0) -> Any:
+            result = s.system.reduce(s.run({"loops": "double", **values}, seed=seed))
+            return next(c for c in result.coefficients if c.name == "θ_max")
+
+        still = largest({n: 0.0 for n in STILL if ".D" not in n}).estimate
+        z = [(c.estimate - still) / c.u for c in (largest({}, seed) for seed in range(4))]
+    assert max(map(abs, z)) < 4.0 and math.hypot(*z) > 0.2

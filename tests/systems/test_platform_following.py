@@ -11,11 +11,13 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
+from gyrobench.reduction.loops.slow_drift import slow_drift
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.units import ARCMIN, DPH, EARTH_RATE
 
 NAME = "platform_following"
 closed: Any = importlib.import_module(".closed", type(load_system(NAME)).__module__)
+size: Any = importlib.import_module(".size", type(load_system(NAME)).__module__)
 QUIET = {
     f"{g}.{n}_{c}": 0.0 for g in ("gyro_a", "gyro_b") for n in ("turn_on", "markov", "white", "pickoff") for c in "xy"
 }
@@ -97,6 +99,64 @@ def test_each_error_makes_the_drift_of_the_closed_form(session: Session) -> None
         ]
     )
     assert found == pytest.approx(np.linalg.solve(rows, w) - w, rel=3e-3, abs=2e-4 * DPH)
+
+
+def test_slow_drift_is_in_the_interval(session: Session) -> None:
+    """Drift that 20 s cannot tell from a constant: the interval holds the constant one, and is not many times too wide.
+
+    The mean over T << tau has nearly the whole rms.  The noise of the record alone is 0.006 deg/h: without the share of
+    the slow drift 15 errors are some ten u of that each.
+    """
+    rms = 0.06
+    slow = {f"{g}.markov_{c}": rms * DPH for g in ("gyro_a", "gyro_b") for c in "xy"}
+    slow |= {f"{g}.markov_tau": 2000.0 for g in ("gyro_a", "gyro_b")}
+    white = {f"{g}.white_{c}": 0.0178 * DPH for g in ("gyro_a", "gyro_b") for c in "xy"}
+    z = []
+    for seed in range(5):
+        record = session.run({**PERFECT, **slow, **white, "residual": 0.05 * DPH}, seed=seed)
+        c = {c.name: c for c in session.system.with_values({}).reduce(record).coefficients}
+        z += [c[f"drift {a}"].z for a in "xyz"]
+        assert all(rms < c[f"drift {a}"].u < 1.5 * rms for a in "xyz")
+        assert all(abs(c[n].z) < 4.0 for n in ("drift", "tilt 1 h", "heading 1 h"))
+    assert np.max(np.abs(z)) < 4.0 and 0.5 < np.std(z) < 1.5
+
+
+def test_the_interval_of_a_size_holds_it() -> None:
+    """2000 vectors of 2 and 3 elements, from 0 to 10 of their noise, which differs by direction up to ten times."""
+    rng = np.random.default_rng(11)
+    for elements in (2, 3):
+        held = []
+        for _ in range(1000):
+            spread = 10.0 ** rng.uniform(-0.5, 0.5, elements)
+            m = rng.normal(size=elements) * 10.0 ** rng.uniform(-1.5, 1.0)
+            low, high = size.size_of(m + spread * rng.standard_normal(elements), np.diag(spread**2))[1]
+            held.append(low <= np.linalg.norm(m) <= high)
+        assert 0.93 < np.mean(held) < 0.985
+    assert size.size_of(np.zeros(2), np.eye(2))[1][0] == 0.0
+    assert size.size_of(np.array([300.0, 400.0]), np.eye(2))[1] == pytest.approx((500.0 - 1.96, 500.0 + 1.96), abs=1e-3)
+
+
+def test_the_mean_of_slow_drift_by_sampling() -> None:
+    """6000 processes each, walked in steps of tau/100: turn-on and Gauss-Markov, flicker, walk that began before."""
+    rng, h, n, count = np.random.default_rng(8), 1.0, 100, 6000
+    t = np.arange(40.0, 40.0 + n + 1)
+
+    def markov(rms: float, tau: float) -> np.ndarray:
+        a = np.exp(-h / tau)
+        x, total = rms * rng.standard_normal(count), np.zeros(count)
+        for _ in range(n):
+            x = a * x + rms * np.sqrt(1.0 - a * a) * rng.standard_normal(count)
+            total += x / n
+        return total
+
+    found = float(np.std(3.0 * rng.standard_normal(count) + markov(2.0, 100.0)))
+    given = {"g.turn_on_x": 3.0, "g.markov_x": 2.0, "g.markov_tau": 100.0}
+    assert slow_drift(given, "g", "_x", t) == pytest.approx(found, rel=0.03)
+    walks = np.cumsum(0.5 * rng.standard_normal((count, 140)), axis=1)[:, 40:].mean(axis=1)
+    assert slow_drift({"g.walk": 0.5}, "g", "", t) == pytest.approx(float(np.std(walks)), rel=0.03)
+    steady = slow_drift({"g.flicker": 1.0, "g.flicker_tau": 1e12}, "g", "", t)  # twelve constants: 5.59 B2
+    assert steady < np.sqrt(5.59) and slow_drift({"g.flicker": 1.0}, "g", "", t) < steady
+    assert slow_drift({}, "g", "_x", t) == 0.0
 
 
 def test_budget_by_hand_and_in_the_report(session: Session) -> None:

@@ -12,6 +12,7 @@ from gimballed import session as with_methods
 from gyrobench.reduction.loops import margins
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import InvalidConfigurationError, load_system
+from gyrobench.units import ARCSEC
 
 NAME = "stabilizer_power_two_axis"
 closed: Any = importlib.import_module(".closed", type(load_system(NAME)).__module__)
@@ -98,6 +99,14 @@ def test_measures_beside_the_closed_forms(session: Any) -> None:
     assert c["servo rate y"].estimate == pytest.approx(0.0, abs=0.01)
     c = {c.name: c for c in session.system.reduce(session.run({"platform.white": 0.0, "drift": "3deg/h"})).coefficients}
     assert c["drift x"].estimate == pytest.approx(3.0, rel=1e-3) and c["drift x"].truth == pytest.approx(3.0)
+
+
+def test_u_of_the_largest_angle_is_that_of_the_random_walk(session: Any) -> None:
+    """The platform turns as the gyro of the other axis drifts: N sqrt(t) after t, 0.123 s to the peak by hand."""
+    c = {c.name: c for c in session.system.reduce(session.run({"drift": 0.0})).coefficients}
+    walk = 8.63e-8 * np.sqrt(0.123) / ARCSEC
+    for name in ("cross x", "cross y"):
+        assert walk * 0.6 < c[name].u < walk * 1.7, name
 
 
 def test_linear_model_of_the_parts(session: Any) -> None:

@@ -46,6 +46,7 @@ from gyrobench.reduction.loops.open_loop import (
     open_loop_point,
     why_no_crossover,
 )
+from gyrobench.reduction.loops.slow_drift import slow_drift
 from gyrobench.reduction.loops.validity import why_void
 from gyrobench.result import AllanDeviation, LoopResult, Reason, Table
 from gyrobench.units import DPH
@@ -334,16 +335,20 @@ class LoopFindings(MeasureFindings):
 
     # ------------------------------------------------------------------ drift
     def drift(
-        self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None
-    ) -> Drift:
+        self, gate: Gate, output: str, *, key: str = "", truth: float | None = None, walk: float | None = None,
+        gyro: tuple[str, str] | None = None,
+    ) -> Drift:  # fmt: skip
         """Measure drift and random walk of an angle in a hold phase, °/h and °/√h; show the Allan deviation.
 
         key: appended to the names of the coefficients.  truth: of the rate, rad/s; walk: of the random walk, rad/√s.
+        gyro: slot and channel ("_x", "") of the one whose drift it is; what its slow drift may add to a record of this
+        length is in u.
         """
         measures = drift(gate.t, gate[output])
+        u = measures.u if gyro is None else math.hypot(measures.u, slow_drift(self.run.parameters, *gyro, gate.t))
         self.show_allan(measures)
         meaning = "mean drift rate of the platform at rest"
-        self.measure(f"drift{key}", meaning, "°/h", measures.rate, measures.u, scale=DPH, truth=truth)
+        self.measure(f"drift{key}", meaning, "°/h", measures.rate, u, scale=DPH, truth=truth)
         if measures.walk is not None:
             size, u = (math.degrees(w) * 60.0 for w in measures.walk)
             true = math.degrees(walk) * 60.0 if walk else None

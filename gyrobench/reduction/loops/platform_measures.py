@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.loops.loop_measures import Gate, Point, Step
+from gyrobench.reduction.loops.loop_measures import Gate, Point, Step, step_noise_std
 from gyrobench.reduction.loops.loop_result import LoopFindings
 
 DECIBEL = 8.686  # of a relative uncertainty
@@ -22,6 +22,16 @@ LEVEL = ("D_F", "D_S", "D_SS")
 def late_noise(y: Array) -> float:
     """Return the standard deviation of the white noise in the last tenth of a signal."""
     return float(np.std(np.diff(y[..., -y.shape[-1] // 10 :]))) / math.sqrt(2.0)
+
+
+def peak_noise(at_rest: Array | None, before: int, at: int, y: Array) -> float:
+    """Return the standard deviation that noise gives an angle ``at`` samples after a baseline, the mean of ``before``.
+
+    at_rest: the angle in a hold; noise of any colour is in it, as a platform's random walk.  Without one, or with too
+    short a one, it is that of white noise in the end of the signal y, too small where the noise is slow.
+    """
+    u = None if at_rest is None else step_noise_std(at_rest, before, max(at, 1), 1)
+    return late_noise(y) if u is None else u
 
 
 def command_step(
