@@ -299,8 +299,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
             sample = size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
         low, high = (float(v) / unit for v in np.quantile(sample, (tail, 1.0 - tail)))
         own = c.interval
-        if name == "τ":  # it was fitted in logarithms
-            factor = math.exp(min(c.k * c.u / c.estimate, 20.0))
+        if name == "τ":  # it was fitted in logarithms; type B below
+            factor = math.exp(min(c.k * (c.u_a or c.u) / c.estimate, 20.0))
             own = c.estimate / factor, c.estimate * factor
         low, high = min(low, own[0]), max(high, own[1])  # colour of the noise weighs differently on each
         type_b = NORMAL * math.sqrt(max(c.u**2 - (c.u_a or 0.0) ** 2, 0.0))
