@@ -313,9 +313,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         z = None if true is None or not u else (c.estimate - true) / u
         if self.endless and (name == "b" or (number != "E" and name != "E" and k == q - 1)):
             low, high = (low if name == "τ" else -math.inf), math.inf
-            nan = math.nan
-            return replace(c, estimate=nan, u=nan, u_a=None, k=NORMAL, interval=(low, high), truth=true, z=None, t=None,
-                           p=None, no_value=ENDLESS)  # fmt: skip
+            bare = replace(c, estimate=math.nan, u=math.nan, u_a=None, z=None, t=None, p=None)
+            return replace(bare, k=NORMAL, interval=(low, high), truth=true, no_value=ENDLESS)
         return replace(c, u=u, u_a=u_a, k=NORMAL, interval=(low, high), truth=true, z=z)
 
     def effects(self, found: Findings) -> list[Effect]:
