@@ -99,7 +99,7 @@ class PlatformFollowing(TwoGyroTest):
         "follower.turned",
         "platform.theta",
         "motion.angle",
-        "platform.lock platform.saturated",
+        "platform.saturated",
     )
 
     def phases(self) -> list[LoopPhase]:

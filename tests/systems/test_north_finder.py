@@ -242,7 +242,7 @@ def test_auto_takes_the_shortest() -> None:
     ("values", "words"),
     [
         (["latitude=86deg"], "within 5° of a pole"),
-        (["method=gyrocompass"], "must be one of two, four"),
+        (["method=gyrocompass"], "must be one of two, null, four"),
         (["method=auto"], "wanted=1arcmin"),
         (["time=5s"], "moves and settling take"),
         (["base=train"], "must be one of rest"),

@@ -10,4 +10,5 @@ for cell in CELLS:  # type: ignore[name-defined]  # noqa: F821
     exec(compile(tree, "cell", "exec"), NAMES)
     if isinstance(last, ast.Expr):
         value = eval(compile(ast.Expression(last.value), "cell", "eval"), NAMES)
-        SHOWN.append(value._repr_html_() if hasattr(value, "_repr_html_") else repr(value))
+        html = value._repr_html_() if hasattr(value, "_repr_html_") else None  # None of a figure
+        SHOWN.append(html or repr(value))
