@@ -86,6 +86,7 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) ->
 
 
 @pytest.mark.parametrize("raises", FAILURES)
+@pytest.mark.long
 def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: Call, raises: str) -> None:
     line, message = FAILURES[raises]
     place = f"{Path('systems/own/system.py').resolve()}:{line}: {message}"
@@ -163,6 +164,7 @@ def test_a_slot_with_an_unknown_socket(gyrobench: Call) -> None:
     assert (code, err) == (2, "gyrobench: no socket 'Sit'; did you mean Site?\n")
 
 
+@pytest.mark.long
 def test_every_exception_class_is_a_gyrobench_error() -> None:
     """Of gyrobench and of the standard content: an error that is not one would be shown as a fault of the program."""
     builtin = {name for name, value in vars(builtins).items() if isinstance(value, type)}

@@ -291,6 +291,7 @@ def cycle(graph: dict[str, set[str]]) -> list[str]:
     return next((found for start in sorted(graph) if start not in done and (found := search([start]))), [])
 
 
+@pytest.mark.long
 def test_no_module_imports_itself_by_way_of_others() -> None:
     modules = {module_of(f) for f in FILES}
     graph = {module_of(f): imported_modules(f, modules) for f in FILES}
@@ -311,6 +312,7 @@ def test_no_two_modules_of_one_name() -> None:
     assert len(set(names)) == len(names), sorted({n for n in names if names.count(n) > 1})
 
 
+@pytest.mark.long
 def test_no_two_public_classes_of_one_name() -> None:
     places: dict[str, list[str]] = {}
     bench = standard_folder()
@@ -352,6 +354,7 @@ def test_no_call_in_a_reduction_takes_more_than_ten_arguments() -> None:
     assert long == FLAT, f"build it in steps, group what belongs together: {long - FLAT}; gone: {FLAT - long}"
 
 
+@pytest.mark.long
 def test_docstrings_open_with_what_is_returned_or_done() -> None:
     """Not with a fragment: "Return the parameters ...", "Parameters of ...", and not "Of all parts, ..."."""
     fragment = re.compile(r"(What|Of|As|Whether)\b")

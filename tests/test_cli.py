@@ -26,6 +26,7 @@ TINY = ["--set", "rate=30deg/s", "--set", "dwell=2", "--set", "settle=0.5", "--s
 
 
 # ------------------------------------------------------------------------------------------ help, list
+@pytest.mark.long
 def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
@@ -81,6 +82,7 @@ def test_list(gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ show
+@pytest.mark.long
 def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path) -> None:
     code, out, err = gyrobench("show", NAME, "--set", "rate=2deg/s", "--set", "latitude=50deg")
     assert (code, err) == (0, "")
@@ -251,6 +253,7 @@ def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_pa
     assert code == 1 and out
 
 
+@pytest.mark.long
 def test_parts_are_built_side_by_side(gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same files as one after the other; one that cannot be built is named, and those before it are there."""
     from gyrobench import packaging
@@ -271,6 +274,7 @@ def test_parts_are_built_side_by_side(gyrobench: Call, tmp_path: Path, monkeypat
     assert code != 0 and out == "fmus/meter.fmu\n" and "site/model.py:22: IndentationError" in err
 
 
+@pytest.mark.long
 def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """In a process that has exported nothing: what an export registers with ElementTree is not there."""
     values = (*TINY, "--set", "gyro.D_I=0.7deg/h/g")
@@ -299,6 +303,7 @@ def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, capl
 
 
 # ------------------------------------------------------------------------------------------- measured
+@pytest.mark.long
 def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> None:
     code, template, _ = gyrobench("reduce", "torquer_scale_factor", "--template")
     assert code == 0 and "current [mA],rate_plus [deg/h]" in template

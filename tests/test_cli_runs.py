@@ -50,6 +50,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 # ------------------------------------------------------------------------------------------ run, report
+@pytest.mark.long
 def test_run_prints_table_verdict_step_check_and_paths(runs: Path) -> None:
     text = (runs / "a.txt").read_text(encoding="utf-8")
     assert text.startswith("Single-axis tumble test")
@@ -90,6 +91,7 @@ def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: 
     assert code == 2 and "name a folder and the --key that signs it" in err
 
 
+@pytest.mark.long
 def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
     code, out, _ = gyrobench("report", runs / "a", "--spec", "floated_gyro", "--strict", figures=False)
     assert code == 0 and "step check (" in out and "verdict: pass" in out
@@ -97,6 +99,7 @@ def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
     assert code == 1 and json.loads(out)["verdict"] == "fail"
 
 
+@pytest.mark.long
 def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Path) -> None:
     code, out, err = gyrobench("run", NAME, *TINY, "--json", pages=True, figures=False)
     assert code == 0
@@ -112,6 +115,7 @@ def test_the_same_run_has_the_same_folder_and_another_one_another(gyrobench: Cal
     assert len(list((tmp_path / "reports" / "out" / NAME).iterdir())) == 2
 
 
+@pytest.mark.long
 def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "here"]
     assert gyrobench(*run)[0] == 0
@@ -124,6 +128,7 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
     assert Record.load(tmp_path / "here").run.seed == 2
 
 
+@pytest.mark.long
 def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Call, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run, pages=True, figures=False)[0] == 0
@@ -139,6 +144,7 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
     assert gyrobench("report", "r", figures=False)[0] == 0 and (tmp_path / "r" / "report.html").is_file()
 
 
+@pytest.mark.long
 def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "a", tmp_path / "a")
     code, out, _ = gyrobench("record", "a", "--to", "csv", "--out", "t")
@@ -156,6 +162,7 @@ def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path)
     assert code == 2 and "nothing: no run there" in err
 
 
+@pytest.mark.long
 def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "a", tmp_path / "a")
     result = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))
@@ -175,6 +182,7 @@ def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Call, run
     assert windows == Record.load(tmp_path / "a").windows["phase"].tolist()
 
 
+@pytest.mark.long
 def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text('[coefficients.D_I]\nunit = "mA"\nmin = -1\n', encoding="utf-8")
     code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
@@ -184,6 +192,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
     assert gyrobench("report", "r", figures=False)[0] == 0
 
 
+@pytest.mark.long
 def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
     short = [TINY[0], "rate=60deg/s", *TINY[2:], "--set", "table.index_rate=2"]
     for name, more in (("n", []), ("r", ["--engine", "reference"])):
@@ -191,6 +200,7 @@ def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
     assert Record.load(tmp_path / "n").same_data(Record.load(tmp_path / "r"))
 
 
+@pytest.mark.long
 def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
     code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--out", "c")
     assert code == 0 and out.startswith("B (b) ") and "Set differently: " in out.splitlines()[-5]
@@ -237,6 +247,7 @@ def test_interrupt_does_not_replace_a_whole_record(
     assert Record.load(tmp_path / "r").complete and not Record.load(tmp_path / "r-incomplete").complete
 
 
+@pytest.mark.long
 def test_interrupted_step_check_still_gives_the_report(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

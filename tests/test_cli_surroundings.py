@@ -46,6 +46,7 @@ def run(folder: Path, shell: str, variables: dict[str, str], command: list[str])
 
 
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.long
 def test_a_command_goes_on_or_names_what_is_wrong(case: str, tmp_path: Path) -> None:
     shell, variables, words, code, says = CASES[case]
     (tmp_path / "m.csv").write_bytes(CORPUS["fixed_position"])
@@ -74,6 +75,7 @@ for words in sys.argv[1:]:
 """
 
 
+@pytest.mark.long
 def test_pipes_and_devices_are_refused_as_files(tmp_path: Path) -> None:
     """Of a process each, in one: a pipe that nobody writes to would wait, a device fill the memory."""
     os.mkfifo(tmp_path / "p")

@@ -17,6 +17,7 @@ INPUTS = {
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("kind", INPUTS)
+@pytest.mark.long
 def test_no_input_ends_in_a_traceback(kind: str, tmp_path: Path) -> None:
     attack = attacks(tmp_path, kind)[kind]
     for seed in range(INPUTS[kind]):

@@ -84,6 +84,7 @@ def test_the_white_noise_of_a_sheet_is_that_of_its_part(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["adis16405", "gg1320", "kvh1750"])  # one of each part
+@pytest.mark.long
 def test_drift_record_returns_the_random_walk(name: str) -> None:
     sheet = find_instrument(name)
     system = load_system("drift_record").with_values({"duration": 120.0, "window": 0.1, "settle": 1.0})
@@ -112,6 +113,7 @@ def test_rate_table_returns_the_nonlinearity_of_a_sheet() -> None:
     assert max(abs(row[2]) for row in rows) == pytest.approx(1000.0 * (280.0 / 300.0) ** 2, rel=0.05)  # ppm
 
 
+@pytest.mark.long
 def test_the_vibrating_table_returns_the_bandwidth_of_a_sheet() -> None:
     """MTi-1: 255 Hz; noise of its density, drift off."""
     sheet = find_instrument("mti1")
@@ -135,6 +137,7 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
+@pytest.mark.long
 def test_from_python() -> None:
     test = gb.load("drift_record", {"duration": "600s"}, instrument="adis16405")
     run = test.run(seed=1)

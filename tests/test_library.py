@@ -61,6 +61,7 @@ def test_every_name_of_the_face_is_there_and_others_are_not() -> None:
 
 
 # ------------------------------------------------------------------------------------------- runs
+@pytest.mark.long
 def test_a_run_in_memory_leaves_no_file_and_is_that_of_the_command(
     folder: Path, run: gb.Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +117,7 @@ def test_without_pandas_the_remedy_is_said(run: gb.Run, monkeypatch: pytest.Monk
             call()
 
 
+@pytest.mark.long
 def test_out_keeps_record_and_result_and_report_adds_the_pages(folder: Path, run: gb.Run) -> None:
     kept = gb.load(NAME, TINY).run(seed=5, out="r")
     files = {"run.json", "record.parquet", "channels.parquet", "result.json", "manifest.json"}
@@ -132,6 +134,7 @@ def test_out_keeps_record_and_result_and_report_adds_the_pages(folder: Path, run
         run.report()
 
 
+@pytest.mark.long
 def test_values_stay_with_their_experiment_and_progress_is_called() -> None:
     calls: list[float] = []
     test = gb.load("servo_vertical_level", dwell=40, windows=8, cycles=1, settle="1 s")
@@ -142,6 +145,7 @@ def test_values_stay_with_their_experiment_and_progress_is_called() -> None:
     assert "dwell" in str(test) and "dwell" in repr(test)
 
 
+@pytest.mark.long
 def test_fmus_stay_loaded_between_runs_and_are_freed(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[Session] = []
     make = Session.__init__
@@ -163,6 +167,7 @@ def test_fmus_stay_loaded_between_runs_and_are_freed(monkeypatch: pytest.MonkeyP
     assert not any(session.folder.exists() for session in opened)
 
 
+@pytest.mark.long
 def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:
     names = ("estimator_none", "estimator_moving_average")
     runs = [gb.load("estimator_bench", parts={"estimator": n}).run(seed=2) for n in names]
@@ -189,6 +194,7 @@ def test_measured_data_are_reduced(folder: Path) -> None:
     assert np.array_equal(kept.result.array(), measured.result.array())
 
 
+@pytest.mark.long
 def test_a_suite_runs_in_folders(folder: Path) -> None:
     plans = {
         f"{NAME}.rate": "30deg/s", f"{NAME}.dwell": 20, f"{NAME}.settle": 0.5, f"{NAME}.windows": 12,
@@ -327,6 +333,7 @@ def shown(displayed: Any) -> str:
     return tags.text
 
 
+@pytest.mark.long
 def test_a_notebook_shows_tables_and_figures(run: gb.Run) -> None:
     text = shown(run)
     assert run.result.title in text and "mass unbalance" in text and "No specification given" in text
@@ -338,6 +345,7 @@ def test_a_notebook_shows_tables_and_figures(run: gb.Run) -> None:
     assert "Differences from baseline A" in shown(both) and "D_IS" in shown(both)
 
 
+@pytest.mark.long
 def test_a_verdict_is_shown_and_text_is_escaped(run: gb.Run) -> None:
     judged = gb.load(NAME, TINY).set("gyro.D_I", "3deg/h/g").run(seed=3, spec="floated_gyro")
     assert judged.result.verdict == "fail" and "Verdict: fail." in shown(judged) and "✗ fail" in shown(judged)

@@ -42,6 +42,7 @@ def test_every_file_of_the_report_is_covered_those_of_tests_within_too(folder: P
     assert found.others == ["notes.txt", "record.csv"] and found.report_id == "0123456789" and not found.signed
 
 
+@pytest.mark.long
 def test_a_bit_changed_anywhere_is_found(folder: Path, key: Path) -> None:
     """1,000 flips over all files: those of the report, its manifest, the signature."""
     manifest.sign(folder, key)

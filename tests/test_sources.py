@@ -91,6 +91,7 @@ def prose(file: Path) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ keys
+@pytest.mark.long
 def test_no_source_is_cited_by_a_file_or_by_hearsay() -> None:
     hearsay = r"\d{3}_[0-9a-f]{16}|\bspec d\d|\bseed eq|\b[Tt]he (?:book|thesis)\b|\b[Ss]pecification d\d"
     for file in files():
@@ -99,6 +100,7 @@ def test_no_source_is_cited_by_a_file_or_by_hearsay() -> None:
             assert not found, f"{file}: '{found[0]}'; cite a key of docs/references.md or an id of docs/methods"
 
 
+@pytest.mark.long
 def test_every_key_is_in_the_bibliography() -> None:
     keys = r"\b[A-Z][a-z]+ (?:19|20)\d\d\b(?!-)|\bGSP ch\. \d|\bIEEE \d+|\bISO(?:/IEC)? \d+|\bTR ?\d{4}\.\d"
     cited_keys: set[str] = set()
@@ -147,6 +149,7 @@ def test_every_id_has_a_heading() -> None:
     assert not missing, f"no heading in docs/methods: {missing}"
 
 
+@pytest.mark.long
 def test_what_stands_in_brackets_resolves() -> None:
     """[ACC; Hu 1981, eq. 3-38]: single words, too, are ids, keys or errata."""
     for file in files("components", "gyrobench", "systems", "tests"):
@@ -206,6 +209,7 @@ def test_tests_of_errata_are_named_there() -> None:
             assert number in errata(), f"{file}: {number}"
 
 
+@pytest.mark.long
 def test_every_erratum_that_is_cited_exists() -> None:
     for file in files("components", "docs", "gyrobench", "systems"):
         if file.suffix in (".py", ".md"):

@@ -50,6 +50,7 @@ def test_a_record_of_0_1_0_is_read_with_a_note(tmp_path: Path) -> None:
     assert Record.load(tmp_path).run.notes == ["one", NO_DIGEST]  # what was not known then is not known now
 
 
+@pytest.mark.long
 def test_a_result_that_was_changed_is_refused(tmp_path: Path, gyrobench: Command) -> None:
     Path("m.csv").write_bytes(CORPUS["fixed_position"])
     gyrobench("reduce", "fixed_position", "--data", "m.csv", "--out", "r")
@@ -91,6 +92,7 @@ def test_rows_and_description_of_a_campaign_that_were_changed_are_refused(tmp_pa
     assert "has no SHA-256 of its own" in Campaign.open(tmp_path / "c").notes[0]
 
 
+@pytest.mark.long
 def test_a_damaged_cache_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An FMU cut off, a library of the engine with other bytes, and the copy of an FMU that a run takes."""
     from gyrobench.engine.engine_library import SOURCE, library_path, make_library, open_library

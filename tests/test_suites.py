@@ -81,6 +81,7 @@ def result(folder: Path) -> dict[str, Any]:
 
 
 # ------------------------------------------------------------------------------------------- what it leaves
+@pytest.mark.long
 def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
     for name in PLANS:
         assert Record.load(done / name).complete
@@ -160,6 +161,7 @@ def test_the_shared_scale_factor_is_named(done: Path) -> None:
     assert [v["u_shared"] > 0.0 for v in drift["values"]] == [True, True, False]
 
 
+@pytest.mark.long
 def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
     """The same numbers from the suite's folder, and from the folders of its tests as if they came from elsewhere."""
     before = result(done)
@@ -173,6 +175,7 @@ def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
     ]
 
 
+@pytest.mark.long
 def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -> None:
     spec = tmp_path / "limits.toml"
     for limit, code, verdict in ((5.0, 0, "pass"), (0.001, 1, "fail")):
@@ -181,6 +184,7 @@ def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -
         assert result(done)["verdict"] == verdict
 
 
+@pytest.mark.long
 def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
     """The fixed position of another gyro: the run says so, and names the parameter."""
     other = words("fixed_position", "servo_vertical_level", sets=("fixed_position.gyro.D_F=0.5deg/h",))
@@ -190,6 +194,7 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------ stopped and failed
+@pytest.mark.long
 def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
@@ -218,6 +223,7 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
     assert gyrobench(*run, "--seed", "2")[2].count("holds another run") == 1
 
 
+@pytest.mark.long
 def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
     """A current limit that saturates: the reduction of this one test refuses, the report is of the others."""
     three = words(*PLANS, sets=("fixed_position.rebalance.i_max=1e-9",))
@@ -270,6 +276,7 @@ def test_show_and_list(gyrobench: Call) -> None:
 
 
 # ------------------------------------------------------------------------------------- measured records
+@pytest.mark.long
 def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
     """The simulated windows as a laboratory would write them down: same numbers, no truth; what it does not state and a
     signature wants is said.

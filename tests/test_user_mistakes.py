@@ -89,6 +89,7 @@ def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) ->
     assert "stabilizer has no 'i_motor' (optional); not connected" in out
 
 
+@pytest.mark.long
 def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_common(gyrobench: Call) -> None:
     """The bench of estimators has one step only, that of its readings."""
     code, out, err = gyrobench(*BENCH, "--check-step", "--out", "a", pages=True)
@@ -120,6 +121,7 @@ def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Call) -> None:
     assert Path("own/systems/vertical_gyro/system.py").is_file()
 
 
+@pytest.mark.long
 def test_a_run_that_breaks_off_says_once_where_its_record_is(gyrobench: Call) -> None:
     values = ["--set", "float_stop=0.01deg", "--set", "time=5s"]
     code, _, err = gyrobench("run", "stabilizer_sdf", *values, "--out", "a")
@@ -144,6 +146,7 @@ def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
         assert code == 2 and message in err and not out and "Traceback" not in err
 
 
+@pytest.mark.long
 def test_python_dash_m(tmp_path: Path) -> None:
     path = str(Path(cli.__file__).parents[2])
     words = [sys.executable, "-m", "gyrobench", "show", "nothing"]

@@ -174,6 +174,7 @@ def test_what_is_refused_before_anything_runs(asked: dict[str, Any], problem: st
 LOOP = {"system": "platform_single_axis", "over": {"platform.J": "2,4 kg.m2"}, "set": {"hold": "10s"}}
 
 
+@pytest.mark.long
 def test_a_design_that_follows_a_varied_part_is_told_and_can_be_held(monkeypatch: pytest.MonkeyPatch) -> None:
     """The gain of the loop is in proportion to the inertia it is designed for: of a sweep of the inertia each point is
     the same loop, unless the design is held; then twice the inertia halves the gain and costs phase margin.

@@ -43,6 +43,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 # ------------------------------------------------------------------------------------------------- numbers
+@pytest.mark.long
 def test_the_answer_says_what_was_put_into_the_runs(page: Path) -> None:
     doc = json.loads((page.parent / "analysis.json").read_text())
     text = " ".join(doc["answer"])
@@ -86,6 +87,7 @@ def test_rows_go_out_with_full_precision_and_units(folder: Path) -> None:
 
 
 # --------------------------------------------------------------------------------------------------- files
+@pytest.mark.long
 def test_reports_are_linked_in_the_campaign_and_published_with_the_site(folder: Path, tmp_path: Path) -> None:
     assert '"../kept/0000000000000000/report.html"' in (folder / "site" / "runs.js").read_text()
     public, small = tmp_path / "public", synthetic.sweep(tmp_path / "small", 4, reports=(0,))
@@ -114,6 +116,7 @@ def test_command_prints_the_answer(command: Callable[..., tuple[int, str, str]],
     assert command("site", small, "--out", "a", "--publish", "b")[0] == 2
 
 
+@pytest.mark.long
 def test_a_site_from_python_is_that_of_the_command(tmp_path: Path) -> None:
     small = synthetic.sweep(tmp_path / "small", 6)
     made = gb.site(small)
@@ -139,6 +142,7 @@ def column(browser: Browser, name: str) -> list[str]:
 
 @needs_chromium
 @pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.long
 def test_page_opens_from_disk_without_complaint(browser: Browser, page: Path, width: int) -> None:
     browser.console.clear()
     browser.open(page, width)
@@ -239,6 +243,7 @@ def test_what_the_whole_lot_warns_of_singles_out_nobody(tmp_path: Path, ids: boo
     assert doc["lot"]["accepted"] == 27
 
 
+@pytest.mark.long
 def test_lot_of_measured_files(tmp_path: Path) -> None:
     """One torn, one inconclusive with its cause, one unlike the rest; the others are judged without them."""
     lot = synthetic.lot(tmp_path / "lot", 40)

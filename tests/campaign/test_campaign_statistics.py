@@ -76,6 +76,7 @@ def test_distance_of_a_good_instrument_is_from_all_others() -> None:
     assert found.distance[7] ** 2 == pytest.approx(off @ np.linalg.inv(np.cov(others.T)) @ off, rel=1e-6)
 
 
+@pytest.mark.long
 def test_few_lots_without_outliers_have_any_named() -> None:
     rng = np.random.default_rng(9)
     named = sum(bool(robust_outliers(rng.normal(size=(30, 5))).outlier.any()) for _ in range(25))  # type: ignore[union-attr]
@@ -96,6 +97,7 @@ def test_small_lots_and_coefficients_that_say_nothing_new() -> None:
     assert robust_outliers(x[:8]) is None
 
 
+@pytest.mark.long
 def test_one_coefficient_far_off_is_not_diluted_by_the_others() -> None:
     """Off by 7 deviations in one of four: the distance in all four, 7.2 for one in 20, alone would let it pass."""
     named = []

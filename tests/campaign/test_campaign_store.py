@@ -47,6 +47,7 @@ def test_half_files_of_killed_writers_are_removed(tmp_path: Path) -> None:
     assert not half.exists() and runs(tmp_path / "c")
 
 
+@pytest.mark.long
 def test_order_and_files_of_the_rows_change_no_bit(tmp_path: Path) -> None:
     seen = set()
     for k, order in enumerate(itertools.permutations(ROWS)):

@@ -6,11 +6,13 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from measured_lot import instrument, write_lot, wrong
 
 COUNT = 12
 
 
+@pytest.mark.long
 def test_lot_with_mistakes_ends_in_a_site_that_names_them(
     command: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:

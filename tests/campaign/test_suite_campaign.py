@@ -34,6 +34,7 @@ def client() -> Iterator[Any]:
         yield one
 
 
+@pytest.mark.long
 def test_a_row_has_what_the_suite_says_and_what_each_test_says(client: Any, tmp_path: Path) -> None:
     """A test that fails leaves the row with its reason, and with what the other one found."""
     frame = gb.campaign(ASKED, client=client, out=tmp_path / "c")
@@ -57,6 +58,7 @@ def test_a_row_has_what_the_suite_says_and_what_each_test_says(client: Any, tmp_
     assert {"D_F", "tumble_single_axis.D_F"} <= names
 
 
+@pytest.mark.long
 def test_names_are_those_of_the_tests_that_are_chosen() -> None:
     """Values of tests that are not in the suite's own choice; a name that no test has."""
     asked = {"system": "drift_test_suite", "set": {"tests": "tumble_two_channel eight_position"}}

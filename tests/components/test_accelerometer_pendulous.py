@@ -200,6 +200,7 @@ def test_white_acceleration_noise(h):
     assert means.var() == pytest.approx(size**2 / 0.4, rel=5 * math.sqrt(2 / len(means)))
 
 
+@pytest.mark.long
 def test_random_bias():
     first, constant = [], []
     for seed in range(1000):

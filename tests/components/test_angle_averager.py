@@ -66,6 +66,7 @@ def test_across_zero():
     assert played(averager(n=2), np.radians([359.999, 0.001]))[-1, 0] == pytest.approx(0.0, abs=3e-15)
 
 
+@pytest.mark.long
 def test_ten_readings_of_10_arcsec2_have_1_arcsec2():
     one = make("angle_averager", "native")
     one.set({"Ts": T, "sigma": math.sqrt(10.0) * ARCSEC})

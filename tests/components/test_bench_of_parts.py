@@ -85,6 +85,7 @@ def expected(row, face):
     return np.trapezoid(values, dx=1.0) / 800
 
 
+@pytest.mark.long
 def test_shortened_tumble():
     h = 5e-3
     rows, bench, faces = tumble(h)
@@ -157,6 +158,7 @@ def test_no_window_is_lost_whatever_the_order(order, quantum):
         )
 
 
+@pytest.mark.long
 def test_plain_and_native_parts_give_the_same_windows():
     """All that is noise or order included, bit for bit: the other tests here may take the native ones."""
     noise = {"white": 1e-8, "markov": 1e-9, "pickoff": 1e-8, "seed": 3}

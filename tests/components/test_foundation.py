@@ -64,6 +64,7 @@ def test_a_passive_mount_helps_from_5_hz_on() -> None:
 
 
 @pytest.mark.parametrize(("f", "seconds"), [(0.02, 900.0), (0.04, 600.0), (0.2, 300.0), (2.0, 200.0)])
+@pytest.mark.long
 def test_transmissibility_of_the_active_one(f: float, seconds: float) -> None:
     """The closed form, which shares no code with the part: the servo's polynomial against its states."""
     found = driven("active", "a", "a_block[1]", f, seconds, 5e-3)
@@ -93,6 +94,7 @@ def started(part: Any, **values: Any) -> Any:
     return made
 
 
+@pytest.mark.long
 def test_an_active_block_follows_a_lean() -> None:
     """Its accelerometers take g q for an acceleration: the part against scipy's solution of the same states."""
     p, q, f, h, seconds = SERVO, 5.0 * ARCSEC, 0.01, 0.02, 60.0
@@ -118,6 +120,7 @@ def test_an_active_block_follows_a_lean() -> None:
     assert abs(isolation.follows(f, p, G0)) * q == pytest.approx(np.abs(other[1:]).max(), rel=0.01)
 
 
+@pytest.mark.long
 def test_a_person_tilts_the_block() -> None:
     """70 kg at 2 m of 5.7e5 kg.m2 at 3.5 Hz: 1373 N.m over J w2 = 2.757e8 N.m/rad is 1.03 arcsec; a floor on the walls
     that lets 2 % through 0.02 arcsec.  Weight on the east side turns the block about north, +: up leans to east."""

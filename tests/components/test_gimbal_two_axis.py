@@ -164,6 +164,7 @@ def base_motion(t: float) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("form", [0, 1])
+@pytest.mark.long
 def test_a_ride_is_that_of_an_integrated_lagrangian(form: int) -> None:
     """2 s with base motion, unbalance, both modes, cable, cogging, viscous friction; line of sight by quaternion.
 
@@ -273,6 +274,7 @@ def test_the_mode_of_the_linear_model_is_where_it_was_asked_for() -> None:
 
 
 # ------------------------------------------------------------------------------------------- torques
+@pytest.mark.long
 def test_stiction_holds_and_lets_go() -> None:
     """A torque that rises to 98 % of it stays within presliding; above it the joint turns by M - friction."""
     part = Gimbal(friction=[0.04, 0.0], stiction=[0.05, 0.0], **BARE)

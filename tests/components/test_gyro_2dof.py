@@ -349,6 +349,7 @@ def test_gauss_markov_per_channel():
     assert abs(np.corrcoef(x)[0, 1]) < 5 / math.sqrt(independent)
 
 
+@pytest.mark.long
 def test_random_drift_at_the_start():
     first, constant = [], []
     for seed in range(1500):

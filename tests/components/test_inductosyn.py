@@ -121,6 +121,7 @@ def wrong(monkeypatch, a, error_deg, half_step=True):
     return np.count_nonzero(block.carried(a % 10000, coarse, 2000.0, 10000.0, 720.0) != a)
 
 
+@pytest.mark.long
 def test_no_slip_at_any_angle_within_the_coarse_limit(monkeypatch, all_angles):
     for error in (-0.199, 0.199):
         assert wrong(monkeypatch, all_angles, error) == 0

@@ -87,6 +87,7 @@ def test_exact_without_noise(part: str) -> None:
     ("part", "gain"),
     [("two_position", 1.0 / math.sin(1.2)), ("four_position", 2**0.5), ("continuous", 2**0.5), ("strapdown", 1.0)],
 )
+@pytest.mark.long
 def test_sigma(part: str, gain: float) -> None:
     """sigma = g N / (A sqrt(T)), and the scatter of 60 runs is that within three of its standard deviations (28 %)."""
     N, latitude, heading = 0.01 * DPH, 0.7, 1.2

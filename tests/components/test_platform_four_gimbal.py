@@ -118,6 +118,7 @@ def test_crossing_pitch_90(gain, moved, error, swing):
     assert swing is None or inner(out) == pytest.approx(swing, rel=0.02)
 
 
+@pytest.mark.long
 def test_vertical_launch_active_or_locked():
     """3 deg of yaw wobble at the vertical: the active servo runs 90 deg for nothing, locked it stands, g2 follows."""
     active = fly(PART, wobble, 10.0, gain=SEC, allow_vertical=1, **VERTICAL)
@@ -127,6 +128,7 @@ def test_vertical_launch_active_or_locked():
     assert inner(locked) == pytest.approx(3.0 * 2 / (2 * math.pi * 0.3), rel=1e-3)  # the wobble's swing, 3.18 deg
 
 
+@pytest.mark.long
 def test_launch_sequence():
     """Locked until the pitch has left the vertical, then roll 90, yaw 50: < 0.001 deg; three gimbals lose > 2 deg."""
     out = fly(PART, over, 10.0, gain=SEC, launch=1, **VERTICAL)

@@ -68,6 +68,7 @@ def test_momentum_about_an_axis():
     assert 0.5 * part.get("omega[1]") + 10.0 * b1 == pytest.approx(0.4 * 0.2, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_free_gyro_drifts_with_its_drift_rate():
     """Held by its loop the platform turns with d; here free and undamped, the nutation about it averages out."""
     part = Part(white=0.0, C_x=0.0, C_y=0.5, drift=[1e-3, 0.0])

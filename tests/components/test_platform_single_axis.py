@@ -158,6 +158,7 @@ def test_sticks_up_to_break_away_without_creep(load, sticks):
         np.testing.assert_allclose(rate, math.copysign(gone / 2.0, load), rtol=1e-6)
 
 
+@pytest.mark.long
 def test_stick_slip_as_counted_by_events():
     """A spring k pulled at u: sticks until k x = F_s, then J y'' = k (u t - y) - F_c until y' = 0 (events)."""
     k, u, fs, fc, inertia = 20.0, 0.02, 0.6, 0.4, 2.0

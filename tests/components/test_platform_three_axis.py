@@ -88,6 +88,7 @@ def test_neutral_inertias():
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3])
+@pytest.mark.long
 def test_energy_of_the_undriven_gimbals_is_kept(h):
     """10 s, no friction, base at rest: to 1e-8, and the momentum about the roll axis, which nothing can change, too."""
     part = make("platform_three_axis", "native")
@@ -175,6 +176,7 @@ def test_attitude_is_the_integral_of_the_rate():
 
 
 # ------------------------------------------------------------------------------------ motors, bearings
+@pytest.mark.long
 def test_back_emf_by_base_motion():
     """Base at 0.1 rad/s about x, pitch motor shorted, L = 0: w = w_b (1 - exp(-t k_t k_e / (R I))), I = 1.0."""
     part = Platform(viscous=[0.0] * 3, L=[0.0] * 3, theta_dot_0=[-0.1, 0.0, 0.0])

@@ -120,6 +120,7 @@ def roll_then_yaw(t):
     return base_rate(roll=36.0 * (t < 2.4999), yaw=10.0 * (2.4999 < t < 7.4999))
 
 
+@pytest.mark.long
 def test_rolled_into_lock_it_is_dragged_along_by_the_whole_yaw():
     """[PLATFORM-3GIMBAL-2DOF] roll to exactly 90 deg, then 50 deg of yaw: the platform's error is the 50 deg."""
     out = fly("platform_three_gimbal_2dof", roll_then_yaw, 8.0, mount=1, allow_lock=1)
@@ -131,6 +132,7 @@ def test_rolled_into_lock_it_is_dragged_along_by_the_whole_yaw():
     assert np.max(other["error"]) < 1e-6 * DEG and not other["lock"].any()
 
 
+@pytest.mark.long
 def test_lock_is_told_with_time_and_angle_and_then_refused():
     """Roll at 36 deg/s: within 5 deg of 90 after 85 / 36 s; |cos| < 1e-3 at 89.943 deg after 2.4984 s."""
     part = Three(mount=1)

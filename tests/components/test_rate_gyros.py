@@ -78,6 +78,7 @@ def test_a_step_halved_is_the_same_mean(name):
         ("gyro_hemispherical", {"white": 1e-3}),
     ],
 )
+@pytest.mark.long
 def test_white_noise_has_the_density_that_is_shown(name, given):
     """Means of 0.5 s of 400 records: variance N2/T, chi2 of 800 degrees of freedom, 5 % standard deviation."""
     part = Native(name, **given)
@@ -117,6 +118,7 @@ def test_counts_lose_no_angle(name, size):
     assert np.abs(found.sum(axis=0) * 1e-3 - [1.2345e-3, -3.21e-4]).max() <= 0.5 * one * (1 + 1e-9)
 
 
+@pytest.mark.long
 def test_flicker_walk_and_turn_on_are_in_the_rate():
     one = rates("gyro_mems", [0, 0, 0], 200, white=0.0, flicker_x=1e-4)
     assert np.ptp(one[:, 0]) > 0.0 and not one[:, 1].any()
@@ -274,6 +276,7 @@ def test_lock_in_rate_by_integration(ratio):
     assert laser(-w, lock_in=band, dither=0.0) == -expected
 
 
+@pytest.mark.long
 def test_random_walk_of_dithered_lock_in_by_integration():
     """1000 rings, 10 cycles, amplitude of each cycle by chance: variance of the angle N2 t, 4.5 % its deviation.
 
@@ -295,6 +298,7 @@ def test_random_walk_of_dithered_lock_in_by_integration():
     assert part.density**2 * cycles == pytest.approx(variance, rel=0.2)
 
 
+@pytest.mark.long
 def test_beyond_the_dither_by_integration():
     """w above the dither amplitude: no crossing, the scale factor error of lock-in that is left."""
     k, band, dither, w = 2.0 * math.pi * 100.0, 0.05, 1.0, 1.5

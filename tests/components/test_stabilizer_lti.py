@@ -142,6 +142,7 @@ def test_poles_over_six_decades_keep_seven_digits() -> None:
 
 
 @pytest.mark.parametrize("Ts", [0.0, H])
+@pytest.mark.long
 def test_a_conditioned_controller_does_not_wind_up(Ts: float) -> None:
     """G = 10 (1 + 10/s), limit 1 V, 2 s of r = 1.
 

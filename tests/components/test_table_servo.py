@@ -32,6 +32,7 @@ def test_square_law_without_its_root_shaper():
 
 
 @pytest.mark.parametrize("h, error", [(1e-4, 4e-4), (1e-3, 4e-2)])
+@pytest.mark.long
 def test_torque_limit_against_a_tight_reference(h, error):
     """The README's number: a voltage of 2e-3 sin(20 t) V drives the demand far beyond the limit and back."""
     part = Loop(h=h).table

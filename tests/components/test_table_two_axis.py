@@ -110,6 +110,7 @@ def test_errors_against_scipy():
 
 # ----------------------------------------------------------------------------------- rates are derivatives
 @pytest.mark.parametrize("errors", [{}, ERRORS])
+@pytest.mark.long
 def test_omega_and_alpha_are_derivatives(errors):
     """C' C^T = -[omega x] with a base at rest, and d(omega)/dt = alpha with one that turns."""
     h = 1e-3
@@ -144,6 +145,7 @@ def test_omega_and_alpha_are_derivatives(errors):
 
 
 # --------------------------------------------------------------------------------------------- motion
+@pytest.mark.long
 def test_each_axis_moves_as_table_rate_and_is_read_as_it():
     wrong = [
         {"encoder_amplitude": [3e-3, -2e-3], "encoder_phase": [0.4, 1.1]},

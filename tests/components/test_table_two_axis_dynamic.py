@@ -31,6 +31,7 @@ def run(part, until, names, h=1e-3, **values):
     return np.array(rows)
 
 
+@pytest.mark.long
 def test_the_axes_load_each_other(table):
     """Both turn evenly, D = 4.0 - 0.2 kg.m2: the motors hold against M_x = D x' y' sin 2y = 0.0319 N.m sin 2y and
     M_y = -(D/2) x'2 sin 2y = -0.0122 N.m sin 2y.

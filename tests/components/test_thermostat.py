@@ -78,6 +78,7 @@ def test_a_room_that_warms(stages: int, left: float) -> None:
     assert y[-1, 0] == pytest.approx(left, abs=2e-6) and y[-1, 1] == pytest.approx(ROOM + 8.0)
 
 
+@pytest.mark.long
 def test_cold_start_against_an_ode() -> None:
     """From the room's temperature, heaters at their limits at first, integrals held; scipy with the same clip."""
 
@@ -136,6 +137,7 @@ def test_refusals(values: dict[str, object], text: str) -> None:
         Thermostat(**values).initialize()
 
 
+@pytest.mark.long
 def test_a_gyro_in_a_thermostat_drifts_less() -> None:
     """Fixed position, D_T = 0.05 deg/h/K, a room that swings by 3 K in 20 min: the record's temperature shrinks by the
     stages, and with it what the room does to the drift."""

@@ -105,6 +105,7 @@ def cross(path, hertz):
         ((40, 10, 30), 3.0, (0.164, 0.0112)),
     ],
 )
+@pytest.mark.long
 def test_cross_axes_of_a_commanded_sine(theta, hertz, spec):
     """[DECOUPLE-BENCH-83MIL] x command of a third of 83 mil; cross over main with and without T2, ratio <= 0.1."""
     amplitude = 83 * MIL / 3 * 2 * math.pi * hertz
@@ -118,6 +119,7 @@ def test_cross_axes_of_a_commanded_sine(theta, hertz, spec):
     assert with_t2 == pytest.approx(spec[1], rel=0.02)
 
 
+@pytest.mark.long
 def test_base_motion_is_isolated():
     """F17: 83-mil sines at 0.5, 0.7, 0.9 Hz about x, y, z: >= 40 dB with T2."""
     w = 2 * math.pi * np.array([0.5, 0.7, 0.9])

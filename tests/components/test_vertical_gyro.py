@@ -88,6 +88,7 @@ def test_linear_law_decays_with_k():
     assert tilt(pair) == pytest.approx(math.hypot(1e-3, 2e-3) * math.exp(-2.0), rel=1e-3)
 
 
+@pytest.mark.long
 def test_hang_off_of_the_linear_law_under_earth_rate():
     """Earth rate at 40 deg, k = 0.05 1/s: 3.84 arcmin."""
     pair = bench(None, {"law": 1.0}, {"earth_rate": 7.2921159e-5})

@@ -152,6 +152,7 @@ def test_white_noise_of_force_and_pick_off(closed: float, given: dict[str, float
 
 
 # ------------------------------------------------------------------------------------------------ both modes
+@pytest.mark.long
 def test_against_an_integration_of_both_modes() -> None:
     """x'' and y'' with matrices of damping and stiffness by scipy, a step of the rate, open loop; carrier 500 Hz.
 

@@ -63,6 +63,7 @@ def test_bryan_factor_of_ring_and_hemisphere() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ slow equations
+@pytest.mark.long
 def test_against_both_modes_with_their_loops() -> None:
     """x'' + D x' + K x = 4 k W S x' + forces, 20 Hz, by scipy; pattern angle and quadrature after 4 s.
 

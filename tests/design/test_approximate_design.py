@@ -54,6 +54,7 @@ def test_quadratic_regression_on_an_interval() -> None:
 
 
 @pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.long
 def test_no_shares_are_better_than_the_bound(criterion: str) -> None:
     rng = np.random.default_rng(7)
     X, wanted = rng.normal(size=(12, 4)), rng.normal(size=(3, 4))

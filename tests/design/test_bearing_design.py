@@ -53,6 +53,7 @@ def test_the_part_takes_the_values(designed: BearingDesign) -> None:
     assert pytest.approx(torque, rel=1e-6) == part.M
 
 
+@pytest.mark.long
 def test_page(designed: BearingDesign, tmp_path: Path) -> None:
     written = write_bearing(designed, tmp_path)
     assert {p.name for p in written.values()} == {"bearing.json", "bearing.html", "bearing.pdf", "bearing.toml"}

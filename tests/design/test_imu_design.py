@@ -32,6 +32,7 @@ def candidates(record: Record) -> Any:
     return design._Candidates(system, budget.ImuSetup.of(record.run), noise)
 
 
+@pytest.mark.long
 def test_windows_are_those_of_a_run(record: Record) -> None:
     """Times to a second over eleven moves; rates and forces at rest to rounding, turning to what a turn begins with."""
     omega, force, t0, t1, rest = candidates(record)._windows({})
@@ -57,6 +58,7 @@ def test_uncertainty_is_the_closed_form(record: Record, count: int) -> None:
         assert merit == pytest.approx(1.0, rel=1e-4)  # dwells of whole milliseconds
 
 
+@pytest.mark.long
 def test_proposals_turn_no_longer_than_is_wanted(record: Record) -> None:
     """Only scale factors of gyros: the plan turns most of the time; only of accelerometers: as little as can be."""
     test = candidates(record)

@@ -41,6 +41,7 @@ def made(session: Any) -> Any:
     return record, fits, design.TestModel.of(system, record)
 
 
+@pytest.mark.long
 def test_the_expected_path_has_the_rows_of_the_reduction(made: Any) -> None:
     """Regressors along the path of this gyro's drift, mount by mount, against those from the angles that were read."""
     _, fits, model = made
@@ -68,6 +69,7 @@ def test_noise_of_the_readings_is_that_of_the_pickoffs(session: Any) -> None:
         assert scatter / math.sqrt(np.mean(np.diag(V))) == pytest.approx(1.0, abs=0.25)
 
 
+@pytest.mark.long
 def test_mounts_that_are_proposed_can_be_run_and_take_the_time_that_was_promised(
     session: Any, made: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

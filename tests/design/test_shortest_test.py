@@ -40,6 +40,7 @@ PLANS = {
 
 
 @pytest.mark.parametrize("name", PLANS)
+@pytest.mark.long
 def test_rows_and_times_are_those_of_reduction_and_run(name: str) -> None:
     """What the search works with must be the design matrix that the reduction makes of a record."""
     system = load_system(name).with_values(PLANS[name])
@@ -80,6 +81,7 @@ def test_six_positions_a_mount_are_best_for_the_accelerometer() -> None:
     assert evaluate(M, np.eye(8), np.full(48, 1 / 48), "D")[0] / phi == pytest.approx(1.1086, abs=1e-3)
 
 
+@pytest.mark.long
 def test_windows_of_a_tumble_are_those_of_its_reduction() -> None:
     """Choices of the single-axis tumble are compared without a run, by windows that must be those of one."""
     system = load_system("tumble_single_axis").with_values({"rate": "60 ERU", "dwell": "100s", "windows": 12})
@@ -99,6 +101,7 @@ def test_windows_of_a_tumble_are_those_of_its_reduction() -> None:
     assert t1 - t0 == pytest.approx(fit.t_end - fit.t_start, rel=2e-2)
 
 
+@pytest.mark.long
 def test_the_shortest_method_of_north_finding() -> None:
     """Two methods, each as long as its own reduction needs; the system's own is among them and is not shorter."""
     system = load_system("north_finder").with_values({"level": "false", "windows": 24})
@@ -123,6 +126,7 @@ def designed() -> Iterator[DesignedTest]:
         yield design_test(load_system("accelerometer_multipoint"), {"k2": "0.5ug/g2"}, count=16)
 
 
+@pytest.mark.long
 def test_what_was_wanted_is_reached_and_counted(designed: DesignedTest) -> None:
     k2 = designed.values["k2"]
     assert k2.wanted == 0.5 and k2.u <= 0.5 * 1.02 and k2.error <= 0.5 * 1.02
@@ -143,6 +147,7 @@ def test_the_printed_command_is_the_plan(designed: DesignedTest) -> None:
     assert str(designed).endswith(designed.command)
 
 
+@pytest.mark.long
 def test_the_prediction_is_what_drawn_data_give() -> None:
     """The same fit of 120 made records by hand: mean of the stated u and standard deviation of the estimates."""
     from gyrobench.reduction.estimation.findings import Group
@@ -302,6 +307,7 @@ def test_visits_as_text() -> None:
             parse_visits("visits", text, ("", "rad"), 10.0)
 
 
+@pytest.mark.long
 def test_noise_of_a_run_takes_the_place_of_that_of_the_parts(tmp_path: Path) -> None:
     """A run with three times the white noise: its estimate, of 40 degrees of freedom, is within three of its standard
     errors, and what is predicted of the same plan goes with it.

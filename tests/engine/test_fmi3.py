@@ -53,6 +53,7 @@ def pair(foreign: Foreign, system: type[System] = Pair, engine: str = "native", 
     return run(system(), parts={n: foreign("types3") for n in "ab"}, engine=engine, **more)
 
 
+@pytest.mark.long
 def test_foreign_fmus_are_valid(foreign: Foreign) -> None:
     assert validate_fmu(str(foreign("types3"))) == []
     assert validate_fmu(str(foreign("vendor_gyro3"))) == []
@@ -108,6 +109,7 @@ def test_what_ends_a_run(
     assert words in str(caught.value)
 
 
+@pytest.mark.long
 def test_own_builds_give_the_record_of_fmi_2(small: System, tmp_path: Path) -> None:
     """All parts, whose vectors are arrays then, and some of them beside parts of FMI 2."""
     every: dict[str, Path | str] = {slot: build(s.part, fmi=3, out=tmp_path) for slot, s in small.slots.items()}
@@ -120,6 +122,7 @@ def test_own_builds_give_the_record_of_fmi_2(small: System, tmp_path: Path) -> N
             assert three.run.order == two.run.order
 
 
+@pytest.mark.long
 def test_arrays_of_own_builds_that_are_wired_and_set_in_part(tmp_path: Path) -> None:
     """A platform on three axes: wires from and to single elements; of a matrix one element set."""
     system = load_system("platform_three_axis")
@@ -131,6 +134,7 @@ def test_arrays_of_own_builds_that_are_wired_and_set_in_part(tmp_path: Path) -> 
         assert run(system, values=values, seed=5, parts=every, engine=engine).same_data(two)
 
 
+@pytest.mark.long
 def test_a_vendors_gyro_with_arrays(small: System, foreign: Foreign) -> None:
     """The FMI 3.0 gyro is the FMI 2.0 one but for its floats, which hold 24 bits of the load and the current."""
     maps = {"gyro": FOREIGN / "vendor_gyro3.toml"}
@@ -146,6 +150,7 @@ def test_a_vendors_gyro_with_arrays(small: System, foreign: Foreign) -> None:
     assert not early.same_data(new)
 
 
+@pytest.mark.long
 def test_arrays_in_an_archive(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """Elements of arrays are connectors of their names; the archive reads back with the same connections."""
     parts, maps = {"gyro": foreign("vendor_gyro3")}, {"gyro": FOREIGN / "vendor_gyro3.toml"}
@@ -162,6 +167,7 @@ def test_arrays_in_an_archive(small: System, foreign: Foreign, tmp_path: Path) -
     assert links[0] == pytest.approx(links[1], rel=1e-15)
 
 
+@pytest.mark.long
 def test_an_archive_of_own_builds_gives_the_values_of_fmi_2(small: System, tmp_path: Path) -> None:
     """Start values of inputs, parameters and wires, element by element: the same channels."""
     found = []

@@ -90,6 +90,7 @@ def killed(words: list[str], folder: Path, moment: str, patch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.long
 def test_killed_and_resumed(
     command: Command, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, moment: str
 ) -> None:

@@ -138,6 +138,7 @@ def test_a_flag_without_a_number_that_is_not_finite_changes_nothing(
     assert by_calls == standard == 0
 
 
+@pytest.mark.long
 def test_a_run_is_continued_in_the_other_form(small: System, tmp_path: Path) -> None:
     whole = run(small, values=QUICK, engine="native", seed=2)
     for first, second in (("linked", "native"), ("native", "linked")):
@@ -147,6 +148,7 @@ def test_a_run_is_continued_in_the_other_form(small: System, tmp_path: Path) -> 
         assert run(small, values=QUICK, engine=second, seed=2, out=out, resume=True).same_data(whole)
 
 
+@pytest.mark.long
 def test_it_is_used_where_it_is_there_or_worth_it(
     small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -192,6 +194,7 @@ def test_without_a_compiler_a_long_run_is_not_linked(
         run(small, values=QUICK, engine="linked")
 
 
+@pytest.mark.long
 def test_foreign_and_python_parts_are_not_linked(small: System, foreign: Callable[[str], Path]) -> None:
     with Session(small, target="python") as session:
         assert not session.linkable

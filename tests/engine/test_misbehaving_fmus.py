@@ -55,6 +55,7 @@ STEP = [
 
 
 @pytest.mark.parametrize(("fault", "words"), STEP)
+@pytest.mark.long
 def test_a_fault_in_a_step(
     small: System, foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
 ) -> None:
@@ -85,6 +86,7 @@ def test_a_fault_in_a_step(
         ("NONE", ("-DNO_INSTANCE",), "gyro: instantiate failed"),
     ],
 )
+@pytest.mark.long
 def test_a_fault_before_the_first_step(
     small: System, foreign: Foreign, tmp_path: Path, fault: str, flags: tuple[str, ...], words: str
 ) -> None:
@@ -102,6 +104,7 @@ def test_a_fault_before_the_first_step(
     assert not record.complete and words in record.run.problem and record.run.steps == 0
 
 
+@pytest.mark.long
 def test_a_library_outside_of_the_archive(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """The identifier leads to a library that would end the process: it is not loaded."""
     outside = foreign("faulty", "-DON_LOADING").with_suffix("")
@@ -123,6 +126,7 @@ def test_a_library_outside_of_the_archive(small: System, foreign: Foreign, tmp_p
         ("HANG_IN_TERMINATE", "gyro: terminate after the end of the run: no answer within 0.5 s"),
     ],
 )
+@pytest.mark.long
 def test_what_does_not_touch_the_run(
     small: System, foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, words: str
 ) -> None:
@@ -138,6 +142,7 @@ def test_what_does_not_touch_the_run(
     assert Path.cwd() == tmp_path
 
 
+@pytest.mark.long
 def test_memory_of_the_caller_is_not_the_runs(small: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A notebook that holds more data than a run may take: its fork shares them and is not stopped for them."""
     held = np.ones(25_000_000)  # 200 MB
@@ -170,6 +175,7 @@ def test_nothing_is_left_of_a_process_that_an_fmu_started(small: System, foreign
 
 @pytest.mark.parametrize("fork", [True, False])
 @pytest.mark.parametrize("engine", ["native", "reference"])
+@pytest.mark.long
 def test_the_record_of_a_child_is_bit_equal(
     small: System, monkeypatch: pytest.MonkeyPatch, engine: str, fork: bool
 ) -> None:

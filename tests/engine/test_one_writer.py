@@ -111,6 +111,7 @@ def test_a_file_of_the_cache_is_made_once(tmp_path: Path) -> None:
     assert found == ["library.so", "library.so.sha256"]  # and no lock
 
 
+@pytest.mark.long
 def test_two_runs_into_one_folder(command: Command, tmp_path: Path) -> None:
     long = ("fixed_position", "--engine", "reference", "--out", str(tmp_path / "r"))
     process = started(*long, cwd=tmp_path)
@@ -127,6 +128,7 @@ def test_two_runs_into_one_folder(command: Command, tmp_path: Path) -> None:
         assert not Record.load(tmp_path / "r").complete and (tmp_path / "r" / FILE).is_file()
 
 
+@pytest.mark.long
 def test_a_hangup_keeps_the_record(tmp_path: Path) -> None:
     process = started("fixed_position", "--engine", "reference", "--out", "r", cwd=tmp_path)
     wait_for((tmp_path / STEPPING).is_file, process)
@@ -136,6 +138,7 @@ def test_a_hangup_keeps_the_record(tmp_path: Path) -> None:
     assert (tmp_path / "r" / FILE).is_file() and not (tmp_path / "r" / LOCK).exists()
 
 
+@pytest.mark.long
 def test_resume_finishes_a_missing_report(command: Command, tmp_path: Path) -> None:
     """Killed between record and report: --resume makes the report, and nothing runs again."""
     out = tmp_path / "r"

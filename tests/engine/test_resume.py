@@ -38,6 +38,7 @@ def stop(system: System, out: Path, at: float, **more: Any) -> RunInterrupted:
 
 
 @pytest.mark.parametrize("engine", ["native", "reference"])
+@pytest.mark.long
 def test_stopped_at_many_times_the_record_is_that_of_a_whole_run(small: System, tmp_path: Path, engine: str) -> None:
     """Stops before the first step, in settling, in a window, at the end of one, in the turn, just before the end."""
     whole = run(small, values=QUICK, seed=5, engine=engine)
@@ -69,6 +70,7 @@ def test_one_engine_continues_what_the_other_began(small: System, tmp_path: Path
     assert run(small, values=QUICK, seed=5, engine="native", out=tmp_path / "r", resume=True).same_data(whole)
 
 
+@pytest.mark.long
 def test_python_parts_save_their_state_too(small: System, tmp_path: Path) -> None:
     setup: dict[str, Any] = {"target": "python", "engine": "reference"}
     whole = run(small, values=QUICK, seed=5, engine="native")
@@ -132,6 +134,7 @@ def test_another_part_or_wiring_is_refused(small: System, tmp_path: Path) -> Non
         run(other, values=QUICK, seed=5, out=tmp_path, resume=True)
 
 
+@pytest.mark.long
 def test_nothing_or_a_damaged_file_is_refused(small: System, tmp_path: Path) -> None:
     again: dict[str, Any] = {"values": QUICK, "seed": 5, "out": tmp_path / "r", "resume": True}
     with pytest.raises(ResumeError, match=r"no interrupted run to continue in .*/r \(there is no checkpoint.npz\)"):
@@ -157,6 +160,7 @@ def test_a_part_that_cannot_save_its_state(small: System, foreign: Foreign, tmp_
         run(small, seed=5, out=tmp_path, resume=True, **setup)
 
 
+@pytest.mark.long
 def test_a_child_resumes(small: System, tmp_path: Path) -> None:
     """Stopped and resumed in one process or another: the checkpoint is the same, and its times come back."""
     whole = run(small, values=QUICK, seed=5)
@@ -233,6 +237,7 @@ def command(words: list[str], capture: Any, patch: pytest.MonkeyPatch) -> tuple[
     return code, out, err
 
 
+@pytest.mark.long
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
 
@@ -269,6 +274,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert Record.load(tmp_path / "r").run.resumed_at
 
 
+@pytest.mark.long
 def test_a_killed_process_is_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -144,6 +144,7 @@ def test_seeds(small: System) -> None:
     assert fixed.run.parameters["gyro.seed"] == 77
 
 
+@pytest.mark.long
 def test_values_are_refused_with_a_hint(small: System) -> None:
     for values, words in (
         ({"lattitude": 1}, "lattitude: no such option of smalltumble; options: latitude"),
@@ -236,6 +237,7 @@ def test_many_rows_do_not_overflow_the_blocks(foreign: Foreign) -> None:
     np.testing.assert_array_equal(found.channels["time"], np.arange(50001) * 0.01)
 
 
+@pytest.mark.long
 def test_python_and_native_parts_give_the_same_record(small: System) -> None:
     native = run(small, values=QUICK, seed=3)
     python = run(small, values=QUICK, seed=3, target="python", engine="reference")

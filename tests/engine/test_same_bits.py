@@ -32,11 +32,13 @@ def test_the_record_has_the_bits_of_the_table(name: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("name", IN_PYTHON)
+@pytest.mark.long
 def test_the_python_target_gives_them(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert digest(recorded(first_steps(name, monkeypatch), "reference", "python")) == expected()[name]
 
 
 @pytest.mark.parametrize("name", IN_NODE)
+@pytest.mark.long
 def test_webassembly_gives_them(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     node = shutil.which("node")
     if node is None or importlib.util.find_spec("ziglang") is None:
@@ -47,6 +49,7 @@ def test_webassembly_gives_them(name: str, tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("platform", [this_platform(), "win64"])
 @pytest.mark.parametrize("name", ["gyrocompass", "tumble_two_axis"])
+@pytest.mark.long
 def test_the_one_fmu_gives_them(name: str, platform: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a host in C: here, and the library of Windows under wine."""
     command = host(platform, tmp_path)

@@ -105,6 +105,7 @@ def test_a_model_description_that_would_fill_the_memory_is_not_read(
         check_fmu_files({"gyro": fmu})
 
 
+@pytest.mark.long
 def test_a_mat_file_that_ends_its_reader_is_refused(tmp_path: Path) -> None:
     """The class of an array changed: scipy's reader takes what is not there (signal 11) in its own process."""
     savemat(tmp_path / "a.mat", {"time": np.arange(4.0), "s": {"a": np.arange(4.0)}})

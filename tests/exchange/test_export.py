@@ -57,6 +57,7 @@ def archive(small: System, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_ssp_is_valid_and_reproducible(small: System, archive: Path, tmp_path: Path) -> None:
     from fmpy.ssp.ssd import read_ssd, read_ssv
 
@@ -88,6 +89,7 @@ def test_ssp_is_valid_and_reproducible(small: System, archive: Path, tmp_path: P
     assert {v.unit for v in fmu.modelVariables if v.name in ("x", "mean")} == {None}
 
 
+@pytest.mark.long
 def test_ssp_reads_back(small: System, archive: Path, foreign: Foreign, tmp_path: Path) -> None:
     # the archive names no windows and no done output, so it runs to its stop time; the channels are comparable
     system = read_ssp(archive, step=1e-3)
@@ -114,6 +116,7 @@ def test_ssp_that_is_none(tmp_path: Path) -> None:
         read_ssp(tmp_path / "bad.ssp", 1e-3)
 
 
+@pytest.mark.long
 def test_ssp_in_fmpy(small: System, archive: Path) -> None:
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import read_ssv
@@ -123,6 +126,7 @@ def test_ssp_in_fmpy(small: System, archive: Path) -> None:
     close(run(small, values=QUICK), record_from_series(small, {n: found[n] for n in names(small)}), 5)
 
 
+@pytest.mark.long
 def test_ssp_in_libcosim(small: System, archive: Path, tmp_path: Path) -> None:
     pytest.importorskip("libcosimpy")
     from libcosimpy.CosimExecution import CosimExecution
@@ -145,6 +149,7 @@ def test_ssp_in_libcosim(small: System, archive: Path, tmp_path: Path) -> None:
     close(run(small, values=QUICK), record_from_series(small, series), 5)
 
 
+@pytest.mark.long
 def test_container_is_bit_equal(small: System, tmp_path: Path) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
     from fmpy.validation import validate_fmu

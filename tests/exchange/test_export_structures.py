@@ -105,6 +105,7 @@ def same_units(assembly: Assembly, gains: Gains) -> None:
         assert not (a and b) or same_dimension(a, b), f"{c.source}.{c.output.variable} [{a}] -> {c.target} [{b}]"
 
 
+@pytest.mark.long
 def test_every_file_of_an_archive(tmp_path: Path) -> None:
     """Step and end of the system in all FMUs, one name of all sets, a start value for each input that is connected."""
     system = load_system("stabilizer_floated_2dof")  # two gains

@@ -83,6 +83,7 @@ def libcosim(system: System, archive: Path, folder: Path, ours: dict[str, Any], 
     return estimates(system, record_from_series(system, series, ours["run"].replace(step=step)))
 
 
+@pytest.mark.long
 def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: dict[str, Any]) -> None:
     pytest.importorskip("libcosimpy")
     from fmpy.ssp.simulation import simulate_ssp
@@ -105,6 +106,7 @@ def test_libcosim_and_fmpy(system: System, archive: Path, tmp_path: Path, ours: 
         assert abs(fmpy[name] - double[name]) < 1e-7, name
 
 
+@pytest.mark.long
 def test_container(system: System, tmp_path: Path, ours: dict[str, Any]) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
 

@@ -136,6 +136,7 @@ def test_the_gain_is_an_fmu_as_all(archive: Path, tmp_path: Path) -> None:
     assert (description.defaultExperiment.stepSize, description.defaultExperiment.stopTime) == ("0.02", "1.0")
 
 
+@pytest.mark.long
 def test_a_mapped_gyro_in_other_tools(small: System, foreign: Foreign, tmp_path: Path) -> None:
     """Units and signs of a mapping file: the container's windows are those of the bench bit for bit, outputs in SI."""
     pytest.importorskip("fmu_manipulation_toolbox")
@@ -170,6 +171,7 @@ def test_a_mapped_gyro_in_other_tools(small: System, foreign: Foreign, tmp_path:
         assert series[0]["gyro.u"].si(block, np.array([0])) == [value]
 
 
+@pytest.mark.long
 def test_parameters_of_a_container(small: System, tmp_path: Path) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
     file, values = tmp_path / "c.fmu", {"dwell": 0.2, "turns": 0.01, "table.index_rate": 2.0}
@@ -190,6 +192,7 @@ def test_parameters_of_a_container(small: System, tmp_path: Path) -> None:
     assert float(parameters["latitude"].start) == math.radians(45.75)
 
 
+@pytest.mark.long
 def test_an_option_called_time_stays_built_in(tmp_path: Path) -> None:
     """The container has a variable ``time`` of its own."""
     pytest.importorskip("fmu_manipulation_toolbox")

@@ -36,6 +36,7 @@ def ended(browser: Browser) -> np.ndarray[Any, Any]:
 
 @needs_chromium
 @needs_ziglang
+@pytest.mark.long
 def test_the_page_runs_as_the_fmu_does(tmp_path: Path) -> None:
     system = load_system(LOOP)
     chosen = ["platform.J", "gyro.D_F"]
@@ -81,6 +82,7 @@ def test_the_page_runs_as_the_fmu_does(tmp_path: Path) -> None:
 
 
 @needs_ziglang
+@pytest.mark.long
 def test_a_title_cannot_leave_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     system = load_system(LOOP)
     monkeypatch.setattr(type(system), "title", "</script><script>alert(1)</script>")

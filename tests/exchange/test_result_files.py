@@ -115,6 +115,7 @@ def write(series: Array, form: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("form", ["csv", "npy", "parquet", "mat 5", "mat 4", "mat normal"])
+@pytest.mark.long
 def test_each_format_gives_the_coefficients_of_the_own_run(
     form: str, own: gb.Run, elsewhere: Array, command: Command, tmp_path: Path
 ) -> None:
@@ -180,6 +181,7 @@ def file_observer(folder: Path, **slots: str) -> Any:
     return CosimObserver(CosimObserver._CosimObserver__create_key, pointer)  # the wrapper lacks this one
 
 
+@pytest.mark.long
 def test_libcosim_by_its_csv_files(own: gb.Run, command: Command, tmp_path: Path) -> None:
     """Coupled in parallel, six digits.  The SSP repeats the values of its export, so none is given."""
     pytest.importorskip("libcosimpy")
@@ -254,6 +256,7 @@ def refusals(series: Array) -> dict[str, tuple[Array, str]]:
     }
 
 
+@pytest.mark.long
 def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: Array, tmp_path: Path) -> None:
     test = gb.load(NAME, VALUES)
     for what, (series, words) in refusals(elsewhere).items():
@@ -281,6 +284,7 @@ def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: A
         test.reduce_result(file)
 
 
+@pytest.mark.long
 def test_files_that_are_none(command: Command, tmp_path: Path) -> None:
     for name, content, words in (
         ("a.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 200, "save it with save"),

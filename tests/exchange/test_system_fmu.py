@@ -45,6 +45,7 @@ def simulated(file: Path, stop: float, interval: float = 1e-3, **values: Any) ->
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.long
 def test_fmpy_gives_the_record_of_the_bench(small: System, write: Write, fmi: int) -> None:
     file = write(small, fmi)
     assert validate_fmu(str(file)) == []
@@ -74,6 +75,7 @@ def test_parameters_and_inputs_that_were_exposed(small: System, write: Write) ->
     assert not np.array_equal(series["gyro.u"], simulated(file, 0.5)["gyro.u"])
 
 
+@pytest.mark.long
 def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Path) -> None:
     # latitude shapes the mounts of a tumble as well, terms is of the reduction; height is that of the site alone,
     # settle that of every phase
@@ -89,6 +91,7 @@ def test_the_options_that_stand_for_values_of_parts_are_the_default(tmp_path: Pa
     assert {"sources/fmi2.c", "sources/part_floated_gyro.c", "documentation/README.md", "model.png"} <= set(names)
 
 
+@pytest.mark.long
 def test_an_option_that_is_the_time_of_the_run_is_built_in(tmp_path: Path) -> None:
     bench = Path(__file__).parents[1] / "benchmarks" / "bench"
     export_fmu(load_system("loop", bench), tmp_path / "loop.fmu", values={"duration": 2.0}, bench=bench)

@@ -77,6 +77,7 @@ def continuous_loop() -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
     return num, den, found
 
 
+@pytest.mark.long
 def test_margins_of_a_continuous_loop() -> None:
     """Margins within 0.2 dB and 1 degree: simulated by scipy.signal.lsim, 10 kHz, r added to the plant's input."""
     num, den, truth = continuous_loop()
@@ -100,6 +101,7 @@ def test_margins_of_a_continuous_loop() -> None:
             assert abs(20.0 * np.log10(m.value / value)) < 0.2, name
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth(counted: list[tuple]) -> None:
     """Some thousand points of L, S, T and P: 0.93 to 0.97 of the intervals of gain and phase; 10 platforms' margins."""
     held = dict.fromkeys("LSTP", 0)
@@ -201,6 +203,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_file_from_python_and_its_page(file: Path, tmp_path: Path) -> None:
     found = gb.identify(file, band="1Hz..140Hz")
     assert found.period == pytest.approx(4.0) and found.record.at == "plant input"

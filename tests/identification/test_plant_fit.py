@@ -43,6 +43,7 @@ def platforms() -> list[tuple]:
 
 
 # ------------------------------------------------------------------------------------------- parameters
+@pytest.mark.long
 def test_parameters_of_random_platforms(platforms: list[tuple]) -> None:
     """Truth that the fit does not know: J, friction, delay, mode, of the sampled plant: held by 95 % intervals."""
     z, lacking = [], 0

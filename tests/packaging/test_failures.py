@@ -297,6 +297,7 @@ def test_a_fault_shows_its_traceback(instance: Callable, monkeypatch: pytest.Mon
     one.step(0.0, 1e-3)
 
 
+@pytest.mark.long
 def test_versions_and_parts_do_not_clash(tmp_path: Path) -> None:
     """Two parts and two versions of one part in one process, interleaved."""
     paths = []
@@ -331,6 +332,7 @@ def test_versions_and_parts_do_not_clash(tmp_path: Path) -> None:
         one.free()
 
 
+@pytest.mark.long
 def test_foreign_masters_see_the_messages(fmu: Callable, tmp_path: Path) -> None:
     """FMPy's own simulation, in a process of its own: it ends with the message, not with a crash."""
     program = """

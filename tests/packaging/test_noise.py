@@ -75,6 +75,7 @@ def draws() -> dict[tuple[int, int], np.ndarray]:
     return {k: np.array([normal(*k, n) for n in range(N)]) for k in keys}
 
 
+@pytest.mark.long
 def test_distribution(draws: dict[tuple[int, int], np.ndarray]) -> None:
     """Kolmogorov-Smirnov, mean, variance, and neighbours uncorrelated: each within 4.5 sigma of its law."""
     for x in draws.values():
@@ -103,6 +104,7 @@ def series(one: object, h: float, n: int) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.long
 def test_density_is_independent_of_the_step(instance: Callable) -> None:
     """Two-sided density 0.2 V/sqrt(Hz): one-sided PSD 2 x 0.04, flat, at 1 ms and at 2.5 ms.
 

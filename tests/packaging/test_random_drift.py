@@ -91,6 +91,7 @@ def test_bank_is_flicker_noise() -> None:
 
 
 @pytest.mark.parametrize("h", STEPS)
+@pytest.mark.long
 def test_flicker(h: float, series: Callable[[float], Array]) -> None:
     """PSD of the samples of all relaxations, that of flicker noise; Allan variance from their covariances."""
     x = series(h)[0]

@@ -149,6 +149,7 @@ def run(target: str, bench: Path, steps: int = 20) -> tuple[list[list[float]], A
     return rows, one
 
 
+@pytest.mark.long
 def test_all_targets_have_the_same_bits(bench: Path) -> None:
     plain, part = run("plain", bench)
     assert len({tuple(r) for r in plain}) == len(plain)

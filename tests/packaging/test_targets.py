@@ -93,6 +93,7 @@ def test_sources_say_how_to_build(part: str, fmu: Callable) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.long
 def test_sources_build_by_themselves(fmu: Callable, tmp_path: Path, fmi: int) -> None:
     """The one file that is named is one unit, without an option of the build's own: the same bits."""
     path = fmu("floated_gyro", "native", fmi)
@@ -263,6 +264,7 @@ def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callabl
         library.fmi2FreeInstance(ctypes.c_void_p(c))
 
 
+@pytest.mark.long
 def test_a_thousand_python_instances(fmu: Callable, instance: Callable) -> None:
     path = fmu("rebalance_analog", "python")
     like = instance("rebalance_analog", "python")

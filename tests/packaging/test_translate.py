@@ -235,6 +235,7 @@ def test_faces_compile_without_warnings(tmp_path: Path, fmi: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["place", "told", "step", "draw"])
+@pytest.mark.long
 def test_a_sampled_method_may_have_the_name_of_a_function_of_the_runtime(
     written: Written, tmp_path: Path, name: str
 ) -> None:
@@ -256,15 +257,18 @@ def test_a_sampled_method_may_have_the_name_of_a_function_of_the_runtime(
     one.free()
 
 
+@pytest.mark.long
 def test_parts_compile_without_warnings(part: str, tmp_path: Path) -> None:
     strict(load_part(part), tmp_path, once=True)
 
 
 @pytest.mark.parametrize("toy", ["lag", "linear", "noisy", "swing", "raiser"])
+@pytest.mark.long
 def test_toys_compile_without_warnings(toy: str, tmp_path: Path) -> None:
     strict(load_part(toy, TOYS), tmp_path)
 
 
+@pytest.mark.long
 def test_odd_parts_compile_without_warnings(written: Written, tmp_path: Path) -> None:
     strict(written("toy", ACCEPTED), tmp_path)
     strict(written("bare", '    y = Output("1")\n    def outputs(self):\n        self.y = 1.0\n'), tmp_path)

@@ -77,6 +77,7 @@ def test_not_an_fmu(tmp_path: Path) -> None:
         validate("nothing")
 
 
+@pytest.mark.long
 def test_another_run_than_the_reference(tmp_path: Path, fmu: Callable) -> None:
     """A bench whose reference run was made by another model."""
     for room in ("components/site", "systems", "reports"):

@@ -182,6 +182,7 @@ def proposed(folder: Path, text: str, system: str) -> tuple[str, list[str]]:
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.long
 def test_proposal_for_a_drift_record_of_a_logger(tmp_path: Path) -> None:
     """Units in a row of their own, a blank as separator; the rates in dps become those of the record."""
     gx = np.random.default_rng(1).normal(size=600).round(3).tolist()

@@ -157,6 +157,7 @@ FORMATS: dict[str, tuple[Callable[[Path], None], str, tuple[str, str]]] = {
 
 
 @pytest.mark.parametrize("end", FORMATS)
+@pytest.mark.long
 def test_every_number_comes_back_as_it_was_written(end: str, tmp_path: Path) -> None:
     write, table, (time, rate) = FORMATS[end]
     file = tmp_path / f"log{end}"
@@ -175,6 +176,7 @@ def test_every_number_comes_back_as_it_was_written(end: str, tmp_path: Path) -> 
         assert len(tables_of(file)) == 1
 
 
+@pytest.mark.long
 def test_a_sheet_is_read_as_it_stands(tmp_path: Path) -> None:
     file = tmp_path / "log.xlsx"
     write_excel(file)
@@ -184,6 +186,7 @@ def test_a_sheet_is_read_as_it_stands(tmp_path: Path) -> None:
     assert as_text(file, "Klima").read_text(encoding="utf-8").splitlines()[1] == "2026-03-01 08:00:00.000000,20"
 
 
+@pytest.mark.long
 def test_dates_are_seconds_since_the_first_and_gaps_are_empty(tmp_path: Path) -> None:
     file = tmp_path / "log.parquet"
     stamps = np.datetime64("2026-03-01T08:00:00") + np.array([0, 10, 25]) * np.timedelta64(1, "ms")
@@ -192,6 +195,7 @@ def test_dates_are_seconds_since_the_first_and_gaps_are_empty(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("end", [e for e in FORMATS if e != "-7.3.mat"] + [".xlsx"])
+@pytest.mark.long
 def test_a_damaged_file_ends_in_a_message(end: str, tmp_path: Path) -> None:
     file = tmp_path / f"log{end}"
     file.write_bytes(b"nothing of the kind" * 50)
@@ -211,6 +215,7 @@ def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         tables_of(file)
 
 
+@pytest.mark.long
 def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Call, tmp_path: Path) -> None:
     """A drift record of white noise 0.01 °/s at 100 Hz: N = 0.01·60/√100 = 0.06 °/√h, from the table that has rates."""
     import h5py
@@ -228,6 +233,7 @@ def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Call, tmp_path: Path
     assert n["estimate"] == pytest.approx(0.06, rel=0.02)
 
 
+@pytest.mark.long
 def test_columns_of_the_bench_need_no_map(gyrobench: Call, tmp_path: Path) -> None:
     made = {"time [s]": np.arange(2000) * 0.01, "rate [deg/s]": 0.01 * np.random.default_rng(4).normal(size=2000)}
     parquet.write_table(pa.table(made), tmp_path / "log.parquet")

@@ -31,6 +31,7 @@ def content(folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("old", NAMES, indirect=True)
+@pytest.mark.long
 def test_a_record_is_reduced_to_the_same_result(old: Path) -> None:
     """Of 1e-9: the same formulas, in another version of numpy perhaps."""
     then = content(old)

@@ -52,6 +52,7 @@ def test_the_published_schema_is_that_of_the_typed_form() -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in SYSTEMS if load_system(n).slots])
+@pytest.mark.long
 def test_a_run_of_every_system_follows_the_schema(name: str, tmp_path: Path) -> None:
     """A run that is stopped after ten steps: run.json has all that a run begins with, and what its end adds."""
     system = load_system(name)

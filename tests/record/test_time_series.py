@@ -52,6 +52,7 @@ def exported(run: Record, file: Path, phase: bool, cut: slice = slice(None), **c
     return file
 
 
+@pytest.mark.long
 def test_series_of_a_run_give_its_windows_and_its_result(run: Record, tmp_path: Path) -> None:
     system = load(TUMBLE, PLAN)
     expected = {c.name: c for c in system.reduce(run).coefficients}

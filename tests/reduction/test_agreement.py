@@ -98,6 +98,7 @@ def test_the_one_that_is_off_is_named() -> None:
 
 # ----------------------------------------------------------------------------------------- by counting
 @pytest.mark.parametrize(("sigma", "dof"), [((1.0, 1.0), (6.0, 9.0)), ((1.0, 3.0, 0.5), (math.inf, 8.0, 20.0))])
+@pytest.mark.long
 def test_false_alarms_and_coverage(sigma: tuple[float, ...], dof: tuple[float, ...]) -> None:
     """Values that agree raise the alarm in 5 %, estimated u and all; the mean's interval holds the truth in 95 %."""
     n, rng = 3000, np.random.default_rng(7)
@@ -118,6 +119,7 @@ def test_false_alarms_and_coverage(sigma: tuple[float, ...], dof: tuple[float, .
     assert stats.binom.ppf(1e-3, n, 0.94) <= covered <= stats.binom.ppf(1.0 - 1e-3, n, 0.965)
 
 
+@pytest.mark.long
 def test_false_alarms_of_a_whole_suite() -> None:
     """Nine coefficients by three methods: one alarm in any of them in 5 % of suites, as p is adjusted."""
     n, rng, names = (

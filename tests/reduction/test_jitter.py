@@ -47,6 +47,7 @@ def made(kind: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, float
 
 
 @pytest.mark.parametrize("kind", ["white", "walk", "mode"])
+@pytest.mark.long
 def test_intervals_contain_the_true_value(kind: str) -> None:
     """150 records of 60 s each; 500 of each kind held 94.6, 94.6 and 94.2 %."""
     rng = np.random.default_rng({"white": 3, "walk": 4, "mode": 5}[kind])

@@ -112,6 +112,7 @@ def test_test_of_the_residuals_knows_what_is_stated() -> None:
     assert p[0] < 1e-6 and p[1] > 0.05
 
 
+@pytest.mark.long
 def test_intervals_hold_where_the_errors_are_of_the_stated_size() -> None:
     """100 records: sine and cosine of an encoder and constants of two mounts, white noise; 0.95 +- 0.022.  Counted
     twice, as noise and as type B, the constant was held by 0.990.

@@ -40,6 +40,7 @@ def test_response_of_a_first_order_lag() -> None:
     assert p.u is not None and p.u < 1e-9
 
 
+@pytest.mark.long
 def test_uncertainty_covers_and_coherence_falls_with_noise() -> None:
     """White noise of sigma s on y: a phasor of N samples has variance 2 s2/N in each part, so u = s sqrt(2/N) / |Y|
     = 0.3 sqrt(2/8000) / 0.5 = 9.5e-3; over 200 draws the mean of u meets it to 5 %, and 95 % of the phases lie inside
@@ -143,6 +144,7 @@ def test_interval_of_a_change_after_a_short_rest(samples: int, lasting: int) -> 
 
 
 # ------------------------------------------------------------------------------------------- drift
+@pytest.mark.long
 def test_drift_and_random_walk() -> None:
     """White rate of density N: the angle is a random walk N sqrt(t); rate over T has u = N/sqrt(T) = 1e-3/10 = 1e-4.
     60 draws: mean rate and its scatter, u with what 30 parts leave open, walk N to 15 %."""
@@ -245,6 +247,7 @@ def test_noise_at_rest_does_not_move(seed: int) -> None:
     assert all(not s.unsettled or s.moves > 0.0 for s in found)
 
 
+@pytest.mark.long
 def test_drift_intervals_hold_with_reading_errors_and_slow_drift() -> None:
     """Holds of 30 s: white rate noise N, errors of the readings, drift of 0.6 N/sqrt(T) that stays in a hold (as the
     Markov drift does).  1.96 times the scatter of ten parts over sqrt(10) held 0.87 of the true rates.

@@ -126,6 +126,7 @@ def covered(draws: int) -> dict[str, int]:
     return inside
 
 
+@pytest.mark.long
 def test_uncertainty_of_measured_margins_covers_interpolation_and_noise() -> None:
     """In nine of ten draws or more; tests/benchmarks/loops.py counts 1000."""
     inside = covered(50)

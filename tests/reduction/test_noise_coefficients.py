@@ -169,6 +169,7 @@ def test_allan_of_the_model() -> None:
     assert np.mean((curve.low < model) & (model < curve.high)) > 0.8
 
 
+@pytest.mark.long
 def test_check_of_the_model() -> None:
     """White noise passes; a line and Gauss-Markov drift of half the variance do not, and are found where they are."""
     n, rng = 20000, np.random.default_rng(1)

@@ -76,6 +76,7 @@ def test_whitening_in_blocks_and_its_transpose(monkeypatch: pytest.MonkeyPatch, 
     np.testing.assert_allclose(noise.whiten_transposed(t0, t1, z, model), whole[:, 0].T @ z, atol=1e-13)
 
 
+@pytest.mark.long
 def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
     """A matrix of 10,000 x 10,000 would take 800 MB."""
     t0 = 10.0 * np.arange(10_000)
@@ -222,6 +223,7 @@ SLOW = os.environ.get("GYROBENCH_SLOW") == "1"
 
 @pytest.mark.parametrize(("turn", "dwell"), [(36, 5), (72, 10)])
 @pytest.mark.parametrize(("tau", "share"), [(0.0, 0.0), (1.0, 1.0), (3.0, 1.0), (8.0, 1.0)])
+@pytest.mark.long
 def test_intervals_cover(turn: int, dwell: int, tau: float, share: float) -> None:
     """Nine coefficients, white and Gauss-Markov noise whose parameters the fit estimates itself."""
     runs = 1000 if SLOW else 120 if turn == 36 else 50
@@ -233,6 +235,7 @@ def test_intervals_cover(turn: int, dwell: int, tau: float, share: float) -> Non
 
 
 @pytest.mark.parametrize(("design", "readings"), [("tumble", False), ("mean", True)])
+@pytest.mark.long
 def test_intervals_cover_the_population(design: str, readings: bool) -> None:
     """Noise drawn from the population, nine coefficients of a tumble or one mean of 30 windows: 95 % of the intervals
     hold the truth, not 90 and not 99 (see counting.check).

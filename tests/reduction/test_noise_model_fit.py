@@ -55,6 +55,7 @@ def test_spectra_have_the_variance_of_a_sample() -> None:
         assert float(np.mean(term.spectrum(np.array(p), grid))) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.long
 def test_white_noise_through_a_filter_and_drift() -> None:
     """Low-pass of 2 samples, Gauss-Markov drift of 0.3 and 100 samples: N is of the white noise unfiltered."""
     rng = np.random.default_rng(1)
@@ -88,6 +89,7 @@ def test_wild_samples_of_very_different_sizes() -> None:
 
 
 @pytest.mark.parametrize(("share", "stated"), [(0.1, False), (1e-3, True)])
+@pytest.mark.long
 def test_missing_samples_under_a_steep_spectrum(share: float, stated: bool) -> None:
     """Angle noise Q = 1 beside N = 0.1: a missing sample lacks 2 Q2 = 2, evenly over all frequencies.
 
@@ -104,6 +106,7 @@ def test_missing_samples_under_a_steep_spectrum(share: float, stated: bool) -> N
         assert model["N"].low <= 0.1 <= model["N"].high and model["N"].determined
 
 
+@pytest.mark.long
 def test_steps_wild_and_missing_samples() -> None:
     """A step of 1, 20 samples off by 20, a twentieth missing: N of the rest; with the wild ones N2 is 1 + 0.001 400."""
     rng = np.random.default_rng(3)
@@ -122,6 +125,7 @@ def test_steps_wild_and_missing_samples() -> None:
     assert model.agrees, "with what was taken out the deviation is that of the record as it was"
 
 
+@pytest.mark.long
 def test_wild_samples_and_a_step_under_angle_noise() -> None:
     """Q = 1, N = 0.1, a step of 2, ten samples off by 30: under the spectrum of the angle noise each wild sample is
     in a hundred others.  Left in they were N2 = 10/5000 30^2 = 1.8.
@@ -149,6 +153,7 @@ def ring_laser(n: int, rng: np.random.Generator) -> np.ndarray:
     return out
 
 
+@pytest.mark.long
 def test_dither_that_is_no_line() -> None:
     """The band of the dither, four times the angle noise, is neither N nor Q; its frequency 2.94/(2 pi) = 0.4679, its
     rms 2 (2 sin(1.47)) = 3.98, which 19,200 samples of 800 a coherence know to some 15 %.
@@ -163,6 +168,7 @@ def test_dither_that_is_no_line() -> None:
     assert sum(rms**2 for *_, rms in model.peaks()) + taken == pytest.approx(3.98**2, rel=0.4)
 
 
+@pytest.mark.long
 def test_a_step_under_angle_noise() -> None:
     """A step of 0.02 in angle noise of 1: the ends of the angle, of a variance of 2/n of it, do not hide it."""
     rng = np.random.default_rng(9)

@@ -86,6 +86,7 @@ def runs() -> list[tuple[str, dict[str, Any], dict[str, tuple[float, float]]]]:
 
 
 @pytest.mark.parametrize(("name", "values", "limits"), runs(), ids=[r[0] for r in runs()])
+@pytest.mark.long
 def test_other_words_change_nothing(
     name: str, values: dict[str, Any], limits: dict[str, tuple[float, float]], request: pytest.FixtureRequest
 ) -> None:

@@ -63,6 +63,7 @@ def test_ramp_joins_and_is_what_was_put_in() -> None:
     assert found.gain.shape == (3, n) and np.allclose(found.gain @ found.est.X, np.eye(3), atol=1e-9)
 
 
+@pytest.mark.long
 def test_clean_records_keep_their_model() -> None:
     """Of 40 records without trend or temperature at most two have one (5 % each would be four); u grows by a sixth."""
     rng = np.random.default_rng(4)
@@ -131,6 +132,7 @@ def test_turn_ons_are_told_from_mounts() -> None:
     assert [q.name for q in same.quantities] == ["a", "b", "σ_mount"]
 
 
+@pytest.mark.long
 def test_clean_records_gain_no_turn_on_and_no_asymmetry() -> None:
     """Of 24 records at most one gains one (of 60 none did): white noise, twenty turn-ons, a current of both signs."""
     x = np.cos(2.0 * np.pi * np.arange(60) / 12.0)
@@ -159,6 +161,7 @@ def test_mounts_taken_once_are_in_u_or_withhold(stated: float) -> None:
     assert any("Of a: each mount is taken once" in w for w in result.warnings) == (not stated)
 
 
+@pytest.mark.long
 def test_stated_remounts_hold() -> None:
     """Half the windows of the benchmark, 40 records, constants from mount to mount of the size of the noise of a
     window, each mount once: D_O, D_II and D_SS are held by less than 0.85 without, and all by 0.87 or more
@@ -177,6 +180,7 @@ def test_noise_free_records_have_no_nuisances() -> None:
 
 
 @pytest.mark.parametrize("name", ["clean", "tilt of 20 arcsec", "ramp of 0.02 deg/h"])
+@pytest.mark.long
 def test_intervals_hold_with_setup_effects(name: str) -> None:
     """Half the windows of the benchmark, 50 records: none of the nine below 0.88, their mean within 0.93 and 0.98;
     without the nuisance model the tilt makes it 0 of D_S, the ramp less than 0.85 of D_O.
@@ -192,6 +196,7 @@ def test_intervals_hold_with_setup_effects(name: str) -> None:
         assert plain[bench.NAMES.index(coefficient)] < most
 
 
+@pytest.mark.long
 def test_mounts_that_scatter_by_as_much_as_a_window() -> None:
     """Twelve mounts of ten windows, six attitudes twice: the intervals of 100 records hold 0.91 or more of each of six
     coefficients, whose constants are those of two mounts each.
@@ -209,6 +214,7 @@ def test_mounts_that_scatter_by_as_much_as_a_window() -> None:
     assert held.min() >= 88 and 92 <= held.mean() <= 98
 
 
+@pytest.mark.long
 def test_no_verdict_rests_on_noise_being_white() -> None:
     """Half the windows of the benchmark, 30 records under drift with a correlation time of a quarter of the record and
     half the variance of a window, which a record cannot tell; a limit at the truth itself, the worst there is: at most
@@ -237,6 +243,7 @@ def price_of_choice() -> Any:
 
 
 @pytest.mark.parametrize("widening", [1.5, 2.0, 34.0])
+@pytest.mark.long
 def test_effects_of_every_size_are_held_alike(widening: float) -> None:
     """By calculation, noise known: 0.93 to 0.97 of the intervals hold, whatever the size, at intervals 0.96 or more as
     wide as of a model that always has the effect.  With even odds 0.98 and 0.885 to 0.92 would.
@@ -250,11 +257,13 @@ def test_effects_of_every_size_are_held_alike(widening: float) -> None:
     assert even.max() > 0.97 and even.min() < 0.925
 
 
+@pytest.mark.long
 def test_a_widening_that_does_not_matter_changes_no_coverage() -> None:
     assert price_of_choice().single(1.0001, np.array([0.0, 2.0]))[0] == pytest.approx([0.95, 0.95], abs=1e-3)
 
 
 @pytest.mark.parametrize(("contrasts", "least", "most"), [(6, 0.94, 0.97), (8, 0.935, 0.964), (12, 0.928, 0.957)])
+@pytest.mark.long
 def test_scatters_of_every_size_are_held_alike(contrasts: int, least: float, most: float) -> None:
     """By calculation, noise known; with a size of 1 among those weighed six contrasts would hold 0.98 without a
     scatter.

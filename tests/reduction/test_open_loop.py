@@ -69,6 +69,7 @@ def test_the_threshold_follows_from_the_segments() -> None:
 
 
 @pytest.mark.parametrize(("noise", "stated"), [(0.1, 30), (1.0, 10), (3.0, 0)])
+@pytest.mark.long
 def test_stated_crossovers_hold_at_every_noise(noise: float, stated: int) -> None:
     """30 seeds: nine of ten of what is stated lie within 2 u of the truth, all within 4; |L| is flat, 1.3 to 0.9 from 4
     to 20 Hz, so that noise moves the crossover far.

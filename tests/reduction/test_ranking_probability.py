@@ -45,6 +45,7 @@ def test_equal_numbers_that_differ_by_rounding_are_a_tie():
     assert a.value != b.value and [p.place for p in rank([a, b])] == [1, 1]
 
 
+@pytest.mark.long
 def test_adjustment_is_holms():
     p = [0.001, 0.04, 0.03, 0.2, 0.012]
     assert adjusted(p) == pytest.approx(multipletests(p, method="holm")[1])
@@ -61,6 +62,7 @@ def test_ranks_and_probability_by_hand():
 
 
 @pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.long
 def test_equal_candidates_get_a_false_rank_in_at_most_one_comparison_of_twenty(paired):
     """400 comparisons of seven equal candidates over six seeds.  u of 0.05 in 400: 0.011."""
     random = np.random.default_rng(11)
@@ -73,6 +75,7 @@ def test_equal_candidates_get_a_false_rank_in_at_most_one_comparison_of_twenty(p
     assert false / 400 <= LEVEL + 2.0 * 0.011
 
 
+@pytest.mark.long
 def test_stated_steps_between_ranks_are_true_as_often_as_said():
     """Seven candidates in three true classes 1.5 standard deviations apart, eight seeds, 300 comparisons.
 

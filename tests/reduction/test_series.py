@@ -140,6 +140,7 @@ def test_light_tails_are_no_finding() -> None:
 
 
 @pytest.mark.parametrize("design", ["tumble", "twelve positions"])
+@pytest.mark.long
 def test_sizes_after_a_fit(design: str) -> None:
     """White noise less what a fit takes of it, 200 records: tests at 0.05, 0.01 and 0.001 reject no more often than
     that (within 3.3 standard deviations of the counts).  A chi-squared probability of Ljung and Box rejects 20 % and

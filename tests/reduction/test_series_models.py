@@ -69,6 +69,7 @@ def test_bias_of_first_order() -> None:
         assert n * found.bias[0] == pytest.approx(-(1 + 3 * found.phi[0]), rel=0.15)
 
 
+@pytest.mark.long
 def test_intervals_cover_and_without_the_bias_they_would_not() -> None:
     """60 values of phi = 0.6: of 200 records the interval holds the truth in about 95 %."""
     rng = np.random.default_rng(4)
@@ -122,6 +123,7 @@ def test_sbc_finds_the_order_and_differenced_white_noise_has_none() -> None:
     assert table.at_limit and np.all(np.diff(table.sbc) < 0.0)
 
 
+@pytest.mark.long
 def test_ljung_box_takes_off_what_was_fitted() -> None:
     """EX16: residuals of a fitted AR(3) have 3 degrees of freedom of 6 lags; with 6, hardly any record is rejected."""
     rng = np.random.default_rng(8)
@@ -184,6 +186,7 @@ def test_arma_is_that_of_statsmodels_and_its_intervals_that_of_the_information()
         fit_arma(np.tile(x, 60), 1, 1)
 
 
+@pytest.mark.long
 def test_one_difference_too_many_has_no_interval_and_is_flagged() -> None:
     w = np.random.default_rng(12).normal(size=3000)
     found = fit_arma(np.diff(w), 0, 1)
@@ -193,6 +196,7 @@ def test_one_difference_too_many_has_no_interval_and_is_flagged() -> None:
     assert not over_differencing(w).flagged
 
 
+@pytest.mark.long
 def test_local_level_of_the_benchmark() -> None:
     """q = 1e-3 r, r = 2.70e-6, 17158 values: r within 5 %, q within 50 %; the AR(3) of the difference is that of
     differenced white noise and flagged (EX17).
@@ -240,6 +244,7 @@ def test_likelihood_is_the_dense_one() -> None:
             assert found.alone(phi) == pytest.approx(dense, rel=1e-9)
 
 
+@pytest.mark.long
 def test_correlation_time_of_a_day() -> None:
     """864 values, tau 18 of them: from Yule-Walker's phi the median is 1599 s for 1800 s, here it is not low; intervals
     hold the truth in about 95 % of 200 records, with white noise and without.
@@ -297,6 +302,7 @@ def drift() -> DriftModel:
     return describe(x + 0.8 * np.sin(2 * np.pi * 0.05 * 5.0 * np.arange(4000)), 5.0)
 
 
+@pytest.mark.long
 def test_description_of_a_drift(drift: DriftModel) -> None:
     assert [round(line.frequency, 3) for line in drift.lines.lines] == [0.05]
     assert (
@@ -309,6 +315,7 @@ def test_description_of_a_drift(drift: DriftModel) -> None:
     assert drift.runs is not None and drift.runs[0].z < -1.96
 
 
+@pytest.mark.long
 def test_description_does_not_depend_on_the_unit() -> None:
     """In rad/s about an offset (1e-12, 5e-9) as in °/h: no tolerance is absolute."""
     x = autoregressive(0.9, 700, np.random.default_rng(24)) + 1.5 * np.sin(0.7 * np.arange(700))
@@ -324,6 +331,7 @@ def test_description_does_not_depend_on_the_unit() -> None:
     assert len(one.lines.lines) == 1 and other.spectrum.density == pytest.approx(1e-24 * one.spectrum.density, rel=1e-3)
 
 
+@pytest.mark.long
 def test_description_on_block_means_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wandering level with a steep record: models describe means of 4 samples; the walk is named."""
     monkeypatch.setattr(drift_model, "MODEL_SAMPLES", 1000)
@@ -335,6 +343,7 @@ def test_description_on_block_means_says_so(monkeypatch: pytest.MonkeyPatch) -> 
     assert found.trend is not None and not found.trend.significant
 
 
+@pytest.mark.long
 def test_description_refuses_and_keeps_reasons() -> None:
     rng = np.random.default_rng(20)
     with pytest.raises(SeriesError, match="at least 512"):

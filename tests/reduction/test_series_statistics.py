@@ -73,6 +73,7 @@ def test_up_and_down_runs_of_the_source() -> None:
     assert stationarity.up_down_runs(np.repeat(y, 2)).z == pytest.approx(found.z)
 
 
+@pytest.mark.long
 def test_no_slope_is_significant_over_a_random_walk() -> None:
     rng = np.random.default_rng(3)
     walks = [np.cumsum(rng.normal(size=1000)) for _ in range(12)]

@@ -83,6 +83,7 @@ def eliminate(X: Any, y: Any, names: Sequence[str], level: float, groups: Sequen
     return backward(names, groups or [(n,) for n in names[1:]], level, fit_of, test)
 
 
+@pytest.mark.long
 def test_what_selection_does() -> None:
     """Eight null columns at 5 %: one is kept in 0.337 of records (0.347); two real terms of 0.6 s are both kept in 97
     %. Of what was kept of nothing no interval of the reduced fit holds zero; the full model's covers throughout.

@@ -125,6 +125,7 @@ def test_the_covariance_of_a_drift_test_gets_the_signed_product() -> None:
 
 
 # ------------------------------------------------------------------------------- through the product
+@pytest.mark.long
 def test_the_effect_stated_by_default_is_that_of_much_smaller_steps(command: Any, tmp_path: Any) -> None:
     """Against runs at h and h/4 of a plan, noise off, whose difference is 3/4 of the effect: within a fifth."""
     import json

@@ -96,6 +96,7 @@ def test_a_limit_that_is_active_at_rest() -> None:
 
 
 # ------------------------------------------------------------------------------- through the product
+@pytest.mark.long
 def test_an_unstable_run_has_no_figure_and_no_rank(command: Any, tmp_path: Any) -> None:
     """J s2 + ... with K_G = 0.05: its pole is +0.699 1/s by the polynomial of the closed loop, exp(0.699) = 2.01.
 

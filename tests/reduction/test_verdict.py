@@ -97,6 +97,7 @@ def written_verdicts() -> Iterator[str]:
                         yield f"{file.name}:{ast.unparse(node)}"
 
 
+@pytest.mark.long
 def test_one_function_writes_verdicts() -> None:
     """SuiteQuantity has a word of comparison (agree, disagree), SuiteMember the verdict of its test, told again."""
     told = {"method_comparison.py:SuiteQuantity", "method_comparison.py:SuiteMember"}

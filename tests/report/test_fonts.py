@@ -61,6 +61,7 @@ def test_no_font_no_pdf_the_other_files_stand(bare_machine, tmp_path):
     assert set(e.value.written) == {"json", "html"} and NAME in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_a_font_of_the_bench_is_taken_and_no_other(bare_machine, tmp_path):
     square_font(tmp_path / "reports" / "fonts" / "own.ttf", "Own Squares", NAME)
     (found,) = fonts.fonts_for([NAME], tmp_path)

@@ -167,6 +167,7 @@ def test_verdicts_keep_their_sign_and_colour(tmp_path: Path) -> None:
     assert "✓ 合格" in pdf_text(tmp_path / "c.pdf")
 
 
+@pytest.mark.long
 def test_a_report_in_chinese_and_what_it_lacks(tmp_path: Path) -> None:
     found = certified(0).report.result
     written = write(found, tmp_path, language="zh")

@@ -92,6 +92,7 @@ def look(page: str, folder, width: int, dark: bool = False) -> tuple[dict, str]:
 @needs_chromium
 @pytest.mark.parametrize("width", [390, 1280])
 @pytest.mark.parametrize("which", ["written", "compared"])
+@pytest.mark.long
 def test_page_in_the_browser(which, width, request, tmp_path):
     page: Written = request.getfixturevalue(which)
     found, log = look(page.html, tmp_path, width)
@@ -105,12 +106,14 @@ def test_page_in_the_browser(which, width, request, tmp_path):
 
 
 @needs_chromium
+@pytest.mark.long
 def test_a_console_error_would_be_seen(written, tmp_path):
     _, log = look(written.html.replace("</main>", "</main><script>missing();</script>"), tmp_path, 1280)
     assert "CONSOLE" in log
 
 
 @needs_chromium
+@pytest.mark.long
 def test_an_overlap_would_be_seen(written, tmp_path):
     broken = written.html.replace("</style>", "dd { margin-top: -1.2rem !important; } h1 { width: 200vw; }</style>")
     found, _ = look(broken, tmp_path, 390)

@@ -55,6 +55,7 @@ def test_one_figure_per_measure(compared):
     assert compared.html.count('<figure class="picture') == len(compared.json["measures"])
 
 
+@pytest.mark.long
 def test_coefficients_of_other_name_or_unit_are_not_subtracted(tmp_path):
     a = tumble(windows=12)
     b = with_coefficient(with_coefficient(a, 0, name="D_F + D_OO·X²"), 1, unit="rad/s")
@@ -67,6 +68,7 @@ def test_coefficients_of_other_name_or_unit_are_not_subtracted(tmp_path):
     assert sum(m["name"] == "D_I" for m in doc["measures"]) == 2
 
 
+@pytest.mark.long
 def test_five_runs_fit_on_paper(tmp_path):
     runs = [(f"run number {k} with a long name", tumble(seed=k, windows=12)) for k in range(1, 6)]
     paths = report.compare(runs, tmp_path, baseline=2)

@@ -41,6 +41,7 @@ def as_number(text: str) -> tuple[float, float]:
 # ---- result.json
 
 
+@pytest.mark.long
 def test_json_follows_the_published_schema(written):
     jsonschema.Draft202012Validator.check_schema(schema())
     jsonschema.validate(written.json, schema())
@@ -70,6 +71,7 @@ def test_json_holds_what_the_design_names(written):
     assert len(first["interval"]) == 2
 
 
+@pytest.mark.long
 def test_no_nan_in_json(tmp_path):
     r = with_coefficient(with_coefficient(tumble(windows=12), 0, estimate=math.nan), 1, z=np.float64("inf"))
     acf = dataclasses.replace(r.acf, bound=np.array(r.acf.bound))
@@ -241,6 +243,7 @@ def test_a_bare_result_makes_a_report(tmp_path):
     assert "<h2" in w.html and "figure-fit" not in w.html
 
 
+@pytest.mark.long
 def test_all_text_is_escaped(tmp_path):
     r = with_coefficient(tumble(windows=12), 0, name=NASTY, meaning=NASTY, unit=NASTY)
     r = dataclasses.replace(
@@ -262,6 +265,7 @@ def test_all_text_is_escaped(tmp_path):
         assert piece in text
 
 
+@pytest.mark.long
 def test_an_equation_that_typst_cannot_read_is_shown_as_it_is(tmp_path):
     r = dataclasses.replace(unplotted(tumble(windows=12)), equation="k i = $ #broken( <b>")
     w = Written(report.write(r, tmp_path))
@@ -282,6 +286,7 @@ def test_figures_keep_extremes_of_long_records():
     assert ex[ey.index(9.0)] == 123_457.0
 
 
+@pytest.mark.long
 def test_channels_of_a_run_are_drawn(tmp_path):
     time_ = np.arange(0.0, 20_000.0, 0.5)
     record = {"time": time_, "gyro.u": np.sin(time_ / 500.0), "table.angle": time_ * 7e-4}
@@ -293,6 +298,7 @@ def test_channels_of_a_run_are_drawn(tmp_path):
 # ---- writing
 
 
+@pytest.mark.long
 def test_nothing_heavy_is_imported_before_a_report_is_written():
     code = (
         "import sys, gyrobench.report; "
@@ -301,6 +307,7 @@ def test_nothing_heavy_is_imported_before_a_report_is_written():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.long
 def test_others_are_written_when_one_format_fails(tmp_path):
     bench = tmp_path / "bench"
     (bench / "reports" / "templates").mkdir(parents=True)
@@ -323,6 +330,7 @@ def test_unknown_format_is_refused(tmp_path):
         report.write(tumble(windows=12), tmp_path, formats=("docx",))
 
 
+@pytest.mark.long
 def test_same_result_same_bytes(written, tmp_path):
     again = report.write(tumble(), tmp_path)
     assert set(again) == set(written.paths) == {"json", "html", "pdf"}
@@ -330,6 +338,7 @@ def test_same_result_same_bytes(written, tmp_path):
         assert path.read_bytes() == written.paths[kind].read_bytes()
 
 
+@pytest.mark.long
 def test_step_check_and_tables_of_the_method_are_shown(tmp_path):
     table = Table(
         "closed_form", "Least squares and closed form", "From the same windows",

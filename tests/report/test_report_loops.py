@@ -69,6 +69,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     return Written(report.write(result(), tmp_path_factory.mktemp("loop")))
 
 
+@pytest.mark.long
 def test_schema_holds_responses(written: Written) -> None:
     schema = json.loads(read_content("result.schema.json"))
     jsonschema.validate(written.json, schema)
@@ -100,6 +101,7 @@ def test_plan_of_a_loop_shows_its_excitations(written: Written) -> None:
     assert "frequency" in html and "amplitude" in html and ">face<" not in html
 
 
+@pytest.mark.long
 def test_comparison_lays_responses_over_each_other(tmp_path: Any) -> None:
     runs = [("a", result(2.0)), ("b", result(4.0))]
     doc = comparison(runs)
@@ -112,6 +114,7 @@ def test_comparison_lays_responses_over_each_other(tmp_path: Any) -> None:
     assert html.count('id="figure-response-') == 2
 
 
+@pytest.mark.long
 def test_phases_a_turn_apart_are_drawn_together() -> None:
     """The second run's phase is written 360 degrees lower: the figure is the same as with it at the same turn."""
     a = responses(2.0)[0]
@@ -121,6 +124,7 @@ def test_phases_a_turn_apart_are_drawn_together() -> None:
     assert one == two
 
 
+@pytest.mark.long
 def test_units_of_a_loop_stand_in_a_column(tmp_path: Any) -> None:
     """Gain margin in dB, crossover in Hz, stiffness in N·m/rad: headings would make as many groups as rows."""
     loop = result()
@@ -164,6 +168,7 @@ def test_a_system_says_which_channels_matter() -> None:
     assert panels(record, {}, declared) == [["platform.attitude[1]", "platform.attitude[3]"], ["pitch.e", "roll.e"]]
 
 
+@pytest.mark.long
 def test_declared_channels_are_drawn_and_the_others_named(tmp_path: Any) -> None:
     loop = result()
     loop.provenance.update(

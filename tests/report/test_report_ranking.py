@@ -95,6 +95,7 @@ def test_void_runs_are_listed_last_and_have_no_rank():
     assert "run 3" in comparison_html(comparison(mixed), "")
 
 
+@pytest.mark.long
 def test_a_result_without_a_value_keeps_its_reason_on_disk():
     nothing = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
     r = with_coefficient(tumble(windows=12), 0, **nothing, verdict="void", no_value="unstable, pole")

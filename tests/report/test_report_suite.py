@@ -34,12 +34,14 @@ def colours(suite: SuiteResult) -> list[str]:
     return re.findall(r'class="([^"]*)"', render.html(report_files.page(Report.of(suite)), None))
 
 
+@pytest.mark.long
 def test_the_deviating_method_is_known_by_its_label(suite: SuiteResult) -> None:
     assert {q.name: q.deviating for q in suite.suite.quantities if q.verdict == "disagree"} == {"D_I": "test 2"}
     coloured = [VERMILION in svg for svg in drawn(suite)]
     assert coloured == [q.name == "D_I" for q in suite.suite.quantities]
 
 
+@pytest.mark.long
 def test_other_words_change_no_figure_and_no_colour(suite: SuiteResult) -> None:
     quantities = [dataclasses.replace(q, words="Other words.") for q in suite.suite.quantities]
     other = dataclasses.replace(suite, suite=dataclasses.replace(suite.suite, quantities=quantities))

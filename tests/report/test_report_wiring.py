@@ -48,6 +48,7 @@ def test_texts_neither_overlap_nor_leave_the_page(name: str) -> None:
         assert right - left < wide
 
 
+@pytest.mark.long
 def test_a_system_too_wide_for_names_of_wires_keeps_those_of_its_parts() -> None:
     order = [f"gyro_{k}" for k in range(12)]
     places = layout(order, [(a, "omega_of_platform_element", b, "u") for a in order for b in order])

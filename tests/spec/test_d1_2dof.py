@@ -109,6 +109,7 @@ def test_opposite_polarity(model: str) -> None:
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
 
 
+@pytest.mark.long
 def test_symbols_of_the_simple_model() -> None:
     """[MEAS-REBALANCE] k_x i_x = w_y - R_x + u_zx g_y - u_y g_z - Q_x g_y g_z, k_y i_y = w_x + R_y - u_x g_z
     + u_zy g_x + Q_y g_x g_z: currents made from these lines (gamma = 1) give the eight numbers of the table back.
@@ -130,6 +131,7 @@ def test_symbols_of_the_simple_model() -> None:
         assert row[2] == pytest.approx(symbols[row[0]], abs=1e-6)  # windows of finite width: 1 - sinc(0.1 deg)
 
 
+@pytest.mark.long
 def test_tilt_of_the_measuring_axes_needs_both_senses() -> None:
     """x or y tilted towards z by eps sees eps (W + table rate), of opposite sign in the mounts: at one rate that is
     Dx_z, wrong by eps (W + rate)/(gamma sin phi); with both senses it is found and does no harm.

@@ -254,6 +254,7 @@ def test_e19() -> None:
     assert repeatability.statistics(TABLE["uy"][0]).sigma == pytest.approx(5.6, abs=0.05)
 
 
+@pytest.mark.long
 def test_days_together() -> None:
     """Mean, sigma and t interval over the days; the printed unbalance is stable, the scale factor is not the truth."""
     rng, phi = np.random.default_rng(10), math.radians(45.75)
@@ -283,6 +284,7 @@ def test_days_together() -> None:
 
 # ------------------------------------------------------------------------------------------ uncertainty
 @pytest.mark.parametrize("colour", ["white", "Gauss-Markov"])
+@pytest.mark.long
 def test_intervals_cover(colour: str) -> None:
     """20 records of 3 cycles with 2 readings each: of 20 intervals of coverage 0.93 fewer than 13 hold the truth with
     probability 1e-4, for each of the twelve; all 240 together are held to the same risk, which finds out intervals of
@@ -328,6 +330,7 @@ def test_sensitivities() -> None:
     assert lines["attitude of each position", "R_x"].contribution == pytest.approx(7.29e-4 / math.sqrt(2.0), rel=0.01)
 
 
+@pytest.mark.long
 def test_attitude_shift_as_predicted() -> None:
     """Each position turned by 20 arcsec about each axis, one at a time: what the reduction gives is what the
     sensitivities say, to second order.

@@ -176,6 +176,7 @@ def test_gimbal_lock() -> None:
         assert geometry.swing(m, math.radians(45.0)) == pytest.approx(math.pi / 2)
 
 
+@pytest.mark.long
 def test_path_against_integration() -> None:
     """Both ways of the path, without and with drift, against the equations of Hu 1981 integrated."""
     t = np.linspace(0.0, DAY, 241)
@@ -206,6 +207,7 @@ def test_rank_and_best_pairs() -> None:
 
 # ------------------------------------------------------------------------------------------ recovery
 @pytest.mark.parametrize(("seed", "terms"), [(1, 8), (2, 9)])
+@pytest.mark.long
 def test_recovery_to_1e_8(seed: int, terms: int) -> None:
     """SERVO2-E2E: 24 h each in two mounts, 120 s windows, random gyro and latitude: all coefficients to 1e-8 deg/h."""
     rng = np.random.default_rng(seed)
@@ -222,6 +224,7 @@ def test_recovery_to_1e_8(seed: int, terms: int) -> None:
     assert [row[1] for row in book] == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.long
 def test_windows_of_ten_minutes() -> None:
     """600 s: the spline between the readings costs less than 1e-6 deg/h, at 0.98 g0 of gravity."""
     rng = np.random.default_rng(7)

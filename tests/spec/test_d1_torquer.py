@@ -33,6 +33,7 @@ def named(result: Any) -> dict[str, Any]:
     return {c.name: c for c in result.coefficients}
 
 
+@pytest.mark.long
 def test_printed_table(book: Any) -> None:
     """[LIN-TABLE] K = 17.1706 (printed 17.171); linearity with K = 17.171."""
     assert named(book)["K"].estimate == pytest.approx(17.170625, abs=1e-9)
@@ -86,6 +87,7 @@ def test_cubic_torquer() -> None:
     assert c["K_1"].estimate == pytest.approx(17.0, abs=4 * c["K_1"].u)
 
 
+@pytest.mark.long
 def test_intervals_cover() -> None:
     """Constant mark error: sd of K_n is K e/(sqrt2 Theta), so ten times smaller over 100 than over 10 degrees."""
     runs = 400
@@ -132,6 +134,7 @@ def test_two_currents_are_too_few() -> None:
         R.reduce({n: v[:2] for n, v in made().items()})
 
 
+@pytest.mark.long
 def test_files(tmp_path: Path) -> None:
     """Wrong units and missing columns are refused by name; other units of the same kind are converted."""
     text = BOOK.read_text("utf-8")

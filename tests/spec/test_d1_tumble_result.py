@@ -43,6 +43,7 @@ def test_sensitivities_of_the_method() -> None:
         assert abs(closed(T.setup(gravity=frames.G0, base=tilted))[name]) == pytest.approx(eps * size, rel=1e-3)
 
 
+@pytest.mark.long
 def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
     """Each line's sensitivity equals the change of the estimates when the record is made with that error in it.  The
     errors are stated so small that they move no weights: stated in full, each record would have weights of its own.

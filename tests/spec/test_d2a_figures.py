@@ -42,6 +42,7 @@ def test_a_mean_damps_a_harmonic_and_turns_no_phase() -> None:
     assert gain(4 * 0.3, 4) == pytest.approx([0.776699, 0.0], abs=5e-7)
 
 
+@pytest.mark.long
 def test_harmonics_of_a_rate_that_varies() -> None:
     """RED-HARMONIC, 48 samples at equal times of a rate 1 + 0.2 cos + 0.05 sin 2: sums give 0.9784, least squares 1.
     n times the variances of a_0, a_r, b_r are 1, 2, 2 of one value, as stated.

@@ -64,6 +64,7 @@ def test_sine_through_sage_husa(sine):
         (1, 5, 31, -16.9, -1.4),
     ],
 )
+@pytest.mark.long
 def test_sine_through_the_wavelet(sine, moments, J, delay, late, now):
     """Error against the truth of its own time and against the truth now."""
     _, truth, z = sine

@@ -98,6 +98,7 @@ def fixed_point(ratio: float, model=None) -> float:
 
 
 @pytest.mark.parametrize(("ratio", "predicted"), [(4.0, 1.092), (1.0, 1.589)])
+@pytest.mark.long
 def test_printed_posterior_has_the_bias_of_its_fixed_point(ratio, predicted):
     assert fixed_point(ratio) == pytest.approx(predicted, abs=2e-3)
     _, z = series(ratio)
@@ -146,6 +147,7 @@ def test_printed_innovation_destroys_a_signal():
 
 
 @pytest.mark.parametrize("form", [1, 2])
+@pytest.mark.long
 def test_noise_that_changes(form):
     """Three times the noise after 30 s: R follows within 10 %, the error is below that of the fixed filter."""
     t = np.arange(1, 60001) * T

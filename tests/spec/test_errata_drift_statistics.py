@@ -86,6 +86,7 @@ def test_phase_of_a_line() -> None:
     assert np.arctan2(b, a) == pytest.approx(2.5, abs=0.03) and abs(np.arctan(b / a) - 2.5) > 3.0
 
 
+@pytest.mark.long
 def test_error_of_a_mean_kurtosis() -> None:
     """EX12: 0.3422 is the error of one block of 200; of the mean of 85 blocks it is 0.037, and u is 3.9, not 0.42."""
     one = standard_errors(200)[1]

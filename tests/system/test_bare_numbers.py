@@ -120,6 +120,7 @@ def documented() -> list[tuple[str, dict[str, str], dict[str, str]]]:
     return found
 
 
+@pytest.mark.long
 def test_no_documented_command_is_questioned() -> None:
     commands = documented()
     assert len(commands) > 20

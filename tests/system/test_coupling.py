@@ -53,6 +53,7 @@ def test_every_part_takes_the_values_before_the_step(foreign: Foreign) -> None:
     assert found.run.cuts[0] == "a.y -> b.u: one step delay (parallel coupling)"
 
 
+@pytest.mark.long
 def test_libcosim_couples_alike(small: System, tmp_path: Path) -> None:
     """Noise off; what is left is rounding of the time.  In the order of the bench the windows are others."""
     pytest.importorskip("libcosimpy")
@@ -71,6 +72,7 @@ def test_libcosim_couples_alike(small: System, tmp_path: Path) -> None:
     assert np.max(np.abs(ordered["mean"] / theirs["mean"] - 1.0)) > 1e-3
 
 
+@pytest.mark.long
 def test_the_report_of_a_loop_that_is_coupled_in_parallel(tmp_path: Path, command: Command) -> None:
     """The step check runs by itself, the report names the coupling, the run is another one than in order."""
     words = ("run", "fixed_position", *(f"--set={x}" for x in ("readings=8", "dwell=4s", "settle=1s")), "--no-report")
@@ -92,6 +94,7 @@ def test_the_report_of_a_loop_that_is_coupled_in_parallel(tmp_path: Path, comman
     assert gb.load("fixed_position", coupling="parallel").system.coupling == "parallel"
 
 
+@pytest.mark.long
 def test_an_archive_says_what_its_step_does(foreign: Foreign, tmp_path: Path, command: Command) -> None:
     """Two lags feed one another, the first from 1: half the step moves the second by what is written here by hand."""
     elements = LAG.format("a", bound(real("y0", 1.0))) + LAG.format("b", "")

@@ -67,6 +67,7 @@ def chain(foreign: Foreign, tmp_path: Path, text: dict[str, str], **more: Any) -
     return both
 
 
+@pytest.mark.long
 def test_offsets_and_constants_against_a_loop_by_hand(foreign: Foreign, tmp_path: Path) -> None:
     # a gives degC: y[K] = v + 273.15; b works in degF above 100 K: u[K] = 5/9 v + 100; a is held by constant inputs
     text = {
@@ -95,6 +96,7 @@ def test_offsets_and_constants_against_a_loop_by_hand(foreign: Foreign, tmp_path
     assert set(held.channels["a.y"].tolist()) == {273.15}
 
 
+@pytest.mark.long
 def test_delay_is_one_step_whatever_the_order(foreign: Foreign, tmp_path: Path) -> None:
     one = '[u]\nname = "u"\n%s[hold]\nconstant = 0\n[valid]\nconstant = 0\n'
     found = chain(foreign, tmp_path, {"a": one % "", "b": one % "delay = 1\n"}, values={"a.y0": 20.0})[0]
@@ -225,6 +227,7 @@ def test_optional_connectors_are_marked() -> None:
     assert latency.optional
 
 
+@pytest.mark.long
 def test_offsets_and_constants_survive_an_archive(foreign: Foreign, tmp_path: Path) -> None:
     text = {
         "a": 'y = {name = "y", unit = "degC"}\nu = {name = "u", unit = "K"}\n'

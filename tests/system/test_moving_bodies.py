@@ -48,6 +48,7 @@ def vector(record: Record, name: str) -> Array:
 
 
 @pytest.mark.parametrize("name", SHORT)
+@pytest.mark.long
 def test_the_instrument_feels_gravity_where_its_axes_are(name: str) -> None:
     """f = C (0, 0, g) with the axes in east, north, up as rows of C; the table gives f in the axes of the instrument.
 
@@ -65,6 +66,7 @@ def test_the_instrument_feels_gravity_where_its_axes_are(name: str) -> None:
     assert np.abs(f - expected)[away].max() < 1e-9 * np.linalg.norm(f[0])
 
 
+@pytest.mark.long
 def test_the_table_turns_earth_rate_as_its_axes_say() -> None:
     """omega = C omega_E + mount (0, 0, rate): the part about the vertical, which gravity does not show."""
     name, rate = "tumble_single_axis", [f"table.omega[{k}]" for k in (1, 2, 3)]
@@ -82,6 +84,7 @@ def test_the_table_turns_earth_rate_as_its_axes_say() -> None:
     ("name", "slot", "values"),
     [("table_capture", "table", {}), ("table_rate_test", "body", {"rates": "1 100", "least": 20, "dwell": "5s"})],
 )
+@pytest.mark.long
 def test_a_servo_table_turns_as_its_axes_say(name: str, slot: str, values: dict[str, Any]) -> None:
     """omega = C omega_E + mount (0, 0, rate), f = C (0, 0, g): the mount by the phase that the sequencer records."""
     record = run(name, values, *(f"{slot}.{what}[{k}]" for what in ("omega", "f") for k in (1, 2, 3)), f"{slot}.rate")
@@ -96,6 +99,7 @@ def test_a_servo_table_turns_as_its_axes_say(name: str, slot: str, values: dict[
     assert np.abs(f - np.linalg.norm(f[0]) * axes[:, :, 2]).max() < 1e-9 * np.linalg.norm(f[0])
 
 
+@pytest.mark.long
 def test_the_inner_element_feels_the_force_of_its_base() -> None:
     """f of the platform is that of the base through roll, pitch and azimuth gimbal; of the base, C (0, 0, g)."""
     names = [f"{slot}.f[{k}]" for slot in ("platform", "motion") for k in (1, 2, 3)]

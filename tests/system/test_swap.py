@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 
@@ -15,6 +17,7 @@ QUIET = {"rebalance.meter": 0.0, "rebalance.resolution": 0.0}
 TERMS = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS")
 
 
+@pytest.mark.long
 def test_vendor_gyro_gives_the_same_coefficients(foreign: Foreign) -> None:
     system = load_system("tumble_single_axis")
     noise = {f"gyro.{n}": 0.0 for n in ("turn_on", "markov", "white", "pickoff")}

@@ -61,6 +61,7 @@ def test_41_unknowns_of_96_readings() -> None:
     assert np.linalg.matrix_rank(X[:, :41]) == 41 == np.linalg.matrix_rank(X)
 
 
+@pytest.mark.long
 def test_errors_and_intervals() -> None:
     """+-11 arcsec, 3 uV, D1 known to 5e-7 rad: rms of 80 records as the design says, K_I and K_O 0.98, F 1.34, IO and
     II 2.0 uV within 20 %; intervals hold 95 % +- 2.5 (1600, some correlated); the sensors alone are ten times worse.
@@ -81,6 +82,7 @@ def test_errors_and_intervals() -> None:
     assert 7.0 < float(np.mean(ratio)) < 12.0
 
 
+@pytest.mark.long
 def test_the_chain_of_the_source_is_as_good() -> None:
     """With D2 and D3 averaged over the sensors its errors are those of the joint fit."""
     rng = np.random.default_rng(6)

@@ -221,6 +221,7 @@ def test_measured_data(command: Command, head: Session, tmp_path: Path) -> None:
             assert word in err, err
 
 
+@pytest.mark.long
 def test_another_table(command: Command, tmp_path: Path) -> None:
     """A free table in the place of the indexing head: same coefficients."""
     more = ("--set", "points=8", "--set", "dwell=1", "--part", "table=table_rate")

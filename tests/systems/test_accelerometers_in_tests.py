@@ -15,6 +15,7 @@ tables: Any = importlib.import_module(".tables", type(load_system("imu_positions
 G0 = 9.80665
 
 
+@pytest.mark.long
 def test_imu_positions_reads_accelerometers_of_their_own() -> None:
     """Noise off: bias and rows of the matrix, (1 + scale) axes - 1, are those of the part, not of the IMU."""
     axes = [[1.0, 1e-3, -2e-3], [5e-4, 1.0, 3e-4], [0.0, -1e-3, 1.0]]
@@ -33,6 +34,7 @@ def test_imu_positions_reads_accelerometers_of_their_own() -> None:
             assert c.truth is not None and c.truth * tables.SCALES[c.unit] == pytest.approx(true, abs=1e-12)
 
 
+@pytest.mark.long
 def test_drift_record_of_an_accelerometer() -> None:
     """1200 windows of 1 s of white noise alone: N is known to 2 %; the axis stands up and the bias is 20 mg."""
     values = {

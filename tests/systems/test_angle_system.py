@@ -170,6 +170,7 @@ def runs(session: Session) -> list[Any]:
     return [measured(session, random_system(k)) for k in range(12)]
 
 
+@pytest.mark.long
 def test_random_systems_come_back(runs: list[Any]) -> None:
     """All coefficients with a true value, two heads and reversal: z of rms about 1, none far off."""
     z = np.concatenate([[c.z for c in r.coefficients if c.z is not None] for r in runs])

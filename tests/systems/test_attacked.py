@@ -44,6 +44,7 @@ def test_forward_models_import_nothing_of_the_bench(name: str) -> None:
 
 
 @pytest.mark.parametrize("system", QUICK)
+@pytest.mark.long
 def test_intervals_hold_truths_of_records_of_another_hand(system: str, benchmark_of: Any, tmp_path: Path) -> None:
     """Of all coefficients of three records: of 3 or more, fewer than two thirds are a thing of 1 in 10,000 at 95 %."""
     model = benchmark_of("attack").MODELS[system]
@@ -57,6 +58,7 @@ def test_intervals_hold_truths_of_records_of_another_hand(system: str, benchmark
 
 
 @pytest.mark.parametrize("test", ["torquer_scale_factor", "pickoff_scale_factor"])
+@pytest.mark.long
 def test_no_kind_of_mistake_passes(test: str, benchmark_of: Any) -> None:
     """A meter that is off by a factor passed, with estimates off by 580 u and more: it is asked for, like what else
     nobody can see; stated as checked the clean record passes.  All kinds in the pickoff test, which is quick.

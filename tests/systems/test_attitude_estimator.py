@@ -66,6 +66,7 @@ def test_squares_of_an_error_that_stays_count_once() -> None:
     assert lasting_squares(np.random.default_rng(1).normal(size=n)) > 0.7 * n
 
 
+@pytest.mark.long
 def test_the_multiplicative_filter_is_consistent_at_any_attitude() -> None:
     for rocking in ("20deg", "60deg"):
         r = made(phases=CALM, rocking=rocking)
@@ -76,6 +77,7 @@ def test_the_multiplicative_filter_is_consistent_at_any_attitude() -> None:
         assert r.result["tilt rocking"].estimate < 0.008
 
 
+@pytest.mark.long
 def test_intervals_of_an_rms_are_those_of_chi_square() -> None:
     """Above 0, wider upwards; few independent values of a bias: the next run may have several times as much."""
     r = made(phases=CALM)
@@ -86,6 +88,7 @@ def test_intervals_of_an_rms_are_those_of_chi_square() -> None:
     assert r.result["bias rocking"].dof < 20.0 < r.result["tilt rocking"].dof
 
 
+@pytest.mark.long
 def test_the_linear_filter_is_consistent_at_small_angles_only() -> None:
     small, large = (made("kalman", phases=CALM, rocking=x) for x in ("1deg", "20deg"))
     assert abs(small.result["NEES"].estimate - 1.0) < 4.0 * small.result["NEES"].u
@@ -105,6 +108,7 @@ def test_drift_is_found() -> None:
     assert 0.5 < stated < 3.0
 
 
+@pytest.mark.long
 def test_a_slow_acceleration_separates_the_filters() -> None:
     """0.05 g lean the vertical by 2.86 deg: filters that weigh the noise take it over in seconds, the slow one not."""
     fast, slow = made(), made("complementary")
@@ -174,6 +178,7 @@ def test_a_base_without_manoeuvres_is_asked_to_rest() -> None:
         run(load_system(NAME), {"motion": "base_motion"}, values={"phases": "rest rocking"})
 
 
+@pytest.mark.long
 def test_comparison_ranks_them() -> None:
     runs = [made(e) for e in ("mekf", "kalman", "complementary")]
     text = str(gb.compare(*runs, names=("mekf", "kalman", "complementary")))

@@ -57,6 +57,7 @@ def test_rounding_of_an_angle_is_white_from_two_fifths_of_a_step_on() -> None:
 
 
 @pytest.mark.parametrize("column", ["counts [1]", "angle [arcsec]", "each [1]"])
+@pytest.mark.long
 def test_a_coarse_angle_is_named_and_passes_nothing(tmp_path: Path, column: str) -> None:
     """A quarter of a count of random change: N, 0.25 arcsec a second, comes out wrong by more than its interval."""
     x = counted(0.25)
@@ -88,6 +89,7 @@ def test_a_rate_that_another_column_explains_leaves_rounding(tmp_path: Path) -> 
     assert any("explain all of the rate but" in w and "computed from the rate" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_a_line_at_half_the_sampling_rate_is_no_angle_noise(tmp_path: Path) -> None:
     """Levels in turn, 1 deg/h, and noise of 0.02: an angle error with (2 Q)^2 = 1 there would be one of 0.5 arcsec."""
     x = (-1.0) ** np.arange(1500) + 0.02 * np.random.default_rng(3).normal(size=1500)
@@ -116,6 +118,7 @@ def test_slopes_of_a_deviation_of_zero() -> None:
 
 
 @pytest.mark.parametrize(("n", "missing"), [(20_000, 0.1), (20_000, 0.2), (6_000, 0.04)])
+@pytest.mark.long
 def test_samples_missing_all_over_do_not_raise_the_white_noise(tmp_path: Path, n: int, missing: float) -> None:
     """N = 1 arcsec/sqrt(s): means over k of m samples have 1/k of the variance, at a tenth missing 1.11 times 1/m; a
     fifth missing leaves no stretch of 40 samples to tell.

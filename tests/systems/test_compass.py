@@ -49,6 +49,7 @@ def curve(result: Any, name: str) -> tuple[Any, Any]:
     return np.array(r.x), np.array(r.y) * np.exp(1j * np.radians(r.phase))
 
 
+@pytest.mark.long
 def test_the_two_filters_are_complementary(quiet: Any) -> None:
     """Measured k/(s + k) of the magnetic heading and s times 1/(s + k) of the drift: their sum is 1 (a step: 0.1 %)."""
     f, magnetic = curve(quiet, "magnetic path")
@@ -69,6 +70,7 @@ def test_cut_off_is_k_over_two_pi_measured_and_computed(quiet: Any) -> None:
     assert quiet["time constant"].estimate == pytest.approx(60.0, rel=2e-3)  # half a step of 0.1 s
 
 
+@pytest.mark.long
 def test_time_constant_under_noise() -> None:
     """The noise of the heading decays as the step does, so that its samples are no independent ones: eight seeds."""
     found = [result["time constant"] for result in each(("alignment",), 8)]
@@ -85,6 +87,7 @@ def test_drift_at_rest_leaves_the_drift_over_k(quiet: Any) -> None:
     assert free.estimate == pytest.approx(expected, rel=1e-3) and free.closed == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.long
 def test_declination_makes_the_heading_true() -> None:
     values = {"declination": 10 * DEG, **QUIET}
     assert reduced(("rest",), **values)["error at rest"].estimate == pytest.approx(5.0 / 60.0, rel=1e-3)
@@ -129,6 +132,7 @@ def test_a_disturbed_field_moves_it_by_the_limit_or_the_filter(quiet: Any) -> No
     assert middle.estimate == pytest.approx(law, rel=3e-3) and middle.closed is None
 
 
+@pytest.mark.long
 def test_random_heading_noise_is_that_of_the_two_filters() -> None:
     """White noise S of the magnetic heading: var S2 k/2; random walk N: N2/(2k).  Four times 1440 s: 48 independent."""
     noise, walk, k = 0.1 * DEG, 0.1 * DEG / 60.0, 1.0 / 60.0
@@ -156,6 +160,7 @@ def test_field_of_a_day_is_the_world_magnetic_models(
     assert here.u_declination / DEG == pytest.approx(math.hypot(0.26, 5625.0 / H), rel=1e-3)
 
 
+@pytest.mark.long
 def test_date_and_site_give_the_sensor_its_field() -> None:
     """55.75 N, 37.6 E, 200 m: ppigrf with IGRF 14 has D 12.06, I 71.73 degrees, H 16.647 uT; the heading is true."""
     place = {"latitude": 55.75 * DEG, "longitude": 37.6 * DEG, "height": 200.0}

@@ -151,6 +151,7 @@ def ratios(name: str, runs: int) -> Array:
 
 
 @pytest.mark.parametrize("name", list(READ))
+@pytest.mark.long
 def test_intervals_cover(name: str) -> None:
     low, high = counting.bounds(ratios(name, READ[name][1] // 4))
     assert low <= 0.95 <= high, f"coverage {low:.3f} .. {high:.3f}"

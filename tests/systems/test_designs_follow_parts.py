@@ -72,6 +72,7 @@ def test_rebalance_set_by_hand_is_what_the_stabilizer_reckons_with(designed: Ses
     assert record.run.linear is not None and record.run.linear.wanted == {"stabilizer": 10.0}
 
 
+@pytest.mark.long
 def test_three_axes_with_ten_times_the_inertia() -> None:
     """It ran into its stop: the gains were for 1, 2 and 0.7 kg.m2."""
     values = {**TENFOLD, "hold": 5.0, "swing": 0.0, "load_step": 0.5}
@@ -84,12 +85,14 @@ def test_three_axes_with_ten_times_the_inertia() -> None:
     assert not any("asked for" in w or "lock" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_rate_gain_of_three_axes_follows_the_torquers() -> None:
     values = {"gyro_x.k": "20deg/h/mA", "hold": 5.0, "sweeps": False, "swing": "1deg"}
     with only(THREE, "command step") as s:
         assert estimates(reduced(s, values)[1])["rate gain"] == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.long
 def test_gimbals_whose_servos_turn_faster() -> None:
     _, result = run(GIMBAL, {"platform.rate_gain": 10.0, "gyro_b.K_sg_y": 20.0, "roll": 1.0, "hold": 2.0})
     for axis in ("pitch", "roll", "azimuth"):
@@ -121,6 +124,7 @@ def test_foreign_gyro_on_a_heavier_platform(foreign: Foreign, known_gyro: Path) 
     assert found["rate gain"] == pytest.approx(1.0, abs=5e-3)
 
 
+@pytest.mark.long
 def test_foreign_gyro_that_says_nothing_of_its_torquer(
     foreign: Foreign, tmp_path: Path, command: Command, caplog: Any
 ) -> None:
@@ -142,6 +146,7 @@ def test_foreign_gyro_that_says_nothing_of_its_torquer(
     assert any(taken in n for n in json.loads((out / "run.json").read_text())["notes"])
 
 
+@pytest.mark.long
 def test_foreign_platform(foreign: Foreign) -> None:
     """Its servos turn with 50 deg/s for a volt, not with 1 rad/s."""
     maps = {"platform": FOREIGN / "vendor_platform.toml"}
@@ -152,6 +157,7 @@ def test_foreign_platform(foreign: Foreign) -> None:
 
 
 # ------------------------------------------------------------------------------------ what is missed
+@pytest.mark.long
 def test_gain_set_by_hand_is_told_with_what_comes_out(command: Command, tmp_path: Path, caplog: Any) -> None:
     """A third of the gain: 3.9 Hz instead of 10, told before the run and in the report, and so it is."""
     with Session(ONE) as s:

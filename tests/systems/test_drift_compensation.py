@@ -55,6 +55,7 @@ def test_figures_of_the_method() -> None:
     assert both.error[-1] == pytest.approx(both.stated[-1], rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_figures_come_out_of_the_co_simulation(with_angle: Any, rate_only: Any) -> None:
     for result, low, high in ((with_angle[1], 0.2, 0.28), (rate_only[1], 2.0, 2.9)):
         for c in result.coefficients:

@@ -111,6 +111,7 @@ def shifts(system: System, values: dict[str, Any], *fields: dict[str, Any]) -> l
     return [{n: found[n] - plain[n] for n in plain} for found in others]
 
 
+@pytest.mark.long
 def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_its_table() -> None:
     """Vertical, b U: unbalance, as in the tumble.  East, b E: y = -E at angle 0 in both mounts, so that B_y = -b cos a,
     B_z = b sin a, while X Z = g2 s c cos a and X Y = g2 s c sin a in both: D_IS by -b D_BO / (g2 s c), D_IO by
@@ -130,6 +131,7 @@ def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_its_table() -> N
     assert max(abs(v) for n, v in east.items() if n not in expected) < 1e-4, east
 
 
+@pytest.mark.long
 def test_the_field_is_turned_on_two_axes() -> None:
     """Vertical, b U: unbalance by -b D_B / gamma along all three axes of a gyro that is tumbled by both axes."""
     b = 44e-6
@@ -144,6 +146,7 @@ def test_the_field_is_turned_on_two_axes() -> None:
     assert max(abs(v) for n, v in up.items() if n not in expected) < 1e-4, up
 
 
+@pytest.mark.long
 def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_two_axes() -> None:
     """The same of both channels, over the attitudes of mounts 2 and 4."""
     b, values = 44e-6, servoing_two_axes.day(200.0, 72, **servoing_two_axes.QUIET)
@@ -156,6 +159,7 @@ def test_the_field_is_turned_into_the_axes_of_a_gyro_that_holds_two_axes() -> No
     assert max(abs(v) for n, v in up.items() if n not in expected) < 2e-4, up
 
 
+@pytest.mark.long
 def test_a_gyro_on_tilting_ground_reads_the_rate_of_the_tilt() -> None:
     """Input axis east, the ground turns by 100 arcsec/h about east: omega_IA and so k i is larger by 100/3600 deg/h;
     the drift rate omega_IA - k i that the reduction states with the Earth rate alone is smaller by it.  The spin axis,

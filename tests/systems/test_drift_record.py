@@ -71,6 +71,7 @@ def result(run: Record) -> DriftRecordResult:
     return found
 
 
+@pytest.mark.long
 def test_the_report_finds_the_noise_of_the_gyro(run: Record, result: DriftRecordResult) -> None:
     """N = sqrt(white^2 + (k meter)^2): both are white in the current; K and Q are set; B and R are none.
 
@@ -98,6 +99,7 @@ def test_the_report_finds_the_noise_of_the_gyro(run: Record, result: DriftRecord
     assert [result[n].verdict for n in ("N", "B", "K")] == ["inconclusive", "pass", "inconclusive"], "by the interval"
 
 
+@pytest.mark.long
 def test_a_channel_of_a_run(run: Record, result: DriftRecordResult, tmp_path: Path, command: Command) -> None:
     """The windows of a folder: the current with its scale is the rate, and the coefficients are those of the run."""
     folder = run.save(tmp_path / "run")
@@ -118,6 +120,7 @@ def test_a_channel_of_a_run(run: Record, result: DriftRecordResult, tmp_path: Pa
 
 # ------------------------------------------------------------------------------------------- files
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
     """Two gyros in one file: one in deg/s with a line and a temperature, one as angle; a gap in both."""
     n = 6000
@@ -144,6 +147,7 @@ def test_columns_lines_gaps_and_temperature(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_lines_are_taken_out_where_they_are(tmp_path: Path) -> None:
     """A line is in the deviations of the record; taken out, over a gap too, it is not: its phase is right."""
     n = 4000
@@ -159,6 +163,7 @@ def test_lines_are_taken_out_where_they_are(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_means_of_a_long_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where means are held, deviations are those of every sample, and the coefficients those of the same noise."""
     n = 8192
@@ -181,6 +186,7 @@ def test_means_of_a_long_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert means["K"].interval[0] < 0.2 < means["K"].interval[1]
 
 
+@pytest.mark.long
 def test_a_gauss_markov_drift_is_reported_as_a_filter_takes_it(tmp_path: Path) -> None:
     """0.05 deg/h rms of 20 s under white noise of 0.02 deg/h in 1 s: N, variance, tau and driving density; no B, no K.
 
@@ -208,6 +214,7 @@ def test_a_gauss_markov_drift_is_reported_as_a_filter_takes_it(tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.
 
@@ -230,6 +237,7 @@ def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_nothing_is_stated_that_the_deviation_contradicts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model whose deviation is not the record's gives no coefficient and no verdict, and says what it is not."""
     agreement = importlib.import_module("gyrobench.reduction.noise_model.agreement")
@@ -244,6 +252,7 @@ def test_nothing_is_stated_that_the_deviation_contradicts(tmp_path: Path, monkey
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_a_coarse_counter(tmp_path: Path) -> None:
     """15.36 counts of 0.5 arcsec a sample: two steps in three are the same, and none is a reset or wild.
 
@@ -292,6 +301,7 @@ def test_what_is_refused(
     assert not (tmp_path / "out" / "report.html").exists()
 
 
+@pytest.mark.long
 def test_what_is_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A wild value, rounding coarser than the noise, aliasing, a converter at its limit: read, and said."""
     description = importlib.import_module(".description", type(load()).__module__)

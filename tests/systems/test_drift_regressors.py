@@ -89,6 +89,7 @@ def turning(tmp_path_factory: pytest.TempPathFactory) -> DriftRecordResult:
     return reduce(tmp_path_factory.mktemp("turning") / "r.csv", columns, angle="table", harmonics="3")
 
 
+@pytest.mark.long
 def test_harmonics_over_the_angle(turning: DriftRecordResult) -> None:
     """C sin(t + phi): 3 cos t = 3 sin(t + 90 deg), -4 cos 2t = 4 sin(2t - 90 deg); u = sqrt(2/n) = 0.018."""
     found = rows(turning, 1)
@@ -120,6 +121,7 @@ def test_angles_that_carry_no_harmonics(tmp_path: Path, columns: dict[str, float
         reduce(tmp_path / "r.csv", table, angle="table")
 
 
+@pytest.mark.long
 def test_the_smoothed_drift_follows_the_true_one(tmp_path: Path) -> None:
     """Gauss-Markov drift of 0.5 deg/h and 200 s under white noise of 1 deg/h in 1 s: its 95 % band holds it."""
     rng = np.random.default_rng(4)

@@ -100,6 +100,7 @@ def floated(seed: int, tests: str, **more: Any) -> tuple[Suite, dict[str, float]
 
 # ------------------------------------------------------------------------------------------ agreement
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.long
 def test_tumble_and_polar_servo_agree(sessions: dict[str, Session], seed: int) -> None:
     """[CROSS-MAP], noise on: two tables, two loops, one with the torquer and one without it; all nine coefficients."""
     chosen, true = floated(seed, "tumble_single_axis servo_polar")
@@ -115,6 +116,7 @@ def test_tumble_and_polar_servo_agree(sessions: dict[str, Session], seed: int) -
         assert abs(p.difference) < 2.0 * p.U
 
 
+@pytest.mark.long
 def test_noise_off_leaves_what_the_loops_leave(sessions: dict[str, Session]) -> None:
     """The rebalance loop reads harmonics too large by a known fraction (tumbling.lag); nothing else parts them."""
     chosen, true = floated(5, "tumble_single_axis servo_polar")
@@ -128,6 +130,7 @@ def test_noise_off_leaves_what_the_loops_leave(sessions: dict[str, Session]) -> 
         assert max(lag.values()) > 1.2e-6  # so that the line above says something
 
 
+@pytest.mark.long
 def test_composite_drift_and_three_more_methods(sessions: dict[str, Session]) -> None:
     """One attitude, six attitudes and 36 positions against the tumble: each sees what it can and no more."""
     chosen, _ = floated(
@@ -159,6 +162,7 @@ def test_both_channels_by_tumble_and_eight_positions(sessions: dict[str, Session
         assert a == pytest.approx(b, abs=1e-5), name
 
 
+@pytest.mark.long
 def test_both_channels_by_tumble_and_two_axis_servo(sessions: dict[str, Session]) -> None:
     """Eighteen coefficients, noise on: one table turning under two rebalance loops, two tables held by the gyro."""
     true = two_channels.gyro(np.random.default_rng(6))
@@ -182,6 +186,7 @@ def unchanged(sessions: dict[str, Session]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("name", "culprit"), [("D_I", "servo_polar"), ("D_S", "servo_vertical_level")])
+@pytest.mark.long
 def test_a_gyro_that_changed_in_one_test_is_found(
     sessions: dict[str, Session], unchanged: dict[str, Any], name: str, culprit: str
 ) -> None:
@@ -196,6 +201,7 @@ def test_a_gyro_that_changed_in_one_test_is_found(
     assert any(f"gyro.{name} = " in w and "Not the same in all tests" in w for w in found.warnings)
 
 
+@pytest.mark.long
 def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str, Session]) -> None:
     """k of the torquer taken 10 % too large in both tumbles; the servo does not use it.  The reduction reads all drift
     that 10 % too large.  With a standard uncertainty of 10 % stated, the three agree and the mean follows the servo;

@@ -295,6 +295,7 @@ def from_file(command: Command, folder: Path, text: str, *more: str) -> dict[str
     return found
 
 
+@pytest.mark.long
 def test_laboratory_file(session: Session, command: Command, tmp_path: Path) -> None:
     record = session.run(SHORT, seed=4)
     expected = load().reduce(record)
@@ -343,6 +344,7 @@ def test_bad_laboratory_files(session: Session, tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------ days
+@pytest.mark.long
 def test_days_of_turn_on(session: Session, tmp_path: Path) -> None:
     """Five days whose turn-on constants are drawn with 0.1 deg/h about x: R_y scatters by that, u_x does not; the list
     of the runs and a laboratory's file with a column day give the same.

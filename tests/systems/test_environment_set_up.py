@@ -59,6 +59,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("error", "source", "by_hand"), CASES, ids=[c[1] for c in CASES])
+@pytest.mark.long
 def test_an_error_is_predicted_and_taken_out(
     session: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
 ) -> None:
@@ -93,6 +94,7 @@ def test_scales_by_hand(session: Session) -> None:
     assert part["offset of the current reading", "ω_0"] == pytest.approx((-17200.0, 0.0172), rel=1e-3)
 
 
+@pytest.mark.long
 def test_stated_mounts_are_held(session: Session) -> None:
     """Forty mounts of 60 arcsec about each axis, noise of 1e-4 deg/h in a window: stated, 0.85 or more of the
     intervals of ω_0, s_E and s_N hold; not stated, less than a quarter of those of ω_0.

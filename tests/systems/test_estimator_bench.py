@@ -119,6 +119,7 @@ def test_ar3() -> None:
 
 
 @pytest.mark.parametrize("part", ["kalman_ar", "kalman_rate"])
+@pytest.mark.long
 def test_consistency_counted(part: str) -> None:
     """On their own model NEES and NIS stay within their 99.9 % bounds for ten seeds of twenty (mean: one in fifty)."""
     benchmark = {"kalman_ar": "ar3", "kalman_rate": "level"}[part]
@@ -142,6 +143,7 @@ def test_sage_husa_on_constant_noise_is_no_better() -> None:
     assert own["R̂/R"].estimate == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.long
 def test_ranked_by_error_not_by_smoothness() -> None:
     """The wavelet of six levels has the least noise by far, and the largest error: it comes last."""
     runs = {
@@ -244,6 +246,7 @@ def test_records_that_cannot_be_reduced() -> None:
 
 
 # --------------------------------------------------------------------------------------- commands
+@pytest.mark.long
 def test_swap_and_compare(command: Command, tmp_path: Path) -> None:
     for part in ("none", "kalman_rate", "wavelet"):
         words = ["--part", f"estimator=estimator_{part}", "--out", tmp_path / part, "--json"]
@@ -263,6 +266,7 @@ def test_swap_and_compare(command: Command, tmp_path: Path) -> None:
     assert html.index("Ranking by error") < html.index("Components, parameters and settings that differ")
 
 
+@pytest.mark.long
 def test_errors_and_innovations_stand_under_their_names_over_the_whole_time(tmp_path: Any) -> None:
     """57 s are evaluated (3 s are skipped); the extremes of both are in their figures, which are no residuals of a fit.
 

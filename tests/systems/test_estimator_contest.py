@@ -87,6 +87,7 @@ def test_a_line_in_the_reading_can_be_had_without_the_contest() -> None:
 
 
 # ------------------------------------------------------------------------------------ effort
+@pytest.mark.long
 def test_motor_voltage_is_what_the_back_emf_and_friction_of_the_ride_take(quiet: Any) -> None:
     """k_t i = J w' + b (w - w_b), v = R i + L i' + k_e (w - w_b), b = 0.05, k_t = k_e = 1, R = 2, L = 4e-3, J = 2.
 
@@ -101,6 +102,7 @@ def test_motor_voltage_is_what_the_back_emf_and_friction_of_the_ride_take(quiet:
     assert quiet.result["time at a limit"].estimate == 0.0
 
 
+@pytest.mark.long
 def test_motor_voltage_of_noise_is_that_of_the_linear_model(noisy: Any) -> None:
     """var = 2 int |V|^2 S^2 df of a two-sided density, V from the test signal, which is added where the reading is.
 
@@ -126,6 +128,7 @@ def test_time_at_a_limit_is_the_share_of_the_clipped_sine(quiet: Any) -> None:
 
 
 # ------------------------------------------------------------------------------------ delay
+@pytest.mark.long
 def test_lag_of_an_average_is_half_its_length(averaged: Any, quiet: Any) -> None:
     """10 readings at 0.5 ms are 2.25 ms late at every frequency: 360 f_c 2.25e-3 degrees, and the margin loses them."""
     f_c, lag = averaged.result["f_c"].estimate, averaged.result["lag"].estimate
@@ -230,6 +233,7 @@ def test_more_noise_is_three_times_the_noise(noisy: Any, quiet: Any) -> None:
     )
 
 
+@pytest.mark.long
 def test_aiding_takes_the_drift_off(quiet: Any) -> None:
     """A drift of 10 deg/h turns the platform by 10 arcsec/s, 76 arcsec rms from 2 to 12 s after the phase begins; with
     the reference the estimator leaves what the base does, and the motor works no more for it.  Without a drift and an
@@ -328,6 +332,7 @@ def test_the_crossover_is_moved_until_the_margin_is_the_one_wanted(
     assert script.at_margin("any") == pytest.approx(10.0, abs=0.03)
 
 
+@pytest.mark.long
 def test_contest_of_two_over_two_seeds(script: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """Averaging takes most of the noise, the line and the mode from the motor; two seeds are enough to say so."""
     crossover = {"estimator_none": 16.2, "estimator_moving_average": 10.1}

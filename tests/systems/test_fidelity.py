@@ -72,6 +72,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.long
 def test_dynamic_is_quasi_static(name: str) -> None:
     case = CASES[name]
     system = load_system(name)

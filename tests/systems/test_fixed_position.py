@@ -120,6 +120,7 @@ def test_dynamic_against_quasi_static(session: Session) -> None:
 
 
 @pytest.mark.parametrize("correlated", [0.0, 0.002, 0.004])
+@pytest.mark.long
 def test_intervals_cover(correlated: float) -> None:
     """The default plan, white 0.0178 deg/h/sqrt(Hz) and Gauss-Markov noise of 300 s: of 100 intervals of coverage 0.93
     fewer than 83 hold the truth with probability 1e-4.

@@ -42,6 +42,7 @@ def apart(both: Any, name: str, record: int = 0) -> float:
     return float(np.max([np.abs(theirs[f"{name}[{k}]"] - ours[f"{name}[{k}]"]) for k in (1, 2, 3)]))
 
 
+@pytest.mark.long
 def test_the_vendors_platform_does_what_ours_does(both: Any) -> None:
     """The same plan on both, the whole run: they differ by what the integration explains, and by that.
 

@@ -112,6 +112,7 @@ def roll(tmp_path_factory: Any) -> str:
 
 
 @pytest.mark.parametrize(("form", "inner"), [("yaw-pitch", "pitch"), ("pitch-yaw", "yaw")])
+@pytest.mark.long
 def test_a_roll_past_the_bearings_is_rigid_kinematics(form: str, inner: str, roll: str) -> None:
     """About the outer axis the loop alone takes tan 40 degrees of the roll: hundreds of µrad, in both forms.
 
@@ -135,6 +136,7 @@ def test_a_roll_past_the_bearings_is_rigid_kinematics(form: str, inner: str, rol
 
 
 @pytest.mark.parametrize("form", ["yaw-pitch", "pitch-yaw"])
+@pytest.mark.long
 def test_second_order_is_in_the_budget(form: str) -> None:
     """A vehicle four times as rough: the roll times the joint angle rules, 16 times as large; budget within 2 %."""
     result, _ = ridden(form=form, psd_scale=4.0, gyro_noise=0.0, ride=36.0)

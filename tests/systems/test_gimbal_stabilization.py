@@ -18,6 +18,7 @@ def quiet() -> Any:
     return ridden(ride=60.0)[0]
 
 
+@pytest.mark.long
 def test_jitter_is_that_of_the_linear_model(quiet: Any) -> None:
     """Without dry friction the budget is in the interval of the co-simulation, widened by 2 %; the gyro rules."""
     for name in ("jitter pitch", "jitter yaw", "jitter"):
@@ -29,6 +30,7 @@ def test_jitter_is_that_of_the_linear_model(quiet: Any) -> None:
     assert quiet.reasons == [r for r in quiet.reasons if r.id != "budget.not_linear"]
 
 
+@pytest.mark.long
 def test_noise_of_the_gyro_by_hand() -> None:
     """No vibration: with |T| about 1 below the crossover, rms of n/(2 pi f) from 1 Hz on, peaked by the loop.
 
@@ -47,6 +49,7 @@ def test_noise_of_the_gyro_by_hand() -> None:
     "friction",
     [{"stiction": 0.05}, {"stiction": 0.02, "pitch": 0.6}, {"stiction": 0.02, "form": "pitch-yaw", "yaw": -0.5}],
 )
+@pytest.mark.long
 def test_slipping_joints_have_a_budget(friction: dict[str, Any]) -> None:
     """Dry friction rules the jitter; the torque that the joint angles make explains it within 6 %."""
     result, _ = ridden(**friction)
@@ -54,6 +57,7 @@ def test_slipping_joints_have_a_budget(friction: dict[str, Any]) -> None:
     assert rows(result)["dry friction"][2] > 30.0
 
 
+@pytest.mark.long
 def test_cogging_and_cables_have_a_budget() -> None:
     given = {f"platform.cogging[{k}]": 0.02 for k in (1, 2)} | {f"platform.cable[{k}]": 0.3 for k in (1, 2)}
     result, _ = ridden(given, gyro_noise=0.0)
@@ -69,6 +73,7 @@ def test_unbalance_and_acceleration_have_a_budget() -> None:
     assert rows(result)["acceleration by unbalance"][2] == pytest.approx(100.0)
 
 
+@pytest.mark.long
 def test_both_forms_are_one_gimbal() -> None:
     """Pitch-yaw with the inertias in its own axes, turned by 0.4: the jitters change places (other phases: 15 %)."""
     turned = {
@@ -81,6 +86,7 @@ def test_both_forms_are_one_gimbal() -> None:
     assert first["peak yaw"].estimate == pytest.approx(second["peak pitch"].estimate, rel=1e-6)
 
 
+@pytest.mark.long
 def test_margins_are_those_of_the_linear_model() -> None:
     """At 50 degrees of pitch the secant keeps the crossover of the outer loop where it was asked for."""
     result, _ = ridden(sweeps=True, psd="none", pitch=math.radians(50.0), gyro_noise=1e-6, ride=36.0)
@@ -89,6 +95,7 @@ def test_margins_are_those_of_the_linear_model() -> None:
         assert result[f"PM {axis}"].estimate == pytest.approx(result[f"PM {axis}"].closed, abs=0.3)
 
 
+@pytest.mark.long
 def test_the_keyhole_is_said() -> None:
     result, _ = ridden(pitch=math.radians(80.0), psd="none", ride=36.0)
     text = " ".join(result.warnings)
@@ -112,6 +119,7 @@ def test_refused(options: dict[str, Any], message: str) -> None:
         ridden(**options)
 
 
+@pytest.mark.long
 def test_a_file_with_spectra(tmp_path: Path) -> None:
     """Rates about x alone, 0.01 (deg/s)2/Hz from 2 to 8 Hz: no vibration about z in the budget."""
     file = tmp_path / "mast.csv"

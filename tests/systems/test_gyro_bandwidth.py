@@ -56,6 +56,7 @@ def test_a_butterworth_has_its_order(order: int) -> None:
     assert r.value[3] == pytest.approx(-phase[1] / w[1], rel=2e-3)
 
 
+@pytest.mark.long
 def test_random_responses_come_back() -> None:
     """24 low-passes with a delay, noise of 0.3 %: z of all figures, chi2 of 96 within 4 standard deviations."""
     rng = np.random.default_rng(4)
@@ -93,6 +94,7 @@ def test_random_responses_come_back() -> None:
         ("gyro_fog", {"gyro.optical": 0.0}, (1.0, None, None, 0.05, None)),
     ],
 )  # fmt: skip
+@pytest.mark.long
 def test_closed_forms_come_back(part: str, given: dict[str, Any], expected: tuple[float | None, ...]) -> None:
     c = found(reduced(part, {**SHORT, **given}))
     for name, value in zip(("K", "f_3dB", "f_90", "delay", "order"), expected, strict=True):
@@ -110,6 +112,7 @@ def wrong() -> Result:
                                       "u_lag": 2e-4})  # fmt: skip
 
 
+@pytest.mark.long
 def test_set_up_errors_do_what_is_predicted(wrong: Result) -> None:
     c = found(wrong)
     assert c["K"].estimate == pytest.approx(1.0 / 1.01, rel=1e-3)
@@ -158,6 +161,7 @@ def measured(tmp_path: Path, rows: np.ndarray, comments: str = "# type_b = none"
     return result
 
 
+@pytest.mark.long
 def test_a_measured_file(tmp_path: Path) -> None:
     """With u and without: the scatter about the curve takes its place."""
     rows = rows_of()
@@ -167,6 +171,7 @@ def test_a_measured_file(tmp_path: Path) -> None:
         assert c["order"].estimate == pytest.approx(2.0, abs=0.02)
 
 
+@pytest.mark.long
 def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
     ids = [r.id for r in measured(tmp_path, rows_of(), "").reasons]
     assert "type_b.unstated" in ids
@@ -207,11 +212,13 @@ def mistaken(kind: str) -> np.ndarray:
         ("point", "response.outlier", "off the curve"),
     ],
 )
+@pytest.mark.long
 def test_mistakes_are_named(tmp_path: Path, kind: str, id: str, said: str) -> None:
     reasons = {r.id: r.text for r in measured(tmp_path, mistaken(kind)).reasons}
     assert said in reasons.get(id, f"only {sorted(reasons)}")
 
 
+@pytest.mark.long
 def test_a_good_record_names_none(tmp_path: Path) -> None:
     reasons = [r.id for r in measured(tmp_path, rows_of(noise=1e-4)).reasons]
     assert not [r for r in reasons if r.startswith("response.")]

@@ -93,6 +93,7 @@ def drawn(rng: np.random.Generator) -> tuple[float, float, float, float, list[fl
     return rng.uniform(0.5, 2.0), tau_0, more, a2, [a2 * tau_0, a2, tau_0 + more, 1.0]
 
 
+@pytest.mark.long
 def test_random_responses_come_back() -> None:
     """15 gyros, noise of 0.1 %: sum of z2 of g, tau and f_3dB, 45 with standard deviation sqrt(90), 4.5 of them."""
     rng = np.random.default_rng(3)

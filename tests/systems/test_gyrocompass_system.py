@@ -47,6 +47,7 @@ def near(result: Any, name: str, value: float, off: float, closed: float = 0.0) 
     assert result[name].closed == pytest.approx(value, abs=closed or off), name
 
 
+@pytest.mark.long
 def test_periods_and_damping(quiet: Any) -> None:
     """Without damping 84.32 min, longer by a2/16 at the swing a = 4.4 degrees; damped with 0.33: over sqrt(1 - 0.33^2).
 
@@ -61,6 +62,7 @@ def test_periods_and_damping(quiet: Any) -> None:
     assert quiet["Schuler ratio"].closed == pytest.approx(1.0 / (1.0 + NORTH**2 * R / G0), rel=1e-9)
 
 
+@pytest.mark.long
 def test_latitude_error(quiet: Any, liquid: Any) -> None:
     """sin = -(D/mgl) tan L with D/H = 2 0.33 Omega, w_N beside mgl/H: -1.43 degrees; by a horizontal torque none."""
     error = -math.asin(2.0 * 0.33 * OMEGA * math.tan(40 * DEG) / (K + NORTH)) / DEG
@@ -110,6 +112,7 @@ def test_speed_error_is_tan_formula(quiet: Any, liquid: Any) -> None:
     assert quiet["turn error"].estimate == pytest.approx(quiet["turn error"].closed, abs=5e-4)
 
 
+@pytest.mark.long
 def test_ballistic_deflection_and_schulers_condition(quiet: Any, liquid: Any) -> None:
     """(mgl/H) V/g moves the heading; by Schuler's condition that is the speed error, so that nothing is left.
 
@@ -151,6 +154,7 @@ def test_rolling_between_the_quarters(quiet: Any) -> None:
     assert abs(cardinal["rolling error"].estimate) < 1e-3
 
 
+@pytest.mark.long
 def test_correctors_take_away_what_they_can() -> None:
     """What is left of the speed is the swing under the Coriolis force; of the ballistic error nothing is taken."""
     found = reduced(latitude_correction=True, speed_correction=True, phases="settling speed", settle="8h",
@@ -168,6 +172,7 @@ def test_noise_stays_within_the_intervals(seed: int) -> None:
     assert 0.005 < found["latitude error"].u < 0.1 and found["damping ratio"].u < 0.03
 
 
+@pytest.mark.long
 def test_fit_covers_with_drift_in_the_signal() -> None:
     """24 synthetic records of a swing under drift in tilt and noise: the errors are as large as u says.
 

@@ -65,6 +65,7 @@ def test_a_clean_record_passes(command: Command, text: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("more", [(), ("--set", "tilt=yes"), ("--set", "nuisances=none")])
+@pytest.mark.long
 def test_exchanged_mounts(command: Command, text: str, tmp_path: Path, more: tuple[str, ...]) -> None:
     """D_O Y is of the wrong sign against the dwells: a step of 4 x 0.1 x sin(45.75 deg) = 0.29 deg/h between mounts,
     which a tilt of the input axis would make, too; so it is found when that is estimated, and not advised.
@@ -85,6 +86,7 @@ def test_exchanged_mounts(command: Command, text: str, tmp_path: Path, more: tup
     assert "A handling error explains the residuals" in found["withheld"][-1]
 
 
+@pytest.mark.long
 def test_an_unknown_mistake_is_inconclusive(command: Command, text: str, tmp_path: Path) -> None:
     """The currents of mount 2 four times as large: no mistake that is tried, and no verdict."""
     *head, header, rest = text.partition("remark,")
@@ -187,6 +189,7 @@ MISTAKEN: dict[str, Callable[[str], str]] = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKEN)
+@pytest.mark.long
 def test_what_no_residual_shows_is_asked_for(command: Command, text: str, tmp_path: Path, mistake: str) -> None:
     """Each is fitted as well as the truth (D_S off by hundreds of u, D_I by 0.98 of 15 deg/h cos and sin ...): a record
     that does not state that they were looked for passes nothing, and names them; one that does passes.
@@ -210,6 +213,7 @@ def test_what_no_residual_shows_is_asked_for(command: Command, text: str, tmp_pa
     assert not [r for r in found["reasons"] if r["id"] == "arrangement.unstated"]
 
 
+@pytest.mark.long
 def test_a_stated_uncertainty_is_not_asked_for(command: Command, text: str, tmp_path: Path) -> None:
     bare = text.replace("# arrangement = checked\n", "").replace("# type_b = none\n", "")
     sizes = ("u_scale_factor=1e-4", "u_mount=20arcsec", "u_remount=1e-4deg/h")
@@ -225,6 +229,7 @@ def test_a_word_that_is_no_statement_is_refused(command: Command, text: str, tmp
     assert code == 2 and "arrangement = perhaps: 'checked' or nothing is expected" in err
 
 
+@pytest.mark.long
 def test_data_of_one_dwell_in_the_other_are_named(command: Command, text: str, tmp_path: Path) -> None:
     """Readings of static 3 copied into static 4, bit for bit; the same with one digit changed is no copy."""
     head, _, rest = text.partition("remark,")

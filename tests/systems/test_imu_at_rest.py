@@ -47,6 +47,7 @@ def table(result: DriftRecordResult, id: str) -> Table:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_units_walks_gravity_and_the_latitude(tmp_path: Path) -> None:
     """N of 1 mg in 0.1 s: 9.80665e-3 sqrt(0.1) 60 = 0.18607 m/s/sqrt(h) = 316.2 ug/sqrt(Hz).
 
@@ -72,6 +73,7 @@ def test_units_walks_gravity_and_the_latitude(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_a_mistaken_unit_is_named(tmp_path: Path) -> None:
     """Values in g under a head of m/s2: |f| is 1/9.80665 of gravity; a bias of 0.1 deg/s hides the Earth's rate."""
     columns = unit_at_rest(bias=360.0)
@@ -85,6 +87,7 @@ def test_a_mistaken_unit_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_a_single_accelerometer_above_gravity_is_named_from_a_forked_process_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -99,6 +102,7 @@ def test_a_single_accelerometer_above_gravity_is_named_from_a_forked_process_too
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_correlation_and_line_of_several_channels(tmp_path: Path) -> None:
     """gyro_x and gyro_y share half of their white power, gyro_z and acc_x a line of 1.7 Hz; no other pair has any."""
     n = 8192
@@ -120,6 +124,7 @@ def test_correlation_and_line_of_several_channels(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_the_share_of_a_temperature_is_its_own(tmp_path: Path) -> None:
     """A random walk beside a temperature that trends through the record: plain least squares give it most.
 
@@ -170,6 +175,7 @@ def test_a_change_that_follows_its_temperature_is_left_out(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_frozen_channels_and_repeated_rows_are_named(tmp_path: Path) -> None:
     """gyro_y stays for 60 samples; then each row is written twice.  Noise of 1 in steps of 0.1: p0 = 0.03."""
     columns = {n: np.round(v / q) * q for (n, v), q in
@@ -200,6 +206,7 @@ def test_runs_of_equal_samples_over_blocks() -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_channels_side_by_side_are_those_one_after_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     columns = {n: v for n, v in unit_at_rest(2048).items() if n[:6] in ("time [", "gyro_x", "acc_z ")}
     one = reduce(tmp_path, columns)

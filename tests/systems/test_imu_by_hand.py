@@ -48,6 +48,7 @@ def estimates(result: Any) -> dict[str, float]:
     return {c.name: c.estimate * tables.SCALES[c.unit] for c in result.coefficients}
 
 
+@pytest.mark.long
 def test_recovers_a_unit_without_noise(tmp_path: Path) -> None:
     """200 Hz, 18 attitudes: to 3e-7 of the sizes, what the trapezoid and the twelve digits of the file leave.  The
     truth is turned into the axes of the accelerometers by Gram and Schmidt, the reduction does it by LQ."""
@@ -63,6 +64,7 @@ def test_recovers_a_unit_without_noise(tmp_path: Path) -> None:
         assert value == pytest.approx(truth[n], abs=size), n
 
 
+@pytest.mark.long
 def test_g_sensitivity_while_turning(tmp_path: Path) -> None:
     """0.1 deg/s/g turns with gravity: without it in the model a turn in 1.5 s makes Sg wrong by 2e-4."""
     rng = np.random.default_rng(2)
@@ -76,6 +78,7 @@ def test_g_sensitivity_while_turning(tmp_path: Path) -> None:
     assert max(abs(off[c.name]) / (c.u * tables.SCALES[c.unit]) for c in result.coefficients) < 4.5
 
 
+@pytest.mark.long
 def test_counts_are_as_good_as_units(tmp_path: Path) -> None:
     """Counts of any zero and scale give the same sizes: scale factors, biases and angles."""
     rng = np.random.default_rng(2)
@@ -97,6 +100,7 @@ def test_counts_are_as_good_as_units(tmp_path: Path) -> None:
     assert sizes == pytest.approx(9.805, abs=8e-4)  # as printed, the correction makes gravity of every reading
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     """8 runs of 30 coefficients, a small unit in 24 attitudes; tests/benchmarks/imu_positions.py counts more."""
     hits = total = 0
@@ -113,6 +117,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     assert total == 240 and 0.90 < hits / total < 0.99
 
 
+@pytest.mark.long
 def test_runs_go_the_same_way() -> None:
     """The co-simulation with attitudes that are not read: intervals hold the truth, in axes of the accelerometers."""
     values = {"attitudes": "unknown", "positions": 18, "dwell": 8.0, "windows": 1, "settle": 2.0, "turns": 1}

@@ -38,6 +38,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return unit, run, write_fitted(load_system("imu_positions"), run.result, run.record, "imu_compensator", folder)
 
 
+@pytest.mark.long
 def test_a_second_run_proves_the_compensation(calibrated: Any) -> None:
     """Behind the compensator 33 coefficients are left: each truth within 4.5 U/1.96 of the first run, none of the 5e-3
     that were there, and the second run's estimates agree with them.

@@ -94,6 +94,7 @@ def test_co_simulation_recovers_the_unit() -> None:
         assert value == pytest.approx(truth[n], abs=size), n
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth() -> None:
     """24 runs, 33 coefficients: noise of the population (white, Gauss-Markov or both), whole skeleton; the share of 792
     intervals, those of a run being related, within 0.92 .. 0.98.  tests/benchmarks/imu_positions.py counts more."""
@@ -264,6 +265,7 @@ LABELS = {
 
 
 @pytest.mark.parametrize("said", LABELS)
+@pytest.mark.long
 def test_mistaken_angles_of_a_file_are_named(said: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(10)
     world, places = World(), (*EDGES[4:], *EDGES[:4], *FACES)
@@ -299,6 +301,7 @@ FORGOTTEN = {
 
 
 @pytest.mark.parametrize("said", FORGOTTEN)
+@pytest.mark.long
 def test_a_forgotten_position_is_named(said: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(10)
     world, places = World(), (*EDGES[4:], *FACES, *EDGES[:4])
@@ -311,6 +314,7 @@ def test_a_forgotten_position_is_named(said: str, tmp_path: Path) -> None:
     assert said in told
 
 
+@pytest.mark.long
 def test_a_file_gives_what_its_windows_give(tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     world, unit = World(), Unit.drawn(rng)
@@ -320,6 +324,7 @@ def test_a_file_gives_what_its_windows_give(tmp_path: Path) -> None:
     assert file == pytest.approx(own, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.long
 def test_position_that_is_off_contradicts_the_model(tmp_path: Path) -> None:
     """One position a degree off: the constants of the phases differ by more than the noise, and nothing passes."""
     rng = np.random.default_rng(13)

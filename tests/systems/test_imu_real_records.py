@@ -46,6 +46,7 @@ def xsens(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return reduced(tmp_path_factory.mktemp("xsens") / "mti.csv", head, data)
 
 
+@pytest.mark.long
 def test_xsens_against_its_data_sheet(xsens: Any) -> None:
     """Data sheet, rounded to 1 count: 415, 413, 415 counts/(m/s2) and 4778, 4758, 4766 counts/(rad/s); angles between
     the input axes from its rounded misalignments of the accelerometers (1, 0, -0.01; 0.01, 1, 0.01; 0.02, 0.01, 1):

@@ -67,6 +67,7 @@ def setup(**more: Any) -> Any:
     return budget.ImuSetup(**{**site, "thermal": (3, 2, 10.0, 0.0), **more})
 
 
+@pytest.mark.long
 def test_a_world_in_plain_numpy_comes_back() -> None:
     """No noise; what is left comes from a temperature that only the means of windows tell, 1.4 K a window at 4 K/min:
     below 0.03 of a thermal effect at 40 K (20 deg/h, 2 mg, 500 ppm)."""
@@ -90,6 +91,7 @@ def white(seed: int) -> Any:
     return noise
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth() -> None:
     """White noise, four units of 75 coefficients, those of a unit being related; the benchmark counts more."""
     hits = total = 0
@@ -116,6 +118,7 @@ def first() -> Any:
     return gb.load("imu_positions", VALUES).run(seed=1, check_step=False)
 
 
+@pytest.mark.long
 def test_a_unit_in_the_chamber(first: Any) -> None:
     temperature = np.asarray(first.record.channels["chamber.temperature"])
     assert temperature.max() > 35.0 and temperature.min() < -35.0 and abs(temperature[-1]) < 15.0
@@ -123,6 +126,7 @@ def test_a_unit_in_the_chamber(first: Any) -> None:
     assert z.size == 75 and np.abs(z).max() < 4.5 and 0.7 < np.sqrt(np.mean(z**2)) < 1.4
 
 
+@pytest.mark.long
 def test_the_compensation_holds_in_a_second_cycle(first: Any, tmp_path: Path) -> None:
     """With what was found in a part, another run: the temperature terms are gone within both intervals; none of it was
     so before."""
@@ -140,6 +144,7 @@ def test_the_compensation_holds_in_a_second_cycle(first: Any, tmp_path: Path) ->
     assert all(c.truth is None for c in found.coefficients)  # what is left of a polynomial over another is none
 
 
+@pytest.mark.long
 def test_a_laboratory_reads_its_thermometer_in_degrees(tmp_path: Path) -> None:
     w, truth = heated(5, 3, white(5))
     names = ["phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{k}{a}" for k in "ga" for a in "xyz")]

@@ -104,6 +104,7 @@ def test_errors_that_are_not_stated_leave_the_estimates_alone(head: Session) -> 
         reduced(head, {}, "angle error, once a turn = 1(1) arcsec")
 
 
+@pytest.mark.long
 def test_stated_errors_of_the_head_are_held(head: Session) -> None:
     """Thirty records of 24 positions in both mounts, noise of 1 ug, each with readings that are off by 2 arcsec once a
     turn (sine, cosine: 9.7 ug/g^2 in k4 and k5): stated, 0.90 or more of the intervals hold; not stated, those of k5
@@ -146,6 +147,7 @@ def made(rng: np.random.Generator, points: int, size: float, **setup: Any) -> tu
 
 
 @pytest.mark.parametrize("size", [0.2, 1.0])
+@pytest.mark.long
 def test_errors_of_positions_that_come_back_are_in_the_intervals(size: float) -> None:
     """One error of a position is in both mounts.  As noise of each datum they had k0 held 0.75 times at 1 arcsec."""
     held: dict[str, list[bool]] = {}
@@ -173,6 +175,7 @@ def test_positions_that_come_back_are_asked_for_where_the_plan_does_not_show_the
     assert conclude(result, None, limits).verdict == "pass" and "σ_position" in result.names
 
 
+@pytest.mark.long
 def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
     """k5 X Z in mount a is -k5 sin cos, k4 X Y in mount b +k4 sin cos: exchanged, k4 is -k5 and k5 is -k4, and no
     residual shows it.  Twelve of twelve are inconclusive, and name it; stated as checked they pass.

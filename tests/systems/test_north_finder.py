@@ -329,6 +329,7 @@ def test_the_reduction_is_right_at_any_tilt(method: str) -> None:
         )
 
 
+@pytest.mark.long
 def test_two_positions_near_north_are_held() -> None:
     """Cosines 0, 1, 2 and 4 standard deviations from 1, 60 records each: the interval is that of the cosine.
 

@@ -37,6 +37,7 @@ def names(system: System) -> list[str]:
     return [system.windows.watch, *system.windows.columns.values()]
 
 
+@pytest.mark.long
 def test_container_in_fmpy_is_the_run_of_the_bench(tmp_path: Path) -> None:
     """With all noise: windows, what the finder says and the heading of the reduction, bit for bit."""
     pytest.importorskip("fmu_manipulation_toolbox")
@@ -57,6 +58,7 @@ def test_container_in_fmpy_is_the_run_of_the_bench(tmp_path: Path) -> None:
     assert abs(found["finder.heading"][-1] - HEADING) < 6.0 * found["finder.sigma"][-1]
 
 
+@pytest.mark.long
 def test_ssp_in_libcosim_finds_the_same_heading(tmp_path: Path) -> None:
     """Without noise.  libcosim couples all parts in parallel, a step late: at rest that changes nothing."""
     pytest.importorskip("libcosimpy")

@@ -101,6 +101,7 @@ def test_spin_axis_coupling_is_allowed_for(session: Session) -> None:
     assert lines["float gain H/C"] == pytest.approx(abs(wrong.estimate - right.estimate), rel=0.05)
 
 
+@pytest.mark.long
 def test_with_noise(session: Session) -> None:
     """An hour with the standard noise, four seeds: z of rms about 1, the gain within 1 %, the range in the summary."""
     results = [reduced(session, {"dwell": 1.0}, seed) for seed in range(4)]
@@ -192,6 +193,7 @@ def test_refused_records() -> None:
 
 
 # ------------------------------------------------------------------------------------------ laboratory files
+@pytest.mark.long
 def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
     record = session.run({**SHORT, "latitude": 0.5}, seed=3)
     expected = load().reduce(record).coefficients[0]

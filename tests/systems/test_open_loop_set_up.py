@@ -64,6 +64,7 @@ def test_an_error_is_predicted_and_taken_out(
     assert math.sqrt(c.u**2 - c.u_a**2) == pytest.approx(abs(by_hand) / 60.0, rel=0.02)
 
 
+@pytest.mark.long
 def test_stated_errors_of_the_encoder_are_held(session: Session) -> None:
     """Thirty encoders off by 60 arcsec once a turn, readings to 1e-8 rad: stated, 0.86 or more of the intervals hold
     what an ideal one gives, not stated less than half.

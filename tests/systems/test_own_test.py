@@ -44,6 +44,7 @@ def test_it_is_short() -> None:
     assert len(EXAMPLE.read_text("utf-8").splitlines()) <= 45
 
 
+@pytest.mark.long
 def test_from_a_folder_to_a_report(bench: Path, command: Command) -> None:
     """Six coefficients of the standard gyro with their uncertainties; halving the step changes none of them."""
     code, out, err = command("run", NAME, "--set", "u_scale_factor=1e-4", "--check-step", "--seed", 4, pages=True)
@@ -61,6 +62,7 @@ def test_from_a_folder_to_a_report(bench: Path, command: Command) -> None:
     assert "Six-position test" in page and "mass unbalance along the spin axis" in page
 
 
+@pytest.mark.long
 def test_what_comes_along_from_the_family(bench: Path, command: Command) -> None:
     """Options, checks, order of execution and set-up errors, without a word of them in the file."""
     code, out, _ = command("show", NAME)

@@ -86,6 +86,7 @@ def test_a_bent_pickoff_is_seen() -> None:
     assert named(r)["linearity"].verdict == "fail" and r.verdict == "fail"
 
 
+@pytest.mark.long
 def test_the_largest_of_many_departures_is_no_bend() -> None:
     """A straight pickoff, noise of the readings alone: the largest of 21 departures is 2.3 u off zero, and a factor for
     one of them held zero in 0.63 of records.  Of 100, 0.95 less 3 sigma (0.065) hold it.

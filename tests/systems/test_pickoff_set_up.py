@@ -82,6 +82,7 @@ def record(rng: np.random.Generator, encoder: float) -> dict[str, Any]:
     return {**ideal, "angle_start": read, "angle_end": read, "mean": u}
 
 
+@pytest.mark.long
 def test_stated_errors_of_the_encoder_are_held() -> None:
     """Forty records with 30 arcsec once a turn (1.5e-4 of S, ten times its u of type A): 0.87 or more are held where
     it is stated, less than a third where it is not.

@@ -90,6 +90,7 @@ def test_a_simulated_error_has_the_sign_and_size_of_its_budget_line(session: Any
     assert line.sensitivity * size == pytest.approx(expected / DEG, rel=0.03, abs=0.005)
 
 
+@pytest.mark.long
 def test_a_wrong_latitude_moves_order_two_and_not_order_three(session: Any, clean: Any) -> None:
     """U torqued too large by u leaves d_z = u; order 2, its gains over N as believed: 2 z u/w times that over N."""
     e, w = 3.0 * DEG, 0.04

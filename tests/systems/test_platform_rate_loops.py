@@ -42,6 +42,7 @@ def gain(k: int) -> float:
     return WC * J[k] / math.hypot(1.0, WI / WC)
 
 
+@pytest.mark.long
 def test_stiffness_of_the_rate_loop_with_integral(found: Any) -> None:
     """K_w w + K_wi angle: a constant torque M turns an axis by M/(K_w wi), 266 arcsec about pitch, and no further.
 

@@ -80,6 +80,7 @@ def test_answer_says_how_far_the_loop_is_from_its_limits(quiet):
     assert any(s.startswith("A load of 1 N·m turns it by up to 75.") for s in result.summary)
 
 
+@pytest.mark.long
 def test_estimators_are_ranked_by_platform_error_not_by_smoothness():
     """With the same noise: the moving average has the smoothest estimate and the worst margin of the three."""
     found = {e: reduced({"estimator": f"estimator_{e}"}, hold=30.0, reading_noise=3e-4)[1:]
@@ -93,6 +94,7 @@ def test_estimators_are_ranked_by_platform_error_not_by_smoothness():
 
 
 @pytest.mark.parametrize("name", ["kalman_ar", "sage_husa", "wavelet", "alpha_beta_gamma"])
+@pytest.mark.long
 def test_every_estimator_runs_in_the_loop(name):
     values = {"estimator.phi[1]": 0.95, "estimator.phi[2]": 0.0, "estimator.phi[3]": 0.0} if name == "kalman_ar" else {}
     _, _, found = reduced({"estimator": f"estimator_{name}"}, **values)

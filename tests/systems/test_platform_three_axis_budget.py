@@ -50,6 +50,7 @@ def whole() -> tuple[Any, dict[tuple[str, str], Any]]:
     return ridden(swing(2, 0.7), swing(3, 0.9), COMMANDED, **DRY)
 
 
+@pytest.mark.long
 def test_shares_add_up_and_the_whole_is_what_was_measured(whole: Any) -> None:
     result, rows = whole
     for motion in (BASE_Y, BASE_Z, COMMAND):
@@ -61,6 +62,7 @@ def test_shares_add_up_and_the_whole_is_what_was_measured(whole: Any) -> None:
 
 
 @pytest.mark.parametrize(("source", "name"), [("viscous friction", "viscous"), ("dry friction", "friction")])
+@pytest.mark.long
 def test_friction_switched_off_takes_its_share(whole: Any, source: str, name: str) -> None:
     """What the budget says would be left is what a run without the source measures."""
     _, rows = whole
@@ -77,6 +79,7 @@ def test_reaction_of_the_gimbals_alone(whole: Any) -> None:
     assert less[BASE_Z, "measured"][0] == pytest.approx(rows[BASE_Z, "reaction of the gimbals"][0], rel=0.1)
 
 
+@pytest.mark.long
 def test_output_axes_switched_off_take_their_share() -> None:
     """Gyros that do not get the angular acceleration have no output-axis coupling; bearings without friction."""
     free = {f"platform.viscous[{k}]": 0.0 for k in AXES}
@@ -93,6 +96,7 @@ def test_output_axes_switched_off_take_their_share() -> None:
     ("source", "noise", "seeds", "scatter"),
     [("white drift of the gyros", "white", 6, 0.16), ("noise of the pickoffs", "pickoff", 1, 0.1)],
 )
+@pytest.mark.long
 def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float) -> None:
     """A hold of 4 s at rest: the mean square of three axes and six seeds; of a random walk about mean and slope nearly
     all is in a few independent parts an axis, so it scatters by about sqrt(2/(3 6 4)) = 17 %, the rms by 8."""

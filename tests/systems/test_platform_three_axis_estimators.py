@@ -35,6 +35,7 @@ def filtered() -> Any:
     return ride("estimator_kalman_rate")
 
 
+@pytest.mark.long
 def test_no_estimator_in_the_three_slots_is_no_slot(plain: Any) -> None:
     """Bit for bit: the wires from the gyros to the decoupler go through them."""
     through = ride("estimator_none")

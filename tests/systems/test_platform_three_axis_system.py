@@ -61,6 +61,7 @@ def closed(session, azimuth):
 
 
 @pytest.mark.parametrize("azimuth", [40.0, 60.0, 80.0])
+@pytest.mark.long
 def test_stability_over_azimuth(sessions, azimuth):
     """F16 in the co-simulation: without T2 stable at 40, unstable at 60 and 80 degrees; with T2 at all three."""
     for decoupled, session in sessions.items():
@@ -79,6 +80,7 @@ def test_stability_over_azimuth(sessions, azimuth):
         assert bool(unstable(record.run.linear.closed.discrete)) is not stable
 
 
+@pytest.mark.long
 def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
     """Without T2 the loop gain is W(s) exp(+-j azimuth): it is at its limit where the azimuth is the phase margin.
 
@@ -96,6 +98,7 @@ def test_each_degree_of_azimuth_costs_a_degree_of_margin(sessions):
 @pytest.mark.parametrize(
     ("theta", "hertz", "printed"), [((20, 0, 30), 1.0, 1.72), ((40, 10, 30), 1.0, 1.90), ((40, 10, 30), 3.0, 16.4)]
 )
+@pytest.mark.long
 def test_coupling_on_the_83_mil_bench(sine_about_x, theta, hertz, printed):
     """[DECOUPLE-BENCH-83MIL] A third of 83 mil: cross axes without T2 as there, with T2 a tenth of it."""
     values = {"pitch": f"{theta[0]}deg", "roll": f"{theta[1]}deg", "azimuth": f"{theta[2]}deg", "frequency": hertz,
@@ -105,6 +108,7 @@ def test_coupling_on_the_83_mil_bench(sine_about_x, theta, hertz, printed):
     assert cross[True] < 0.1 * cross[False]
 
 
+@pytest.mark.long
 def test_base_motion_is_isolated_by_more_than_40_db(short):
     """F17: 83 mil at 0.5, 0.7, 0.9 Hz about x, y, z, one after the other; the T2 is not what isolates."""
     for _, _, found in short.values():
@@ -133,6 +137,7 @@ def test_isolation_is_that_of_the_continuous_model(short):
             assert 20.0 * math.log10(taken) == pytest.approx(truth, abs=0.15)
 
 
+@pytest.mark.long
 def test_isolation_about_z_is_that_of_its_own_motion(short):
     """Within 2 u of the same equations, integrated through a swing of 83 mil from the joint angles at its start."""
     record, _, found = short[True]
@@ -162,6 +167,7 @@ def test_isolation_about_z_is_that_of_its_own_motion(short):
     assert "about z, 4.98° at 0.9 Hz, joints about 20.0°, " in found["isolation z"].meaning
 
 
+@pytest.mark.long
 def test_command_turns_the_platform_its_way():
     """A commanded rate through the torquer: angle reached = angle commanded / |1 + 1/L|, in phase within degrees."""
     with only(NAME, "command") as session:
@@ -175,6 +181,7 @@ def test_command_turns_the_platform_its_way():
         assert np.corrcoef(rate, record.channels[f"exciter.command[{k}]"][inside])[0, 1] > 0.999
 
 
+@pytest.mark.long
 def test_margins_of_the_sweep_are_those_of_the_linear_parts():
     """Within 1 dB and 3 degrees up to twice the crossover, on each axis; the delays are in the model."""
     with only(NAME, "loop") as session:
@@ -187,6 +194,7 @@ def test_margins_of_the_sweep_are_those_of_the_linear_parts():
     assert all(45.0 < found[f"PM {axis}"].estimate < 60.0 for axis in ("pitch", "roll", "azimuth"))
 
 
+@pytest.mark.long
 def test_platform_drifts_as_its_gyros_do():
     """Drift about each axis is that of the gyro there, for gravity as the tilted element sees it; noise included."""
     with only(NAME, "command step", "drift") as session:
@@ -198,6 +206,7 @@ def test_platform_drifts_as_its_gyros_do():
         assert abs(c.z) < 4.0
 
 
+@pytest.mark.long
 def test_singular_secant_and_lock_are_said(sessions):
     values = {"pitch": "75deg", "decoupler.theta_f_max": "60deg", "swing": 0.0}
     _, result, _ = reduced(sessions[True], **values)

@@ -30,6 +30,7 @@ def reduced(name: str, part: str, values: dict[str, object], seed: int = 1) -> t
 
 
 @pytest.mark.parametrize("part", PARTS)
+@pytest.mark.long
 def test_drift_record_gives_the_density_that_the_gyro_shows(part: str) -> None:
     system, result = reduced("drift_record", part, {"duration": 600.0, "window": 0.2})
     assert system["reading"] == "rate" and "rebalance" not in system.slots

@@ -53,6 +53,7 @@ def polar(request: pytest.FixtureRequest) -> Iterator[tuple[str, Session, dict[s
         yield request.param, prepared, {**DAY50, **quiet(loaded), "lock.i_max": 1.0}
 
 
+@pytest.mark.long
 def test_random_gyros(polar: Any) -> None:
     """Nine coefficients of the axis come back, whatever the other axis drifts; its torquer reads the other axis."""
     channel, session, values = polar
@@ -102,6 +103,7 @@ def _locked_axis_reads(channel: str, record: Any, values: dict[str, Any]) -> Non
     assert np.max(np.abs(read + omega_d)[S]) / DPH < 2e-3  # middle of a window of 2.5 degrees for its mean
 
 
+@pytest.mark.long
 def test_a_turned_gyro_is_off_as_predicted(polar: Any) -> None:
     """60 arcsec about the gyro's x, y, z: what the report predicts is what happens, with the axes of this channel."""
     channel, session, values = polar

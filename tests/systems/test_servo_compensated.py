@@ -65,6 +65,7 @@ def test_currents_by_hand_and_nothing_is_left() -> None:
     assert rate == pytest.approx(frames.EARTH_RATE * math.sin(math.radians(45.75)), abs=1e-6 * DPH)
 
 
+@pytest.mark.long
 def test_a_coefficient_that_does_not_repeat_is_left() -> None:
     """D_S put in as of the day before, 0.1 deg/h/g off, under noise: that one is beyond its interval."""
     _, result = compensated(TRUE | {"D_S": TRUE["D_S"] + 0.1}, dwell=300.0)

@@ -23,6 +23,7 @@ LONG = {"attitudes": NORTH, "cycles": 1, "dwell": 1500.0, "levelled": True, "nui
 
 
 @pytest.mark.parametrize("channel", ["", "y"])
+@pytest.mark.long
 def test_random_gyros(channel: str) -> None:
     """25 min with the input axis north, where the Earth would turn the table by 4.4 deg: 1 deg is the limit.
 

@@ -121,6 +121,7 @@ def drawn():
     return gb.load(NAME, **values).run(seed=5, check_step=False), values
 
 
+@pytest.mark.long
 def test_run_recovers_the_loop(drawn):
     """Each value within 3 u of its closed form; the margins of the linear model with step and delays are those too."""
     run, _ = drawn
@@ -161,6 +162,7 @@ def quiet(**values):
     return {c.name: c for c in run.result.coefficients}
 
 
+@pytest.mark.long
 def test_follower_and_shaper_by_comparison():
     """Rings on the axis: 1397 g.cm instead of 127.  Without shaper 1400 g.cm turn the table by 8.4 times the angle."""
     rings = quiet(follower=False, hold=2.0)
@@ -172,6 +174,7 @@ def test_follower_and_shaper_by_comparison():
     assert "K_T" not in bare and "PM" not in bare  # H/c = 1: table and float turn by the same angle, 0.896 arcsec
 
 
+@pytest.mark.long
 def test_vortex_torque_of_the_bearing_moves_the_null():
     """M_2 = 0.05 N.m acts at rest: the table stands M_2/K_T aside; differences, so stiffness and M_r, do not show it.
 
@@ -186,6 +189,7 @@ def test_vortex_torque_of_the_bearing_moves_the_null():
         assert aside[name].estimate == pytest.approx(still[name].estimate, rel=1e-6)
 
 
+@pytest.mark.long
 def test_undamped_gyro_returns_the_table_and_holds_the_torque_by_its_float():
     """c -> 0: the table angle under a constant torque is 0, the float holds M / (G K_g); no stiffness is given."""
     c = quiet(network=3, hold=2.0, friction=0.0)

@@ -87,6 +87,7 @@ def test_combination_when_nothing_tells_r_from_k_zx(day: Any) -> None:
         assert c.estimate == pytest.approx(c.truth, abs=LIMIT)
 
 
+@pytest.mark.long
 def test_equal_compliances_assumed(polar: Session) -> None:
     """Route (i) is exact when K_zx = K_xz; else the error is (K_zx - K_xz) in K_zx and that times g2 sin2 in R."""
     values = {**DAY50, **QUIET, "route": "equal", "gyro.D_II": -0.04 * DPH, "gyro.D_SS": 0.04 * DPH}
@@ -159,6 +160,7 @@ def test_too_little_of_a_turn_is_refused(day: Any) -> None:
         load_system(NAME).reduce(part_of(day, 30.0))
 
 
+@pytest.mark.long
 def test_large_unbalance(polar: Session) -> None:
     """D_S of a full Earth rate: within a window the rate changes by percents, and the regressors follow it (an even
     turn was 2e-3 deg/h off at D_S = 15 deg/h/g).  Drift and Earth rate are fifty times larger than in a real day.
@@ -235,6 +237,7 @@ def test_refused_before_anything_runs(polar: Session, values: dict[str, Any], te
         polar.run(values)
 
 
+@pytest.mark.long
 def test_encoder_harmonics_shift_as_predicted(polar: Session, day: Any) -> None:
     """a sin(theta + p) read with the angle adds a theta' cos(theta + p) to the rate; mount S turns at +W, N at -W.
 
@@ -283,6 +286,7 @@ def test_axis_tilt_shifts_as_predicted(polar: Session, day: Any) -> None:
     assert math.hypot(*(b.contribution for b in lines)) == pytest.approx(size_S / math.sqrt(2.0), rel=0.1)
 
 
+@pytest.mark.long
 def test_unbalance_over_stiffness_shifts_as_predicted(polar: Session, day: Any) -> None:
     """A mass m at r on the face pulls with m r (y force); the table gives way by that over K_T: a cos(theta) in S and
     -a cos(theta) in N with a = m r g c / K_T.  The rates -+a theta' sin(theta) are -a W sin(theta) in both mounts, and

@@ -38,6 +38,7 @@ def of(result: Any, title: str) -> list[dict[str, Any]]:
     return [dict(zip(table.columns, row, strict=True)) for row in table.rows]
 
 
+@pytest.mark.long
 def test_end_values_are_generalized_least_squares_over_the_record(live: Any) -> None:
     """Of each mount by itself, all windows at once, with the noise of the gyro: to 1e-5 of the standard deviations."""
     record, _ = live

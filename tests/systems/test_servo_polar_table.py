@@ -47,6 +47,7 @@ def smooth(polar: Session) -> Callable[[float], dict[str, float]]:
 
 @pytest.mark.parametrize("softer", [1.0, 2.0])
 @pytest.mark.parametrize(("phase", "name", "sign"), [(0.0, "D_S", 1.0), (math.pi / 2.0, "D_O", -1.0)])
+@pytest.mark.long
 def test_ripple_over_stiffness(
     polar: Session, smooth: Callable[[float], dict[str, float]], softer: float, phase: float, name: str, sign: float
 ) -> None:
@@ -96,6 +97,7 @@ def wobbling() -> Iterator[tuple[Session, dict[str, float]]]:
 
 
 @pytest.mark.parametrize(("phase", "row"), [(0.0, 0), (math.pi / 2.0, 1)])
+@pytest.mark.long
 def test_wobble(wobbling: tuple[Session, dict[str, float]], phase: float, row: int) -> None:
     """The axis goes round a cone twice a turn: gravity along the gyro axes changes with it, Earth rate along the input
     axis does not, to first order.  Told by the budget with sign, to 5 % of the largest shift.  (Second order is q2 W,

@@ -50,6 +50,7 @@ def table() -> Iterator[Session]:
 
 # ------------------------------------------------------------------------------------------ recovery
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.long
 def test_random_gyros_at_random_latitudes(table: Session, seed: int) -> None:
     """A day in fifty: every window reads the equation of Hu 1981 and the effect of the loop's stiffness, to 2e-8 deg/h.
     Every coefficient comes back to 1e-6 deg/h of the truth and what that effect makes of it, by both ways; the effect
@@ -158,6 +159,7 @@ def test_table_effects_as_predicted(
     assert np.max(np.abs(shift - expected)) < 0.03 * np.max(np.abs(expected))
 
 
+@pytest.mark.long
 def test_gyro_askew_on_the_plate_as_predicted(table: Session, brief: Any) -> None:
     """The gyro turned by 20 arcsec about each axis of the plate; about z it mixes the channels of the loops."""
     for k, axis in enumerate("xyz"):

@@ -139,6 +139,7 @@ def test_drift_that_ends_the_plan_is_foreseen(bench: Session, values: dict[str, 
         bench.run({**SHORT, "dwell": 600.0, "settle": 10.0, **values})
 
 
+@pytest.mark.long
 def test_ordinary_gyro_of_ten_degrees_an_hour(bench: Session) -> None:
     """The loop closes above capture_slow; dwells start on the other side of level by what the drift turns the table,
     10 deg/h 305 s = 0.85 deg.  D_OS comes in by the sine of that, at most 0.02 0.015 = 3e-4 deg/h at the ends, and is

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from servoing import DAY50, DPH, polar_at_2_ms
 from servoing_two_axes import day
 from stated import FAINT
@@ -78,6 +79,7 @@ def ramped(record: Record, rate: float) -> Record:
 
 
 # ------------------------------------------------------------------------------------------ servo tests
+@pytest.mark.long
 def test_polar_servo() -> None:
     """A day in fifty.  A ramp of 0.5 deg/h/h in the table angle; 0.02 deg/h/K of a thermometer, which is put into the
     angle by parts: the drift of a window is 0.02 (T - mean).  In the plan without repeats mounts cannot be told.
@@ -104,6 +106,7 @@ def test_polar_servo() -> None:
     holds(reduced(with_columns(record, **warm)), temperature=0.02)
 
 
+@pytest.mark.long
 def test_vertical_and_level_servo() -> None:
     """The input axis 300 arcsec off, which eighteen attitudes tell from the coefficients and six do not; steps of 0.05
     deg/h from mount to mount.
@@ -131,6 +134,7 @@ def test_vertical_and_level_servo() -> None:
     assert worst(result, clean) > 5.0  # more than the noise of this record explains
 
 
+@pytest.mark.long
 def test_two_axis_servo() -> None:
     """A day in 500: Dy_0 = 0.5 deg/h ages by 1 % a second, 18 deg/h/h in the y channel; reported is its middle."""
     with Session("servo_two_axis") as session:
@@ -180,6 +184,7 @@ def test_two_channel_tumble() -> None:
 
 
 # ------------------------------------------------------------------------------------------ others
+@pytest.mark.long
 def test_open_loop() -> None:
     """Ageing by D_F p_F t, -0.3 deg/h 1e-3/s in 25 readings: -1.08 deg/h/h."""
     with Session("open_loop_drift") as session:

@@ -48,6 +48,7 @@ def found(name: str, values: Mapping[str, Any], gyro: Path | None = None) -> dic
 
 
 @pytest.mark.parametrize("gyro", ["ours", "vendor"])
+@pytest.mark.long
 def test_a_site_that_the_test_does_not_know(
     command: Command, foreign: Foreign, tmp_path: Path, caplog: pytest.LogCaptureFixture, gyro: str
 ) -> None:
@@ -76,6 +77,7 @@ def test_a_site_that_the_test_does_not_know(
     assert (folder / "report.pdf").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_the_same_by_the_option_is_no_error(command: Command, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     code, out, err = command(
         "run", NAME, *SHORTENED, "--set", "latitude=-33.86deg", "--out", tmp_path / "run", pages=True, figures=False
@@ -120,6 +122,7 @@ def test_options_of_other_systems_own_what_they_set() -> None:
     assert list(found("servo_two_axis", {"inner.base": [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]})) == ["inner.base"]
 
 
+@pytest.mark.long
 def test_every_owned_and_assumed_parameter_exists() -> None:
     from gyrobench.bench import Bench, standard_folder
     from gyrobench.system.suite import Suite, load_test

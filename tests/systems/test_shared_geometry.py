@@ -46,9 +46,11 @@ def agrees(system: str, values: dict, source: str, sign: float) -> None:
     np.testing.assert_allclose(covariance[:half, half:], together[:half, half:], rtol=1e-6)
 
 
+@pytest.mark.long
 def test_tumble_of_two_channels() -> None:
     agrees("tumble_two_channel", SHORT, "gyro turned about its z axis", 1.0)
 
 
+@pytest.mark.long
 def test_two_axis_servo() -> None:
     agrees("servo_two_axis", day(500.0), "gyro on the plate, about z", 1.0)

@@ -83,6 +83,7 @@ def test_tumble(seed: int, plan: dict[str, Any]) -> None:
     agree("tumble_single_axis", {}, {**plan, **STILL, **DRIFT, "rebalance.meter": 0.0}, errors, 0.05)
 
 
+@pytest.mark.long
 def test_tumble_on_the_table_as_it_is_built() -> None:
     """Scale and axis of a table with sampled servo, currents and edges of a pulse-width rebalance, all at once."""
     # a turn in 5 minutes instead of hours: soft poles and a float of little inertia, or what jitter and the uneven rate
@@ -108,6 +109,7 @@ def test_tumble_with_pulses_on_demand() -> None:
     agree("tumble_single_axis", {"rebalance": "rebalance_pulse"}, values, errors, 0.05)
 
 
+@pytest.mark.long
 def test_tumble_on_two_axes() -> None:
     values = {"dwell": 10.0, "windows": 1, "inner_rate": 0.003, "settle": 3.0}
     errors = {
@@ -119,6 +121,7 @@ def test_tumble_on_two_axes() -> None:
     agree("tumble_two_axis", {}, {**values, **STILL, **DRIFT, "rebalance.meter": 0.0}, errors, 0.05, step=4e-3)
 
 
+@pytest.mark.long
 def test_two_axis_servo() -> None:
     """The inner axis out of the right angle with the outer one, and both scales wrong, at five hundred Earth rates."""
     errors = {
@@ -165,6 +168,7 @@ def built() -> Iterator[tuple[Session, Result]]:
         yield session, session.system.reduce(session.run(BUILT, seed=3))
 
 
+@pytest.mark.long
 def test_polar_servo_on_the_table_as_it_is_built(built: tuple[Session, Result]) -> None:
     """Scale, axis and unbalance of a table whose sampled controller holds the gyro, and the gyro on it, all at once.
 
@@ -183,6 +187,7 @@ def test_polar_servo_on_the_table_as_it_is_built(built: tuple[Session, Result]) 
     as_predicted(plain, session.system.reduce(session.run({**BUILT, **errors}, seed=3)), 0.05)
 
 
+@pytest.mark.long
 def test_unbalance_over_the_stiffness_of_a_sampled_servo(built: tuple[Session, Result]) -> None:
     """a = m g0 / K_T with K_T = 547 g.cm/arcsec (p = 0.5): a mass along y moves D_IO, one along z D_IS, each by
     2 a W g c / (g2 sin 2 phi) downwards.  [BEARING-AIR, SERVO-TF]

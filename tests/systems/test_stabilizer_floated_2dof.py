@@ -159,6 +159,7 @@ def reference(M: float, time: float, t: Any) -> Any:
     return solve_ivp(right, (0.0, t[-1]), [0.0] * 4, t_eval=t, max_step=5e-4, rtol=1e-7, atol=1e-10).y[0]
 
 
+@pytest.mark.long
 def test_a_motor_at_its_limit_makes_the_loop_unstable(caplog: pytest.LogCaptureFixture) -> None:
     """5 N.m for 50 ms comes back, for 100 ms it does not: the same linear loop, the motor gives 2.7 N.m."""
     summaries = []
@@ -182,6 +183,7 @@ def test_a_motor_at_its_limit_makes_the_loop_unstable(caplog: pytest.LogCaptureF
 
 
 # ------------------------------------------------------------------------------------ sweep, margins, measures
+@pytest.mark.long
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, with the gyro's noise."""
     result = load().reduce(whole)
@@ -302,6 +304,7 @@ def test_a_poor_network_is_told_and_fails_acceptance(steps: Session, caplog: pyt
     assert any("more than 45° is wanted" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_a_load_step_too_short_for_a_slow_loop_is_void(command: Any, tmp_path: Any) -> None:
     """tau1 = 2 s, T1 = 20 s put a closed-loop pole at about -1/tau1: after 3 s it has exp(-1.5) = 22 % to go, and moves
     by 3.5 % in the last tenth.  Stiffness and angle at rest have no value; the rate gain, with a fast pole, has one.

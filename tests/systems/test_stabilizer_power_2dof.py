@@ -164,6 +164,7 @@ def test_poles_of_the_default_set(steps: Session) -> None:
     np.testing.assert_allclose(found, roots, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, the delay of the step included.  The
     continuous model differs by the delay: half a step of holding and nothing else, 360 f h/2 = 0.048 deg at 2.66 Hz."""
@@ -222,6 +223,7 @@ def covered(runs: int) -> dict[str, int]:
     return inside
 
 
+@pytest.mark.long
 def test_intervals_cover() -> None:
     """Of 10 runs the binomial law of 95 % leaves less than 7 once in a thousand; tests/benchmarks/loops.py counts
     200.

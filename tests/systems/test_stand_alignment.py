@@ -111,6 +111,7 @@ def test_with_noise(session: Session) -> None:
     assert 0.03 < found["about p × east"].u < 0.2 and 0.03 < found["about east"].u < 0.2
 
 
+@pytest.mark.long
 def test_intervals_cover() -> None:
     """400 records of the equations alone (no part): lean exactly as a rotation, star from the hour angle."""
     rng, held, runs = np.random.default_rng(8), 0, 400

@@ -63,6 +63,7 @@ def test_a_wrong_heading_goes_into_the_azimuth_in_full(session: Session) -> None
     assert not any(b.id.startswith(("clock", "star.place", "level.scale")) for b in found.budget)
 
 
+@pytest.mark.long
 def test_intervals_cover(session: Session) -> None:
     """60 runs with noise and a heading drawn with its u: 95 % intervals of e and a."""
     rng, held, n = np.random.default_rng(5), 0, 60

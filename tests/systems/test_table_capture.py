@@ -57,6 +57,7 @@ def test_time_to_the_fine_loop_beside_the_equations(seed):
     assert c["w_max"].estimate == pytest.approx(math.degrees(np.max(np.abs(w[: since + 100]))), rel=5e-3)
 
 
+@pytest.mark.long
 def test_time_optimal_return():
     """Beside the equations, and beside the least time of the double integrator, 2 sqrt(e J/M): no law is quicker."""
     J, C, H, offset, rate = 2.0, 0.03, 0.04, math.radians(2.0), 150.0
@@ -121,6 +122,7 @@ def test_what_is_refused(values, text):
         gb.load(NAME, **values).run()
 
 
+@pytest.mark.long
 def test_the_step_is_in_u(tmp_path):
     """At 0.5 ms the fine loop is closed 0.04 s late, by far more than the sampling of the record: u says so."""
     runs = [gb.load(NAME).run(seed=1, step=h, out=tmp_path / str(k)).result for k, h in enumerate((5e-4, 1e-4))]

@@ -104,6 +104,7 @@ def test_two_axis_tumble(session: Session, plain: Result, error: dict[str, Any],
 
 # ------------------------------------------------------------------------------------------ two-channel tumble
 @pytest.mark.parametrize("row", [0, 1])
+@pytest.mark.long
 def test_wobble_of_the_two_channel_tumble(row: int) -> None:
     """The axis goes round a cone of A twice a turn.  Its rate, 2 A a' (-sin(2a + p), cos(2a + p)) in axes that stand,
     is 2 A a' (-sin(a + p), cos(a + p)) along the table's own, with a = -theta, a' = -R.  The mounts have x = -x_T, y =

@@ -49,6 +49,7 @@ def found(session: Session) -> DriftTestResult:
     return result
 
 
+@pytest.mark.long
 def test_sensitivities_drawn_at_random_come_back(found: DriftTestResult) -> None:
     assert found.names[:7] == ["ω_0", "s_rate", "s_E", "s_N", "s_T", "s_dT", "s_B"]
     for c in found.coefficients[:7]:

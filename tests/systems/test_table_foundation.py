@@ -27,6 +27,7 @@ def found() -> DriftTestResult:
     return result
 
 
+@pytest.mark.long
 def test_the_drift_is_resolved_by_the_motion_of_the_block(found: DriftTestResult) -> None:
     for c in found.coefficients[:7]:
         assert c.truth is not None and c.z is not None and abs(c.z) < 3.5, c.name

@@ -55,6 +55,7 @@ def run(request: pytest.FixtureRequest) -> gb.Run:
     return drawn(request.param)
 
 
+@pytest.mark.long
 def test_constants_come_back(run: gb.Run) -> None:
     """All within 3.5 u of what was drawn, and u a small part of them."""
     names = {c.name for c in run.result.coefficients}
@@ -108,6 +109,7 @@ def with_values(values: dict[str, Any], seed: int = 11) -> gb.Run:
     return test.run(seed=seed, check_step=False)
 
 
+@pytest.mark.long
 def test_a_cable_is_told_from_the_inertia() -> None:
     """0.05 N.m/rad about 1 rad, so 0.05 N.m at the angle 0.  Without c in the model J is 44 u and K_t 27 u off."""
     result = with_values({"body.axis_cable": 0.05, "body.axis_cable_zero": "1rad"}).result
@@ -118,6 +120,7 @@ def test_a_cable_is_told_from_the_inertia() -> None:
     assert not any("leaves holds" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_a_torque_that_the_model_lacks_is_named() -> None:
     """0.05 kg.m on an axis tilted by 1 deg: 0.05 * 9.8066 * sin(1 deg) = 8.56e-3 N.m once a turn."""
     values: dict[str, Any] = {"body.axis_unbalance[1]": 0.05, "body.tilt[1]": "1deg"}
@@ -152,6 +155,7 @@ def test_without_shaper_is_refused() -> None:
         test.run()
 
 
+@pytest.mark.long
 def test_inductance_of_a_quick_winding() -> None:
     """R / L = 600 1/s: the current bends within 0.1 ms.  Trapezoids err by h2/12 R (i'1 - i'0) / (L di), some 4e-4."""
     test = gb.load(NAME, coast=0.5)
@@ -162,6 +166,7 @@ def test_inductance_of_a_quick_winding() -> None:
     assert result["L"].estimate == pytest.approx(10.0, rel=1e-4)
 
 
+@pytest.mark.long
 def test_a_voltage_that_does_not_come_to_its_limit_tells_no_inductance() -> None:
     test = gb.load(NAME, coast=0.5)
     test.set("drive.motor_U_max", 1000.0)
@@ -208,6 +213,7 @@ def solved() -> list[Any]:
     return [reduction.solve(windows(rng), reduction.QUANTUM, reduction._wound) for _ in range(60)]
 
 
+@pytest.mark.long
 def test_u_is_the_scatter_of_the_errors_where_angles_and_meter_are_the_noise(solved: list[Any]) -> None:
     """Random torque makes 2 T3/3 (2e-4/2.5)2, the angles 6 (4e-7)2, the ammeter 2 T3/3 2.5e-3 s (3 1e-3/2.5)2 of the
     variance of y: 5.3e-13, 9.6e-13 and 3.0e-13.  With angles that err by their rounding alone, 3.8e-13, and all

@@ -45,6 +45,7 @@ def found(folder: Path) -> Any:
     return position_run(out=folder).result
 
 
+@pytest.mark.long
 def test_first_harmonic_is_handed_over(found: Any, folder: Path) -> None:
     """To four accelerometers on the same axis: D is the position error, where the axis is less where it was sent."""
     took = gb.load("accelerometer_four", from_run=[folder])
@@ -112,6 +113,7 @@ def test_one_mount_separates_only_what_two_heads_do() -> None:
     assert "order 2 is the same in all mounts" in r["E2 cos"].no_value
 
 
+@pytest.mark.long
 def test_a_mount_that_is_taken_twice_is_one_mount() -> None:
     r = position_run(mounts="0 0 60", positions=6, orders=2).result
     for name in ("E1 cos", "E1 sin", "E2 cos", "E2 sin", "squareness x", "squareness y"):
@@ -129,6 +131,7 @@ def test_true_harmonics_are_those_at_the_head() -> None:
     assert truth(p, "reader")[2] == (0.0, 0.0) and truth({}, "reader") == {}
 
 
+@pytest.mark.long
 def test_friction_loses_motion() -> None:
     """A table that is held by friction inside a count stops short on both ways."""
     r = position_run(**{"body.axis_friction": 0.3, "positions": 6, "mounts": "0 60", "orders": 2}).result
@@ -151,6 +154,7 @@ def test_refusals(values: dict[str, Any], text: str) -> None:
         position_run(**values)
 
 
+@pytest.mark.long
 def test_program_from_a_file(tmp_path: Any) -> None:
     """Every third face by a program, forced upwards and the shorter way back."""
     rows = [f"index,{a}deg,8deg/s,{way},1min" for a, way in ((60, "up"), (120, "up"), (0, "shorter"), (240, "shorter"))]

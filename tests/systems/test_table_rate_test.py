@@ -41,6 +41,7 @@ def found() -> Any:
     return test_run(command__reference_clock=4e-6)
 
 
+@pytest.mark.long
 def test_time_base_and_rates_come_back(found: Any) -> None:
     r = found.result
     base = r["time base"]
@@ -82,6 +83,7 @@ def test_torque_of_the_largest_change_is_that_of_the_linear_loop(found: Any) -> 
     assert np.abs(np.array(step.y) - exact).max() < 0.55  # three counts
 
 
+@pytest.mark.long
 def test_without_feedforward_the_ramp_costs_the_acceleration_over_the_stiffness() -> None:
     run = test_run(feedforward="0", rates="1999.9", dwell="2s")
     (step,) = [x for x in run.result.responses if x.kind == "step"]
@@ -89,6 +91,7 @@ def test_without_feedforward_the_ramp_costs_the_acceleration_over_the_stiffness(
     assert max(map(abs, step.y)) == pytest.approx(2.56 / stiffness / ARCSEC, abs=0.5)
 
 
+@pytest.mark.long
 def test_sampled_against_analogue_control(found: Any) -> None:
     analogue = test_run({"controller": "controller_analog"}, rates="100", dwell="5s")
     assert abs(analogue.result["error 100 ERU"].z) < 4

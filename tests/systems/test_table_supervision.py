@@ -78,6 +78,7 @@ def test_a_table_that_is_switched_off_stops(record: Record, found: LoopResult) -
     assert not found.reasons
 
 
+@pytest.mark.long
 def test_false_alarms_come_at_the_rate_of_their_noise(session: Session) -> None:
     """Noise of 0.4 half widths: a look is outside with p = 2 Phi(-2.5) = 0.01242; of four items 40 looks a second, so
     0.497 1/s with hold_off 1 and 40 p2/(1 + p) = 0.0061 1/s with 2: 298 +- 17 and 3.7 +- 1.9 in 600 s.

@@ -99,6 +99,7 @@ def test_short_of_lock_and_with_the_other_mount_it_is_kept(quick: Session) -> No
 
 
 # ------------------------------------------------------------------------------------ azimuth
+@pytest.mark.long
 def test_with_the_resolver_every_azimuth_is_stable() -> None:
     """Poles of the loop as it is stepped, every 30 degrees; the phase margin is the same everywhere."""
     with session(NAME, at_rest=lambda self: REST) as s:
@@ -145,6 +146,7 @@ def test_with_the_resolver_a_load_is_held_at_any_azimuth(azimuth: float) -> None
 
 
 @pytest.mark.parametrize("integral", [0.0, 20.0])
+@pytest.mark.long
 def test_without_the_resolver_up_to_the_phase_margin(integral: float) -> None:
     """Opened loops with exp(+-j azimuth) between them: stable as far as the phase margin of one, by poles and in the
     co-simulation.  1 degree beyond it the ringing grows with about feedback sin(1 deg) = 0.7 1/s."""
@@ -178,6 +180,7 @@ def phase_margin(model: Any) -> float:
 
 
 # ------------------------------------------------------------------------------------ measures of the whole run
+@pytest.mark.long
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; by hand the crossover is 6.346 Hz, the margin 85.44
     less the delay, 360 f h / 2 = 0.57 deg at most."""

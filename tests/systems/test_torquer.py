@@ -194,6 +194,7 @@ def test_run_is_refused(command: Command, tmp_path: Path, values: list[str], wor
     assert not (tmp_path / "run" / "run.json").exists()
 
 
+@pytest.mark.long
 def test_run_and_show(command: Command, tmp_path: Path) -> None:
     code, out, err = command("show", NAME)
     assert code == 0 and "current_source" in out and "+100 mA" in out, err

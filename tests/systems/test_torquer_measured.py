@@ -136,6 +136,7 @@ def test_a_gain_that_changes_with_the_range_is_named_and_in_u() -> None:
         assert "torquer.range_step" in {b.id for b in result.budget}
 
 
+@pytest.mark.long
 def test_tables_without_a_step_keep_their_intervals() -> None:
     """Of 300 (1,000: K 0.946, K_LS 0.958, K_1 0.950, drift 0.945) 0.95 hold the truth, and 0.01 are doubted."""
     truth = {"K": 17.2, "K_LS": 17.2, "K_1": 17.2, "drift": 0.05}

@@ -27,6 +27,7 @@ def positions() -> Record:
         return session.run({"dwell": 20.0, "settle": 2.0, "readings": 2, "cycles": 10}, seed=1)
 
 
+@pytest.mark.long
 def test_asymmetry_of_both_torquers_in_eight_positions(positions: Record) -> None:
     """0.2 % of the Earth's rate of 10 deg/h are 0.02 deg/h; the reading that is opposite to the other one shows it."""
     clean = reduced(positions)
@@ -37,6 +38,7 @@ def test_asymmetry_of_both_torquers_in_eight_positions(positions: Record) -> Non
     assert worst(reduced(asymmetric(positions, mean_x=2e-3), nuisances="none"), clean) > 5.0
 
 
+@pytest.mark.long
 def test_asymmetry_in_a_tumble() -> None:
     """Unbalances of 10 deg/h/g: currents of 0.6 mA of both signs tell 0.3 %.  Of the standard gyro a tenth of that
     current is left, which tells 3 % (flagrant) and no sound torquer; a scale factor is what all coefficients share."""
@@ -54,6 +56,7 @@ def test_asymmetry_in_a_tumble() -> None:
     holds(reduced(asymmetric(standard, mean=5e-2)), **{"k_±": 5.0})
 
 
+@pytest.mark.long
 def test_turn_ons_of_a_tumble() -> None:
     """Twelve turn-ons with constants of 0.035 deg/h, five times the u of D_F in one: the deviation of those drawn is in
     the interval, and so are the coefficients.  Three times the default rate, so a third of its time: u is sqrt(3) as

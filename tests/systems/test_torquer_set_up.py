@@ -94,6 +94,7 @@ def test_ammeter_and_time_base_by_hand(servo: Session) -> None:
     assert r["K"].u == pytest.approx(math.hypot(1e-3, 1e-4) * K, rel=1e-3)
 
 
+@pytest.mark.long
 def test_stated_errors_of_the_encoder_are_held(servo: Session) -> None:
     """Thirty records whose angles are read with 20 arcsec once a turn: stated, 0.86 or more of the intervals of K, K_1
     and K_LS hold; not stated, less than half of those of K_LS.

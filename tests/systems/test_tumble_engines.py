@@ -23,6 +23,7 @@ Command = Callable[..., tuple[int, str, str]]
 HASTY = {"rate": 3.0, "windows": 6, "dwell": 0.6, "settle": 0.3, "table.acceleration": 20.0}
 
 
+@pytest.mark.long
 def test_engines_give_bit_equal_records(tmp_path: Path) -> None:
     """All noise on, all parts native: windows and channels of both engines are the same bytes."""
     found = {e: run(NAME, values=HASTY, seed=7, engine=e, out=tmp_path / e) for e in ("native", "reference")}
@@ -36,6 +37,7 @@ def test_engines_give_bit_equal_records(tmp_path: Path) -> None:
         assert getattr(native.run, key) == getattr(reference.run, key)
 
 
+@pytest.mark.long
 def test_order_cuts_and_delays_are_the_same_everywhere(command: Command, tmp_path: Path) -> None:
     """``show``, run.json, result.json and the HTML report state one order, the same cuts and the same delays."""
     values = [w for k, v in SHORT.items() for w in ("--set", f"{k}={v}")]
@@ -95,6 +97,7 @@ def test_gyro_sees_gravity_and_earth_rate_before_the_first_step(session: Session
 
 
 @pytest.mark.parametrize("engine", ["native", "reference"])
+@pytest.mark.long
 def test_first_row_of_the_channels_is_the_settled_start(engine: str) -> None:
     """The drift recorded at t = 0 is that of the first attitude: D_F + D_O (-g/g0), with f not yet seen it would be
     D_F alone.
@@ -110,6 +113,7 @@ def test_first_row_of_the_channels_is_the_settled_start(engine: str) -> None:
     assert abs(hand - values["gyro.D_F"]) > 0.4 * DPH
 
 
+@pytest.mark.long
 def test_halving_the_step_changes_nothing_that_matters(command: Command, tmp_path: Path) -> None:
     """Far below a tenth of u: exchanging u and i every 1 ms or 0.5 ms only moves the fast poles of the loop; the
     coefficients (tumbling.lag) do not depend on the step to that order.  The report says by how much.

@@ -234,6 +234,7 @@ def noisy(w: dict[str, np.ndarray[Any, Any]], seed: int, size: float = 0.003) ->
     return {**w, "mean": w["mean"] + np.random.default_rng(seed).normal(size=w["mean"].size) * scatter * DPH / SCALE}
 
 
+@pytest.mark.long
 def test_continuous_and_intermittent_agree(tmp_path: Path) -> None:
     """The same gyro in equal time: the differences are within what both state."""
     file = tmp_path / "lab.csv"
@@ -277,6 +278,7 @@ def test_which_noise_is_seen_better_by_which(share: float, low: float, high: flo
         assert ratio[[1, 6, 7, 8]] == pytest.approx([0.53, 0.53, 0.53, 0.50], abs=0.01)
 
 
+@pytest.mark.long
 def test_tilt_of_the_input_axis(tmp_path: Path) -> None:
     """60" towards the output axis: at rest it brings W sin 60" = 0.0044 deg/h, in turns of 10 W 9 times as much.
 

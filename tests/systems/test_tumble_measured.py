@@ -72,6 +72,7 @@ def reduced(command: Command, folder: Path, text: str, *more: str) -> dict[str, 
     ("scale", "polarity", "delimiter"),
     [("laboratory", None, ","), ("laboratory", "book", ";"), ("fine", "project", "\t"), ("SI", "book", ",")],
 )
+@pytest.mark.long
 def test_laboratory_units(
     command: Command, record: Record, tmp_path: Path, scale: str, polarity: str | None, delimiter: str
 ) -> None:
@@ -137,6 +138,7 @@ def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
     assert found["instrument"] == "type and number of the gyro"
 
 
+@pytest.mark.long
 def test_report_of_measured_data_can_be_made_again(command: Command, record: Record, tmp_path: Path) -> None:
     """The folder is a record like that of a run: ``gyrobench report`` gives the same numbers, in book polarity too."""
     first = reduced(command, tmp_path, laboratory(record, polarity="book"))

@@ -116,6 +116,7 @@ def shifts(name: str, parts: dict[str, str], values: dict[str, Any], errors: dic
     return np.array(moved), np.array([said[n] for n in names]), np.array([before[n].u for n in names])
 
 
+@pytest.mark.long
 def test_two_axis_tumble() -> None:
     """A current of 1 A lets the inner axis turn quickly; a clock of 10 MHz keeps the counts fine."""
     plan = {"positions": 25, "dwell": 4.0, "settle": 3.0, "inner_rate": 0.05, "table.index_rate[1]": 1.0}
@@ -126,6 +127,7 @@ def test_two_axis_tumble() -> None:
     assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)
 
 
+@pytest.mark.long
 def test_eight_positions() -> None:
     """Each loop has errors of its own; the mean of the currents is found as a scale factor."""
     values = {"cycles": 2, "readings": 6, "dwell": 6.0, "settle": 3.0, **{f"rebalance_{c}.f_q": 1e7 for c in "xy"}}
@@ -136,6 +138,7 @@ def test_eight_positions() -> None:
     assert np.all(np.abs(moved - said) < 0.05 * np.abs(said) + 0.1 * u), (moved, said, u)
 
 
+@pytest.mark.long
 def test_two_channels() -> None:
     """The loop of the torquer about x shifts the y channel, that about y the x channel.  Without nuisances, whose
     weights change with the data.

@@ -22,6 +22,7 @@ def words(values: dict[str, Any]) -> list[str]:
     return [w for k, v in values.items() for w in ("--set", f"{k}={v!r}")]
 
 
+@pytest.mark.long
 def test_vendor_gyro_gives_its_coefficients(command: Command, foreign: Foreign, tmp_path: Path) -> None:
     """Rates in deg/h, load in g with the opposite sign, current in mA, pickoff in mV, k = 20 deg/h/mA: mapped by a
     file, it gives what it was built with, and so does ours with the same truth.
@@ -109,6 +110,7 @@ def test_other_misfits(command: Command, tmp_path: Path) -> None:
     ("fault", "expected"),
     [(1, "its process crashed (SIGSEGV)"), (2, "no answer within 2 s"), (3, "the wheel has stopped")],
 )
+@pytest.mark.long
 def test_failing_gyro(command: Command, foreign: Foreign, tmp_path: Path, fault: int, expected: str) -> None:
     """Crash, hang and error in step 1500 of the tumble: exit code 3, and two windows of the first dwell are kept.
 

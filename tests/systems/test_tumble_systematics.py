@@ -78,6 +78,7 @@ def test_input_axis_tilted_towards_the_output_axis(session: Session) -> None:
     assert eps * RATE > 0.1 * DPH  # it is a large disturbance: eps times the table rate
 
 
+@pytest.mark.long
 def test_tilt_that_the_data_show_is_estimated(session: Session) -> None:
     """With noise: 62 arcsec join the model and are reported with an interval; where there is none, nine coefficients.
     Without nuisances they go into the coefficients.

@@ -116,6 +116,7 @@ def test_encoder_in_phase_once_a_turn(session: Session, plain: Result) -> None:
 
 
 @pytest.mark.parametrize("phase", [0.0, HALF])
+@pytest.mark.long
 def test_wobble(phase: float) -> None:
     """The axis goes round a cone of A twice a turn.  Its rate, 2 A a' (-sin(2a + p), cos(2a + p)), stands along the
     input axis as -2 A a' sin(a + p), with a' = -R in both mounts, and is taken for a drift of -2 A R sin(a + p): in

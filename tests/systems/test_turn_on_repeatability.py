@@ -43,6 +43,7 @@ def test_biases_are_drawn_anew() -> None:
     assert len({s for each in seen.values() for s, _ in each}) == 6
 
 
+@pytest.mark.long
 def test_components_by_hand_and_their_coverage() -> None:
     """Two days of two: means 1, 5; S_on = 2 + 8 = 10 of 2 degrees, S_day = 2 (4 + 4) = 16 of 1, n_0 = 2; then 400
     random designs, with noise of each bias and one that all share by their sense, with a temperature.
@@ -181,6 +182,7 @@ def reduced(command: Command, folder: Path, table: list[list[float]]) -> tuple[i
     return code, err, json.loads((folder / "r" / "result.json").read_text()) if code == 0 else None
 
 
+@pytest.mark.long
 def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     code, err, result = reduced(command, tmp_path, rows())
     assert code == 0, err

@@ -73,6 +73,7 @@ def test_random_gyros_at_random_latitudes(session: Session, seed: int, m: int, n
         assert c.closed is None if m == 3 else abs(c.closed - truth) < 1e-9
 
 
+@pytest.mark.long
 def test_dynamic_against_quasi_static_with_noise(session: Session) -> None:
     """The noisy record of the standard rates gives the coefficients within its uncertainty."""
     values = {"positions": 25, "dwell": 60.0}
@@ -81,6 +82,7 @@ def test_dynamic_against_quasi_static_with_noise(session: Session) -> None:
         assert abs(c.estimate - c.truth) < 4.0 * c.u and c.u > 1e-4, c.name
 
 
+@pytest.mark.long
 def test_engines_and_step(session: Session) -> None:
     hasty = {**SHORT, "positions": 11, "dwell": 0.2, "settle": 0.2, "rebalance.i_max": 100.0, "inner_rate": 2.0}
     native = run(NAME, values=hasty, seed=7, engine="native")
@@ -209,6 +211,7 @@ def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_report_and_plan(command: Command, tmp_path: Path) -> None:
     words = [w for k, v in SHORT.items() for w in ("--set", f"{k}={v}")]
     code, out, err = command("run", NAME, *words, "--set", "harmonic=true", "--out", tmp_path, pages=True)

@@ -72,6 +72,7 @@ def laboratory(record: Record, polarity: str = "project", drop: str = "") -> str
 
 
 @pytest.mark.parametrize(("model", "polarity"), [("simple", "book"), ("nine", "project")])
+@pytest.mark.long
 def test_laboratory_record(
     command: Command, records: dict[str, Record], tmp_path: Path, model: str, polarity: str
 ) -> None:

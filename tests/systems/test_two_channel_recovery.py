@@ -84,6 +84,7 @@ def test_lag_of_the_unbalance_by_hand(session: Session) -> None:
     assert abs(found["Dx_0"]) < 1e-9 and abs(found["Dy_z"]) < 1e-9
 
 
+@pytest.mark.long
 def test_both_senses_several_turns_and_tilt(session: Session) -> None:
     rng = np.random.default_rng(20)
     values = {**SHORT, **quiet(load()), **gyro(rng), "latitude": latitude(rng)}
@@ -101,6 +102,7 @@ def test_both_senses_several_turns_and_tilt(session: Session) -> None:
     assert sum("with the Earth" in t for t in labels) == sum("against the Earth" in t for t in labels) == 4
 
 
+@pytest.mark.long
 def test_halving_the_step_and_engines(session: Session) -> None:
     """Half the step changes nothing that matters; both engines give the same record."""
     hasty = {
@@ -151,6 +153,7 @@ def test_set_up_errors_shift_as_the_budget_predicts(
 
 
 @pytest.mark.parametrize(("order", "row"), [(1, 0), (1, 1), (2, 0), (2, 1)])
+@pytest.mark.long
 def test_encoder_harmonic_shifts_as_the_budget_predicts(ran: Callable[..., Record], order: int, row: int) -> None:
     """The table's angle read too large by E sin(n theta) or E cos(n theta): the coefficients move, with sign, by what
     the budget of the run without it says, to 10 % of the largest; a coefficient of 1 deg/h/g by some E times it.

@@ -43,6 +43,7 @@ def reduced(
     return code, json.loads((out / "result.json").read_text("utf-8")), page
 
 
+@pytest.mark.long
 def test_without_a_statement_nothing_passes(command: Command, record: Record, tmp_path: Path) -> None:
     code, found, page = reduced(command, tmp_path, record)
     assert code == 1 and found["verdict"] == "inconclusive"
@@ -57,6 +58,7 @@ def test_a_fail_needs_no_statement(command: Command, record: Record, tmp_path: P
     assert reduced(command, tmp_path, record, limits=FAR, pages=False)[1]["verdict"] == "fail"
 
 
+@pytest.mark.long
 def test_stated_or_declared_absent(command: Command, record: Record, tmp_path: Path) -> None:
     code, found, page = reduced(command, tmp_path, record, "--set", "u_scale_factor=1e-4", pages=False)
     assert code == 1 and found["verdict"] == "inconclusive"  # each mount is taken once

@@ -21,6 +21,7 @@ def got(text: str, L: np.ndarray) -> float:
     return measure(wish, F, L)
 
 
+@pytest.mark.long
 def test_a_loop_in_closed_form() -> None:
     """L = 4/(s (s + 1)(s + 2)): |L(j sqrt 2)| = 4/6 at -180 degrees, so the gain margin is 1.5."""
     L = 4.0 / (S * (S + 1.0) * (S + 2.0))

@@ -187,6 +187,7 @@ def test_the_w_plane_is_the_plant_and_its_reduction_keeps_the_integrator() -> No
 
 
 @pytest.mark.parametrize("name", ["lqg", pytest.param("hinf", marks=needs_slycot)])
+@pytest.mark.long
 def test_a_computed_controller_does_what_is_wanted(name: str) -> None:
     """The same wishes as a lead-lag network fulfils; of order 8 at most, stable by its discrete poles."""
     from gyrobench.tuning.controller_search import search
@@ -205,6 +206,7 @@ def test_hinf_without_slycot_says_what_to_install(monkeypatch: pytest.MonkeyPatc
     assert structure_of("lqg").name == "lqg" and isinstance(structure_of("pi"), ControllerStructure)
 
 
+@pytest.mark.long
 def test_a_trade_gives_one_wish_for_the_other() -> None:
     """More phase margin, less bandwidth, strictly; what was found for both lies on it or is no better."""
     from gyrobench.tuning.controller_search import search

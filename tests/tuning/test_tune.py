@@ -95,6 +95,7 @@ def tuned():
     return tune(load_system(NAMES[0]), WISHES, ["platform.J=±30%"])
 
 
+@pytest.mark.long
 def test_what_is_promised_holds_between_the_points_and_in_another_model(tuned) -> None:
     """The wishes at 25 inertias, the loop in python-control: its own margins, disk margins, poles."""
     assert tuned.had and tuned.proven
@@ -125,6 +126,7 @@ def test_the_proof_measured_what_the_model_says(tuned) -> None:
     assert len(tuned.proofs) == 2 and dict(tuned.proofs[0].values) == {}
 
 
+@pytest.mark.long
 def test_the_search_finds_what_a_grid_finds() -> None:
     """Factor pi, two numbers: the worst ratio within 2 % of the best of 70 x 70 controllers (or above it)."""
     found, _, _, step = models(NAMES[0], points([Range("platform.J", 1.4, 2.6, "kg.m2")])[:3])
@@ -139,6 +141,7 @@ def test_the_search_finds_what_a_grid_finds() -> None:
     assert np.exp(best) < 1.1 * np.exp(max(every))  # a grid of 70 is not far off
 
 
+@pytest.mark.long
 def test_what_is_left_over_buys_quietness() -> None:
     """pi+lead of a rate loop wanted at 5 Hz: half of ln ratio is kept, and the noise at the motor, computed here by the
     impulse response of K S in scipy, is less by what is said; no controller of 200 random ones has less yet.
@@ -168,6 +171,7 @@ def test_what_is_left_over_buys_quietness() -> None:
     assert quieted(problem.of(1), quiet.x) is None or quieted(problem.of(1), quiet.x).less < quiet.less
 
 
+@pytest.mark.long
 def test_the_test_sines_of_a_proof_meet_no_limit() -> None:
     """A lead makes 25 V of the test voltage of the system's own plan, far above the share of 27 V that a sine may take.
     The sines are smaller, so that what is measured is the linear loop; and the saturation of the stabilizer is watched.
@@ -188,6 +192,7 @@ def run(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
 
 
+@pytest.mark.long
 def test_the_command_and_what_it_prints() -> None:
     """A structure for stabilizer_lti, another estimator in the loop: the command that is printed has both."""
     wishes = [x for w in ("phase margin=45deg", "bandwidth>4Hz") for x in ("--want", w)]
@@ -203,6 +208,7 @@ def test_the_command_and_what_it_prints() -> None:
     assert shown.exit_code == 0 and "stabilizer_lti" in shown.stdout
 
 
+@pytest.mark.long
 def test_what_cannot_be_had_is_said_with_the_reason() -> None:
     answer = run("tune", NAMES[0], "--want", "phase margin=60deg", "--want", "bandwidth>60Hz", "--structure", "pi+lead")
     assert answer.exit_code == 1

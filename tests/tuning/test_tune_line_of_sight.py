@@ -55,6 +55,7 @@ def test_the_loops_of_a_gimbal() -> None:
 
 
 @pytest.mark.parametrize("axis", ["pitch", "yaw"])
+@pytest.mark.long
 def test_the_model_without_controller_makes_the_loop(axis: str) -> None:
     """-G Q is G times the plant, which is made by another road."""
     plant, sight, G, _ = models(axis, pitch=0.5)
@@ -64,6 +65,7 @@ def test_the_model_without_controller_makes_the_loop(axis: str) -> None:
     assert ways.f[0] >= 1.0
 
 
+@pytest.mark.long
 def test_jitter_by_hand() -> None:
     """No mode, no vibration: line of sight = T n / s, T = L/(1 + L), L = G F k/(J s).
 
@@ -81,6 +83,7 @@ def test_jitter_by_hand() -> None:
     assert set(sight.at(F).sources(G)) == {f"vibration about {a}" for a in "xyz"} | {"noise of the sensor"}
 
 
+@pytest.mark.long
 def test_slipping_friction_is_viscous_friction_of_the_same_torque() -> None:
     """M over the rms of the base's rate; joints that stick stay as they are."""
     system = gimbal(stiction=0.05)
@@ -93,6 +96,7 @@ def test_slipping_friction_is_viscous_friction_of_the_same_torque() -> None:
     assert still.slipping == {} and still.free == {}
 
 
+@pytest.mark.long
 def test_wanted_jitter_is_had_and_measured() -> None:
     wishes = ["phase margin=40deg", "gain margin=6dB", "jitter=20urad"]
     found = tune(gimbal(jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="pitch")
@@ -103,6 +107,7 @@ def test_wanted_jitter_is_had_and_measured() -> None:
     assert "µrad" in str(found) and found.command.count("--set") == 4 and "loop pitch" in str(found)
 
 
+@pytest.mark.long
 def test_a_jitter_that_friction_forbids_says_so() -> None:
     """Much less than the loop can do: the sources are named, the note says how friction was taken."""
     wishes = ["phase margin=40deg", "jitter=20urad"]
@@ -113,6 +118,7 @@ def test_a_jitter_that_friction_forbids_says_so() -> None:
     assert "dry friction slips in the ride" in text
 
 
+@pytest.mark.long
 def test_a_controller_of_less_order_takes_the_design_away() -> None:
     """The design of the system has a notch: its coefficients beyond those of a pi controller become 0."""
     found = tune(gimbal(), ["phase margin=40deg", "S at 1Hz<-20dB"], structure="pi", loop="yaw")

@@ -30,6 +30,7 @@ def test_a_disk_is_where_S_is_as_far_from_one_half(margin: float) -> None:
     assert np.abs(1.0 / (1.0 + ring) - 0.5) == pytest.approx(np.full(ring.size, 1.0 / margin), rel=1e-9)
 
 
+@pytest.mark.long
 def test_tuning_from_python_runs(tuned) -> None:
     """The settings are those of gb.load; the loop of the run has the nominal margin that was promised."""
     assert tuned.had and tuned.proven and "tuned (pi+lead" in str(tuned)
@@ -38,6 +39,7 @@ def test_tuning_from_python_runs(tuned) -> None:
     assert run.result["PM"].estimate == pytest.approx(np.degrees(promised), abs=1.0)
 
 
+@pytest.mark.long
 def test_the_page_says_what_was_wanted_and_what_came(tuned, tmp_path: Path) -> None:
     written = tuned.write(tmp_path)
     assert {p.name for p in written.values()} == {"tuning.json", "tuning.html", "tuning.pdf"}

@@ -26,6 +26,7 @@ print("then", *[m for m in MODULES if m not in sys.modules])
 """
 
 
+@pytest.mark.long
 def test_a_report_needs_all_of_them_and_a_command_has_none_before(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", REDUCE, CORPUS, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

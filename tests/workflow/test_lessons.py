@@ -64,6 +64,7 @@ def test_ten_lessons_in_their_order() -> None:
 
 
 @pytest.mark.parametrize("name", CURVES)
+@pytest.mark.long
 def test_the_formula_is_what_the_record_shows(name: str) -> None:
     """At first, at the values of the exercise, and at random ones: within the tolerance everywhere."""
     item = EVERY[name]
@@ -80,6 +81,7 @@ def test_the_formula_is_what_the_record_shows(name: str) -> None:
     assert tolerance < 0.02 * max(spans), "a formula that were wrong by this much would be seen"
 
 
+@pytest.mark.long
 def test_the_gimbal_falls_behind_beyond_the_angle_of_the_answer() -> None:
     item = EVERY["keyhole"]
     edge = math.degrees(item.answer(first("keyhole")))
@@ -90,6 +92,7 @@ def test_the_gimbal_falls_behind_beyond_the_angle_of_the_answer() -> None:
         assert bool(worst < math.radians(1.0)) == follows, (lean, worst)
 
 
+@pytest.mark.long
 def test_a_walk_grows_with_the_root_of_time() -> None:
     """Its steps of 10 s: a lag of J0 C/H^2 = 0.625 s, that of the platform, leaves N sqrt(9.375 s).
 
@@ -132,6 +135,7 @@ def test_the_answer_is_right_and_the_solution_says_it(name: str) -> None:
         assert said in item.texts(code)["solution"], (code, said)
 
 
+@pytest.mark.long
 def test_a_period_is_that_of_the_record() -> None:
     for name in ("stiffness", "meridian"):
         item = EVERY[name]
@@ -200,6 +204,7 @@ def ended(browser: Browser) -> None:
 
 @needs_chromium
 @needs_ziglang
+@pytest.mark.long
 def test_the_page_of_a_lesson(tmp_path: Path) -> None:
     """The theory of the page is the formula of Python, the simulation near it; the exercise checks number and unit."""
     item = EVERY["keyhole"]

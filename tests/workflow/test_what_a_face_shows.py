@@ -22,6 +22,7 @@ from gyrobench.workflow.run_list import list_runs
 BENCH = Bench(standard_folder())
 
 
+@pytest.mark.long
 def test_every_part_fits_the_slot_it_is_in() -> None:
     parts = load_parts(BENCH)
     assert set(parts) == set(BENCH.parts())
@@ -77,6 +78,7 @@ def test_the_gallery_holds_every_system_and_says_what_does_not_load(
     assert all(e.title and e.summary and e.purposes for e in entries.values() if not e.problem)
 
 
+@pytest.mark.long
 def test_runs_are_listed_whatever_lies_beside_them(tmp_path: Path) -> None:
     for place, content in (
         ("a/1", {"system": "a", "date": "2026-01-02", "seed": 3, "changed": ["latitude"]}),
