@@ -340,6 +340,7 @@ FLAT = {
 }
 
 
+@pytest.mark.long
 def test_no_call_in_a_reduction_takes_more_than_ten_arguments() -> None:
     long, calls = set(), 0
     for top in (TOOL / "reduction", standard_folder() / "systems"):
@@ -367,6 +368,7 @@ def test_docstrings_open_with_what_is_returned_or_done() -> None:
                 assert not fragment.match(text), f"{file}: '{text.splitlines()[0]}'"
 
 
+@pytest.mark.long
 def test_the_tool_names_no_content() -> None:
     """gyrobench works on any bench: no part, system or specification is named in its code."""
     bench = Bench(standard_folder())

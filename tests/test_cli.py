@@ -45,6 +45,7 @@ def test_version(gyrobench: Call) -> None:
     assert gyrobench("--version")[1].startswith("gyrobench")
 
 
+@pytest.mark.long
 def test_list_and_help_load_nothing_heavy() -> None:
     """0.5 s of the budget go to Python and typer; numpy, scipy and matplotlib alone would take it."""
     heavy = (

@@ -109,6 +109,7 @@ def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Pa
     assert not (tmp_path / "fmus").exists()
 
 
+@pytest.mark.long
 def test_the_same_run_has_the_same_folder_and_another_one_another(gyrobench: Call, tmp_path: Path) -> None:
     for more in ([], ["--set", "latitude=2745arcmin"], ["--seed", "2"]):  # 2745' = 45.75°, the default
         assert gyrobench("run", NAME, *TINY, *more, "--json")[0] == 0
@@ -212,6 +213,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------------------- interrupted and failed runs
+@pytest.mark.long
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

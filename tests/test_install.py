@@ -40,6 +40,7 @@ def run(installed: Installed, folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_wheel_holds_tool_and_standard_bench(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         inside = {n for n in archive.namelist() if not n.endswith("/")}

@@ -240,6 +240,7 @@ def stated(tree: ast.AST) -> Iterator[str]:
             yield from (e.value for e in value.elts if isinstance(e, ast.Constant))
 
 
+@pytest.mark.long
 def test_every_source_of_a_system_cites_a_work() -> None:
     found = [(f, text) for f in files("systems") if f.suffix == ".py" for text in stated(ast.parse(read(f)))]
     assert len(found) > 30

@@ -76,6 +76,7 @@ def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str
     assert out == "" and "note:" not in err, "notes that nobody can act on hide the message"
 
 
+@pytest.mark.long
 def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) -> None:
     """The standard stabilizer has no i_motor either: that is the system's own choice, and no news."""
     assert "note:" not in gyrobench("show", "platform_single_axis")[1]

@@ -106,6 +106,7 @@ def test_a_folder_of_something_else_is_not_touched(folder: Path, tmp_path: Path)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.long
 def test_command_prints_the_answer(command: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     small = synthetic.sweep(tmp_path / "small", 6)
     code, out, _ = command("site", small, "--out", tmp_path / "site")
@@ -170,6 +171,7 @@ def test_complaints_would_be_seen(browser: Browser, page: Path, tmp_path: Path) 
 
 
 @needs_chromium
+@pytest.mark.long
 def test_table_filters_sorts_and_turns_pages_by_keyboard(browser: Browser, page: Path, folder: Path) -> None:
     rows = Campaign.open(folder).table()
     browser.open(page, 1280)

@@ -83,6 +83,7 @@ def test_few_lots_without_outliers_have_any_named() -> None:
     assert named <= 2  # 0.25 expected; more than 2 with a probability of 0.002
 
 
+@pytest.mark.long
 def test_small_lots_and_coefficients_that_say_nothing_new() -> None:
     rng = np.random.default_rng(10)
     x = rng.normal(size=(12, 4))
@@ -109,6 +110,7 @@ def test_one_coefficient_far_off_is_not_diluted_by_the_others() -> None:
 
 
 @pytest.mark.parametrize("n", [5, 6, 10, 20, 25, 40])
+@pytest.mark.long
 def test_of_normal_lots_as_many_values_lie_outside_the_limits_as_of_three_sigma(n: int) -> None:
     """0.27 % of the values, whatever their number; ± 3 sigma of few values had 1.0 to 2.5 % outside."""
     x = np.random.default_rng(n).normal(size=(60_000 // n, n))

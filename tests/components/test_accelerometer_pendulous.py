@@ -126,6 +126,7 @@ def continuous(part, until):
     return solve_ivp(right, (0.0, until), [0.0] * 3, "LSODA", rtol=1e-9, atol=1e-14, max_step=1e-4, dense_output=True)
 
 
+@pytest.mark.long
 def test_overload_and_recovery():
     """The limit: first order in the step while it holds (README), bounded, no wind-up; exact before and after."""
     linear = dict.fromkeys(("k0", "k2", "k3", "k4", "k5"), 0.0)

@@ -66,6 +66,7 @@ def align(
 
 # ------------------------------------------------------------------------------------- steady errors
 @pytest.mark.parametrize("order", [3, 2])
+@pytest.mark.long
 def test_steady_errors_are_those_of_the_loops(order: int) -> None:
     """By hand, at rest.  x east, y north; drift d, accelerometer bias b along x and y; heading error = psi - true.
 

@@ -120,6 +120,7 @@ def three_axis(start):
     return integrate(slope, np.concatenate([start, np.zeros(6)]))[[0, 1, 2, 6, 7, 8]]
 
 
+@pytest.mark.long
 def test_three_axis():
     """A communication step has up to eight internal steps here: the base moves through all of them."""
     start = [0.5, 0.2, 0.8]

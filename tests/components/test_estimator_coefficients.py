@@ -115,6 +115,7 @@ def test_consistent(one: Any) -> None:
     assert abs(mean[0] - 1.0) < 3.3 * np.sqrt(2.0 / z.size) and mean[1] > 0.97
 
 
+@pytest.mark.long
 def test_drift_taken_white_understates(one: Any) -> None:
     """EST-KF-COEFF: NEES(5) 161 where w is taken white (variance rms2 a window), although the errors hardly grow.
 

@@ -246,6 +246,7 @@ def test_gauss_markov_variance_and_correlation(h):
         assert r == pytest.approx(math.exp(-lag / tau), abs=5 * math.sqrt(2 / independent))
 
 
+@pytest.mark.long
 def test_gauss_markov_starts_stationary_and_turn_on_is_one_value_a_run():
     first, constant = [], []
     for seed in range(1500):

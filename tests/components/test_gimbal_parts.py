@@ -107,6 +107,7 @@ def test_seeds_and_phases_of_the_plan() -> None:
     assert waits.omega[0] != 0.1 and waits.omega[1] == 0.2
 
 
+@pytest.mark.long
 def test_turning_phasors_stay_on_their_circles() -> None:
     """1e5 steps against cosines, whose arguments come from the frequencies that the part chose."""
     part = Vibration(**VALUES, onset=0.0)

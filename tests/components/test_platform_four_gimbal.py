@@ -87,6 +87,7 @@ def test_roll_to_90_then_yaw(gain):
     assert not out["lock"].any() and not out["saturated"].any()
 
 
+@pytest.mark.long
 def test_full_roll_and_full_loop_with_the_sign():
     """360 deg of roll, then 360 deg of pitch through both verticals: kept; the vertical is reported."""
     out = fly(PART, lambda t: base_rate(roll=72.0 * (t < 5), pitch=72.0 * (t >= 5), yaw=0.5), 10.0, gain=SIGN)

@@ -103,6 +103,7 @@ def test_limits_of_voltage_and_current():
 
 
 # ----------------------------------------------------------------------------------------------- gyro
+@pytest.mark.long
 def test_gyro_wired_by_its_momentum_keeps_the_nutation():
     """J w + h = const and J_g b'' = H w exchanged at 0.1 ms: 17.4 Hz, neither growth nor decay over 32 turns (2 s)."""
     p = made(native=True, J=0.5, **BARE)

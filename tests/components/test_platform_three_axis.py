@@ -165,6 +165,7 @@ def test_acceleration_is_the_derivative_of_the_rate():
         np.testing.assert_allclose(told[2], (rates[3] - rates[1]) / (2 * h), rtol=1e-4, atol=1e-3)
 
 
+@pytest.mark.long
 def test_attitude_is_the_integral_of_the_rate():
     part = Platform(theta_0=[0.4, 0.2, 0.7], theta_dot_0=[0.3, -0.2, 0.5])
     part.initialize()

@@ -79,6 +79,7 @@ def test_signals_meet_t1_and_the_lag(mount):
     np.testing.assert_allclose(found, t1 * 0.7 / (0.05 * s + 1), rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.long
 def test_a_servo_yields_to_torque_like_an_inertia():
     """lag s' = M / drag - s: at first s' = M / (drag lag), the inertia 0.4 kg.m2; in the end M / drag."""
     part = Three()

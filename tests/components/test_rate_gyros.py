@@ -325,6 +325,7 @@ def test_langmuir_bias():
 
 
 # ------------------------------------------------------------------------------------------------ data sheet form
+@pytest.mark.long
 def test_filter_is_a_butterworth():
     """A sine at the bandwidth comes out at 1/sqrt(2); noise rms by the noise bandwidth, pi/(2 sqrt 2) times 2 B N2."""
     part = Native("gyro_mems", **MEMS_QUIET, bandwidth=20.0)

@@ -148,6 +148,7 @@ def test_a_reversal_gives_no_interval():
     assert np.abs(rows[:, 0]) == pytest.approx(2 * DEG, rel=1e-3)
 
 
+@pytest.mark.long
 def test_noise_at_a_mark_is_not_a_reversal():
     """Counts that jump by +-3 between readings, at 1.7 counts a reading: each degree is read once, none backwards."""
     jump = [0.0, 3.0, -2.0, 1.0, -3.0, 2.0, -1.0]

@@ -64,6 +64,7 @@ def test_rate_command_and_load():
     assert abs(w[-1]) < 1e-6 and i[-1] == pytest.approx(-5.0, rel=1e-5)
 
 
+@pytest.mark.long
 def test_position_loop_holds_the_joint():
     """theta goes to theta_wish with the time constant 1/K_p, against a load, without error at rest."""
     part = started(K_p=2 * math.pi, theta_wish=0.02)

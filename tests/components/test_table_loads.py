@@ -111,6 +111,7 @@ def test_rings_on_the_axis_give_it_all_their_friction():
     assert turning(-0.01, time=0.5, ring_follower=0)[-1, 0] == pytest.approx(0.137, rel=1e-9)
 
 
+@pytest.mark.long
 def test_follower_beside_a_differential_equation():
     """A table that swings: the shaft sticks and slides; winding, friction and leads as differential equations."""
     J, K, d, mc, reach = 0.02, 330.0, 4.0, 0.137, 1e-4

@@ -145,6 +145,7 @@ def test_torque_ripple():
     assert settled(loop) == pytest.approx(0.03 * math.sin(36 * 0.1 + 0.4), rel=1e-5)
 
 
+@pytest.mark.long
 def test_rumble_gives_the_angle_its_density_over_the_stiffness():
     """Torque noise well inside the band of the loop: angle density = torque density / K_T; rms by the closed loop."""
     part = Loop(rumble=1e-4, h=1e-3)

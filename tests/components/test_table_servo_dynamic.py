@@ -83,6 +83,7 @@ def by_hand(torque, until, p):
     return np.array(out)
 
 
+@pytest.mark.long
 def test_answers_a_torque_as_the_loop_written_by_hand(table):
     """A torque of 140 g.cm on the table at null, counts of 1e-9 rad: two of them."""
     expected = by_hand(140.0 * GCM, 0.3, 0.5)

@@ -158,6 +158,7 @@ def test_undamped_gyro_holds_the_torque_with_the_float():
     assert track[-1, 6] * 10.0 * loop.table.gain == pytest.approx(0.05, rel=1e-5)
 
 
+@pytest.mark.long
 def test_drift_and_earth_rate():
     """rate = omega_d - omega_E,x (MEAS-SERVO with omega_M = -omega_d), the drift of 1e-7 rad/s with its sign."""
     track = Loop(gyro_parameters={"D_F": 1e-7}).run(0.6)

@@ -74,6 +74,7 @@ def fly(theta, seconds, decoupled, command=lambda t: np.zeros(3), base=lambda t:
 
 
 @pytest.mark.parametrize("azimuth", [40.0, 60.0, 80.0])
+@pytest.mark.long
 def test_stability_over_azimuth(azimuth):
     """F16: margin 53.6 deg less 2 deg of exchange: stable at 40, unstable at 60, 80 deg; with T2 always stable."""
 

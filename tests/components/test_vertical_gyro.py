@@ -119,6 +119,7 @@ def test_fast_start():
 
 
 # ----------------------------------------------------------------------------------- manoeuvre and cut-off
+@pytest.mark.long
 def test_acceleration_with_and_without_cut_off():
     """0.2 g for 60 s: 4.0 deg towards the apparent vertical without cut-off (the apparent one 11.3 deg away)."""
     vehicle = row(right=0.2 * G0)

@@ -55,6 +55,7 @@ def test_the_expected_path_has_the_rows_of_the_reduction(made: Any) -> None:
             assert np.abs(found - X[rows]).max() < 8e-3  # capture takes 0.4 s: 0.34 deg here, nothing in a day
 
 
+@pytest.mark.long
 def test_noise_of_the_readings_is_that_of_the_pickoffs(session: Any) -> None:
     """Pickoff noise alone, 5e-8 V/sqrt(Hz): scatter of 72 rates over what the covariance says of them."""
     values = {**FAST, "gyro.white_x": 0.0, "gyro.white_y": 0.0, "gyro.markov_x": 0.0, "gyro.markov_y": 0.0}

@@ -262,6 +262,7 @@ def test_shares_are_rounded_in_proportion() -> None:
         ({"k4": "1ug/g2"}, {"mounts": "a"}, UsageError, "--want k4: no such value"),
     ],
 )
+@pytest.mark.long
 def test_what_cannot_be_reached_is_refused(
     wants: dict[str, str], values: dict[str, str], error: type[Exception], text: str
 ) -> None:

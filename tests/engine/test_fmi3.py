@@ -59,6 +59,7 @@ def test_foreign_fmus_are_valid(foreign: Foreign) -> None:
     assert validate_fmu(str(foreign("vendor_gyro3"))) == []
 
 
+@pytest.mark.long
 def test_every_type_and_arrays_that_are_wired_in_part(foreign: Foreign) -> None:
     found = pair(foreign, child=True)
     assert pair(foreign).same_data(found)
@@ -180,6 +181,7 @@ def test_an_archive_of_own_builds_gives_the_values_of_fmi_2(small: System, tmp_p
     assert found[1].same_data(found[0])
 
 
+@pytest.mark.long
 def test_a_container_of_arrays_is_refused(small: System, tmp_path: Path) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
     parts: dict[str, Path | str] = {n: build(small.slots[n].part, fmi=3, out=tmp_path) for n in ("gyro", "sampler")}

@@ -24,6 +24,7 @@ SYSTEMS = sorted(n for n in Bench(standard_folder()).systems() if not isinstance
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.long
 def test_the_linked_form_gives_the_same_bits_in_every_system(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first steps, each a row of the channels, and all wired values after the last one."""
     found: list[tuple[Record, bytes]] = []
@@ -80,6 +81,7 @@ def repeated(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     ("ramp", "what"),
     [(1e308, "drift is inf at t = 1.798 s"), (1.5e308, "b is -inf at t = 0.003 s"), (2e307, "b is -inf at t = 4.")],
 )
+@pytest.mark.long
 def test_a_number_that_is_not_finite_ends_the_run_at_its_step(
     small: System, ramp: float, what: str, repeated: list[int], tmp_path: Path
 ) -> None:
@@ -112,6 +114,7 @@ SPILL = """
 """
 
 
+@pytest.mark.long
 def test_a_flag_without_a_number_that_is_not_finite_changes_nothing(
     small: System, tmp_path: Path, repeated: list[int]
 ) -> None:

@@ -69,6 +69,7 @@ def told(system: System, part: Path, maps: dict[str, Path] = MAPS) -> list[str]:
         return [n for n in session.prepare(SHORT)[2].notes if n.startswith("gyro: ") and "SHA-256" not in n]
 
 
+@pytest.mark.long
 def test_a_fixed_internal_step(small: System, change: Change, command: Command) -> None:
     """1 ms is no multiple of 0.4 ms: it would run at steps of its own, silently at another time."""
     kind = '<CoSimulation modelIdentifier="vendor_gyro3"'

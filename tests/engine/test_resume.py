@@ -63,6 +63,7 @@ def test_stopped_at_many_times_the_record_is_that_of_a_whole_run(small: System, 
     assert [p.name for p in out.iterdir() if p.name.startswith(FILE)] == []
 
 
+@pytest.mark.long
 def test_one_engine_continues_what_the_other_began(small: System, tmp_path: Path) -> None:
     whole = run(small, values=QUICK, seed=5)
     stop(small, tmp_path / "r", 0.233, engine="native")
@@ -119,6 +120,7 @@ def test_another_job_is_refused_and_named(
     assert (tmp_path / FILE).read_bytes() == before
 
 
+@pytest.mark.long
 def test_another_part_or_wiring_is_refused(small: System, tmp_path: Path) -> None:
     stop(small, tmp_path, 0.1)
     with pytest.raises(ResumeError, match=r"the part in slot gyro \(its FMU\)"):

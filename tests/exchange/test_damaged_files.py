@@ -50,6 +50,7 @@ def test_an_fmu_with_a_damaged_library_is_refused(tmp_path: Path, command: Comma
     assert code == 2 and words in err and "Traceback" not in err
 
 
+@pytest.mark.long
 def test_an_archive_of_a_system_with_damaged_data_is_refused(tmp_path: Path) -> None:
     export_ssp(load_system("open_loop_drift"), tmp_path / "system.ssp")
     with pytest.raises(InvalidConfigurationError, match="not an SSP archive: Error -3 while decompressing"):

@@ -99,6 +99,7 @@ def test_a_foreign_part_is_refused(foreign: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "x.html").exists()
 
 
+@pytest.mark.long
 def test_without_a_compiler_for_it(tmp_path: Path, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "ziglang" else there(name))

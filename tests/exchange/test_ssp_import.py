@@ -119,6 +119,7 @@ def test_values_that_are_refused(archive: Callable[..., Path], values: str, word
         read_ssp(archive(LAG.format("a", ""), values=values), 0.01)
 
 
+@pytest.mark.long
 def test_a_missing_step_is_asked_for(
     archive: Callable[..., Path], command: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:

@@ -175,6 +175,7 @@ def test_what_is_wrong_is_refused(small: System, write: Write, capfd: pytest.Cap
         assert f"one: a step from t = {when:g} s, but the last one ended at 0.001 s" in capfd.readouterr().out
 
 
+@pytest.mark.long
 def test_what_cannot_be_exposed(small: System, tmp_path: Path, foreign: Callable[[str], Path]) -> None:
     for name, why in {
         "gyro.omega": r"--expose gyro.omega\[1\]: this input is wired: table.omega -> gyro.omega",

@@ -184,6 +184,7 @@ def test_verdicts() -> None:
             parse_wanted([text])
 
 
+@pytest.mark.long
 def test_a_loop_that_depends_on_its_amplitude_passes_nothing(platforms: list[tuple], tmp_path: Path) -> None:
     """The same loop at a tenth of the excitation; then with a cubic of the input that is a tenth as large there."""
     _, record, found = platforms[0]

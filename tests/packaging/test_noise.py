@@ -50,6 +50,7 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return library
 
 
+@pytest.mark.long
 def test_quantile(in_c: ctypes.CDLL) -> None:
     """All three branches of AS 241: bit-equal with Python's, and with scipy to 1e-14 relative."""
     small = [10.0**-k for k in range(1, 300, 7)] + [2.0**-54]

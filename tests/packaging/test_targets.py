@@ -216,6 +216,7 @@ def test_a_state_of_another_part_is_refused(form: str, instance: Callable) -> No
 
 
 # ---------------------------------------------------------------------------------------- instances
+@pytest.mark.long
 def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callable) -> None:
     """All alive at once, each with a seed or a time of its own, stepped in turn; ten are looked at."""
     like = instance(part, "native")

@@ -18,6 +18,7 @@ from gyrobench.packaging.reference import write_reference
 from gyrobench.packaging.validate import STRUCTURED, validate
 
 
+@pytest.mark.long
 def test_parts_have_no_problems(part: str) -> None:
     """FMPy's validation of the Python FMU and of the native FMUs (FMI 2, FMI 3), units, reference runs.
 

@@ -117,6 +117,7 @@ def test_a_long_column_stays_on_the_disk_and_is_what_it_was(tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(not Path("/proc/self/smaps").is_file(), reason="the memory of a mapping is told by Linux alone")
+@pytest.mark.long
 def test_memory_is_given_back() -> None:
     held = mapped(np.full(1 << 20, float(k)) for k in range(4))
 

@@ -17,6 +17,7 @@ from gyrobench.record.run_document import RecordError
 LOADED = "import sys; from pathlib import Path; from gyrobench.record.record import read_table; {}; print(*sys.modules)"
 
 
+@pytest.mark.long
 def test_columns_come_back_without_pandas(tmp_path: Path) -> None:
     columns = {"phase": np.array([1, 2, 2]), "mean": np.array([0.1, np.nan, -3e-300]), "flagged": np.array([0, 1, 0])}
     assert write_table(tmp_path / "record", columns).suffix == ".parquet"

@@ -195,6 +195,7 @@ def logged(run: Record, file: Path, every: int, means: bool, **comments: str) ->
     return exported(Record(run.windows, said, run.run), file, True, **comments)
 
 
+@pytest.mark.long
 def test_point_samples_of_a_fast_loop_are_named(run: Record, tmp_path: Path) -> None:
     """Points at 5 Hz of a loop of 14 Hz; means at the same 5 Hz scatter a quarter as much.  Stated means, a stated
     bandwidth of 2 Hz, and samples at 200 Hz, which fall off before 100 Hz, have no warning."""

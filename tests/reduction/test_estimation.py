@@ -45,6 +45,7 @@ def test_decibels():
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.3, 3.0])
+@pytest.mark.long
 def test_interval_of_an_rms_with_a_sine_holds_the_truth(amplitude):
     """Noise of variance 1 under a sine: rms = sqrt(1 + A^2/2), intervals hold it, and the sine adds no scatter."""
     rng, t = np.random.default_rng(13), np.arange(6000) * T

@@ -60,6 +60,7 @@ def test_fast_powers() -> None:
     )
 
 
+@pytest.mark.long
 def test_blocks_give_the_coefficients_of_the_record(monkeypatch: pytest.MonkeyPatch) -> None:
     """All of 200 000 samples at once, and as means of 512 in stretches of any length: equal within half an interval,
     and intervals as wide within a tenth.

@@ -264,6 +264,7 @@ def test_drift_intervals_hold_with_reading_errors_and_slow_drift() -> None:
     assert largest < 5.0
 
 
+@pytest.mark.long
 def test_noise_of_other_frequencies_is_not_taken_for_that_at_a_sine() -> None:
     """Noise that rises with the frequency, as that of a rate in a position loop: it reaches into short segments.
 

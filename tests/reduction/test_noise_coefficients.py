@@ -105,6 +105,7 @@ def all_five() -> NoiseCoefficients:
     return fit(record(40000, **TRUTH, seed=4), 1.0)
 
 
+@pytest.mark.long
 def test_all_five_are_recovered() -> None:
     found = all_five()
     for name, truth in TRUTH.items():

@@ -71,6 +71,7 @@ def test_white_noise_through_a_filter_and_drift() -> None:
     assert w**2 / (1.0 - phi**2) == pytest.approx(process.sigma.value**2)
 
 
+@pytest.mark.long
 def test_wild_samples_of_very_different_sizes() -> None:
     """8 to 1e5 standard deviations in one record: all are found, and what a large one leaves in others is none.
 

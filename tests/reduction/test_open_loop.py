@@ -50,6 +50,7 @@ def sweep(noise: float, rng: np.random.Generator, test: float = 1.0) -> list[Any
     return found
 
 
+@pytest.mark.long
 def test_pure_noise_has_no_gain() -> None:
     """(r - e)/e of noise alone is -1 with a coherence of 1; at most 1 % of points pass against r, and a few."""
     rng = np.random.default_rng(5)

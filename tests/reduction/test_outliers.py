@@ -80,6 +80,7 @@ def test_rows_that_hide_one_another() -> None:
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.8])
+@pytest.mark.long
 def test_clean_records_have_none(slow: float) -> None:
     """At 1 % a record not more than two of 40, with drift too."""
     assert sum(outliers.find(record({}, seed, slow)) is not None for seed in range(40)) <= 2

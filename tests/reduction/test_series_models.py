@@ -155,6 +155,7 @@ def test_residuals_on_differenced_white_noise_are_not_white() -> None:
 
 
 # ------------------------------------------------------------------------------------- MA, ARMA, ARIMA
+@pytest.mark.long
 def test_reading_noise_makes_arma_and_biases_ar() -> None:
     """tau = 1800 s every 100 s, variances 9.5 : 1: AR(1) finds 0.861 for 0.946, ARMA(1,1) 0.942 in the source's run."""
     rng = np.random.default_rng(10)
@@ -169,6 +170,7 @@ def test_reading_noise_makes_arma_and_biases_ar() -> None:
     assert ljung_box(found.residual, 20, 2).white
 
 
+@pytest.mark.long
 def test_arma_is_that_of_statsmodels_and_its_intervals_that_of_the_information() -> None:
     from statsmodels.tsa.arima.model import ARIMA
 
@@ -260,6 +262,7 @@ def test_correlation_time_of_a_day() -> None:
     assert np.median([m.density for m in mixed]) == pytest.approx(10.0, rel=0.1)  # sqrt(dt)
 
 
+@pytest.mark.long
 def test_correlation_time_of_means() -> None:
     """tau = 2.5 averaging times, from 40 instants in each: exact covariances of means (dense), intervals hold; taken as
     instants the same records give a third too much.

@@ -191,6 +191,7 @@ def test_skewness_and_kurtosis_are_the_unbiased_ones() -> None:
     assert found.block_kurtosis == pytest.approx(blocks.mean()) and found.p < 1e-6
 
 
+@pytest.mark.long
 def test_correlated_normal_records_are_not_rejected() -> None:
     """Gauss-Markov of phi = 0.95: without the correction six of ten are; F3 = (1 + phi^3)/(1 - phi^3)."""
     rng = np.random.default_rng(8)

@@ -55,6 +55,7 @@ def test_latin_greek_cyrillic_and_units_need_no_other_font(bare_machine):
     assert fonts.fonts_for(["ω_d = −0.4 ± 0.1 °/h ″ µ √Hz Ω ≤ γ²", "Гироскоп № 3", "é ß ø ñ"]) == []
 
 
+@pytest.mark.long
 def test_no_font_no_pdf_the_other_files_stand(bare_machine, tmp_path):
     with pytest.raises(report.ReportError, match=r"report\.pdf.*no font of this machine has 测量; they would be") as e:
         report.write(result_of(f"gyro {NAME}"), tmp_path)

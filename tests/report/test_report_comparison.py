@@ -16,6 +16,7 @@ def measure(doc, name):
     return next(m for m in doc["measures"] if m["name"] == name)
 
 
+@pytest.mark.long
 def test_differences_and_their_uncertainty(compared):
     m = measure(compared.json, "D_S")
     a, b = m["runs"][0], m["runs"][1]

@@ -365,6 +365,7 @@ def test_wiring_drawing_stands_alone():
     assert "xmlns=" in svg
 
 
+@pytest.mark.long
 def test_delays_and_cuts_are_said(tmp_path):
     r = unplotted(tumble(windows=12))
     r.provenance["cuts"] = ["rebalance.i -> gyro.i: one step delay (no output depends on it at once)"]

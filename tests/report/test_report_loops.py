@@ -137,6 +137,7 @@ def test_units_of_a_loop_stand_in_a_column(tmp_path: Any) -> None:
     assert ">in Hz<" in html and ">in s<" in html
 
 
+@pytest.mark.long
 def test_a_ratio_of_one_is_no_figure_of_rounding_errors() -> None:
     ratio = responses(1.0)[1]
     n = len(ratio.x)

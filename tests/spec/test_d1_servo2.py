@@ -309,6 +309,7 @@ def test_single_mount_is_warned_of(made: Any) -> None:
         assert c.estimate == pytest.approx(truth[c.name], abs=1e-4), c.name
 
 
+@pytest.mark.long
 def test_gap_in_the_record(made: Any) -> None:
     """Rows left out in the middle of a mount: two stretches, each with a spline of its own."""
     truth = ours(*coefficients(np.random.default_rng(5), 9))

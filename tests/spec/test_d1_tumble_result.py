@@ -81,6 +81,7 @@ def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
         assert c.u > c.u_a
 
 
+@pytest.mark.long
 def test_tilt_of_the_input_axis_can_be_estimated() -> None:
     """Both mounts see it with the table rate, the dwells with Earth rate alone: a tenth unknown, and D_O unharmed."""
     truth, eps = T.random_truth(8), 1e-4

@@ -61,6 +61,7 @@ def test_harmonics_of_a_rate_that_varies() -> None:
     assert 8.0 * (fits[0].u / fits[0].s) ** 2 == pytest.approx([1.0, 2.0, 2.0, 2.0, 2.0])
 
 
+@pytest.mark.long
 def test_bias_of_an_autocorrelation_is_that_of_the_formula() -> None:
     """RED-ACF: phi = 0.95, N = 500, lag 20: (1 - p/N)(phi^p - var m) = 0.2722 for 0.3585; circular sums are no r."""
     k, n, p = np.arange(1, 500), 500, 20

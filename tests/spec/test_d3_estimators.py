@@ -35,6 +35,7 @@ def error(y, truth):
     ("q", "dB", "gain"),
     [(0.02, -12.4, 1.015), (0.1, -10.9, 1.007), (0.5, -9.3, 1.004), (2.0, -7.9, 1.002), (8.0, -6.5, 1.002)],
 )
+@pytest.mark.long
 def test_sine_through_the_rate_filter(sine, q, dB, gain):
     t, truth, z = sine
     y = play("estimator_kalman_rate", z, q=q, R=SIGMA**2)
@@ -43,6 +44,7 @@ def test_sine_through_the_rate_filter(sine, q, dB, gain):
     assert found == pytest.approx(gain, abs=0.005) and abs(phase) < 0.4
 
 
+@pytest.mark.long
 def test_sine_through_sage_husa(sine):
     t, truth, z = sine
     found = play("estimator_sage_husa", z, ["estimate", "R_hat"], q=2.0, b=0.99, form=1, R0=(3 * SIGMA) ** 2)
@@ -75,6 +77,7 @@ def test_sine_through_the_wavelet(sine, moments, J, delay, late, now):
     assert error(found[:, 0], truth) == pytest.approx(now, abs=0.8)
 
 
+@pytest.mark.long
 def test_printed_drift_filter_over_a_sine(sine):
     """Sign put right, as a model of the signal: the sine is scaled by 0.389, the error 8.6 dB above the raw."""
     t, truth, z = sine

@@ -45,6 +45,7 @@ def test_the_drift_filter_by_either_sign(
     assert 10.0 * math.log10(left / SIGMA**2) == pytest.approx(error, abs=0.1)
 
 
+@pytest.mark.long
 def test_power_and_size_of_the_runs() -> None:
     """DRIFT-STATS-RUNS, 200 blocks of 80: of white noise 5 % are rejected; of a random walk, of noise that doubles, of
     a trend of 1e-4 sigma a sample, and of a stationary autoregression of 0.999 all; the up-and-down runs see no trend,

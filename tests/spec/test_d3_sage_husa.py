@@ -132,6 +132,7 @@ def test_printed_weight_keeps_R0(ratio):
         assert part(z[:21], ratio, 0.96, form)[20, 1] / true < 2.5
 
 
+@pytest.mark.long
 def test_printed_innovation_destroys_a_signal():
     """1 Hz sine: rms error more than three times the corrected one, R/R_true near 5 instead of near 1."""
     t = np.arange(1, 20001) * T

@@ -197,6 +197,7 @@ def test_proposals(foreign: Foreign) -> None:
     assert list(tomllib.loads("\n".join(caught.value.proposal))) == ["i"]
 
 
+@pytest.mark.long
 def test_fit_command(foreign: Foreign, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
     file = tmp_path / "gyro.toml"
     arguments = ("fit", foreign("python_gyro"), "--slot", "tumble_single_axis.gyro")

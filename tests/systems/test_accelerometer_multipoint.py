@@ -192,6 +192,7 @@ def laboratory(record: Record, template: str) -> str:
     return template + "\n".join(rows).replace("np.float64(", "").replace(")", "") + "\n"
 
 
+@pytest.mark.long
 def test_measured_data(command: Command, head: Session, tmp_path: Path) -> None:
     """The co-simulation's record as a laboratory's file gives the coefficients put in; what is missing is asked for."""
     values = {**FAST, **quiet(load()), "gravity": 9.8067, "accelerometer.k2": 1e-4}

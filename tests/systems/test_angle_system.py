@@ -122,6 +122,7 @@ def reduce(windows: Any, run: Any) -> Any:
     return Reduction.reduce(windows, Reduction.setup_of(run))
 
 
+@pytest.mark.long
 def test_ideal_readings_return_the_harmonics(document: Any) -> None:
     """Orders by hand: 3" sin(t + 0.4) is 3 sin 0.4 in the cosine, 3 cos 0.4 in the sine."""
     result = reduce(Ideal().windows(load()), document)

@@ -122,12 +122,14 @@ def test_a_slow_acceleration_separates_the_filters() -> None:
     assert slower.result["tilt acceleration"].estimate < 0.5 * slow.result["tilt acceleration"].estimate
 
 
+@pytest.mark.long
 def test_an_acceleration_beyond_the_gate_leaves_the_attitude() -> None:
     r = made(phases="rest acceleration", acceleration=3.0)
     assert by_phase(r, "aided")["acceleration"] < 0.02
     assert r.result["tilt acceleration"].estimate < 0.05
 
 
+@pytest.mark.long
 def test_compensation_in_front() -> None:
     """Without it the filter takes static drift for bias, which turns with the vehicle: it is no longer consistent."""
     with_it, without = made(phases=CALM), made(phases=CALM, known=0.0)
@@ -137,6 +139,7 @@ def test_compensation_in_front() -> None:
     assert np.abs(static).max() * 206264.8 > 10.0
 
 
+@pytest.mark.long
 def test_without_heading_its_drift_is_not_observable_and_said_so() -> None:
     """The stated variance of heading grows, that of the tilt does not, and both hold."""
     assert (
@@ -151,6 +154,7 @@ def test_without_heading_its_drift_is_not_observable_and_said_so() -> None:
     assert abs(r.result["NEES"].estimate - 1.0) < 4.0 * r.result["NEES"].u
 
 
+@pytest.mark.long
 def test_accelerometer_bias_shows_in_the_consistency() -> None:
     """1 mg: 0.057 deg of tilt, which the filter states as 0.004."""
     r = made(phases=CALM, imu__noise_x_acc_bias=0.02, imu__noise_y_acc_bias=0.02)

@@ -72,6 +72,7 @@ def test_a_coarse_angle_is_named_and_passes_nothing(tmp_path: Path, column: str)
     assert not any("largest or smallest value" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_a_fine_angle_passes(tmp_path: Path) -> None:
     x = counted(0.8)
     record = read(tmp_path / "r.csv", {"time [s]": np.arange(float(x.size)), "counts [1]": x}, scale="1arcsec")

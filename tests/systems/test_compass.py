@@ -116,6 +116,7 @@ def test_magnetic_error_in_the_turn_is_that_of_the_tilted_plane(quiet: Any) -> N
     assert quiet["magnetic error in the turn"].estimate == pytest.approx(-best / DEG, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_disturbed_field_moves_it_by_the_limit_or_the_filter(quiet: Any) -> None:
     """10 degrees for 60 s: 2 deg/min and 5 deg/h make 2.083 degrees; 1 degree: 1 - 1/e of it.  scipy: the whole law."""
     found = quiet["error in the disturbed field"]

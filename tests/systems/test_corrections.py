@@ -68,6 +68,7 @@ def plain(session: Session) -> Result:
 
 
 @pytest.mark.parametrize(("error", "source", "size"), TUMBLE)
+@pytest.mark.long
 def test_tumble(session: Session, plain: Result, error: dict[str, Any], source: str, size: float) -> None:
     """Even an input axis tilted by 20 arcsec, which without the correction is taken for slow noise in part."""
     record = session.run({**TUMBLED, **error}, seed=1)
@@ -103,6 +104,7 @@ def level() -> Iterator[Session]:
 @pytest.mark.parametrize(
     ("axis", "source"), [(2, "input axis towards output axis"), (1, "input axis towards spin axis")]
 )
+@pytest.mark.long
 def test_servo_table(level: Session, axis: int, source: str) -> None:
     """The gyro turned about its spin axis brings the input axis towards the output axis; about minus the output axis,
     towards the spin axis.

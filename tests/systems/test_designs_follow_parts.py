@@ -107,6 +107,7 @@ def test_precession_of_the_power_stabilizer_follows_a_pickoff_given_with_its_uni
 
 
 # ------------------------------------------------------------------------------------ foreign parts
+@pytest.mark.long
 def test_foreign_gyro(foreign: Foreign, known_gyro: Path) -> None:
     """Its torquer has 20 deg/h/mA, its own start value; no linear model tells the crossover, the run does."""
     record, result = run(ONE, {"hold": 10.0}, {"gyro": foreign("vendor_gyro")}, {"gyro": known_gyro})
@@ -117,6 +118,7 @@ def test_foreign_gyro(foreign: Foreign, known_gyro: Path) -> None:
     assert any("whether the loop crosses where it was asked to (stabilizer 10 Hz)" in n for n in record.run.notes)
 
 
+@pytest.mark.long
 def test_foreign_gyro_on_a_heavier_platform(foreign: Foreign, known_gyro: Path) -> None:
     values = {"hold": 10.0, "platform.J": 6.0, "gyro.k": "30deg/h/mA"}
     found = estimates(run(ONE, values, {"gyro": foreign("vendor_gyro")}, {"gyro": known_gyro})[1])
@@ -174,6 +176,7 @@ def test_gain_set_by_hand_is_told_with_what_comes_out(command: Command, tmp_path
     assert f"{crossover:.1f}" in warning
 
 
+@pytest.mark.long
 def test_another_estimator_in_the_loop_is_named() -> None:
     with Session(ONE, {"estimator": "estimator_kalman_ar"}) as s:
         notes = s.prepare({"hold": 10.0})[2].notes
@@ -201,6 +204,7 @@ def test_servo_that_wants_a_rate_gives_a_platform_rate_gyros(slot: str) -> None:
     }
 
 
+@pytest.mark.long
 def test_the_same_servo_fits_where_the_signal_is_a_rate() -> None:
     with Session(ONE, {"stabilizer": "servo_three_loop"}) as s:
         assert s.run({"hold": 10.0}, seed=1).run.linear.loops["stabilizer"].break_at == "stabilizer.u"

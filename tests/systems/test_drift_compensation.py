@@ -189,6 +189,7 @@ class FloatOnServoTable(System):
         }
 
 
+@pytest.mark.long
 def test_a_floated_gyro_on_its_servo_table_is_compensated() -> None:
     """Sign and size of the current hold for the real loop: rate and angle are those of the closed form."""
     found = {}

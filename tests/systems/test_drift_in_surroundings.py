@@ -76,6 +76,7 @@ def test_without_the_thermometer_the_warming_is_a_trend(ramp: Record) -> None:
     assert found["trend"].estimate == pytest.approx(3.6, rel=0.2)
 
 
+@pytest.mark.long
 def test_a_vertical_field_looks_like_unbalance(prepared: Session) -> None:
     """B = b U and (X, Y, Z) = -f/g0 = -gamma U on every axis: D_B . B = -(b/gamma) (D_B . (X, Y, Z)), so that D_I and
     D_S are too large by -b D_BI/gamma = +0.088 deg/h/g and -b D_BS/gamma = -0.022 deg/h/g, the others unchanged.

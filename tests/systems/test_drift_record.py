@@ -328,6 +328,7 @@ def test_short_runs_are_refused(command: Command, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_missing_samples_are_completed_and_long_gaps_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """A gap of more than a thousand samples ends a stretch; the samples missing in the longest one are as its noise."""
     monkeypatch.setattr(P, "describe", lambda x, step: None)

@@ -55,6 +55,7 @@ def test_of_two_columns_that_tell_the_same_one_stays() -> None:
     assert share == pytest.approx(0.5, abs=4 * 0.0225) and low < 0.05 and high > share
 
 
+@pytest.mark.long
 def test_columns_of_noise_stay_out() -> None:
     """Six slow columns, a record of random walk and white noise: 7.5 % of records take one out, for all together.
 

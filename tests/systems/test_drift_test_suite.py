@@ -148,6 +148,7 @@ def test_composite_drift_and_three_more_methods(sessions: dict[str, Session]) ->
     assert found.suite.consistency == "consistent"
 
 
+@pytest.mark.long
 def test_both_channels_by_tumble_and_eight_positions(sessions: dict[str, Session]) -> None:
     """u_zx, u_x, R_y ... of Hu 1981 are combinations; noise off they are what the tumble says, but for its lag."""
     rng = np.random.default_rng(2)

@@ -108,6 +108,7 @@ def test_level() -> None:
     assert any("understates" in w for w in wrong.warnings) and any("not white" in w for w in wrong.warnings)
 
 
+@pytest.mark.long
 def test_ar3() -> None:
     """BENCH-DRIFT-AR3: error variance of the Riccati equation, 1.912e-6; consistent; nothing beats it."""
     r = result("kalman_ar", "ar3")
@@ -218,6 +219,7 @@ def test_parts_refuse_before_the_first_step(part: str, values: dict[str, float],
         run(load_system(NAME), {"estimator": f"estimator_{part}"}, values=more)
 
 
+@pytest.mark.long
 def test_sampling_period_that_does_not_fit_names_both(command: Command, tmp_path: Path) -> None:
     code, _, err = command("run", NAME, "--set", "estimator.Ts=1.5ms", "--out", tmp_path / "r")
     assert code == 3 and "Traceback" not in err

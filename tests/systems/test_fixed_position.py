@@ -238,6 +238,7 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[...
             load().read_measured(tmp_path / "bad.csv", {})
 
 
+@pytest.mark.long
 def test_days(session: Session, tmp_path: Path) -> None:
     """Eight turn-ons of rms 0.2 deg/h: mean, sigma (n - 1), t interval; the scatter is found significant."""
     values, folders = {**SHORT, "gyro.turn_on": 0.2 * DPH}, []
@@ -257,6 +258,7 @@ def test_days(session: Session, tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------ noise coefficients
+@pytest.mark.long
 def test_long_record_gives_noise_coefficients(session: Session) -> None:
     """600 windows of 1 s: flicker and angle noise of the gyro lie in their intervals; 30 windows: no table."""
     values = {**SHORT, **QUIET, "gyro.white": 0.003 * DPH, "gyro.flicker": 0.05 * DPH, "gyro.quantization": 1e-6}

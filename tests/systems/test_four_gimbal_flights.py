@@ -34,6 +34,7 @@ def fly(bench: Session, flight: str, law: str = "sign", **more: Any) -> Result:
 
 # ------------------------------------------------------------------------------------ where it is kept
 @pytest.mark.parametrize("law", ["secant", "sign"])
+@pytest.mark.long
 def test_roll_to_90_then_yaw(bench: Session, law: str) -> None:
     """Three gimbals lose the 50 deg here; four: error < 1e-4 deg (factor 2), inner roll <= 1.2 deg, ring 4 90 deg."""
     c = measures(fly(bench, "roll_yaw", law))
@@ -150,6 +151,7 @@ def test_loops_and_figures_of_a_whole_run(bench: Session) -> None:
     assert result.ranked_by == "platform error"
 
 
+@pytest.mark.long
 def test_three_gimbals_in_the_launch() -> None:
     """The same flight with three gimbals passes near lock and loses > 2 deg at the same rate limit: 4.0 deg, as the
     part with ideal feedback."""

@@ -153,6 +153,7 @@ def printed_swaps() -> list[dict[str, str]]:
     return [f for f in found if f]
 
 
+@pytest.mark.long
 def test_printed_swaps_give_a_result() -> None:
     """With sines of the base, which a manoeuvre does not make: the isolation has no value, and the rest stands."""
     swaps = printed_swaps()

@@ -66,6 +66,7 @@ def test_cogging_and_cables_have_a_budget() -> None:
     assert found["cogging"][2] > 30.0
 
 
+@pytest.mark.long
 def test_unbalance_and_acceleration_have_a_budget() -> None:
     """The truck's acceleration on 2e-3 kg.m of the inner gimbal along z."""
     result, _ = ridden({"platform.unbalance[2,3]": 2e-3}, psd="truck", gyro_noise=0.0, jitter_from=10.0, ride=30.0)

@@ -110,6 +110,7 @@ def test_random_responses_come_back() -> None:
 
 
 @pytest.mark.parametrize("highest", [300.0, 1000.0])
+@pytest.mark.long
 def test_curves_with_a_resonance_and_a_zero_are_found(highest: float) -> None:
     """About the output axis, noise of 0.1 %: chi2 of 46 degrees of freedom, within 5 standard deviations of 9.6."""
     rng = np.random.default_rng(9)

@@ -130,6 +130,7 @@ def test_ballistic_deflection_and_schulers_condition(quiet: Any, liquid: Any) ->
     assert left > 1.5 and short["ballistic error"].estimate == pytest.approx(left, rel=0.01)
 
 
+@pytest.mark.long
 def test_damping_that_stays_on_adds_to_the_deflection(quiet: Any) -> None:
     """D turns the tilt under 10/300 m/s2 into az'' = -w_N D a/(H g), and keeps the latitude error, lost in the cut."""
     on = reduced(cut=False, phases="settling speed", settle="8h", **QUIET)
@@ -140,6 +141,7 @@ def test_damping_that_stays_on_adds_to_the_deflection(quiet: Any) -> None:
     assert quiet["ballistic error"].estimate > 0.09 > 0.0 > on["ballistic error"].estimate
 
 
+@pytest.mark.long
 def test_rolling_between_the_quarters(quiet: Any) -> None:
     """-(mgl/H w_N)(1 + e2) <a_N s>/g, e = D/mgl, course 135 less the axis' azimuth; none on the cardinal courses."""
     a = 10.0 * 10 * DEG * (1.0 - (10 * DEG) ** 2 / 8.0) * (0.2 * math.pi) ** 2 / G0
@@ -164,6 +166,7 @@ def test_correctors_take_away_what_they_can() -> None:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.long
 def test_noise_stays_within_the_intervals(seed: int) -> None:
     """Reading noise ten times, drift fifty times the default: every measure within 3.3 u, u not too large."""
     found = reduced(seed, phases="settling speed", noise="0.1deg/sqrt(Hz)", random_drift="0.01deg/sqrt(h)")
@@ -208,6 +211,7 @@ def test_a_swing_before_a_manoeuvre_spoils_the_deflection() -> None:
     assert found["speed error"].estimate == pytest.approx(SPEED, abs=0.02)
 
 
+@pytest.mark.long
 def test_far_from_the_meridian_nothing_is_passed() -> None:
     """80 degrees, 25 m/s: 17 degrees of speed error; closed forms of small angles, the verdict is withheld."""
     found = reduced(phases="settling speed", latitude=80 * DEG, speed=25.0, specification={"speed error": (0.0, 90.0)})

@@ -57,6 +57,7 @@ def scatters(warning: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
+@pytest.mark.long
 def test_a_clean_record_passes(command: Command, text: str, tmp_path: Path) -> None:
     code, found = strict(command, tmp_path, NAME, text, ("D_S", "deg/h/g"))
     assert code == 0 and found["verdict"] == "pass" and not found["withheld"]

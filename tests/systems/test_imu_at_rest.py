@@ -145,6 +145,7 @@ def test_the_share_of_a_temperature_is_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_a_rate_follows_the_change_of_the_temperature(tmp_path: Path) -> None:
     """0.05 deg/h per K/h, T of 2 K in a sine of 600 s: T' = 2 2pi/600 3600 = 75.4 K/h, 3.8 deg/h."""
     n, rng = 8192, np.random.default_rng(4)

@@ -213,6 +213,7 @@ def test_plan_that_is_not_enough_is_refused_before_the_run() -> None:
     assert "6 positions for nine unknowns" in str(error.value)
 
 
+@pytest.mark.long
 def test_a_proposed_map_reads_other_names_and_numbered_positions(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     unit = Unit.drawn(rng)
@@ -319,6 +320,7 @@ def test_turns_without_samples_leave_the_gyros_bias_and_sensitivity(tmp_path: Pa
     assert level.size == pytest.approx(15.0410686 * math.cos(0.7) / math.sqrt(2.0) * DPH, rel=1e-6)
 
 
+@pytest.mark.long
 def test_readings_at_rest_change_the_turns_as_the_budget_says(tmp_path: Path) -> None:
     """One reading of an accelerometer 1e-4 m/s2 off: gravity after each turn, with the matrix held, is off by the row
     of the source, fit of the nine unknowns included; to first order of 1e-5 rad."""

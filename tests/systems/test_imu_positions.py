@@ -76,6 +76,7 @@ def test_recovers_a_random_unit_without_noise(seed: int) -> None:
     assert len(result.coefficients) == 33
 
 
+@pytest.mark.long
 def test_co_simulation_recovers_the_unit() -> None:
     """Noise off: the coefficients are those of the part, to the trapezoid of the sampler over turning windows."""
     unit = Unit.drawn(np.random.default_rng(5))

@@ -106,6 +106,7 @@ def up_and_down(path: Path, name: str, shift: float) -> Any:
     return reduced(path, "# attitudes = up_down\n# latitude = 51deg\n# type_b = none\n", data)
 
 
+@pytest.mark.long
 def test_ring_laser_up_and_down_sees_the_earth(tmp_path: Path) -> None:
     """LN-100, 300 s each way: half of up less down is the vertical Earth rate, 15.041 sin 51 = 11.689 deg/h, within its
     interval, which is below 0.1 deg/h; the plain half difference of the means is 11.73."""

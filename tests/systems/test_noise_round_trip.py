@@ -70,6 +70,7 @@ def written(
     return read_settings(path)
 
 
+@pytest.mark.long
 def test_record_gyro_record(tmp_path: Path) -> None:
     """The values that the gyro was given lie in the intervals of its record, and the Allan deviations agree."""
     rate = measured(np.random.default_rng(2))

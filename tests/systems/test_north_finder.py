@@ -210,6 +210,7 @@ def test_interval_of_the_null(sessions: Callable[[str], Session]) -> None:
     assert held >= 9
 
 
+@pytest.mark.long
 def test_a_moving_base_does_not_pass_for_noise(
     sessions: Callable[[str], Session], command: Command, tmp_path: Path
 ) -> None:

@@ -103,6 +103,7 @@ def test_what_a_family_leaves_to_the_test_is_asked_for(
     assert code == 2 and f"has no {method}(), which its family leaves to the test" in err
 
 
+@pytest.mark.long
 def test_the_reduction_has_set_up_effects_corrections_and_a_verdict(bench: Path, command: Command) -> None:
     """10 arcsec of the fixture's tilt about east turn the level input axes against the pole: the Earth rate along them
     changes by W sin(45.75 deg) 10 arcsec = 5.2e-4 deg/h where the input axis is north, which the attitudes take for

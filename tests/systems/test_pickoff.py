@@ -205,6 +205,7 @@ def test_refused_records() -> None:
 
 
 # ----------------------------------------------------------------------------------------- measured data
+@pytest.mark.long
 def test_measured_data(command: Command, stepping: Session, tmp_path: Path) -> None:
     w = stepping.run(quiet()).windows
     code, template, _ = command("reduce", NAME, "--template")

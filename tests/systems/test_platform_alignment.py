@@ -135,6 +135,7 @@ def test_two_positions_leave_the_drift_out(session: Any, clean: Any) -> None:
 
 
 # ------------------------------------------------------------------------------------------ settling
+@pytest.mark.long
 def test_settling_of_the_platform_is_that_of_the_loop(session: Any, clean: Any) -> None:
     """A drift, by expm of (phi_x, phi_z, y, integral) over the same 45 s of gyrocompass: order 3, w = 0.04."""
     known = clean[0].run.parameters["controller.drift"][0]

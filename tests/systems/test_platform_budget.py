@@ -47,6 +47,7 @@ def each(runs: int, **values: Any) -> list[Ridden]:
         ("pickoff of the gyro", {"gyro.pickoff": 2e-6}),
     ],
 )
+@pytest.mark.long
 def test_noise_of_one_source(source: str, values: dict[str, float]) -> None:
     """The rms of one run of 30 s scatters by 6 % (noise about 1 Hz counts most): four runs by 3 %, twice that.
 
@@ -59,6 +60,7 @@ def test_noise_of_one_source(source: str, values: dict[str, float]) -> None:
     assert rows[source] == pytest.approx(math.sqrt(sum(squares) / 4.0), rel=0.06)
 
 
+@pytest.mark.long
 def test_base_by_each_way() -> None:
     """1° at 1 Hz: without back EMF by viscous friction alone, and the other way round; together as in the whole run.
 

@@ -73,6 +73,7 @@ def test_a_perfect_platform_follows_a_swaying_base(session: Session) -> None:
     assert session.run({**PERFECT, "base": 5}).channels["motion.angle[2]"].std() > 0.005  # it does sway
 
 
+@pytest.mark.long
 def test_each_error_makes_the_drift_of_the_closed_form(session: Session) -> None:
     """Torquers e w; residual d on each axis; latitude dw/dL; velocity dw/dv; mounting: R w = w_believed, by hand."""
     place = closed.MovingPlace(45.75 * np.pi / 180.0, 0.0, 200.0, 100.0)

@@ -97,6 +97,7 @@ def test_commands_and_drift(found: Any) -> None:
         assert abs(c.estimate - c.truth) < 4.0 * c.u
 
 
+@pytest.mark.long
 def test_position_loops_hold_the_joint_angles() -> None:
     """Outside of the rate loop with its integral: a constant torque leaves no angle, where the rate loop left 266″."""
     with Session(rates(track=1.0, swing=0.0, sweeps=False)) as session:
@@ -120,6 +121,7 @@ def test_refused(command: Command, tmp_path: Path, sets: list[str], said: str) -
     assert code == 2 and said in " ".join(err.split())
 
 
+@pytest.mark.long
 def test_an_acquisition_card_in_front_of_the_loops() -> None:
     """Its estimate is in whole codes of 10 V / 2^14, at a gain of 2.5 V for 1 rad/s."""
     system = rates(swing=0.0, sweeps=False)

@@ -112,6 +112,7 @@ def test_servo_with_a_current_loop_swaps_and_isolates_better(quiet):
     assert not any("carried over" in s for s in result.summary)  # by other ways than those of a plain motor
 
 
+@pytest.mark.long
 def test_halving_the_step_moves_the_margin_by_its_delay():
     """The exchange delays by about a step: 360 f_c h = 1.8 degrees at 10 Hz and 0.5 ms, half of it at half the step."""
     with only(NAME, "loop", "drift") as session:

@@ -72,6 +72,7 @@ def test_friction_switched_off_takes_its_share(whole: Any, source: str, name: st
     assert rows[BASE_Y, "measured"][0] > 1.3 * measured
 
 
+@pytest.mark.long
 def test_reaction_of_the_gimbals_alone(whole: Any) -> None:
     """Without friction it is all that is left of the base about z: tan(pitch) (I_ry + I_fz) heading'' about roll."""
     _, rows = whole
@@ -108,6 +109,7 @@ def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float
     assert rows["drift", source][1] == pytest.approx(100.0)
 
 
+@pytest.mark.long
 def test_budget_of_a_recorded_ride(tmp_path: Path) -> None:
     """Three sines an axis that do not close, with dry friction: computed for Hann's window, as measured."""
     t = np.arange(0.0, 31.0, 0.25)

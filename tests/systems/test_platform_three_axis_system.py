@@ -221,6 +221,7 @@ def test_rate_into_current_wants_its_factor():
         Session(bare)
 
 
+@pytest.mark.long
 def test_ride_by_a_recorded_profile(tmp_path):
     """Roll of 5 degrees at 0.2 Hz as a recording: taken over far below -40 dB; a gap in it is refused."""
     t = np.arange(0.0, 20.0, 0.1)

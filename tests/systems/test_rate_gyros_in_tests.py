@@ -107,6 +107,7 @@ def test_north_finder_takes_them(part: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["drift_record", "north_finder"])
+@pytest.mark.long
 def test_an_archive_holds_the_rate_gyro(name: str, tmp_path: Path) -> None:
     """Export of the system as its parts make it, and the same system again from the archive."""
     system = load_system(name).with_values({"density": 1e-6} if name == "north_finder" else {})

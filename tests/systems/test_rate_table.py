@@ -216,6 +216,7 @@ def row_before(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarr
         (row_before, "the reading belonging to the row before"),
     ],
 )
+@pytest.mark.long
 def test_mistakes_that_residuals_show(tmp_path: Path, mistake: Any, words: str) -> None:
     rate, mean = lab(np.random.default_rng(2))
     assert words in said(measured(write(tmp_path / "a.csv", *mistake(rate, mean))))
@@ -231,6 +232,7 @@ def test_rates_without_their_sign(tmp_path: Path) -> None:
     ("rate_factor", "mean_factor", "words"),
     [(1.0, -1.0, "reversed"), (1.0, math.pi / 180.0, "rad/s"), (1.0, 3600.0, "°/h"), (1.0, 1.25, "Check the senses")],
 )
+@pytest.mark.long
 def test_mistakes_that_no_residual_shows(tmp_path: Path, rate_factor: float, mean_factor: float, words: str) -> None:
     rate, mean = lab(np.random.default_rng(3))
     result = measured(write(tmp_path / "a.csv", rate_factor * rate, mean_factor * mean))

@@ -265,6 +265,7 @@ def test_encoder_harmonics_shift_as_predicted(polar: Session, day: Any) -> None:
         assert line.sensitivity * a == pytest.approx(sign * size, rel=0.1)  # told before it is measured
 
 
+@pytest.mark.long
 def test_axis_tilt_shifts_as_predicted(polar: Session, day: Any) -> None:
     """Table axis tilted by t about y = west, alike in both mounts: its latitude is wrong by t, s becomes s + t c and c
     becomes c - t s.  So D_I takes D_I t c/s, D_S takes -D_S t s/c; and W (1 - t2/2) for W, W t2/(2 g s) in D_I, is seen
@@ -345,6 +346,7 @@ def test_dynamic_against_quasi_static(polar: Session) -> None:
         assert a.estimate == pytest.approx(a.truth, abs=3e-5), a.name  # J/H at 500 Earth rates
 
 
+@pytest.mark.long
 def test_one_step_of_a_tenth_gives_the_same(polar: Session) -> None:
     """0.1 ms and 1 ms of communication step: the coefficients differ by less than 1e-7 deg/h."""
     values = {**DAY500, **QUIET, "time": 10.0, "dwell": 5.0, "window": 1.0, "route": "dwells"}

@@ -82,6 +82,7 @@ def quiet(table: Session) -> Any:
     return table.run({**day(200.0), **QUIET})
 
 
+@pytest.mark.long
 def test_stiffness_is_what_is_left(table: Session, quiet: Any) -> None:
     """Two hundred times as fast 1e-5 deg/h are left, as predicted to 2 %; twice as stiff (crossover up by 1.41) leaves
     half of it."""
@@ -148,6 +149,7 @@ def shifted(table: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]:
         ({"wobble_y.amplitude": 1.0, "wobble_y.phase": math.pi / 2}, "wobble of the inner", 1),
     ],
 )
+@pytest.mark.long
 def test_table_effects_as_predicted(
     table: Session, brief: Any, setting: dict[str, float], source: str, row: Any
 ) -> None:
@@ -171,6 +173,7 @@ def test_gyro_askew_on_the_plate_as_predicted(table: Session, brief: Any) -> Non
 
 
 # ------------------------------------------------------------------------------------------ noise
+@pytest.mark.long
 def test_dynamic_against_quasi_static(table: Session) -> None:
     """Angles integrated from the equation alone give the coefficients of the co-simulation, noise on, within its u."""
     noisy = table.run(NOISY, seed=6)
@@ -310,6 +313,7 @@ def test_delays(quiet: Any) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_stopped_and_continued(tmp_path: Any) -> None:
     """Stopped in the first mount, noise and quantum on, and continued: the record is bit-equal."""
     whole = run(NAME, values=NOISY, seed=3)

@@ -98,6 +98,7 @@ def test_all_eighteen_attitudes(bench: Session) -> None:
     assert len(table.rows) == 18
 
 
+@pytest.mark.long
 def test_noise_and_composite(bench: Session) -> None:
     """Truth within four u; ten windows a dwell give composite statistics of every phase."""
     values = {"dwell": 300.0, "windows": 10, "table.quantum": 0.18 * ARCSEC, "gyro.markov_tau": 30.0}

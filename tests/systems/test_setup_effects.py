@@ -156,6 +156,7 @@ def test_two_axis_servo() -> None:
 
 
 # ------------------------------------------------------------------------------------------ tumbles
+@pytest.mark.long
 def test_two_axis_tumble() -> None:
     """25 positions of a gyro turned by 1500 arcsec about its spin axis, x' = x + 1500 arcsec y, and about its output
     axis, x' = x + 1500 arcsec z: the Earth rate across is seen by the cosine and the sine of the inner angle, and D_O
@@ -198,6 +199,7 @@ def test_open_loop() -> None:
     assert reduced(record, nuisances="none").coefficients[0].u > 2.0 * result.coefficients[0].u
 
 
+@pytest.mark.long
 def test_eight_positions() -> None:
     """The gyro turned by 300 arcsec about its spin axis: x' = x + 300 arcsec y, y' = y - 300 arcsec x."""
     values = {"dwell": 6.0, "settle": 2.0, "readings": 2, "cycles": 6}

@@ -110,6 +110,7 @@ def test_what_the_method_assumes() -> None:
     assert "No option changes what they assume" in errors["gyro.mount"].sentence()
 
 
+@pytest.mark.long
 def test_options_of_other_systems_own_what_they_set() -> None:
     """A servo test has the latitude in two parts, the two-axis table one element of an array."""
     assert list(found("servo_polar", {"stand.latitude": "45deg"})) == ["stand.latitude"]

@@ -102,6 +102,7 @@ def test_tumble_on_the_table_as_it_is_built() -> None:
     agree("tumble_single_axis", parts, values, errors, 0.05)
 
 
+@pytest.mark.long
 def test_tumble_with_pulses_on_demand() -> None:
     """Currents of both signs and length of the pulses; every window has pulses of one sign."""
     values = {**SHORT, **STILL, **DRIFT, "rebalance.I": 3e-3}

@@ -136,6 +136,7 @@ def test_cosimulation_converges_to_the_equations(session, kind, c, k, time):
         assert coarse[1] / fine[1] == pytest.approx(2.0, rel=0.15)
 
 
+@pytest.mark.long
 def test_satellite_example(session):
     """2.15 arcmin with cos(b) and 5.70 deg of float; 1.44 deg for the rate gyro."""
     _, a, b = load(run(session, 2e-4, kind="rate-integrating"))
@@ -145,6 +146,7 @@ def test_satellite_example(session):
     assert a[-1] / DEG == pytest.approx(1.441, abs=0.001)
 
 
+@pytest.mark.long
 def test_nutation_neither_grows_nor_dies(session):
     """Integrating gyro, 600 s without load: amplitude of b' stays; no pole of the discrete model leaves the circle."""
     record = run(session, 5e-3, kind="integrating", M="1e-3N.m", time="3000s")
@@ -229,6 +231,7 @@ def test_friction_turns_with_the_base(session):
 
 
 # ------------------------------------------------------------------------------------------ refusals
+@pytest.mark.long
 def test_the_stop_ends_the_run(session, tmp_path, command):
     code, _, err = command("run", NAME, "--set", "float_stop=3deg", "--step", "2ms", "--out", tmp_path / "r")
     assert code == 3

@@ -233,6 +233,7 @@ def test_a_file_of_a_simulated_record_gives_the_same(session: Session, tmp_path:
 
 
 # ------------------------------------------------------------------------------------------------ hand-over
+@pytest.mark.long
 def test_the_axis_is_handed_over_to_the_tests(session: Session, tmp_path: Path) -> None:
     """As corrections by the names of the sources, with their u; a stand at the pole of 20 arcsec to the east."""
     out = tmp_path / "run"
@@ -249,6 +250,7 @@ def test_the_axis_is_handed_over_to_the_tests(session: Session, tmp_path: Path) 
         assert east.endswith(" arcsec") and 0.0 < float(east.split("(")[1].split(")")[0]) < 0.5
 
 
+@pytest.mark.long
 def test_a_tumble_on_a_stand_off_the_pole_is_mended(session: Session) -> None:
     """The stand of the alignment is that of the tumble: table.tilt about east and about p x east; signs end to end."""
     azimuth, elevation = 60.0 * ARCSEC, -40.0 * ARCSEC

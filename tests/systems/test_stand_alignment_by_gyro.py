@@ -77,6 +77,7 @@ def test_intervals_cover(session: Session) -> None:
     assert held >= 2 * n - 14  # 114 expected of 120, standard deviation 2.4
 
 
+@pytest.mark.long
 def test_heading_of_a_north_finder_is_handed_over() -> None:
     run = gb.load("north_finder", {"time": "60s", "heading": "40deg"}).run(seed=2, check_step=False)
     psi = run.result["ψ"]

@@ -31,6 +31,7 @@ def test_two_degrees_at_4_hz():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.long
 def test_time_to_the_fine_loop_beside_the_equations(seed):
     """Table, float and capture law as differential equations, friction as tanh(w / v); J, H/C, offset at random."""
     rng = np.random.default_rng(seed)
@@ -88,6 +89,7 @@ def test_time_optimal_return():
     assert slow["t_fine"].estimate > 3.0 * c["t_fine"].estimate
 
 
+@pytest.mark.long
 def test_fine_loop_closed_directly_diverges():
     """The counter-example: void, with conditional stability under saturation as the reason."""
     c, result = measured(capture=False)
@@ -96,6 +98,7 @@ def test_fine_loop_closed_directly_diverges():
     assert math.isnan(c["overshoot"].estimate) and c["t_null"].verdict == "void"
 
 
+@pytest.mark.long
 def test_friction_that_holds_the_table_off_null():
     """1400 g.cm / (J (8 pi)^2) = 17.5 arcsec is above the 8 arcsec of the fine loop: it is never closed."""
     c, result = measured(capture_rate=8.0 * math.pi)
@@ -103,6 +106,7 @@ def test_friction_that_holds_the_table_off_null():
     assert c["t_fine"].no_value == "the fine loop is not closed"
 
 
+@pytest.mark.long
 def test_limit_of_the_requirement_is_judged():
     c, result = measured(limit=1.1)
     assert c["t_null"].estimate > 1.1 and result.verdict == "fail"

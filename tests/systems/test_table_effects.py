@@ -146,6 +146,7 @@ def test_wobble_of_the_two_channel_tumble(row: int) -> None:
     check(plain, wrong, right, told(plain, source, row))
 
 
+@pytest.mark.long
 def test_each_torquer_and_each_meter_is_corrected_by_itself() -> None:
     """The scale factor of the torquer about y stated too large by 1e-3, its meter reading 1 uA too much: both are of
     the x channel, whose Dx_0 falls by k times 1 uA (0.0172 deg/h); the y channel does not know of them.

@@ -123,6 +123,7 @@ def test_budgets_of_a_report(found: DriftTestResult) -> None:
     assert totals["Monte Carlo, standard deviation"] == pytest.approx(totals["root of squares"], rel=0.03)
 
 
+@pytest.mark.long
 def test_static_tilt_about_north_turns_the_gyro_against_the_earth(session: Session) -> None:
     """Turned as a rotation, the input axis east leans by q about north to -q up: -q W sin phi of the Earth's rate is on
     it and -q g along it.  Hu 1981, Table 5-4, 3.3e-6 ERU and 4.8e-6 g per arcsec at 42.36 deg; with D_I = 0.1 ERU/g the

@@ -104,6 +104,7 @@ def test_wobble_tilt_and_squareness(found: Any) -> None:
     assert found["repeatability"].estimate < 0.18  # a count
 
 
+@pytest.mark.long
 def test_one_mount_separates_only_what_two_heads_do() -> None:
     """Reversal alone: odd orders by the heads, even ones stay with the polygon, the plate with the level's zero."""
     r = position_run(mounts="0").result

@@ -88,6 +88,7 @@ def test_printed_table_says_where_it_comes_from() -> None:
         (1, 3, 1.02, "Row 3 contradicts the others"),
     ],
 )
+@pytest.mark.long
 def test_mistaken_rows_and_senses(
     command: Command, tmp_path: Path, column: int, row: int, factor: float, words: str
 ) -> None:

@@ -61,6 +61,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("error", "source", "by_hand"), CASES, ids=[c[1] for c in CASES])
+@pytest.mark.long
 def test_an_error_is_predicted_and_taken_out(
     servo: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
 ) -> None:

@@ -93,6 +93,7 @@ def test_laboratory_units(
     assert found["provenance"]["data"]["file"] == "lab.csv"
 
 
+@pytest.mark.long
 def test_options_of_the_command_win(command: Command, record: Record, tmp_path: Path) -> None:
     """k = 34.4 deg/h/mA instead of 17.2: the input rate is 0 in every attitude, so all coefficients double."""
     text = laboratory(record)

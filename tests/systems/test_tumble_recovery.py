@@ -39,6 +39,7 @@ def test_random_gyros_at_random_latitudes(session: Session, seed: int) -> None:
         assert c.closed == pytest.approx(c.estimate, abs=5e-9), c.name
 
 
+@pytest.mark.long
 def test_both_senses_and_several_turns(session: Session) -> None:
     """Turns with the Earth too, two in each sense: same coefficients, no sense in the lag (it goes with rate2)."""
     rng = np.random.default_rng(20)
@@ -105,6 +106,7 @@ def test_d_oo_folds_as_predicted(session: Session) -> None:
     assert any("D_OO is folded" in w and "centrifuge" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_dynamic_against_quasi_static(session: Session) -> None:
     """The record of the dynamic co-simulation and one made from k i = omega_IA - omega_d alone (window means by
     quadrature) give the same coefficients to the lag without noise, and within the noise with it.

@@ -134,6 +134,7 @@ def test_failing_gyro(command: Command, foreign: Foreign, tmp_path: Path, fault:
     assert expected in record.run.problem
 
 
+@pytest.mark.long
 def test_gyro_that_crashes_in_initialization(command: Command, foreign: Foreign, tmp_path: Path) -> None:
     code, _, err = command(
         "run", NAME, "--part", f"gyro={foreign('faulty')}", "--set", "gyro.fault=5",

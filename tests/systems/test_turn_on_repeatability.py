@@ -132,6 +132,7 @@ def test_a_warm_up_longer_than_the_record() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ runs
+@pytest.mark.long
 def test_a_gyro_that_warms_up_comes_back() -> None:
     """At a rate in both senses, two exponentials, scale factor: without noise of the gyro to 1 %."""
     options = {"days": 2, "turn_ons": 2, "dwell": 400.0, "window": 10.0, "rate": 0.1, "limit": 0.5 * DPH}

@@ -168,6 +168,7 @@ def test_run_is_refused(command: Command, tmp_path: Path, values: list[str], wor
 
 
 # ------------------------------------------------------------------------------------------ laboratory, report, README
+@pytest.mark.long
 def test_laboratory_record(command: Command, session: Session, tmp_path: Path) -> None:
     record = session.run({**SHORT, "latitude": math.radians(-33.9)}, seed=9)
     expected = load().reduce(record)

@@ -124,6 +124,7 @@ def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
     assert header.startswith("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean_x [mA],mean_y [mA]")
 
 
+@pytest.mark.long
 def test_report_of_a_run(command: Command, tmp_path: Path) -> None:
     """A run by command gives the report; outside 20 to 70 degrees it warns."""
     values = {**SHORT, "rate": "0.1rad/s", "windows": 24, "settle": 5.0, "latitude": "75deg", "model": "simple"}

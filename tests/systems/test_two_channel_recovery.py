@@ -48,6 +48,7 @@ def errors(result: Result, values: dict[str, Any]) -> dict[str, float]:
 
 @pytest.mark.parametrize("model", ["simple", "nine"])
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.long
 def test_random_gyros_at_random_latitudes(session: Session, model: str, seed: int) -> None:
     """Every error is below 1e-6 deg/h, and is that of the loops' lag as worked out in two_channels.quasi_static."""
     rng = np.random.default_rng(seed)
@@ -127,6 +128,7 @@ def test_halving_the_step_and_engines(session: Session) -> None:
     ("table axis off the pole, about p × east", "u_axis", 60.0),
     ("gyro turned about its x axis", "u_mount", 1.0), ("gyro turned about its y axis", "u_mount", 1.0),
 ])  # fmt: skip
+@pytest.mark.long
 def test_set_up_errors_shift_as_the_budget_predicts(
     ran: Callable[..., Record], source: str, option: str, arcsec: float
 ) -> None:

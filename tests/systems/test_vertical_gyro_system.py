@@ -74,6 +74,7 @@ def test_hang_off_of_the_linear_law(session):
 
 
 @pytest.mark.parametrize("time", [60.0, 700.0])
+@pytest.mark.long
 def test_hang_off_holds_the_equilibrium(session, time):
     """T/H = omega x n with n = (tan e_x, tan e_y, 1): e = W cos(latitude)/gain to 1e-6 of it, 3.84071 arcmin.  A short
     rest has not settled (mean of its second half 3.91 with u 0.02); after a long one u was 6e-14 arcmin, the scatter.

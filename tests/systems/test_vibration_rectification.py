@@ -89,6 +89,7 @@ def test_random_instruments_come_back(session: Session, axis: str) -> None:
         assert found[name].truth == pytest.approx(true[name], rel=1e-9), name
 
 
+@pytest.mark.long
 def test_a_control_accelerometer_that_reads_too_much(session: Session) -> None:
     """By 1 %: K2 seems 2 % too small where the level makes it; the report's table of shifts says so."""
     values = {**SHORT, "ways": "up"}

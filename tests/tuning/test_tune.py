@@ -218,6 +218,7 @@ def test_what_cannot_be_had_is_said_with_the_reason() -> None:
     assert "bandwidth alone: " in text
 
 
+@pytest.mark.long
 def test_systems_without_such_a_loop_are_refused_with_those_that_have_one() -> None:
     able = tunable()
     assert able == sorted([*NAMES, *SEVERAL])
