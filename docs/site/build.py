@@ -35,6 +35,7 @@ CONTENTS = {
         "docs/validation",
         "docs/worked_examples",
         "docs/real_records",
+        "docs/data_sheets",
         "tests/benchmarks/README",
         "tests/spec/README",
     ],
