@@ -13,10 +13,9 @@ import argparse
 import sys
 
 import numpy as np
-from scipy import stats
+from held import Held, found
 
 from gyrobench.engine.session import Session
-from gyrobench.system.system import load_system
 
 NAME = "gyro_dynamics"
 SHORT = {"points": 14, "lowest": 2.0, "dwell": 0.3, "periods": 12, "settle": 0.3, "steps": 6, "hold": 0.15}
@@ -52,26 +51,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
-    hits: dict[str, list[bool]] = {}
-    z: dict[str, list[float]] = {}
+    held = Held()
     for k, part in enumerate(PARTS):
         with Session(NAME, {"gyro": part}) as session:
             for run in range(given.runs // len(PARTS)):
                 values = drawn(rng, part)
-                options = {n: v for n, v in values.items() if "." not in n}
-                record = session.run(values, seed=100_000 * given.seed + 10_000 * k + run)
-                for c in load_system(NAME).with_values(options).reduce(record).coefficients:
-                    if c.truth is not None and not c.no_value:
-                        name = f"{c.name} ({values['axis']})"
-                        hits.setdefault(name, []).append(c.interval[0] <= c.truth <= c.interval[1])
-                        z.setdefault(name, []).append(c.z or 0.0)
-    bad = 0
-    for name, held in sorted(hits.items()):
-        k, n = sum(held), len(held)
-        low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
-        bad += not low <= 0.95 <= high
-        print(f"{name:<18}{k / n:.3f} of {n} ({low:.3f} to {high:.3f}), rms z {np.std(z[name]):.2f}")
-    return int(bad > 0)
+                for c in found(session, values, 100_000 * given.seed + 10_000 * k + run):
+                    held.count(f"{c.name} ({values['axis']})", c)
+    return int(held.show(18) > 0)
 
 
 if __name__ == "__main__":

@@ -16,12 +16,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from held import Held, found
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
 from gyrobench.frames import G0
-from gyrobench.system.system import load_system
 
 DEG = math.pi / 180.0
 DPH = DEG / 3600.0
@@ -100,25 +99,15 @@ def main() -> int:
     given = parser.parse_args()
     logging.getLogger("gyrobench").setLevel(logging.ERROR)  # a line for each simulated error
     rng = np.random.default_rng(given.seed)
-    hits: dict[str, list[bool]] = {}
+    held = Held()
     with Session(given.test) as session:
         for run in range(given.runs):
             values = DRAWN[given.test](rng)
             if given.unstated:
                 values |= {n: 0.0 for n in values if n.startswith("u_")}
-            options = {n: v for n, v in values.items() if "." not in n}
-            record = session.run(values, seed=100_000 * given.seed + run)
-            for c in load_system(given.test).with_values(options).reduce(record).coefficients:
-                if c.truth is not None and not c.no_value:
-                    kind = c.name.split("(")[0].replace(f"_{options.get('axis')}", "_along")
-                    hits.setdefault(kind, []).append(c.interval[0] <= c.truth <= c.interval[1])
-    bad = 0
-    for name, held in hits.items():
-        k, n = sum(held), len(held)
-        low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
-        bad += not low <= 0.95 <= high
-        print(f"{name:<12}{k / n:.3f} of {n} ({low:.3f} to {high:.3f})")
-    return int(bad > 0)
+            for c in found(session, values, 100_000 * given.seed + run):
+                held.count(c.name.split("(")[0].replace(f"_{values.get('axis')}", "_along"), c)
+    return int(held.show(12) > 0)
 
 
 if __name__ == "__main__":

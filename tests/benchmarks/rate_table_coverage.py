@@ -14,10 +14,9 @@ import math
 import sys
 
 import numpy as np
-from scipy import stats
+from held import Held, found
 
 from gyrobench.engine.session import Session
-from gyrobench.system.system import load_system
 
 NAME, DEG = "rate_table_test", math.pi / 180.0
 SHORT = {"cycles": 2, "steps": 5, "dwell": 0.6, "settle": 0.2, "windows": 2, "table.acceleration": 50.0}
@@ -45,22 +44,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
-    hits: dict[str, list[bool]] = {}
+    held = Held()
     with Session(NAME) as session:
         for run in range(given.runs):
-            values = drawn(rng)
-            options = {n: v for n, v in values.items() if "." not in n}
-            record = session.run(values, seed=1000 * given.seed + run)
-            for c in load_system(NAME).with_values(options).reduce(record).coefficients:
-                if c.truth is not None:
-                    hits.setdefault(c.name, []).append(c.interval[0] <= c.truth <= c.interval[1])
-    bad = 0
-    for name, held in hits.items():
-        k, n = sum(held), len(held)
-        low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
-        bad += not low <= 0.95 <= high
-        print(f"{name:<4}{k / n:.3f} of {n} ({low:.3f} to {high:.3f})")
-    return int(bad > 0)
+            for c in found(session, drawn(rng), 1000 * given.seed + run):
+                held.count(c.name, c)
+    return int(held.show(4) > 0)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import math
 import sys
 
 import numpy as np
-from scipy import stats
+from held import Held
 
 from gyrobench.arrays import Array
 from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
@@ -67,17 +67,12 @@ def main() -> int:
         parser.error(f"{sorted(unknown)}: {KINDS}")
     for kind in given.kinds:
         rng = np.random.default_rng([given.seed, KINDS.index(kind)])
-        hits: dict[str, list[bool]] = {}
+        held = Held()
         for _ in range(given.runs):
             windows, truth = written(rng, kind)
             for c in Reduction.reduce(windows, TurnOnSetup(limit=LIMIT * DPH, truth=truth)).coefficients:
-                if c.truth is not None and not c.no_value:
-                    hits.setdefault(c.name, []).append(c.interval[0] <= c.truth <= c.interval[1])
-        for name, held in hits.items():
-            k, n = sum(held), len(held)
-            low, high = stats.beta.ppf(0.025, k, n - k + 1), stats.beta.ppf(0.975, k + 1, max(n - k, 1))
-            bad += high < 0.95
-            print(f"{kind:<10}{name:<8}{k / n:.3f} of {n} ({low:.3f} to {high:.3f})", flush=True)
+                held.count(f"{kind:<10}{c.name}", c)
+        bad += held.show(18, wide=True)
     return int(bad > 0)
 
 
