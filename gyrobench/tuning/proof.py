@@ -39,7 +39,6 @@ SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
 REST = "rest"  # phase without a test signal
-NOISE = "noise alone"
 CUT = 1e-3  # of the time: more is said
 FEW = 6  # sines that count: fewer are no measurement
 
@@ -84,7 +83,10 @@ class ExpectedJitter:
 
 @dataclass(frozen=True)
 class Proof:
-    """Measures of a run at a point of the spread.  why_not: why nothing was, else ""."""
+    """Measures of a run at a point of the spread.  why_not: why nothing was, else "".
+
+    cut: part of the time in which noise alone has the voltage at its limit.
+    """
 
     values: Mapping[str, float]
     wishes: tuple[ProvenWish, ...]
@@ -95,6 +97,7 @@ class Proof:
     step: tuple[Array, Array] | None  # t, attitude (rad) after the load step
     load: float  # N.m
     why_not: str = ""
+    cut: float = 0.0
 
     @property
     def holds(self) -> bool:
@@ -178,7 +181,7 @@ def proof_of(
         tried = _read(record, at, f, L, wishes, load, ports, sight)
         if found is None or not (tried.limits or tried.why_not):
             found = tried
-        if not found.limits or tried.why_not or NOISE in found.limits:
+        if not found.limits or tried.why_not or found.cut > CUT:
             break  # what noise does alone no smaller sine takes away
     assert found is not None
     return found
@@ -206,13 +209,16 @@ def _read(
     sines = [g for g in phases if g.kind == "test"]
     judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
-    noise = _cut(phases, ports.slot, known_limit(record.run.parameters, ports.slot))
-    friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *noise])
+    limit = known_limit(record.run.parameters, ports.slot)
+    cut = _cut(phases, ports.slot, limit)
+    noise = f"{ports.slot} (noise alone has its voltage at the limit of {limit:.3g} V {100.0 * cut:.2g} % of the time)"
+    more = [noise + ", which takes gain from the loop"] if cut > CUT else []
+    friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *more])
     step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
     if len(points) < FEW:
         why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"
         why += f"; the friction ({friction}) may hold the platform" if friction else ""
-        return Proof(at, (), tuple(points), len(points), limits, friction, step, load, why)
+        return Proof(at, (), tuple(points), len(points), limits, friction, step, load, why, cut)
     lost = [p.f for p, counts in judged if not counts]
     of_loop = [
         _gain_margin(w, points, lost, f, L) if w.name == "gain margin" else _proven(w, points, f, L)
@@ -220,9 +226,7 @@ def _read(
         if w.name != JITTER
     ]
     jitter = [_jitter(w, phases, ports, sight) for w in wishes if w.name == JITTER and sight]
-    return Proof(
-        at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load
-    )  # fmt: skip
+    return Proof(at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load, cut=cut)
 
 
 def known_limit(parameters: Mapping[str, Any], slot: str) -> float:
@@ -230,12 +234,10 @@ def known_limit(parameters: Mapping[str, Any], slot: str) -> float:
     return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
 
 
-def _cut(phases: Sequence[Gate], slot: str, limit: float) -> list[str]:
-    """Return how much of the time noise alone has the voltage at its limit, where it has."""
+def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:
+    """Return the part of the time in which noise alone has the voltage at its limit."""
     at_rest = [g[f"{slot}.v"] for g in phases if g.label == REST and f"{slot}.v" in g.channels]
-    share = float(np.mean(np.abs(at_rest[0]) >= (1.0 - 1e-9) * limit)) if at_rest else 0.0
-    text = f"{slot} ({NOISE} has its voltage at the limit of {limit:.3g} V {100.0 * share:.2g} % of the time)"
-    return [text + ", which takes gain from the loop"] if share > CUT else []
+    return float(np.mean(np.abs(at_rest[0]) >= (1.0 - 1e-9) * limit)) if at_rest else 0.0
 
 
 def _jitter(wish: Wish, phases: Sequence[Gate], ports: LoopPorts, sight: ExpectedJitter) -> ProvenWish:

@@ -65,11 +65,10 @@ def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
     def cost(y: Array) -> float:
         inside = np.clip(y, low, high)
         lacking = max(KEPT * best - corners.worst(inside), 0.0)
+        price = PRICE * lacking + float(np.sum(np.abs(y - inside)))
         if lacking > KEPT * best:  # a wish is missed, or the loop is not stable
-            return PRICE * lacking + float(np.sum(np.abs(y - inside)))
-        return float(np.log(effort(corners, problem.controller(inside)) / loud)) + PRICE * lacking + float(
-            np.sum(np.abs(y - inside))
-        )  # fmt: skip
+            return price
+        return price + float(np.log(effort(corners, problem.controller(inside)) / loud))
 
     now = np.asarray(x, float)
     for size in SIZES:

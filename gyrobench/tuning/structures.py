@@ -114,8 +114,8 @@ class ControllerStructure:
         """Return the structure for a nominal plant: no lead has a T2 below its communication step.
 
         Such a lead does not reach the voltage at the ends of the steps.  Within them each change of the signal, of the
-        noise too, comes tau2/T2 times as large, beyond the limit of the voltage: the loop has less
-        gain than its linear model (without that limit the same).
+        noise too, comes tau2/T2 times as large, beyond the limit of the voltage: the loop has less gain than its linear
+        model (without that limit the same).
         """
         found = copy(self)
         found.shortest = float(plant.step)

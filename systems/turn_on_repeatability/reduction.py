@@ -212,8 +212,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             self.endless = self._endless()
             own = [self._allowed(c) for c in own]
         warm = self._time(truth.get("t_w"))
-        coefficients = [*own, *([warm] if warm else []), *added]
-        return replace(result, coefficients=coefficients, correlation=result.correlation)
+        return replace(result, coefficients=[*own, *([warm] if warm else []), *added])
 
     def _time(self, truth: float | None) -> Coefficient | None:
         """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""

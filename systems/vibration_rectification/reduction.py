@@ -174,9 +174,9 @@ class Reduction(ChannelTests[VibrationSetup]):
     channel = VibrationChannel
     handling = staticmethod(mistakes.candidates)
 
-    def __init__(self, windows: Mapping[str, Array], setup: VibrationSetup) -> None:
-        super().__init__(windows, setup)
-        vars(self)["names"] = tuple(n for n, column in COLUMN.items() if column in windows)
+    @property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+        return tuple(n for n, column in COLUMN.items() if column in self.windows)
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
