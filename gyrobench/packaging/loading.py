@@ -76,8 +76,15 @@ def content_imports(folder: Path, part: Path | None = None) -> Iterator[dict[str
 
 
 def load_part(name: str, bench: Path | None = None) -> type[Component]:
-    """Return the Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
+    """Return the Component class of components/<name>/model.py, or of a controller in a file of its own.
+
+    Raises BuildError if there is none, or two.
+    """
+    from gyrobench.packaging.own_controller import is_controller, load_controller
+
     with _loading:
+        if is_controller(name):
+            return load_controller(name)
         return _load(name, bench)
 
 
