@@ -131,11 +131,12 @@ class Session:
             raise
 
     def _check_controllers(self) -> None:
-        """Refuse inputs of controllers of the user's own that nothing is connected to: they would stay 0."""
+        """Let controllers of the user's own keep their values; refuse inputs of theirs that nothing is connected to."""
         from gyrobench.packaging.own_controller import is_controller
 
         wired = {(c.target, c.input.element) for c in self.assembly.connections}
         for slot in (s for s, name in self.names.items() if is_controller(name)):
+            self.assembly.keeps.add(slot)
             binding = self.assembly.bindings[slot]
             known = [c.name for c in binding.socket.connectors if c.causality == "input"]
             unknown = [n for n in binding.inputs if n.split("[")[0] not in known and (slot, n) not in wired]

@@ -85,9 +85,10 @@ def load(
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
-    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part, path of an FMU, or file of a controller
-    of your own (.c, .py).  maps: slot -> mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  instrument: data sheet (``instruments/NAME.toml``, or a file) of a gyro, of a turntable, or both.
+    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part, path of an FMU, or file of a
+    controller of your own (.c, .py).  maps: slot -> mapping file of a third-party FMU.
+    coupling: "sequential", or "parallel": each wire carries the value of the step before.  instrument: data sheet
+    (``instruments/NAME.toml``, or a file) of a gyro, of a turntable, or both.
     from_run: folders of runs of other tests whose results give values of this one; values and options go before them.
     Raises errors of type GyrobenchError; UsageError for a suite.
     """

@@ -104,7 +104,7 @@ class _Prepared:
 
 
 def name_parts(parts: Mapping[str, File] | None) -> None:
-    """Note that the caller has named these parts: a controller's file among them may be compiled.  Raises UsageError."""
+    """Note that the caller has named these parts: a controller's file may be compiled.  Raises UsageError."""
     from gyrobench.packaging.own_controller import allow
 
     for part in (parts or {}).values():

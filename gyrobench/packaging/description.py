@@ -142,7 +142,7 @@ def licence(cls: type[Component]) -> dict[str, str]:
 
 def c_units(cls: type[Component]) -> tuple[str, ...]:
     """Return the files of C that are compiled beside that of the FMI version."""
-    return () if cls.outside is None else (UNIT,)
+    return () if cls._outside is None else (UNIT,)
 
 
 def model_description(

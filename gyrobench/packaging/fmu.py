@@ -52,7 +52,7 @@ def _tool_hash() -> str:
 def _content(cls: type[Component], name: str, target: str, fmi: int) -> str:
     """Return the hash of all that determines what an FMU computes."""
     texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in sources(cls).items()]
-    beside = (cls.outside.unit, cls.outside.glue) if cls.outside is not None else ()
+    beside = (cls._outside.unit, cls._outside.glue) if cls._outside is not None else ()
     return content_hash(*texts, _tool_hash(), target, str(fmi), name, *beside)
 
 
@@ -143,7 +143,7 @@ def build(
     identifier = name
     if file and str(part).endswith(".py"):
         target, fmi = "python", 2
-    if cls.outside is not None and target == "python":
+    if cls._outside is not None and target == "python":
         raise BuildError(f"{part}: a controller in C is built as a native FMU")
     with blamed(sources(cls)["model"]):
         what = _content(cls, name, target, fmi)

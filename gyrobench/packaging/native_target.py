@@ -189,5 +189,5 @@ def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
         "model.c": c_source(cls, guid),
         **runtime_files(),
         **face_files((n for v in variables(cls) for n in (len(v), *[0] * (len(v) - 1))), fmi),
-        **({} if cls.outside is None else {UNIT: cls.outside.unit}),
+        **({} if cls._outside is None else {UNIT: cls._outside.unit}),
     }

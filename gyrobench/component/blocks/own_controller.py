@@ -145,7 +145,9 @@ class PythonLaw:
     def others(self) -> dict[str, int]:
         """Return what the object keeps beside parameters and states: name -> which object it is."""
         return {
-            n: hash(repr(x)) if isinstance(x, PLAIN) else id(x) for n, x in vars(self.object).items() if n not in self.owned
+            n: hash(repr(x)) if isinstance(x, PLAIN) else id(x)
+            for n, x in vars(self.object).items()
+            if n not in self.owned
         }
 
     def mutable(self) -> bytes:
@@ -161,7 +163,8 @@ class PythonLaw:
         changed = [n for n in (*now, *self.kept) if now.get(n) != self.kept.get(n)]
         name = changed[0] if changed else next(n for n in now if not isinstance(getattr(self.object, n), PLAIN))
         raise ComponentError(
-            f"{self.file}: step() changes self.{name}, which is not declared; write its line: @state {name} [1] what it is"
+            f"{self.file}: step() changes self.{name}, which is not declared; write its line: @state {name} [1] what "
+            "it is"
         )
 
 

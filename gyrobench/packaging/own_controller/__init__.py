@@ -14,6 +14,7 @@ from pathlib import Path
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.component import Component
 from gyrobench.files import make_once, write_whole
+from gyrobench.packaging import compiler
 from gyrobench.packaging.loading import import_file
 from gyrobench.packaging.own_controller import c_law
 from gyrobench.packaging.own_controller.declarations import Declarations, read_declarations
@@ -56,8 +57,8 @@ def load_controller(name: str) -> type[Component]:
     path = Path(name)
     if path.resolve() not in _named:
         raise UserCodeError(
-            f"{name}: a controller in a file is compiled only where you name it yourself: by --part on the command line "
-            f"or in gyrobench.load; elsewhere name its FMU (gyrobench build {name})"
+            f"{name}: a controller in a file is compiled only where you name it yourself: by --part on the command "
+            f"line or in gyrobench.load; elsewhere name its FMU (gyrobench build {name})"
         )
     try:
         text = path.read_text(encoding="utf-8")
@@ -74,8 +75,8 @@ def _of_c(path: Path, text: str) -> type[Component]:
     c_law.check_text(text, path)
     cls = _part(path, part_text(path.name, declared, None))
     unit = c_law.c_unit(text, path.name)
-    key = hashlib.sha256(f"{unit}\0{declared}\0{c_law.compiler.identity('linux64')}".encode()).hexdigest()[:20]
-    suffix = c_law.compiler.PLATFORMS[c_law.compiler.this_platform()][0]
+    key = hashlib.sha256(f"{unit}\0{declared}\0{compiler.identity(compiler.this_platform())}".encode()).hexdigest()[:20]
+    suffix = compiler.PLATFORMS[compiler.this_platform()][0]
     library = make_once(
         Bench.find().cache / "controllers" / f"{path.stem}-{key}{suffix}",
         lambda made: c_law.compile_alone(text, path, declared, made),
@@ -83,7 +84,7 @@ def _of_c(path: Path, text: str) -> type[Component]:
     size = len(declared.shown("output")) + len(declared.shown("state"))
     law = cls.pieces["sampled"][0].function.__globals__
     law["LAW"] = c_law.CLaw(library, path.name, declared)
-    cls.outside = law["law"].outside = Outside(unit, c_law.glue(path.name, declared), size)
+    cls._outside = law["law"].outside = Outside(unit, c_law.glue(path.name, declared), size)
     return cls
 
 
@@ -100,7 +101,8 @@ def _of_python(path: Path, text: str) -> type[Component]:
     cls, step = found[0]
     if any(ast.unparse(b).split(".")[-1] == "Component" for b in cls.bases):
         raise UserCodeError(
-            f"{shown}: {cls.name} is a part in the language of equations: its place is components/NAME/model.py of a bench"
+            f"{shown}: {cls.name} is a part in the language of equations: its place is components/NAME/model.py of a "
+            "bench"
         )
     if [a.arg for a in step.args.args][1:] != ["inputs", "dt"]:
         raise UserCodeError(f"{shown}:{step.lineno}: write step(self, inputs, dt)")
@@ -108,7 +110,16 @@ def _of_python(path: Path, text: str) -> type[Component]:
     lines = text.splitlines()[docstring.lineno - 1 : docstring.end_lineno] if docstring else []
     first = docstring.lineno if docstring else 0
     declared = read_declarations(((first + k, line.strip().strip('"')) for k, line in enumerate(lines)), shown)
-    return _part(path, part_text(path.name, declared, (text, cls.name)))
+    part = _part(path, part_text(path.name, declared, (text, cls.name)))
+    law = part.pieces["sampled"][0].function.__globals__["LAW"]
+    start, parameters = ([x for d in declared.of(k) for x in d.start] for k in ("state", "parameter"))
+    first, *_, again = (law([u] * len(declared.shown("input")), start, parameters, 1e-3) for u in c_law.TRIED)
+    if first != again:
+        raise UserCodeError(
+            f"{shown}: step() gives different outputs for the same inputs and state: it keeps something outside of its "
+            "object, or draws random numbers; declare what it keeps as @state"
+        )
+    return part
 
 
 def _part(path: Path, model: str) -> type[Component]:

@@ -1,6 +1,6 @@
 """A controller in C: one function, checked, compiled for this process, and called from the C of its part.
 
-    void step(const double *input, double *output, double *state, const double *parameter, double dt);
+void step(const double *input, double *output, double *state, const double *parameter, double dt);
 """
 
 from __future__ import annotations
@@ -25,22 +25,24 @@ NAME = "controller_step"  # what step is called in the library of an FMU
 UNIT = "controller.c"  # its file there
 #: names that the FMU's own files give to functions which its units share: see instance.h
 SHARED = (
-    "new_instance reset tell wrong missing unsettable tune_values freshen run derivative get_state set_state save load "
-    "model guid"
-).split()
+    "new_instance", "reset", "tell", "wrong", "missing", "unsettable", "tune_values", "freshen", "run", "derivative",
+    "get_state", "set_state", "save", "load", "model", "guid",
+)  # fmt: skip
 GUARDS = 4  # numbers behind the outputs and behind the states that must stay as they are
 GUARD = 0x7FF8_6779_726F_0C01  # a NaN that no arithmetic makes: in outputs before the call, and in the guards
+TRIED = (0.01, -0.3, 0.7, 0.01)  # values of the inputs in the trial: the last answer must be the first
 SLOWEST = 10.0  # s for the calls of the trial
 
 
 def c_unit(text: str, file: str) -> str:
     """Return the C file that is compiled: the user's, behind the names that keep it apart from the FMU's own."""
     renamed = "\n".join(f"#define {n} own_{n}" for n in SHARED)
-    exported = (
+    head = (
         "#ifdef CONTROLLER_ALONE\n#ifdef _WIN32\n__declspec(dllexport)\n#else\n"
-        '__attribute__((visibility("default")))\n#endif\n#endif\n'
+        '__attribute__((visibility("default")))\n#endif\n'
+        f"#else\n#define step {NAME}\n{renamed}\n#endif\n"
     )
-    return f'#define step {NAME}\n{renamed}\n{exported}{SIGNATURE};\n#line 1 "{file}"\n{text}'
+    return f'{head}{SIGNATURE};\n#line 1 "{file}"\n{text}'
 
 
 def check_text(text: str, path: Path) -> None:
@@ -48,7 +50,7 @@ def check_text(text: str, path: Path) -> None:
     for number, line in enumerate(text.splitlines(), 1):
         if m := re.match(r'\s*#\s*include\s*"([^"]*)"', line):
             raise UserCodeError(
-                f"{display_path(path)}:{number}: #include \"{m[1]}\": a controller is one file; it includes headers of "
+                f'{display_path(path)}:{number}: #include "{m[1]}": a controller is one file; it includes headers of '
                 "the C library alone (<math.h>), so that its FMU can carry it"
             )
 
@@ -58,7 +60,8 @@ def compile_alone(text: str, path: Path, declared: Declarations, library: Path) 
     shown = display_path(path)
     if compiler.command(compiler.this_platform()) is None:
         raise UserCodeError(
-            f"{shown}: a controller in C takes a C compiler: install cc, gcc or clang, or `pip install gyrobench[cross]`"
+            f"{shown}: a controller in C takes a C compiler: install cc, gcc or clang, or `pip install "
+            "gyrobench[cross]`"
         )
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         source = Path(folder) / UNIT
@@ -67,16 +70,27 @@ def compile_alone(text: str, path: Path, declared: Declarations, library: Path) 
         try:
             compiler.compile_library(source, made, (), compiler.this_platform())
         except compiler.CompilerError as error:
-            told = str(error).partition("\n")[2].replace(NAME, "step")
-            told = re.sub(rf"(?m)^{re.escape(path.name)}:", lambda _: f"{shown}:", told).replace("own_", "")
-            raise UserCodeError(f"{shown}: the C compiler refuses it:\n{told}") from None
+            raise UserCodeError(f"{shown}: the C compiler refuses it:\n{_told(str(error), path, shown)}") from None
         _try(made, shown, declared)
         made.replace(library)
 
 
+def _told(message: str, path: Path, shown: str) -> str:
+    """Return what the compiler says of the user's file: without the lines about what the bench puts before it."""
+    lines: list[str] = []
+    foreign = False
+    for line in message.splitlines()[1:]:
+        foreign = (foreign and line.startswith(" ")) or f"{UNIT}:" in line
+        if not foreign:
+            lines.append(f"{shown}{line.removeprefix(path.name)}" if line.startswith(f"{path.name}:") else line)
+    if "conflicting types for" in message:
+        lines.append(f"write {SIGNATURE}")
+    return "\n".join(lines)
+
+
 TRIAL = """
-import ctypes, json, struct, sys
-library, name, inputs, outputs, start, parameters = json.loads(sys.argv[1])
+import ctypes, json, sys
+library, name, inputs, outputs, start, parameters, tried = json.loads(sys.argv[1])
 step = getattr(ctypes.CDLL(library), name)
 def call(u):
     x = (ctypes.c_double * (len(start) + 4))(*start)
@@ -84,17 +98,16 @@ def call(u):
     step((ctypes.c_double * (inputs + 1))(*[u] * inputs), y, x,
          (ctypes.c_double * (len(parameters) + 1))(*parameters), ctypes.c_double(1e-3))
     return bytes(y)[:8 * outputs] + bytes(x)[:8 * len(start)]
-first = call(0.01)
-call(-0.3), call(0.7)
-sys.exit(0 if call(0.01) == first else 9)
+first, *_, again = map(call, tried)
+sys.exit(0 if again == first else 9)
 """
 
 
 def _try(library: Path, shown: str, declared: Declarations) -> None:
-    """Call it four times in a process of its own: it must end, and give the same for the same.  Raises UserCodeError."""
+    """Call it in a process of its own: it must end, and give the same for the same.  Raises UserCodeError."""
     start, parameters = ([x for d in declared.of(k) for x in d.start] for k in ("state", "parameter"))
     numbers = [len(declared.shown("input")), len(declared.shown("output")), start, parameters]
-    command = [sys.executable, "-I", "-c", TRIAL, json.dumps([str(library), NAME, *numbers])]
+    command = [sys.executable, "-I", "-c", TRIAL, json.dumps([str(library), "step", *numbers, TRIED])]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=SLOWEST, check=False)
     except subprocess.TimeoutExpired:
@@ -106,7 +119,7 @@ def _try(library: Path, shown: str, declared: Declarations) -> None:
             f"{shown}: step() gives different outputs for the same inputs and state: it keeps something in a static or "
             "global variable; declare it as @state and keep it in state[]"
         )
-    if f"undefined symbol: {NAME}" in done.stderr or "not found" in done.stderr:
+    if "undefined symbol: step" in done.stderr or "not found" in done.stderr:
         raise UserCodeError(f"{shown}: there is no function step; write {SIGNATURE}")
     if undefined := re.search(r"undefined symbol: (\w+)", done.stderr):
         raise UserCodeError(f"{shown}: {undefined[1]}() is called, and there is no such function")
@@ -122,7 +135,7 @@ class CLaw:
     def __init__(self, library: Path, file: str, declared: Declarations) -> None:
         self.file = file
         self.outputs, self.states = declared.shown("output"), declared.shown("state")
-        self.step = getattr(ctypes.CDLL(str(library)), NAME)
+        self.step = ctypes.CDLL(str(library)).step
         self.step.restype = None
 
     def __call__(self, inputs: Any, state: Any, parameters: Any, dt: float) -> list[float]:
@@ -155,7 +168,8 @@ GLUE = """\
 /* {file} stands in {unit}; what it writes is checked here. */
 void {step}(const double *input, double *output, double *state, const double *parameter, double dt);
 
-static inline void law_(Part *part, double inputs[{nu}], double state[{nx1}], double parameters[{np}], double dt, double out_[{n}]) {{
+static inline void law_(Part *part, double inputs[{nu}], double state[{nx1}], double parameters[{np}], double dt,
+                        double out_[{n}]) {{
     static const char *const named[] = {{{names}}};
     static const uint64_t guard = UINT64_C({guard:#x});
     double y[{ny} + {guards}], x[{nx} + {guards}];
@@ -188,7 +202,8 @@ def glue(file: str, declared: Declarations) -> str:
     """Return the C function of the part that calls the user's, and refuses what it must not do."""
     ny, nx = len(declared.shown("output")), len(declared.shown("state"))
     return GLUE.format(
-        file=file, unit=UNIT, step=NAME, guard=GUARD, guards=GUARDS, ny=ny, nx=nx, n=ny + nx, ylast=ny - 1, xlast=nx - 1,
-        nu=max(1, len(declared.shown("input"))), nx1=max(1, nx), np=max(1, len(declared.shown("parameter"))),
+        file=file, unit=UNIT, step=NAME, guard=GUARD, guards=GUARDS, ny=ny, nx=nx, n=ny + nx, ylast=ny - 1,
+        xlast=nx - 1, nu=max(1, len(declared.shown("input"))), nx1=max(1, nx),
+        np=max(1, len(declared.shown("parameter"))),
         names=", ".join(f'"{name}"' for k in ("output", "state") for name in declared.shown(k)),
     )  # fmt: skip

@@ -28,7 +28,10 @@ DECLARATION = re.compile(
     r"\s*(?P<name>\w+)(?:\[(?P<n>\d+)\])?\s*(?:=\s*(?P<start>\[[^\]]*\]|[^\s\[\]]+))?\s*(?:\[(?P<unit>[^\]]*)\])?(?P<doc>.*)"
 )
 FOREIGN = {"param", "return", "returns", "brief", "file", "author", "date", "note", "warning", "see"}  # of doxygen
-TAKEN = {"step", "seed", "Ts", "clock", "held", "tick", "law"}  # of every part that is made so
+TAKEN = {
+    "step", "seed", "Ts", "clock", "held", "tick", "law", "LAW", "vector", "sampled", "Component", "Discrete", "Input",
+    "Output", "Parameter", "ControllerClock", "PythonLaw",
+}  # fmt: skip
 LARGEST = 200  # numbers of a kind
 
 

@@ -48,9 +48,8 @@ PYTHON = "LAW = PythonLaw({text!r}, {file!r}, {name!r}, {inputs!r}, {outputs!r},
 
 
 def class_name(stem: str) -> str:
-    """Return the name of the class: MyPi of my_pi.c."""
-    name = "".join(word[:1].upper() + word[1:] for word in re.split(r"\W|_", stem))
-    return name if name[:1].isalpha() else f"Controller{name}"
+    """Return the name of the class: ControllerMyPi of my_pi.c."""
+    return "Controller" + "".join(word[:1].upper() + word[1:] for word in re.split(r"\W|_", stem))
 
 
 def part_text(file: str, declared: Declarations, python: tuple[str, str] | None) -> str:
