@@ -15,11 +15,10 @@ from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.component import Component
 from gyrobench.files import make_once, write_whole
 from gyrobench.packaging import compiler
-from gyrobench.packaging.loading import import_file
 from gyrobench.packaging.own_controller import c_law
 from gyrobench.packaging.own_controller.declarations import Declarations, read_declarations
 from gyrobench.packaging.own_controller.part_source import class_name, part_text
-from gyrobench.user_code import UserCodeError, blamed
+from gyrobench.user_code import UserCodeError, blamed, import_file
 
 ENDINGS = (".c", ".py")
 _named: set[Path] = set()  # files that the user has named
