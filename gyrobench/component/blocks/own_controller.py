@@ -51,7 +51,7 @@ class ControllerClock(Block):
 
 
 class Inputs:
-    """What `step` gets: the inputs by name, numbers or lists."""
+    """The argument of `step`: the inputs by name, numbers or lists."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names

@@ -16,7 +16,7 @@ from gyrobench.component import Component
 from gyrobench.files import make_once, write_whole
 from gyrobench.packaging import compiler
 from gyrobench.packaging.own_controller import c_law
-from gyrobench.packaging.own_controller.declarations import Declarations, read_declarations
+from gyrobench.packaging.own_controller.declared_ports import Declarations, read_declarations
 from gyrobench.packaging.own_controller.part_source import class_name, part_text
 from gyrobench.user_code import UserCodeError, blamed, import_file
 
@@ -27,7 +27,7 @@ _loaded: dict[str, type[Component]] = {}  # by file and content
 
 @dataclasses.dataclass(frozen=True)
 class Outside:
-    """What the class of a part has beside its model.py: the law in C.
+    """The law in C that the class of a part has beside its model.py.
 
     unit: the C file to be compiled with the part.  glue: the function of the part that calls it.  size: of its answer.
     """

@@ -17,7 +17,7 @@ from typing import Any
 from gyrobench.bench import display_path
 from gyrobench.component.composition import ComponentError
 from gyrobench.packaging import compiler
-from gyrobench.packaging.own_controller.declarations import Declarations
+from gyrobench.packaging.own_controller.declared_ports import Declarations
 from gyrobench.user_code import UserCodeError
 
 SIGNATURE = "void step(const double *input, double *output, double *state, const double *parameter, double dt)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from gyrobench.packaging.own_controller.declarations import Declarations, Declared
+from gyrobench.packaging.own_controller.declared_ports import Declarations, Declared
 
 HEAD = '''\
 """{title}: made by gyrobench from its declarations."""

@@ -1,4 +1,4 @@
-"""What a controller in a file of its own declares: ports, parameters and states, a line each in its comments.
+"""Declarations of a controller in a file of its own: ports, parameters and states, a line each in its comments.
 
     @input     u             [V]       gyro signal
     @output    v             [V]       voltage of the torque motor
