@@ -115,15 +115,15 @@ class VelocityChain:
         """Return angle and mean force (., 3) of steps that begin at phases all round the period."""
         psi = 2.0 * math.pi * np.arange(PHASES) / PHASES
         angle = m.angle * (np.sin(psi + w * h) - np.sin(psi))
-        force = sum(c * self._force(m, w, psi + x * w * h, levers) for c, x in ((1, 0.0), (4, 0.5), (1, 1.0))) / 6.0
-        return angle, force
+        begin, middle, end = (self._force(m, w, psi + x * w * h, levers) for x in (0.0, 0.5, 1.0))
+        return angle, (begin + 4.0 * middle + end) / 6.0
 
     def _force(self, m: Motion, w: float, psi: Array, levers: Array) -> Array:
         theta, a = m.angle * np.sin(psi), m.vibration * np.sin(psi + m.phase)
         c, s, g = np.cos(theta), np.sin(theta), self.gravity
         out = np.column_stack([np.zeros_like(psi), c * a + s * g, c * g - s * a])
         turning, square = -w * w * theta, (w * m.angle * np.cos(psi)) ** 2
-        x, y, z = levers.T
+        _, y, z = levers.T
         out[:, 1] += -turning * z[1] - square * y[1]
         out[:, 2] += turning * y[2] - square * z[2]
         return out

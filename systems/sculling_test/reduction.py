@@ -20,8 +20,8 @@ import numpy as np
 from gyrobench.frames import G0
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.setup.run_metadata import Location
+from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,

@@ -122,7 +122,7 @@ class ScullingTest(System):
             "interval": Option(0.01, "s", "time between two outputs of the unit", 1e-4, sets="increments.period"),
             "bandwidth": Option("200Hz", "Hz", "3 dB of the filter of the gyros; 0: none", 0.0,
                                 sets="increments.bandwidth"),
-            "acc_bandwidth": Option("200Hz", "Hz", "3 dB of that of the accelerometers; 0: none", 0.0,
+            "acc_bandwidth": Option("100Hz", "Hz", "3 dB of that of the accelerometers; 0: none", 0.0,
                                     sets="increments.acc_bandwidth"),
             "sculling": Option(True, bool, "its velocity increments have sculling", sets="increments.sculling"),
             "samples": Option(1, int, "increments the user takes for one update: 1 or 2", 1, 2, sets="user.samples"),
