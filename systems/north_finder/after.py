@@ -1,6 +1,6 @@
 """Heading and level after a time, from the random errors of the instruments: closed forms.  [NORTH-AFTER]
 
-    one position     s_w2 = b2 + N2/T + (B2/pi)(ln(tau/T) + 3/2 - gamma) + K2 T/3        variance of the mean rate
+    one position     s_w2 = b2 + N2/T + (B2/pi)(ln(3.17 tau/T) + 3/2 - gamma) + K2 T/3        variance of the mean rate
     two positions    s_w2 = s_A2(T/2)/2,   s_A2(t) = N2/t + (2 ln 2/pi) B2 + K2 t/3      the bias goes out, half a turn
     heading          s_psi = s_w/(W cos latitude), in one position with tan(latitude) s_tilt
     level            s_tilt = s_f/g,   s_f2 as s_w2 of one position, of the accelerometer
@@ -29,6 +29,8 @@ MINUTES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 MOST = 0.5  # rad, heading beyond which a standard deviation says nothing
 GOALS = (1.0, 0.1)  # deg
 LONGEST = 86400.0  # s, looked at
+#: the slowest relaxation of a part's flicker stands for those beyond it, too: half a ratio of 4, and a third of one
+BEYOND = 2.0 * 4.0 ** (1.0 / 3.0)
 EULER = 0.5772156649015329
 WHITE = ("white_y", "white", "electronics", "quantum", "white_x")
 OWN = ("optical", "lock_in")  # noise that a part computes of its physics: its density is not a parameter
@@ -58,18 +60,18 @@ class RandomErrors:
             given = [np.ravel(np.asarray(parameters.get(n, 0.0), dtype=float)) for n in names]
             return math.sqrt(sum(float(v[min(k, v.size - 1)]) ** 2 for v in given))
 
-        white = next((n for n in WHITE if size(n) > 0.0), "")
+        white = [n for n in WHITE if n in parameters]
         if not white or size(*OWN) > 0.0:
             return None
         return cls(
-            size(white), size("bias", "turn_on", f"turn_on_{axis}"), size(f"flicker_{axis}", f"{axis}_flicker"),
+            size(*white[:1]), size("bias", "turn_on", f"turn_on_{axis}"), size(f"flicker_{axis}", f"{axis}_flicker"),
             size("flicker_tau") or 1e5, size(f"walk_{axis}", f"{axis}_walk"), size(f"markov_{axis}"),
             size("markov_tau") or 300.0,
         )  # fmt: skip
 
     def mean(self, T: float) -> float:
         """Return the variance of the mean over the first T seconds, against the true value."""
-        slow = max(math.log(self.tau / T) + 1.5 - EULER, 0.0)
+        slow = max(math.log(BEYOND * self.tau / T) + 1.5 - EULER, 0.0)
         x = T / self.markov_tau
         return (
             self.bias**2
@@ -137,12 +139,12 @@ def in_words(time: float | None) -> str:
 
 
 def table(p: Mapping[str, Any], latitude: float, gravity: float) -> list[Table]:
-    """Return heading and level after minutes with the instruments of a run, from its parameters; [] without noise."""
+    """Return heading and level after minutes with the instruments of a run, from its parameters; [] without errors."""
     rate, force = (
         RandomErrors.of({n.removeprefix(f"{slot}."): v for n, v in p.items() if n.startswith(f"{slot}.")}, axis)
         for slot, axis in (("gyro", "y"), ("accelerometers", "x"))
     )
-    if rate is None:
+    if rate is None or not rate.mean(60.0):
         return []
     rows: list[list[Any]] = []
     for minutes in MINUTES:

@@ -40,7 +40,16 @@ class NorthFinding(TableTest):
     """
 
     title = "North finding by gyro"
-    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT")
+    spec = (
+        "NORTH-COMMON",
+        "NORTH-2POS",
+        "NORTH-4POS",
+        "NORTH-CONT",
+        "NORTH-TILT",
+        "NORTH-STRAPDOWN",
+        "NORTH-DRIFT",
+        "NORTH-AFTER",
+    )
     reduction = "reduction"
     protocol = "design"
     slots = {
@@ -188,13 +197,12 @@ class NorthFinding(TableTest):
 
     def _density(self, parts: PartValues) -> float:
         """Return the white noise of the gyro in the slot, as its parameters state it."""
-        names = [n for n in (*WHITE, *OWN) if f"gyro.{n}" in parts]
-        rate = RandomErrors.of({n: parts[f"gyro.{n}"] for n in names})
+        rate = _random_errors(parts)
         return rate.white if rate else 0.0
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)
-        if not (self["density"] or float(parameters["finder.density"]) > UNKNOWN):
+        if not self["density"] and _random_errors(parameters) is None:
             problems.append(
                 "density unknown: the parameters of the gyro do not state its white noise; give the option density "
                 "(the output density of the gyro, as 0.3deg/h/sqrt(Hz))"
@@ -256,3 +264,8 @@ class NorthFinding(TableTest):
                 "right at any tilt."
             )
         return found
+
+
+def _random_errors(values: Mapping[str, Any] | PartValues) -> RandomErrors | None:
+    """Return the random errors of the gyro as far as its white noise; None where its parameters do not state it."""
+    return RandomErrors.of({n: values[f"gyro.{n}"] for n in (*WHITE, *OWN) if f"gyro.{n}" in values})

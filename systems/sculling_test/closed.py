@@ -31,7 +31,7 @@ PHASES = 16
 
 
 @dataclass(frozen=True)
-class Motion:
+class ScullingMotion:
     """frequency: Hz.  angle: rad, vibration: m/s2, amplitudes.  phase: of the vibration against the angle, rad."""
 
     frequency: float
@@ -41,7 +41,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Unit:
+class UnitErrors:
     """Errors of a unit in axes of the table: gyro, acc (3, 3), 1 + scale factors and misalignments; levers (3, 3):
     rows: accelerometers from the axis of the angle, m; None: exact.
     """
@@ -87,9 +87,9 @@ class VelocityChain:
         # z: the input held over a step is that of its end here
         return z * (q * (a - 1.0) / (z - a) - p * (b - 1.0) / (z - b)) / (p - q)
 
-    def rise(self, m: Motion, unit: Unit | None = None) -> float:
+    def rise(self, m: ScullingMotion, unit: UnitErrors | None = None) -> float:
         """Return the mean vertical acceleration that the user computes, less that at rest, m/s2."""
-        unit = unit or Unit(levers=self.size * np.outer([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
+        unit = unit or UnitErrors(levers=self.size * np.outer([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
         gyro, acc = (np.eye(3) if x is None else x for x in (unit.gyro, unit.acc))
         T, w = self.interval, 2.0 * math.pi * m.frequency
         n = max(1, round(T / self.step)) if self.step else FINE
@@ -111,14 +111,14 @@ class VelocityChain:
         rotated = Rotation.from_rotvec(start * gyro[:, 0]).apply(gained)
         return float(rotated[:, 2].mean()) / (T * self.samples) - self.gravity * float(acc[2, 2])
 
-    def _steps(self, m: Motion, w: float, h: float, levers: Array) -> tuple[Array, Array]:
+    def _steps(self, m: ScullingMotion, w: float, h: float, levers: Array) -> tuple[Array, Array]:
         """Return angle and mean force (., 3) of steps that begin at phases all round the period."""
         psi = 2.0 * math.pi * np.arange(PHASES) / PHASES
         angle = m.angle * (np.sin(psi + w * h) - np.sin(psi))
         begin, middle, end = (self._force(m, w, psi + x * w * h, levers) for x in (0.0, 0.5, 1.0))
         return angle, (begin + 4.0 * middle + end) / 6.0
 
-    def _force(self, m: Motion, w: float, psi: Array, levers: Array) -> Array:
+    def _force(self, m: ScullingMotion, w: float, psi: Array, levers: Array) -> Array:
         theta, a = m.angle * np.sin(psi), m.vibration * np.sin(psi + m.phase)
         c, s, g = np.cos(theta), np.sin(theta), self.gravity
         out = np.column_stack([np.zeros_like(psi), c * a + s * g, c * g - s * a])
@@ -166,7 +166,7 @@ def _series(c: Array, psi: Array) -> Array:
     return out
 
 
-def reading(m: Motion, gravity: float) -> float:
+def reading(m: ScullingMotion, gravity: float) -> float:
     """Return the mean of the specific force along the vertical axis of the case, less gravity, m/s2."""
     psi = 2.0 * math.pi * np.arange(PHASES) / PHASES
     theta = m.angle * np.sin(psi)

@@ -45,7 +45,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DEG
 
 from . import mistakes
-from .closed import FACES, Motion, Unit, VelocityChain, reading
+from .closed import FACES, ScullingMotion, UnitErrors, VelocityChain, reading
 
 COLUMNS = ("t_start", "t_end", "frequency", "angle", "vibration", "acceleration")
 LEAST = 2  # readings at rest, and in each motion
@@ -72,13 +72,13 @@ class ScullingSetup(Setup):
 class Motions:
     """Motions of a record; of each reading the number of its motion, -1 at rest."""
 
-    motions: tuple[Motion, ...]
+    motions: tuple[ScullingMotion, ...]
     number: Array
 
     @classmethod
     def of(cls, windows: Mapping[str, Array]) -> Motions:
         rows = zip(*(np.asarray(windows[n], dtype=float).tolist() for n in COLUMNS[2:5]), strict=True)
-        given = [Motion(f, angle, a) if f and (angle or a) else None for f, angle, a in rows]
+        given = [ScullingMotion(f, angle, a) if f and (angle or a) else None for f, angle, a in rows]
         motions = tuple(sorted({m for m in given if m}, key=lambda m: (m.frequency, m.angle, m.vibration)))
         return cls(motions, np.array([motions.index(m) if m else -1 for m in given]))
 
@@ -206,7 +206,9 @@ class Reduction(DriftReduction[ScullingSetup]):
         return Table("sculling.expected", "Acceleration by sculling", caption, head, rows)
 
 
-def _slope(chain: VelocityChain, m: Motion, *, angle: float = 0.0, vibration: float = 0.0, phase: float = 0.0) -> float:
+def _slope(
+    chain: VelocityChain, m: ScullingMotion, *, angle: float = 0.0, vibration: float = 0.0, phase: float = 0.0
+) -> float:
     """Return the change of the computed acceleration by relative errors of the amplitudes (phase: rad), by that."""
     more, less = (
         replace(m, angle=m.angle * (1 + k * angle), vibration=m.vibration * (1 + k * vibration), phase=k * phase)
@@ -245,11 +247,11 @@ def true_values(run: RunDocument, gravity: float) -> dict[str, float] | None:
         face.T @ np.reshape(np.asarray(p[n], dtype=float), (3, 3)) @ face
         for n in ("imu.gyro_scale", "imu.acc_scale", "table.levers")
     )
-    unit = Unit(np.eye(3) + gyro, np.eye(3) + acc, levers)
+    unit = UnitErrors(np.eye(3) + gyro, np.eye(3) + acc, levers)
     vibration = float(run.options["vibration"])
     frequencies = sorted({row.target for row in run.plan} - {0.0})
     angle = float(run.options["angle"])
-    return {f"d({f:g} Hz)": chain.rise(Motion(f, angle, vibration), unit) for f in frequencies}
+    return {f"d({f:g} Hz)": chain.rise(ScullingMotion(f, angle, vibration), unit) for f in frequencies}
 
 
 reduce = Reduction.reduce

@@ -17,7 +17,7 @@ from gyrobench.engine.session import Session
 from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
-from systems.sculling_test.closed import Motion, Unit, VelocityChain
+from systems.sculling_test.closed import ScullingMotion, UnitErrors, VelocityChain
 from systems.sculling_test.reduction import Reduction, ScullingSetup
 
 Command = Callable[..., tuple[int, str, str]]
@@ -80,7 +80,7 @@ def test_what_is_left_by_hand() -> None:
     """
     theta, a, T, g = 1e-3, 3.0, 0.01, 9.80665
     for f in (3.0, 17.0, 35.0):
-        w, m = 2.0 * math.pi * f, Motion(f, theta, a)
+        w, m = 2.0 * math.pi * f, ScullingMotion(f, theta, a)
         x, whole = w * T, 0.5 * theta * (a + g * theta)
         hand = whole * (math.sin(x) / x - 1.0) + theta**2 * g * (1.0 - math.cos(x)) / 12.0
         assert VelocityChain(T, sculling=False).rise(m) == pytest.approx(hand, rel=1e-6)
@@ -93,8 +93,8 @@ def test_what_is_left_by_hand() -> None:
         gyro, acc = (1.0 / (1.0 - (f / b) ** 2 + 1j * math.sqrt(2.0) * f / b) for b in (90.0, 60.0))
         hand = whole * ((gyro * acc.conjugate()).real - 1.0) - 0.25 * theta**2 * g * (abs(gyro) ** 2 - 1.0)
         assert VelocityChain(T, 0.0, 90.0, 60.0).rise(m) == pytest.approx(hand, rel=0.01)
-    same = Unit(levers=np.tile([0.0, 0.03, 0.05], (3, 1)))  # one place: its mean acceleration is nothing
-    assert abs(VelocityChain(T).rise(Motion(20.0, theta, a), same)) < 1e-3 * 0.5 * (125.0 * theta) ** 2 * 0.05
+    same = UnitErrors(levers=np.tile([0.0, 0.03, 0.05], (3, 1)))  # one place: its mean acceleration is nothing
+    assert abs(VelocityChain(T).rise(ScullingMotion(20.0, theta, a), same)) < 1e-3 * 0.5 * (125.0 * theta) ** 2 * 0.05
 
 
 @pytest.fixture(scope="module")
