@@ -13,7 +13,8 @@
     note = "rms in 1 Hz, one-sided"
 
 What becomes of the figures is written in :mod:`gyrobench.workflow.sheet_values`.  A gyro goes into the slot gyro, or
-three of them into a unit; a turntable changes no part: it sets what the system's table has, and what is believed of it.  [GYRO-SHEET, TABLE-PRESETS]
+three of them into a unit; a turntable changes no part: it sets what the system's table has, and what is believed of it.
+[GYRO-SHEET, TABLE-PRESETS]
 """
 
 from __future__ import annotations
