@@ -64,7 +64,7 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         Socket(
-            "GyroSupply",
+            "Supply",
             "electrical supplies of a gyro: departures from their nominal values",
             SUPPLIES,
         ),

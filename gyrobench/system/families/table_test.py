@@ -82,7 +82,7 @@ def surroundings(angle: str = "table: angle_read", turned: str = ONE_AXIS) -> di
 def supply() -> dict[str, OnRequest]:
     """Return the slot with the electrical supplies of the gyro."""
     names = " ".join(c.name for c in SUPPLIES)
-    slots = {"supply": Slot("GyroSupply", "gyro_supply")}
+    slots = {"supply": Slot("Supply", "supply")}
     return {"supply": OnRequest(slots, f"supply -> gyro: {names}", channels=("supply.wheel_frequency",))}
 
 

@@ -11,7 +11,7 @@ from wired import BENCH
 
 from gyrobench.packaging.loading import load_part
 
-Supply, Gyro = load_part("gyro_supply", BENCH), load_part("floated_gyro", BENCH)
+Supply, Gyro = load_part("supply", BENCH), load_part("floated_gyro", BENCH)
 OUTPUTS = ("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")
 BLOCKS = ("frequency", "voltage", "asymmetry", "pickoff", "torquer")
 

@@ -7,8 +7,8 @@ from gyrobench.component.math import pi, sin
 from gyrobench.component.set_up import each
 
 
-class GyroSupply(Component):
-    """Electrical supplies of a gyro, how far they are off their nominal values; fits the socket GyroSupply.
+class Supply(Component):
+    """Electrical supplies of a gyro, how far they are off their nominal values; fits the socket Supply.
 
     Each of the five outputs, by parameters of its own:
 
