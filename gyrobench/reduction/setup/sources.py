@@ -185,6 +185,26 @@ REMOUNT = Source("mount.scatter", "drift from mount to mount", "rad/s", "u_remou
 LATITUDE = Source("latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",))
 GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity")
 
+# ------------------------------------------------------------------------------------------------ its supplies
+#: departure of each at the start of the record; its drift over the record is a source beside it: :func:`drifting`
+SUPPLIES = {
+    name: Source(f"supply.{name}", title, unit, option, "departure from the nominal value, at the start")
+    for name, title, unit, option in (
+        ("frequency", "frequency of the wheel supply", RELATIVE, "u_wheel_frequency"),
+        ("voltage", "voltage of the wheel supply", RELATIVE, "u_wheel_voltage"),
+        ("phase", "phases of the wheel supply", "rad", "u_wheel_phase"),
+        ("pickoff", "excitation of the pickoff", RELATIVE, "u_pickoff_excitation"),
+        ("torquer", "excitation of torquer or suspension", RELATIVE, "u_torquer_excitation"),
+    )
+}
+
+
+def drifting(source: Source) -> Source:
+    """Return the drift of a supply, whose change over the record is as uncertain as its departure at the start."""
+    unit, note = "rad/s" if source.unit == "rad" else "1/s", "over the record as uncertain as at the start"
+    return replace(source, id=f"{source.id}.drift", name=f"{source.name}, drift", unit=unit, option="", note=note)
+
+
 # ------------------------------------------------------------------------------------------------ current and readings
 TORQUER_SCALE = Source(
     "torquer.scale_factor", "torquer scale factor", RELATIVE, "u_scale_factor", f"relative, {STATED}",
