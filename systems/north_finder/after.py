@@ -130,6 +130,17 @@ def running(rate: RandomErrors, start: float, T: float, t: float) -> float:
     return math.hypot(start, t * math.sqrt(rate.change(T, t)))
 
 
+def lost(method: str, u_bias: float, latitude: float) -> list[str]:
+    """Return why one position determines no heading: three times the u of the bias is above the Earth rate; [] else."""
+    north = units.EARTH_RATE * math.cos(latitude)
+    if method != "strapdown" or 3.0 * u_bias <= north:
+        return []
+    return [
+        f"u_bias = {u_bias / DPH:.4g} °/h: one position determines no heading where three times this is above the "
+        f"horizontal Earth rate, {north / DPH:.4g} °/h; take the method strapdown two"
+    ]
+
+
 def in_words(time: float | None) -> str:
     """Return a time until a goal is reached."""
     if time is None:

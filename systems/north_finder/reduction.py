@@ -134,11 +134,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
-        if s.method == "strapdown" and MANY * s.u_bias > s.earth.north:
-            problems.append(
-                f"u_bias = {s.u_bias / DPH:.4g} °/h: one position determines no heading where three times this is "
-                f"above the horizontal Earth rate, {s.earth.north / DPH:.4g} °/h; take the method strapdown two"
-            )
+        problems += after.lost(s.method, s.u_bias, s.latitude)
         problems += window_problems(self.windows)
         if s.method == "null" and not problems:
             near = at_null(self.windows)
