@@ -27,7 +27,7 @@ class TrackingController(LeadLag):
     tau2 = Parameter(0.01, "s", "lead: time constant of the numerator", min=0.0)
     T2 = Parameter(0.01, "s", "lead: time constant of the denominator", above=0.0)
     v_max = Parameter(1.0, "V", "largest rate commanded (1 V is 1 rad/s)", above=0.0)
-    slope_max = Parameter(10.0, "V/s", "largest acceleration commanded (1 V/s is 1 rad/s2)", above=0.0)
+    slope_max = Parameter(50.0, "V/s", "largest acceleration commanded (1 V/s is 1 rad/s2)", above=0.0)
 
     before = Discrete(0.0, "V", "v at the end of the step before")
     now = Discrete(0.0, "V", "v at the end of the present step")

@@ -142,7 +142,9 @@ class Reduction(SightReduction):
             else ("K_v", "1/s", "rate", error.slope(k, rate, acceleration), c.c1)
         )
         meaning = f"{what} of the target over the error it makes about {axis}"
-        if slope is None or abs(slope.value) < LEAST * slope.u:
+        if slope is None:
+            return
+        if abs(slope.value) < LEAST * slope.u:
             none = f"the error by the {what} of the target does not stand above the noise"
             self.found.measure(f"{name} {axis}", meaning, unit, None, no_value=none)
             return

@@ -40,7 +40,7 @@ class GimbalTracking(SightTest):
     title = "Line of sight that follows a target"
     spec = ("TRACK-LOOP", "TRACK-IMAGE", "LOS-TARGET", "GIMBAL-2AXIS", "LOS-JITTER", "BASE-PSD")
     reduction = "reduction"
-    test = 0.03
+    test = 0.02
     slots = SightTest.slots | {
         "target": Slot("Target", "moving_target"),
         "tracker": Slot("Tracker", "optical_tracker"),
@@ -72,7 +72,7 @@ class GimbalTracking(SightTest):
         "track": Option(1.5, "Hz", "crossover of both tracking loops, for the gains", 0.05, 20.0),
         "type": Option(2, int, "type of the tracking loops: 1 proportional, 2 with an integral", 1, 2),
         "rate_max": Option(1.0, "rad/s", "largest rate commanded", 1e-3, sets="track_pitch.v_max track_yaw.v_max"),
-        "acceleration_max": Option(20.0, "rad/s2", "largest acceleration commanded", 1e-3,
+        "acceleration_max": Option(50.0, "rad/s2", "largest acceleration commanded", 1e-3,
                                    sets="track_pitch.slope_max track_yaw.slope_max"),
         "frames": Option(100.0, "Hz", "images in a second", 1.0, 5000.0),
         "exposure": Option(4e-3, "s", "time of exposure", 0.0, 1.0),

@@ -1,8 +1,8 @@
 """Tracking error of a ride: mean, rms, share inside an accuracy, lag and its coefficients, each with its uncertainty.
 
 Slow motion of the target makes e = c1 w + c2 w' + c3 w'', 1/(1 + L) = c1 s + c2 s2 + c3 s3 + ...: for type 1 K_v =
-1/c1, for type 2 c1 = 0 and K_a = 1/c2.  Uncertainties come from the scatter of stretches of the ride, from which this lag has
-been taken away; they hold noise that is faster than a stretch.  [TRACK-LOOP; Franklin 2010, section 4.2]
+1/c1, for type 2 c1 = 0 and K_a = 1/c2.  Uncertainties come from the scatter of stretches of the ride, from which this
+lag has been taken away; they hold noise that is faster than a stretch.  [TRACK-LOOP; Franklin 2010, section 4.2]
 """
 
 from __future__ import annotations
