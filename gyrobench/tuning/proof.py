@@ -130,7 +130,8 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
 
 
 def loop_plan(
-    system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = "", kind: str = "test"
+    system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = "",
+    kind: str = "test",
 ) -> tuple[LoopPlan, float]:  # fmt: skip
     """Return the plan of a proof and the torque of its load step, N.m.
 

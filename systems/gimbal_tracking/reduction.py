@@ -15,11 +15,10 @@ from gyrobench.reduction.loops.margins import excitation_response
 from gyrobench.reduction.loops.sight_budget import EXCITED, LOS, MoreSources, Ride, closed_model
 from gyrobench.reduction.loops.sight_reduction import AXES, MICRO, SightReduction
 
-from .tracking_error import ErrorCoefficients, TrackingError, error_coefficients
+from .tracking_error import TrackingError, error_coefficients, lag
 
 MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
-ACCELERATION = ("tracker.acceleration[1]", "tracker.acceleration[2]")
 PAIR = (0, 1)
 LEAST = 5.0  # u of an error by a motion: less is not measured
 MEASURED = ("f_c", "PM", "GM", "GRM")
@@ -98,14 +97,11 @@ class Reduction(SightReduction):
     def _error(self, gate: Gate) -> None:
         """Measure the error of the ride: mean, rms, peak, share inside the accuracy, lag against its closed form."""
         found, wanted = self.found, float(self.run.options["accuracy"])
-        dt = float(gate.t[1] - gate.t[0])
         e = np.array([gate[n] for n in MISS])
-        known = [self._coefficients(axis) for axis in AXES]
-        motion = [(gate[RATE[k]], gate[ACCELERATION[k]]) for k in PAIR]
-        lag = np.array([np.zeros(e.shape[1]) if (c := known[k]) is None else c.lag(*motion[k], dt) for k in PAIR])
-        error = TrackingError(e, lag)
+        lags = [self._lag(gate, axis, k) for k, axis in enumerate(AXES)]
+        error = TrackingError(e, np.array([np.zeros(gate.t.size) if x is None else x for x in lags]))
         for k, axis in enumerate(AXES):
-            closed = None if known[k] is None else float(lag[k].mean())
+            closed = None if lags[k] is None else float(error.lag[k].mean())
             found.add(f"bias {axis}", f"mean of the tracking error about {axis}", "µrad", error.mean(k), scale=MICRO,
                       closed=closed)  # fmt: skip
         for k, axis in enumerate(AXES):
@@ -116,40 +112,40 @@ class Reduction(SightReduction):
         meaning = f"time with an error below {wanted / MICRO:g} µrad, both axes"
         found.measure("inside", meaning, "%", share, u, interval=interval)
         for k, axis in enumerate(AXES):
-            if (c := known[k]) is not None:
-                self._constant(axis, error, k, motion[k], dt, c)
+            self._constant(axis, error, k)
         lines = {axis: error.e[k] / MICRO for k, axis in enumerate(AXES)}
-        lines |= {f"{axis}, lag": lag[k] / MICRO for k, axis in enumerate(AXES) if np.any(lag[k])}
+        lines |= {f"{axis}, lag": error.lag[k] / MICRO for k, axis in enumerate(AXES) if np.any(error.lag[k])}
         caption = "True tracking error in the ride, and the lag that the linear model makes of the target's motion."
         found.responses.append(over_time("tracking error", gate.t - gate.t[0], lines, unit="µrad", caption=caption))
 
-    def _coefficients(self, axis: str) -> ErrorCoefficients | None:
+    def _lag(self, gate: Gate, axis: str, k: int) -> Array | None:
+        """Return the lag in the gate by the linear model, from rest at the start of the phase on."""
         pair = self.found.linear.loops.get(f"track {axis}")
         if pair is None or pair.discrete is None:
             return None
-        return error_coefficients(pair.discrete, float(self.run.options["track"]))
+        channels = gate.channels
+        first = int(np.argmax(channels["exciter.phase"] == gate.row.phase))
+        span = slice(first, gate.inside.stop)
+        t = channels["time"][span]
+        made = lag(pair.discrete, float(self.run.options["track"]), t - t[0], channels[RATE[k]][span])
+        return made[gate.inside.start - first :]
 
-    def _constant(
-        self, axis: str, error: TrackingError, k: int, motion: tuple[Array, Array], dt: float, c: ErrorCoefficients
-    ) -> None:  # fmt: skip
-        """Measure the error constant of a loop's type, where the target moves enough for it."""
-        rate, acceleration = motion
-        second = np.gradient(acceleration, dt)
-        integral = float(np.max(np.asarray(self.run.parameters.get(f"track_{axis}.integral", 0.0))))
-        name, unit, what, slope, closed = (
-            ("K_a", "1/s2", "acceleration", error.slope(k, acceleration, second), c.c2)
-            if integral
-            else ("K_v", "1/s", "rate", error.slope(k, rate, acceleration), c.c1)
-        )
-        meaning = f"{what} of the target over the error it makes about {axis}"
-        if slope is None:
+    def _constant(self, axis: str, error: TrackingError, k: int) -> None:
+        """Measure the error constant of a loop's type, that of the linear model over the share of its lag."""
+        pair = self.found.linear.loops.get(f"track {axis}")
+        share = error.share(k)
+        if share is None or pair is None or pair.discrete is None:
             return
-        if abs(slope.value) < LEAST * slope.u:
+        c1, c2 = error_coefficients(pair.discrete, float(self.run.options["track"]))
+        second = float(np.max(np.asarray(self.run.parameters.get(f"track_{axis}.integral", 0.0)))) > 0.0
+        name, unit, what, c = ("K_a", "1/s2", "acceleration", c2) if second else ("K_v", "1/s", "rate", c1)
+        meaning = f"{what} of a slow target over the error it makes about {axis}"
+        if abs(share.value) < LEAST * share.u:
             none = f"the error by the {what} of the target does not stand above the noise"
             self.found.measure(f"{name} {axis}", meaning, unit, None, no_value=none)
             return
-        value, u = 1.0 / slope.value, slope.u / slope.value**2
-        self.found.measure(f"{name} {axis}", meaning, unit, value, u, dof=slope.dof, closed=1.0 / closed)
+        value, u = 1.0 / (c * share.value), share.u / (abs(c) * share.value**2)
+        self.found.measure(f"{name} {axis}", meaning, unit, value, u, dof=share.dof, closed=1.0 / c)
 
     def more_sources(self, ride: Ride, use: NDArray[np.bool_]) -> MoreSources | None:
         """Return the motion of the target and the noise of the images."""

@@ -1,8 +1,9 @@
-"""Tracking error of a ride: mean, rms, share inside an accuracy, lag and its coefficients, each with its uncertainty.
+"""Tracking error of a ride: mean, rms, share inside an accuracy, lag by the linear model, each with its uncertainty.
 
-Slow motion of the target makes e = c1 w + c2 w' + c3 w'', 1/(1 + L) = c1 s + c2 s2 + c3 s3 + ...: for type 1 K_v =
-1/c1, for type 2 c1 = 0 and K_a = 1/c2.  Uncertainties come from the scatter of stretches of the ride, from which this
-lag has been taken away; they hold noise that is faster than a stretch.  [TRACK-LOOP; Franklin 2010, section 4.2]
+The lag is what the linear model makes of the target's true rate, E = W S/s with S = 1/(1 + L); of slow motion
+e = c1 w + c2 w' + ..., S = c1 s + c2 s2 + ...: for type 1 K_v = 1/c1, for type 2 c1 = 0 and K_a = 1/c2.  Uncertainties
+come from the scatter of stretches of the ride, from which the lag has been taken away; they hold noise that is faster
+than a stretch.  [TRACK-LOOP; Franklin 2010, section 4.2]
 """
 
 from __future__ import annotations
@@ -22,30 +23,41 @@ from gyrobench.reduction.loops.jitter import root
 
 STRETCHES = 12
 SLOW = 300.0  # crossover over the frequency at which the coefficients are taken
-SLIGHT = 1e-4  # of a slope's regressor over its mean: less is constant
+SLIGHT = 0.02  # of the largest lag: a scatter below is constant
+FINE = 100.0  # samples in a period of the crossover, for the lag
+SETTLED = 8.0  # periods of it, in which the loop settles
+POINTS = 600  # of the response
 
 
-@dataclass(frozen=True)
-class ErrorCoefficients:
-    """c1 (s), c2 (s2), c3 (s3) of the error by rate, acceleration and jerk of the target."""
-
-    c1: float
-    c2: float
-    c3: float
-
-    def lag(self, rate: Array, acceleration: Array, dt: float) -> Array:
-        """Return the error that a motion makes, rad."""
-        return self.c1 * rate + self.c2 * acceleration + self.c3 * np.gradient(acceleration, dt)
-
-
-def error_coefficients(loop: LinearModel, crossover: float) -> ErrorCoefficients:
-    """Return the coefficients of an open loop that crosses at ``crossover``, Hz, from its response far below."""
+def error_coefficients(loop: LinearModel, crossover: float) -> tuple[float, float]:
+    """Return c1 (s) and c2 (s2) of an open loop that crosses at ``crossover``, Hz, from its response far below."""
     f = crossover / SLOW * np.array([1.0, 2.0])
     w = 2.0 * np.pi * f
     S = 1.0 / (1.0 + model_response(loop, f)[:, 0, 0])
     odd, even = S.imag / w, -S.real / w**2
-    c3 = float((odd[0] - odd[1]) / (w[1] ** 2 - w[0] ** 2))
-    return ErrorCoefficients(float(odd[0] + c3 * w[0] ** 2), float((4.0 * even[0] - even[1]) / 3.0), c3)
+    return float((4.0 * odd[0] - odd[1]) / 3.0), float((4.0 * even[0] - even[1]) / 3.0)
+
+
+def lag(loop: LinearModel, crossover: float, t: Array, rate: Array) -> Array:
+    """Return the error that a rate of the target makes in the linear model, rad, from rest.
+
+    t: s, from the start of the motion.  Behind its end the rate is faded out and is 0 for as long as the loop settles.
+    """
+    every = max(1, int(1.0 / (FINE * crossover * (t[1] - t[0]))))
+    dt = float(t[1] - t[0]) * every
+    few = rate[::every]
+    fade = int(SETTLED / (crossover * dt)) + 1
+    n = 2 ** math.ceil(math.log2(few.size + 2 * fade))
+    padded = np.concatenate([few, few[-1] * 0.5 * (1.0 + np.cos(np.pi * np.arange(fade) / fade))])
+    f = np.fft.rfftfreq(n, dt)
+    known = np.geomspace(f[1] / 4.0, f[-1], POINTS)
+    way = 1.0 / (1.0 + model_response(loop, known)[:, 0, 0]) / (2j * np.pi * known)
+    from scipy.interpolate import CubicSpline
+
+    at = np.concatenate([[0.0], CubicSpline(np.log(known), way)(np.log(f[1:]))])
+    at[0] = error_coefficients(loop, crossover)[0]
+    made = np.fft.irfft(np.fft.rfft(padded, n) * at, n)[: few.size]
+    return np.asarray(CubicSpline(t[::every], made)(t))
 
 
 @dataclass(frozen=True)
@@ -103,29 +115,25 @@ class TrackingError:
         end = int(np.argmax(rho < 0.0)) or n
         return max(1.0, n / (1.0 + 2.0 * float(np.sum(rho[1:end]))))
 
-    def slope(self, k: int, of: Array, *others: Array) -> UncertainValue | None:
-        """Return the error per unit of a motion, beside a constant and other motions; None where it is constant.
+    def share(self, k: int) -> UncertainValue | None:
+        """Return the error over the lag, beside a constant; None for a lag that does not change."""
+        of = self.lag[k]
+        if not np.std(of) > SLIGHT * np.max(np.abs(of), initial=0.0):
+            return None
 
-        A motion that is constant makes error over motion, without a constant.
-        """
-        kept = [x for x in (of, *others) if np.std(x) > SLIGHT * np.max(np.abs(x), initial=0.0)]
-        if not kept or kept[0] is not of:
-            if not np.any(of):
-                return None
-            columns = np.column_stack([of])
-        else:
-            columns = np.column_stack([*kept, np.ones(of.size)])
-        columns = columns / np.max(np.abs(columns), axis=0)
-        scale = 1.0 / float(np.max(np.abs(of)))
-        whole = float(np.linalg.lstsq(columns, self.e[k], rcond=None)[0][0])
+        def slope(use: Array) -> float:
+            x = of[use] - of[use].mean()
+            return float(x @ self.e[k][use] / (x @ x))
+
+        every = np.ones(of.size, bool)
         left_out = []
         for part in _parts(of.size):
-            use = np.ones(of.size, bool)
+            use = every.copy()
             use[part] = False
-            left_out.append(float(np.linalg.lstsq(columns[use], self.e[k][use], rcond=None)[0][0]))
+            left_out.append(slope(use))
         n = len(left_out)
         u = math.sqrt((n - 1) / n * float(np.sum((np.array(left_out) - np.mean(left_out)) ** 2)))
-        return UncertainValue(whole * scale, u * scale, n - 1)
+        return UncertainValue(slope(every), u, n - 1)
 
 
 def _parts(n: int) -> list[slice]:
