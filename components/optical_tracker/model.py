@@ -98,7 +98,7 @@ class OpticalTracker(Component):
 
     def turned(self, v: Vector) -> Vector:
         """Return a vector of the fixed frame in axes of the tracker."""
-        return v[0] * self.e1 + v[1] * self.e2 + v[2] * cross(self.e1, self.e2)
+        return vector(v[0] * self.e1 + v[1] * self.e2 + v[2] * cross(self.e1, self.e2))
 
     def place(self) -> Vector:
         """Return the direction of the target in axes of the tracker."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +21,7 @@ from .tracking_error import TrackingError, error_coefficients, lag
 MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
 PAIR = (0, 1)
+NEAR = 0.1  # periods of the crossover about a time
 LEAST = 5.0  # u of an error by a motion: less is not measured
 MEASURED = ("f_c", "PM", "GM", "GRM")
 STANDS_OUT = 10.0  # u of the change, or more: a step that stands above the noise
@@ -90,8 +92,17 @@ class Reduction(SightReduction):
         over, u = 100.0 * step.overshoot, 100.0 * step.u_change / abs(step.change) if step.change else 0.0
         found.measure(f"overshoot {axis}", "of a step of the wanted direction", "%", over, u, no_value=none)
         none = none or ("" if step.settled_5 is not None else "within 5 % it does not settle in the step")
-        found.measure(f"t_5 {axis}", "settling of that step within 5 %", "s", step.settled_5, step.u_settled,
-                      no_value=none)  # fmt: skip
+        u = math.hypot(step.u_settled, self._crossing(gate, k, step.settled_5)) if step.settled_5 is not None else None
+        meaning = "settling of that step within 5 %"
+        found.measure(f"t_5 {axis}", meaning, "s", step.settled_5, u, no_value=none)
+
+    def _crossing(self, gate: Gate, k: int, at: float) -> float:
+        """Return by how much noise moves the time at which an error comes into its band: noise over slope, s."""
+        t, half = gate.t - gate.t[0], NEAR / float(self.run.options["track"])
+        near = np.abs(t - at) < half
+        slope = float(np.polyfit(t[near], gate[MISS[k]][near], 1)[0]) if np.count_nonzero(near) > 2 else 0.0
+        noise = float(np.std(gate.rest(MISS[k])))
+        return min(noise / abs(slope), float(t[-1])) if slope else float(t[-1])
 
     # ------------------------------------------------------------------ ride
     def _error(self, gate: Gate) -> None:

@@ -89,7 +89,7 @@ class GimbalTracking(SightTest):
         "passing": Option(500.0, "m", "fly-by: distance where it is nearest", 0.1),
         "speed": Option(60.0, "m/s", "fly-by: speed, to the right", 0.0),
         "accuracy": Option(2e-4, "rad", "wanted: error of the line of sight, both axes together, below this", 1e-7),
-        "acquire": Option(1e-3, "rad", "step of the wanted direction, each axis; 0: none", 0.0),
+        "acquire": Option(3e-3, "rad", "step of the wanted direction, each axis; 0: none", 0.0),
     }  # fmt: skip
     noises = (*SightTest.noises, "tracker.image_noise")
     channels = (

@@ -23,7 +23,7 @@ from gyrobench.reduction.loops.jitter import root
 
 STRETCHES = 12
 SLOW = 300.0  # crossover over the frequency at which the coefficients are taken
-SLIGHT = 0.02  # of the largest lag: a scatter below is constant
+SLIGHT = 0.02  # of the largest lag and of the scatter of the error: a lag that scatters by less is constant
 FINE = 100.0  # samples in a period of the crossover, for the lag
 SETTLED = 8.0  # periods of it, in which the loop settles
 POINTS = 600  # of the response
@@ -85,7 +85,7 @@ class TrackingError:
     @property
     def peak(self) -> float:
         """Return the largest error of both axes together."""
-        return float(self.size.max())
+        return float(np.max(self.size))
 
     def inside(self, wanted: float) -> tuple[float, float, tuple[float, float]]:
         """Return the share of the time with an error below ``wanted``, its u and its interval, %.
@@ -113,12 +113,12 @@ class TrackingError:
             return 1.0
         rho = rho / rho[0]
         end = int(np.argmax(rho < 0.0)) or n
-        return max(1.0, n / (1.0 + 2.0 * float(np.sum(rho[1:end]))))
+        return max(1.0, float(n / (1.0 + 2.0 * np.sum(rho[1:end]))))
 
     def share(self, k: int) -> UncertainValue | None:
         """Return the error over the lag, beside a constant; None for a lag that does not change."""
         of = self.lag[k]
-        if not np.std(of) > SLIGHT * np.max(np.abs(of), initial=0.0):
+        if not np.std(of) > SLIGHT * max(float(np.max(np.abs(of))), float(np.std(self.e[k]))):
             return None
 
         def slope(use: Array) -> float:

@@ -41,7 +41,7 @@ class SightTest(LoopTest):
     """
 
     test: ClassVar[float] = 0.3  # V (rad/s), of the test sines
-    spec = ("GIMBAL-2AXIS", "LOS-JITTER", "BASE-PSD", "GYRO-MEMS", "STABILIZER-LTI")
+    spec: ClassVar[tuple[str, ...]] = ("GIMBAL-2AXIS", "LOS-JITTER", "BASE-PSD", "GYRO-MEMS", "STABILIZER-LTI")
     bodies = """
         base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
         outer gimbal: base, z platform.theta[2]
@@ -90,16 +90,29 @@ class SightTest(LoopTest):
                               0.05, 50.0),
         **loop.PROFILE,
     }  # fmt: skip
-    noises = ("gyro.white", "gyro.turn_on", "gyro.flicker_x", "gyro.flicker_y", "gyro.walk_x", "gyro.walk_y")
+    noises: ClassVar[tuple[str, ...]] = (
+        "gyro.white",
+        "gyro.turn_on",
+        "gyro.flicker_x",
+        "gyro.flicker_y",
+        "gyro.walk_x",
+        "gyro.walk_y",
+    )
     step = 2e-4
-    channels = (
+    channels: ClassVar[tuple[str, ...]] = (
         "exciter.phase", "exciter.gate", "exciter.motion_angle[1]", "exciter.motion_angle[3]", "exciter.torque[1]",
         "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]",
         *loop.three("motion.angle", "vibration.omega", "vibration.f"),
         *(f"{n}[{k}]" for n in ("platform.los", "platform.theta") for k in (1, 2)),
         "platform.keyhole", "decoupler.saturated", *(f"{axis}.{n}" for axis in AXES for n in ("e", "v")),
     )  # fmt: skip
-    shown = ("platform.los", "platform.theta", "vibration.omega", "pitch.e yaw.e", "pitch.v yaw.v")
+    shown: ClassVar[tuple[str, ...]] = (
+        "platform.los",
+        "platform.theta",
+        "vibration.omega",
+        "pitch.e yaw.e",
+        "pitch.v yaw.v",
+    )
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:
