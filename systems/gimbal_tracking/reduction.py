@@ -22,6 +22,7 @@ MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
 PAIR = (0, 1)
 NEAR = 0.1  # periods of the crossover about a time
+LIFTED = 2.0  # rms of the noise: by so much it lifts a peak
 LEAST = 5.0  # u of an error by a motion: less is not measured
 MEASURED = ("f_c", "PM", "GM", "GRM")
 STANDS_OUT = 10.0  # u of the change, or more: a step that stands above the noise
@@ -89,12 +90,15 @@ class Reduction(SightReduction):
         none = ""
         if step.u_change * STANDS_OUT > abs(step.change):
             none = f"the step is less than {STANDS_OUT:g} times its noise"
-        over, u = 100.0 * step.overshoot, 100.0 * step.u_change / abs(step.change) if step.change else 0.0
-        found.measure(f"overshoot {axis}", "of a step of the wanted direction", "%", over, u, no_value=none)
-        none = none or ("" if step.settled_5 is not None else "within 5 % it does not settle in the step")
-        u = math.hypot(step.u_settled, self._crossing(gate, k, step.settled_5)) if step.settled_5 is not None else None
-        meaning = "settling of that step within 5 %"
-        found.measure(f"t_5 {axis}", meaning, "s", step.settled_5, u, no_value=none)
+        size = abs(step.change) or math.inf
+        noise = float(np.std(gate.rest(MISS[k])))
+        u = math.hypot(step.u_change, LIFTED * noise)
+        found.measure(f"overshoot {axis}", "of a step of the wanted direction", "%", 100.0 * step.overshoot,
+                      100.0 * u / size, no_value=none)  # fmt: skip
+        at = step.settled_5
+        none = none or ("" if at is not None else "within 5 % it does not settle in the step")
+        u_t = None if at is None else math.hypot(step.u_settled, self._crossing(gate, k, at))
+        found.measure(f"t_5 {axis}", "settling of that step within 5 %", "s", at, u_t, no_value=none)
 
     def _crossing(self, gate: Gate, k: int, at: float) -> float:
         """Return by how much noise moves the time at which an error comes into its band: noise over slope, s."""
