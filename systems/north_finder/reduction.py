@@ -52,7 +52,7 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import ARCMIN, DEG, DPH
 
-from . import plans
+from . import after, plans
 from .model import LocalEarth, at_null, attitude, of_windows
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
@@ -85,7 +85,7 @@ class NorthFinderSetup(SiteSetup):
 
     drift_order: highest power of time of a drift of the bias that is estimated with the heading.
     density of the white rate noise (rad/s/sqrt(Hz); 0: unknown), total time and settling (s): for the comparison of the
-    methods.
+    methods.  instruments: parameters of those of a run, for heading and level after a time.
     """
 
     method: str
@@ -103,16 +103,17 @@ class NorthFinderSetup(SiteSetup):
     u_accelerometer: float = 0.0
     u_bias: float = 0.0
     unbiased: bool = False
+    instruments: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
         o, p = run.options, run.parameters
         stated: dict[str, Any] = {n: float(o.get(n, 0.0)) for n in ("rough", "sigma_rough", "settle", "density")}
-        stated["density"] = stated["density"] or float(p.get("gyro.white_y", 0.0))
+        stated["density"] = stated["density"] or float(p.get("finder.density", 0.0))
         unbiased = run.type_b == "none" or (not np.any(p.get("gyro.bias", 1.0)) and bias_is_all(p))
         return super().of(
             run, method=method_of(run), rough_stated=not run.measured, drift_order=int(o.get("drift_order", 0)),
-            unbiased=unbiased, **stated, **own,
+            unbiased=unbiased, instruments=None if run.measured else p, **stated, **own,
         )  # fmt: skip
 
     @property
@@ -275,7 +276,9 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 "anticlockwise.",
                 "At rest the specific force points up: nose up makes f_y positive, right side down f_x negative.",
             ],
-            tables=[self._integrity(psi, A), *_methods(s, psi)],
+            tables=[
+                self._integrity(psi, A), *_methods(s, psi), *after.table(s.instruments or {}, s.latitude, s.gravity)
+            ],
         )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:

@@ -247,8 +247,8 @@ def _messy_file(reader: Reader, name: str, step: Step) -> None:
 
 PREPARED = [
     Preparation(r"\bmessung\.csv\b", _messy_file),
-    Preparation(r"(?<=--data )(?:record|day)s?\.csv\b|\bdata\.csv\b", _records),
     Preparation(r"\bdays\.csv\b", lambda r, n, s: (_records if "servo" in s.text else _runs_of_days)(r, n, s)),
+    Preparation(r"(?<=--data )\w+\.csv\b", _records),
     Preparation(r"reports/out/\w+/[0-9][0-9a-f]{7}\b", _saved_run),
     Preparation(r"\bRUN\d\b", _named_runs),
     Preparation(r"\b(?:SECANT|CONSTANT|SIGN)\b", _laws),
