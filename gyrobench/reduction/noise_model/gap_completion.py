@@ -290,9 +290,7 @@ def _lacking(
     return lost, noise
 
 
-def _own_ends(
-    x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: _Precision
-) -> NDArray[np.int64]:
+def _own_ends(x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: _Precision) -> NDArray[np.int64]:
     """Return the wild samples near an end of x (n,) that differ from what the others say of them by no more than the
     noise does there.
 
