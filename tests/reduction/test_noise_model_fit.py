@@ -96,9 +96,9 @@ def test_a_wild_sample_at_an_end_of_angle_noise() -> None:
     """Angle noise Q = 1 beside N = 0.1: what others say of a sample within the record is known to 0.1 or so, of the
     first and the last one to sqrt(Q2 + 0.01), as its outer angle is in no other: 4 there is wild, 3 Q is none.
 
-    Twenty records have 40 ends, of which chance takes none for wild; before, a third of the records had one.
+    Ten records have 20 ends, of which chance takes none for wild; before, a third of the records had one.
     """
-    for seed in range(20):
+    for seed in range(10):
         rng, n = np.random.default_rng([6, seed]), 1000
         x = 0.1 * rng.normal(size=n) + np.diff(rng.normal(size=n + 1))
         assert not {0, n - 1} & set(complete(x).wild.tolist()), seed
