@@ -23,7 +23,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.result import Table
-from gyrobench.units import DEG
+from gyrobench.units import ARCMIN, DEG
 
 MINUTES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 MOST = 0.5  # rad, heading beyond which a standard deviation says nothing
@@ -152,15 +152,18 @@ def table(p: Mapping[str, Any], latitude: float, gravity: float) -> list[Table]:
         tilt = level(force, gravity, T) if force else None
         values = [heading(rate, latitude, T, two=False, tilt=tilt or 0.0), heading(rate, latitude, T)]
         shown: list[Any] = [x / DEG if x < MOST else None for x in values]
-        rows.append([minutes, *shown, tilt / DEG if tilt is not None else None])
-    said = [
-        f"{goal:g}° in two positions {in_words(reached_after(rate, latitude, goal * DEG))}, "
-        f"in one {in_words(reached_after(rate, latitude, goal * DEG, two=False))}"
-        for goal in GOALS
-    ]
+        rows.append([minutes, *shown, tilt / ARCMIN if tilt is not None else None])
     caption = (
         "Standard deviations by bias, white noise, flicker and random walk of the instruments, closed form, of "
-        f"readings without moves; empty: beyond {MOST / DEG:.3g}°. Heading to " + "; to ".join(said)
+        f"readings without moves; empty: beyond {MOST / DEG:.3g}°"
     )
-    head = ["t / min", "σ(ψ), one position / °", "σ(ψ), two positions / °", "σ(tilt), one position / °"]
-    return [Table("after", "Heading and level after minutes", caption, head, rows)]
+    head = ["t / min", "σ(ψ), one position / °", "σ(ψ), two positions / °", "σ(tilt), one position / ′"]
+    times: list[list[Any]] = []
+    for goal in GOALS:
+        found = [reached_after(rate, latitude, goal * DEG, two=two) for two in (False, True)]
+        times.append([goal, *(None if t is None else t / 60.0 for t in found)])
+    return [
+        Table("after", "Heading and level after minutes", caption, head, rows),
+        Table("after.reached", "Time to a heading", "By the same errors; empty: never, in a day",
+              ["σ(ψ) / °", "one position / min", "two positions / min"], times),
+    ]  # fmt: skip
