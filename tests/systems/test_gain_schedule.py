@@ -59,7 +59,7 @@ def crossed(session: Session, values: dict[str, Any], degrees: float) -> tuple[f
 
 @pytest.mark.long
 def test_bandwidth_is_constant_over_the_schedule(sessions: tuple[Session, Session, dict[str, Any]]) -> None:
-    """Fixed gains: the loop gain falls to cos 60 / 2.45 = 0.204, the crossover with it; scheduled: at nodes, between."""
+    """Fixed gains: the loop gain falls to cos 60 / 2.45 = 0.204, the crossover with it; scheduled: not."""
     fixed, own, values = sessions
     ratio = gain(NODES[-1])
     assert ratio == pytest.approx(2.0 * 0.19625 / 0.08)
