@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from gyrobench.component.component import Component
-from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.component.composition import sampled
+from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State
 from gyrobench.component.math import Number, clip, maximum
 
 
