@@ -118,7 +118,7 @@ class LevelChannel(DriftReduction["TwoAxisServoSetup"]):
             method="The gyro holds a two-axis table that its torquers keep level; composite drift of each mount and "
             "channel under an estimated noise model with shared angle readings [SERVO2-LEVELLED]",
             sources=[
-                "SERVO2-LEVELLED, SERVO2-KIN; Hu 1981, section 3.3 item 6-3, eq. 3-97",
+                "SERVO2-LEVELLED, SERVO2-KIN; Hu 1981, ch. 3 par. 3, eq. 3-97",
                 "TEST-COMPOSITE; Hu 1981, eq. 3-91..3-93, corrected by E45, E46",
             ],
             equation=f"omega_{c} - k_{o} i_{o} = omega_\"d{c}\"",
