@@ -12,7 +12,8 @@ A system has sources of its own by declaring them in its folder, in the same way
 
 The way of a statement ``--set u_axis=60arcsec``:
 
-1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI.
+1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI, into
+   the field of the same name, which the setup of the test must have.
 2. ``effects`` of the test pairs it with what one unit does to the data: :meth:`Source.effect`.
 3. ``with_set_up`` (estimation.effects) puts size times error into the covariance of the data, but for a source that is
    relative to the reading, and takes corrections out of the data.
