@@ -45,10 +45,11 @@ class SmallRates:
         for r, plus, minus in _both_senses(w):
             u = 0.5 * noise * math.sqrt(1.0 / np.count_nonzero(plus) + 1.0 / np.count_nonzero(minus))
             rows.append((r, _half(y, plus, minus) / r, u / r, SURE * u / r))
-        return cls(*_columns(rows), unit, scale)
+        rate, ratio, u_ratio, margins = _columns(rows)
+        return cls(rate, ratio, u_ratio, margins, unit, scale)
 
     @classmethod
-    def repeated(cls, w: Array, y: Array, phase: Array, unit: str = "°/s", scale: float = DEG) -> SmallRates:
+    def repeated(cls, w: Array, y: Array, phase: NDArray[np.int_], unit: str = "°/s", scale: float = DEG) -> SmallRates:
         """Return the same of readings in phases (n,) that repeat each rate: what drifts from phase to phase is seen.
 
         The variance of a ratio is the larger of three: of the readings and of the means of repeated phases, each pooled
@@ -63,19 +64,19 @@ class SmallRates:
         rows = []
         for (r, plus, minus), sides in zip(cells, means, strict=True):
             within = math.sqrt(reading * sum(1.0 / np.count_nonzero(side) for side in (plus, minus)))
-            candidates = [(within, dof_reading, shared)]
-            candidates.append((math.sqrt(between * sum(1.0 / len(side) for side in sides)), dof_between, shared))
             own = [np.array([x.mean() for x in side]) for side in sides]
             alone = sum(float(np.var(x, ddof=1)) / x.size for x in own if x.size > 1)
-            candidates.append((math.sqrt(alone), sum(x.size - 1 for x in own), 1.0 - 0.5 * FALSE))
-            u = 0.5 * max(size for size, *_ in candidates) / r
-            margin = (
-                max(float(stats.t.ppf(p, dof)) * size for size, dof, p in candidates if dof)
-                if dof_reading
-                else math.inf
+            sizes = (
+                (within, dof_reading, shared),
+                (math.sqrt(between * sum(1.0 / len(side) for side in sides)), dof_between, shared),
+                (math.sqrt(alone), sum(x.size - 1 for x in own), 1.0 - 0.5 * FALSE),
             )
+            u = 0.5 * max(size for size, *_ in sizes) / r
+            known = [float(stats.t.ppf(p, dof)) * size for size, dof, p in sizes if dof]
+            margin = max(known, default=math.inf)
             rows.append((r, _half(y, plus, minus) / r, u, 0.5 * margin / r))
-        return cls(*_columns(rows), unit, scale)
+        rate, ratio, u_ratio, margins = _columns(rows)
+        return cls(rate, ratio, u_ratio, margins, unit, scale)
 
     @property
     def silent(self) -> bool:
@@ -104,9 +105,11 @@ class SmallRates:
             return _without(nothing, "not determined: the readings of the small rates are too noisy", math.nan)
         low, high = (x / self.scale for x in self.bounds)
         if low == 0.0:
-            return _without(nothing, f"below {high:.4g} {self.unit}: every rate of the plan is answered", high)
+            return _without(
+                nothing, f"below {high:.4g} {self.unit}: none of the plan is surely without an answer", high
+            )
         if math.isinf(high):
-            return _without(nothing, f"above {low:.4g} {self.unit}: no rate of the plan is answered", math.nan)
+            return _without(nothing, f"above {low:.4g} {self.unit}: none of the plan is surely answered", math.nan)
         u = (high - low) / math.sqrt(12.0)  # nothing is known between the two
         return Coefficient(
             "threshold", MEANING, self.unit, 0.5 * (low + high), u, math.sqrt(3.0), (low, high), truth=shown,
