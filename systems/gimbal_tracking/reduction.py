@@ -22,7 +22,9 @@ MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
 PAIR = (0, 1)
 NEAR = 0.1  # periods of the crossover about a time
+FULL = 100.0  # %
 LIFTED = 2.0  # rms of the noise: by so much it lifts a peak
+UNSURE = 0.25  # of a settling time, its u: more says nothing
 LEAST = 5.0  # u of an error by a motion: less is not measured
 MEASURED = ("f_c", "PM", "GM", "GRM")
 STANDS_OUT = 10.0  # u of the change, or more: a step that stands above the noise
@@ -74,12 +76,24 @@ class Reduction(SightReduction):
     def summary(self) -> list[str]:
         found = self.found
         return [
-            *told(found.coefficients, "The tracking error is {error} rms, both axes, {peak} at most; it is inside the "
-                  "wanted accuracy for {inside} of the time."),
+            *told(found.coefficients, "The tracking error is {error} rms, both axes, {peak} at most."),
+            *self._inside(),
             *told(found.coefficients, "Its mean is {bias pitch} about pitch and {bias yaw} about yaw."),
             *told(found.coefficients, f"From the stated frequency on it is {{jitter}} rms{self.cause}."),
             *margins(found, *AXES, *(f"track {a}" for a in AXES)),
         ]  # fmt: skip
+
+    def _inside(self) -> list[str]:
+        """Return for which share of the time the error is inside the accuracy."""
+        found = {c.name: c for c in self.found.coefficients}
+        if "inside" not in found:
+            return []
+        low, high = found["inside"].interval
+        if high == FULL:
+            return [f"It is inside the wanted accuracy for {low:.3g} % of the time or more (95 %)."]
+        if low == 0.0:
+            return [f"It is inside the wanted accuracy for {high:.2g} % of the time or less (95 %)."]
+        return told(self.found.coefficients, "It is inside the wanted accuracy for {inside} of the time.")
 
     def _acquire(self, gate: Gate) -> None:
         """Measure a step of the wanted direction, where it stands above the noise."""
@@ -98,6 +112,8 @@ class Reduction(SightReduction):
         at = step.settled_5
         none = none or ("" if at is not None else "within 5 % it does not settle in the step")
         u_t = None if at is None else math.hypot(step.u_settled, self._crossing(gate, k, at))
+        if at is not None and u_t is not None and u_t > UNSURE * at:
+            none = none or f"noise moves the time at which it comes within 5 % by {u_t:.2g} s (rms)"
         found.measure(f"t_5 {axis}", "settling of that step within 5 %", "s", at, u_t, no_value=none)
 
     def _crossing(self, gate: Gate, k: int, at: float) -> float:
