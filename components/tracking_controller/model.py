@@ -49,4 +49,4 @@ class TrackingController(LeadLag):
     def outputs(self) -> None:
         wish = self.v
         self.v = self.sloped(wish)
-        self.saturated = 1.0 if self.v != self.unlimited() else 0.0
+        self.saturated = 1.0 if self.v != self.unlimited() or self.waited > 0.5 else 0.0

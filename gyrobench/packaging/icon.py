@@ -49,7 +49,7 @@ WORDS = (
     ("motor", "motor|slipring|bearing|tachometer"),
     ("reader", "meter|tracker|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
     ("place", "site|ground|surroundings|foundation|thermostat|chamber"),
-    ("source", "source|target|offset|turn_on|exciter|motion|manoeuvre|torque|vibration"),
+    ("source", "source|supply|target|offset|turn_on|exciter|motion|manoeuvre|torque|vibration"),
     ("gyro", "gyro"),
 )  # fmt: skip
 

@@ -79,7 +79,8 @@ class VelocityChain:
             return 1.0
         w, wn = 2.0 * math.pi * f, 2.0 * math.pi * bandwidth
         if not self.step:
-            return 1.0 / (1.0 - (w / wn) ** 2 + 1j * math.sqrt(2.0) * w / wn)
+            x = min(w / wn, 1e100)  # its square is a number
+            return 1.0 / (1.0 - x * x + 1j * math.sqrt(2.0) * x)
         pole, h = wn * cmath.exp(0.75j * math.pi), self.step
         z = cmath.exp(1j * w * h)
         p, q = pole, pole.conjugate()

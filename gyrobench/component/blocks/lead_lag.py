@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from gyrobench.component.component import Component
-from gyrobench.component.declarations import Input, Output, Parameter, State
-from gyrobench.component.math import Number, clip
+from gyrobench.component.composition import sampled
+from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State
+from gyrobench.component.math import Number, clip, maximum
 
 
 class LeadLag(Component):
@@ -28,11 +29,23 @@ class LeadLag(Component):
 
     v = Output("V", "voltage of the torque motor")
     e = Output("V", "the signal inside the loop, u + test")
-    saturated = Output("1", "1 while the voltage is limited")
+    saturated = Output("1", "1 while the voltage is limited, or in the last step the integral has waited")
 
     lag = State(0.0, "V", "state of the lag network")
     lead = State(0.0, "V", "state of the lead network")
     sum = State(0.0, "V", "integral part")
+
+    began = Discrete([0.0, 0.0, 0.0], "V", "lag, lead and sum at the beginning of the internal step to come")
+    waited = Discrete(0.0, "1", "1: the integral has waited in the last communication step")
+
+    def start(self) -> None:
+        self.keep()
+        self.waited = 0.0
+
+    def keep(self) -> None:
+        self.began[0] = self.lag
+        self.began[1] = self.lead
+        self.began[2] = self.sum
 
     def error(self) -> Number:
         return self.u + self.test - self.K_u * self.command
@@ -50,15 +63,30 @@ class LeadLag(Component):
         self.der.lag = (self.error() - self.lag) / self.T1
         self.der.lead = (self.after_lag() - self.lead) / self.T2
         y = self.after_lead()
-        unlimited = self.unlimited()
+        unlimited = -self.K * (y + self.sum)
         self.der.sum = self.integral * y
-        if (unlimited > self.v_max and y < 0.0) or (unlimited < -self.v_max and y > 0.0):
+        if self.waits(unlimited, y) > 0.5:
             self.der.sum = 0.0
         if self.integral == 0.0:
             self.der.sum = -self.sum  # stays 0, and leaves no pole at 0 in the linearization
+
+    def waits(self, unlimited: Number, y: Number) -> Number:
+        """Return 1 where the voltage is limited and y pushes it further."""
+        return 1.0 if (unlimited > self.v_max and y < 0.0) or (unlimited < -self.v_max and y > 0.0) else 0.0
+
+    @sampled(every=1)
+    def watch(self) -> None:
+        """Note whether the integral has waited in the step: what `flow` saw at its beginning is gone at its end."""
+        if self.integral > 0.0:
+            if self.t < self.step_start + 1.5 * self.h:
+                self.waited = 0.0  # the first internal step of the communication step
+            lagged = self.began[0] + self.tau1 / self.T1 * (self.error() - self.began[0])
+            y = self.began[1] + self.tau2 / self.T2 * (lagged - self.began[1])
+            self.waited = maximum(self.waited, self.waits(-self.K * (y + self.began[2]), y))
+            self.keep()
 
     def outputs(self) -> None:
         self.e = self.u + self.test
         unlimited = self.unlimited()
         self.v = clip(unlimited, -self.v_max, self.v_max)
-        self.saturated = 1.0 if self.v != unlimited else 0.0
+        self.saturated = 1.0 if self.v != unlimited or self.waited > 0.5 else 0.0
