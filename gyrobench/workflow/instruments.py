@@ -218,4 +218,6 @@ def with_instruments(
         if parts.setdefault("gyro", sheet.part) != sheet.part:
             raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
         found |= settings(sheet)
+        if isinstance(test, System) and "u_bias" in test.options and (bias := sheet_values.believed_bias(sheet)):
+            found["u_bias"] = bias
     return "; ".join(titles), found

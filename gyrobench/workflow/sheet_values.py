@@ -150,9 +150,12 @@ def wander(sheet: Instrument) -> float:
 
 def turn_on(sheet: Instrument) -> float:
     """Return the bias at switch-on: as stated, or of a limit what one believes; without both the bias instability."""
-    limit = sheet.limit("bias")
-    believed = sheet.si("bias_instability") if limit is None else limit / math.sqrt(3.0)
-    return sheet.si("bias") or believed or 0.0
+    return believed_bias(sheet) or sheet.si("bias_instability") or 0.0
+
+
+def believed_bias(sheet: Instrument) -> float:
+    """Return the standard uncertainty of the bias at switch-on: as stated, or of a limit; 0 without both."""
+    return sheet.si("bias") or (sheet.limit("bias") or 0.0) / math.sqrt(3.0)
 
 
 def unit(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
