@@ -62,7 +62,7 @@ class SelfTest:
 class Reduction(MeasureReduction):
     """Start, self-tests, test and shutdown as the program wrote them down."""
 
-    part = "program"
+    part = "gyro"
 
     def measure(self) -> Account:
         w = {n: np.asarray(v, dtype=float) for n, v in self.record.windows.items()}
@@ -87,7 +87,7 @@ class Reduction(MeasureReduction):
         self._draw()
         return Account(
             method="Program of a gyro test; each self-test by the mean of its repeats",
-            sources=["TEST-START-UP; Hu 1981, section 6.1 (items 4 to 6)"],
+            sources=["TEST-START-UP; Hu 1981, section 6.1 (items 4, 6)"],
             equation="",
             conventions=[
                 "Intervals of self-tests: t distribution of the repeats. Times count from the begin of the step to its "
@@ -159,7 +159,7 @@ class Reduction(MeasureReduction):
                 (self.rows["reason"][self.rows["ended"] <= begun] > 0.0).any()
             )
             rows.append([name, begun, ended - begun, allowed, value, unit, self.why if broken else "done"])
-        head = ["step", "begin / s", "took / s", "allowed / s", "found", "unit", "outcome"]
+        head = ["phase", "begin / s", "took / s", "allowed / s", "found", "unit", "outcome"]
         caption = "The steps in their order; found: mean of the repeats, of the test its mean current."
         return Table("line", "Time line", caption, head, rows)
 

@@ -167,7 +167,7 @@ class TestStartUp(System):
     def stop(self) -> float:  # type: ignore[override]
         """Return the longest time that the program can take, s."""
         waits = sum(float(self[n]) for n in ("t_heat", "t_wheel", "t_close", "t_brake", "dwell"))
-        return waits + 20.0 * self["repeats"] + 30.0
+        return float(waits + 20.0 * self["repeats"] + 30.0)
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         nominal = {
