@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, Rotation, sampled
 from gyrobench.component.blocks.attitude import turned
-from gyrobench.component.math import Vector, atan2, cross, fabs, sqrt, vector
+from gyrobench.component.math import Vector, atan2, cos, cross, fabs, sin, sqrt, vector
 
 NONE = [0.0, 0.0, 0.0]
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
@@ -26,30 +26,38 @@ def product(a: Vector, b: Vector) -> Vector:
 
 
 class StrapdownAttitude(Component):
-    """The user of a strapdown unit: attitude from angle increments, and by how much it is off.  [TEST-CONING]
+    """The user of a strapdown unit: attitude and velocity from increments, and by how much they are off.
 
         phi = dtheta                                                                samples = 1
         phi = first + second + 2/3 first x second                                   samples = 2 (Miller 1983)
         q  <- exp(-Earth rate T) q exp(phi),   T: time since the last update
         p  = q q_reference^-1,   error: rotation vector of p p_0^-1 along the mean axes of the case
-        drift: change of error over the step, by the step
+        drift: change of error over the step, by the step                                          [TEST-CONING]
 
+        dv = dvelocity                                                              samples = 1
+        dv = first + second + 2/3 (phi_1 x second + first x phi_2)                  samples = 2 (Savage 1998b)
+        dV = q [dv + (1 - cos p)/p^2 a x dv + (1 - sin p/p)/p^2 a x (a x dv)]       q of the update before; a: sum of
+        acceleration = (dV - f_local T)/h at an update, else 0                      the increments, p = |a|
+                                                                                    [TEST-SCULLING]
     While align = 1 the attitude is the reference, then it is the user's own.  The error is that of the last update; p_0
     is p as the gate opens, so that an oscillation of p (a filter is late) leaves nothing after whole periods.
-    Not modelled: velocity and position (sculling), errors of the reference, delay of the computer.
-    Source: Miller 1983; Savage 1998; Bortz 1971.
+    Not modelled: position (scrolling), velocity by Coriolis and transport rate, errors of the reference, delay of the
+    computer.
+    Source: Miller 1983; Savage 1998, 1998b; Bortz 1971.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     face = Rotation("rows: axes x, y, z of the case in table axes")
     samples = Parameter(1, int, "increments of one update: 1, or 2 with the coning between them", min=1, max=2)
 
     dtheta = Input(NONE, "rad", "angle increments, axes of the case")
+    dvelocity = Input(NONE, "m/s", "velocity increments, axes of the case")
     number = Input(0.0, "1", "increments since the start")
     attitude = Input(UPRIGHT, "1", "reference: quaternion of the case without face, in table axes")
     omega_local = Input(NONE, "rad/s", "Earth rate, table axes")
+    f_local = Input(NONE, "m/s2", "specific force at rest, table axes")
     align = Input(0.0, "1", "1: take the reference; 0: integrate")
     gate = Input(0.0, "1", "0: the error is not counted; else it is, from the first sample on")
 
@@ -61,16 +69,41 @@ class StrapdownAttitude(Component):
     change = Discrete(NONE, "rad/s", "its change over the step, by the step")
     seen = Discrete(0.0, "1", "increments seen")
     first = Discrete(NONE, "rad", "first increment of two")
+    first_velocity = Discrete(NONE, "m/s", "first velocity increment of two")
+    gained = Discrete(NONE, "m/s2", "velocity beyond that of f_local in the step, by the step")
     waiting = Discrete(0.0, "1", "1: the first of two increments is there")
     t_update = Discrete(0.0, "s", "time of the last update")
 
     error = Output("rad", "error of the attitude, mean axes of the case", shape=(3,))
     drift = Output("rad/s", "its change over the step, by the step", shape=(3,))
+    acceleration = Output("m/s2", "velocity gained beyond f_local in the step, by the step, table axes", shape=(3,))
 
     def start(self) -> None:
         self.q = self.attitude
         self.seen = self.number
         self.t_update = self.t
+
+    def plate(self, v: Vector) -> Vector:
+        """Return a vector of case axes in those of the plate."""
+        out = vector([0.0, 0.0, 0.0])
+        for j in range(3):
+            out[j] = self.face[0][j] * v[0] + self.face[1][j] * v[1] + self.face[2][j] * v[2]
+        return vector(out)
+
+    def gain(self, angle: Vector, dv: Vector) -> None:
+        """Take the velocity of an update in the axes of its begin: that of a constant rate and force, exactly."""
+        p2 = angle @ angle
+        once = cross(angle, dv)
+        first = 0.5
+        second = 1.0 / 6.0
+        if p2 > 1e-8:
+            p = sqrt(p2)
+            first = (1.0 - cos(p)) / p2
+            second = (1.0 - sin(p) / p) / p2
+        body = vector(dv + first * once + second * cross(angle, once))
+        rest = (self.t - self.t_update) * vector(self.f_local)
+        whole = product(product(vector(self.q), vector([0.0, body[0], body[1], body[2]])), conjugate(vector(self.q)))
+        self.gained = (vector([whole[1], whole[2], whole[3]]) - rest) / self.h
 
     def update(self, phi: Vector) -> None:
         """Turn the attitude by phi (axes of the plate), and the reference frame by the Earth's rate."""
@@ -84,21 +117,24 @@ class StrapdownAttitude(Component):
     @sampled(every=1)
     def tick(self) -> None:
         before = vector(self.off)
+        self.gained = vector(NONE)
         if self.number > self.seen:
             self.seen = self.number
-            now = vector([0.0, 0.0, 0.0])
-            for j in range(3):
-                now[j] = self.face[0][j] * self.dtheta[0] + self.face[1][j] * self.dtheta[1]
-                now[j] = now[j] + self.face[2][j] * self.dtheta[2]
+            now = self.plate(vector(self.dtheta))
+            dv = self.plate(vector(self.dvelocity))
             if self.samples < 1.5:
-                self.update(vector(now))
+                self.gain(now, dv)
+                self.update(now)
             elif self.waiting > 0.5:
                 self.waiting = 0.0
                 one = vector(self.first)
-                self.update(vector(one + now + (2.0 / 3.0) * cross(one, vector(now))))
+                v = vector(self.first_velocity)
+                self.gain(vector(one + now), vector(v + dv + (2.0 / 3.0) * (cross(one, dv) + cross(v, now))))
+                self.update(vector(one + now + (2.0 / 3.0) * cross(one, now)))
             else:
                 self.waiting = 1.0
                 self.first = now
+                self.first_velocity = dv
         if self.counted < 0.5 or self.gate < 0.5:
             self.p_0 = self.p
             before = vector(NONE)
@@ -116,3 +152,4 @@ class StrapdownAttitude(Component):
     def outputs(self) -> None:
         self.error = self.off
         self.drift = self.change
+        self.acceleration = self.gained

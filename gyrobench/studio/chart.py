@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextvars
 import functools
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from nicegui import ui
@@ -24,6 +26,14 @@ COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c
 TEXT, GRID = "#7b8791", "rgba(128, 140, 150, 0.3)"  # read on light and on dark ground
 RECORDS = 3  # kept open
 OPENING = threading.Lock()  # a record that two tabs ask for is read once
+#: threads of their own: a page does not wait for one behind the pyramids of long records, which take seconds
+DRAWING = ThreadPoolExecutor(2, "chart")
+Drawn = TypeVar("Drawn")
+
+
+async def drawn(work: Callable[[], Drawn]) -> Drawn:
+    """Return what a chart needs, worked out in one of its threads."""
+    return await asyncio.get_running_loop().run_in_executor(DRAWING, contextvars.copy_context().run, work)
 
 
 class RecordSignals:
@@ -162,7 +172,7 @@ class SignalChart:
         """Draw these signals over the whole record."""
         self.names = list(names)
         self.view = (self.begin, self.end)
-        options = await asyncio.to_thread(self.options)
+        options = await drawn(self.options)
         self.chart.style(height_of(len(options["grid"])))
         self.chart.options.clear()
         self.chart.options.update(options)
@@ -219,5 +229,5 @@ class SignalChart:
         span = self.end - self.begin
         self.view = (self.begin + span * low / 100.0, self.begin + span * high / 100.0)
         units = list(dict.fromkeys(self._unit(n) for n in self.names))
-        series = await asyncio.to_thread(lambda: self._series(units, {u: self._scale(u) for u in units}))
+        series = await drawn(lambda: self._series(units, {u: self._scale(u) for u in units}))
         self.chart.run_chart_method("setOption", {"series": series})

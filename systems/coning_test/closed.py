@@ -54,7 +54,7 @@ class Chain:
             return 1.0
         w, wn = 2.0 * math.pi * f, 2.0 * math.pi * self.bandwidth
         if not self.step:
-            return 1.0 / math.sqrt(1.0 + (w / wn) ** 4)
+            return 1.0 / math.hypot(1.0, (w / wn) * (w / wn))  # no power: it may exceed the numbers
         pole, h = wn * cmath.exp(0.75j * math.pi), self.step  # y = 1 + (p* e^(p t) - p e^(p* t))/(p - p*) to a step
         z = cmath.exp(1j * w * h)
         p, q = pole, pole.conjugate()

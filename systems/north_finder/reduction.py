@@ -52,7 +52,7 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import ARCMIN, DEG, DPH
 
-from . import plans
+from . import after, plans
 from .model import LocalEarth, at_null, attitude, of_windows
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
@@ -85,7 +85,7 @@ class NorthFinderSetup(SiteSetup):
 
     drift_order: highest power of time of a drift of the bias that is estimated with the heading.
     density of the white rate noise (rad/s/sqrt(Hz); 0: unknown), total time and settling (s): for the comparison of the
-    methods.
+    methods.  instruments: parameters of those of a run, for heading and level after a time.
     """
 
     method: str
@@ -103,16 +103,17 @@ class NorthFinderSetup(SiteSetup):
     u_accelerometer: float = 0.0
     u_bias: float = 0.0
     unbiased: bool = False
+    instruments: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
         o, p = run.options, run.parameters
         stated: dict[str, Any] = {n: float(o.get(n, 0.0)) for n in ("rough", "sigma_rough", "settle", "density")}
-        stated["density"] = stated["density"] or float(p.get("gyro.white_y", 0.0))
+        stated["density"] = stated["density"] or float(p.get("finder.density", 0.0))
         unbiased = run.type_b == "none" or (not np.any(p.get("gyro.bias", 1.0)) and bias_is_all(p))
         return super().of(
             run, method=method_of(run), rough_stated=not run.measured, drift_order=int(o.get("drift_order", 0)),
-            unbiased=unbiased, **stated, **own,
+            unbiased=unbiased, instruments=None if run.measured else p, **stated, **own,
         )  # fmt: skip
 
     @property
@@ -133,6 +134,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
+        problems += after.lost(s.method, s.u_bias, s.latitude)
         problems += window_problems(self.windows)
         if s.method == "null" and not problems:
             near = at_null(self.windows)
@@ -275,7 +277,10 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 "anticlockwise.",
                 "At rest the specific force points up: nose up makes f_y positive, right side down f_x negative.",
             ],
-            tables=[self._integrity(psi, A), *_methods(s, psi)],
+            tables=[
+                self._integrity(psi, A), *after.methods_table(s.density, s.time, s.settle, s.latitude, psi),
+                *after.table(s.instruments or {}, s.latitude, s.gravity, s.u_bias),
+            ],
         )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
@@ -364,27 +369,6 @@ reduce = Reduction.reduce
 
 def _doubt(id: str, text: str, *blocks: str) -> Reason:
     return Reason(id, text, blocks or ("pass", "fail"), severity="doubt")
-
-
-def _methods(s: NorthFinderSetup, psi: float) -> list[Table]:
-    """Return what each method reaches in the same total time with the noise of this gyro."""
-    if not s.density > 0.0 or not s.time > 0.0:
-        return []
-    rows: list[list[Any]] = []
-    for method in plans.PARTS:
-        reading = s.time - plans.overhead(method, 12, False, s.settle, 1e-3)
-        sigma = plans.reached(method, s.density, s.latitude, psi, reading) / ARCMIN if reading > 0.0 else None
-        strapdown = method.startswith("strapdown")
-        needs = "two gyro axes" if strapdown else "one gyro axis"
-        bias = "stays in the heading" if method == "strapdown" else "removed"
-        level = "measured" if strapdown or method == "tilt" else "taken for level"
-        rows.append([method, reading, sigma, needs, bias, level])
-    caption = (
-        f"Standard deviation of the heading by white noise of {s.density / DPH:.3g} °/h/√Hz, closed form, in the same "
-        "total time, moves of the head included"
-    )
-    head = ["method", "time of readings / s", "σ(ψ) / ′", "needs", "bias of the gyro", "tilt of the head"]
-    return [Table("methods", "Methods in the same time", caption, head, rows)]
 
 
 def setup_of(record: Record) -> NorthFinderSetup:

@@ -20,12 +20,14 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
 
-from . import plans
+from . import after, plans
+from .after import OWN, WHITE, RandomErrors
 from .measured import MEASURED
 
 FORCE = "\ntable -> gyro: f"  # of a gyro that feels it
 SOUGHT = "sequencer -> table: mode target face"
 SEEKING = "sequencer -> table: mode face\n    sequencer -> finder: target\n    finder.command -> table.target"
+UNKNOWN = 1e-9  # density of a gyro that does not state its noise, rad/s/sqrt(Hz): the finder needs one
 FACES = {plans.FACE: np.eye(3).tolist()}
 
 
@@ -38,7 +40,16 @@ class NorthFinding(TableTest):
     """
 
     title = "North finding by gyro"
-    spec = ("NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT")
+    spec = (
+        "NORTH-COMMON",
+        "NORTH-2POS",
+        "NORTH-4POS",
+        "NORTH-CONT",
+        "NORTH-TILT",
+        "NORTH-STRAPDOWN",
+        "NORTH-DRIFT",
+        "NORTH-AFTER",
+    )
     reduction = "reduction"
     protocol = "design"
     slots = {
@@ -175,7 +186,7 @@ class NorthFinding(TableTest):
         finder = {
             "finder.latitude?": self["latitude"],
             "finder.gravity?": gravity,
-            "finder.density?": self["density"] or self._density(parts) or 1e-9,
+            "finder.density?": self["density"] or self._density(parts) or UNKNOWN,
         }
         if self["drift_order"]:
             finder["finder.ramp?"] = self["drift_order"]
@@ -186,12 +197,12 @@ class NorthFinding(TableTest):
 
     def _density(self, parts: PartValues) -> float:
         """Return the white noise of the gyro in the slot, as its parameters state it."""
-        names = [n for n in ("gyro.white_y", "gyro.white") if n in parts]
-        return float(parts.get(names[0] if names else "gyro.white_y", 0.0))
+        rate = _random_errors(parts)
+        return rate.white if rate else 0.0
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = super().check_parameters(parameters)
-        if not (self["density"] or {"gyro.white_y", "gyro.white"} & set(parameters)):
+        if not self["density"] and _random_errors(parameters) is None:
             problems.append(
                 "density unknown: the parameters of the gyro do not state its white noise; give the option density "
                 "(the output density of the gyro, as 0.3deg/h/sqrt(Hz))"
@@ -213,6 +224,7 @@ class NorthFinding(TableTest):
                 f"latitude = {math.degrees(self['latitude']):.4g}°: within 5° of a pole the horizontal Earth rate is "
                 "below 9 % of that at the equator; no north finder by Earth rate"
             )
+        problems += after.lost(self.chosen, self["u_bias"], self["latitude"])
         lost = plans.overhead(self.chosen, self["positions"], self["back"], self["settle"], self.step)
         least = 5.0 * self.step * (self["windows"] + self["positions"])
         if self.total - lost <= least:
@@ -253,3 +265,8 @@ class NorthFinding(TableTest):
                 "right at any tilt."
             )
         return found
+
+
+def _random_errors(values: Mapping[str, Any] | PartValues) -> RandomErrors | None:
+    """Return the random errors of the gyro as far as its white noise; None where its parameters do not state it."""
+    return RandomErrors.of({n: values[f"gyro.{n}"] for n in (*WHITE, *OWN) if f"gyro.{n}" in values})

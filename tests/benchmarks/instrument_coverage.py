@@ -48,6 +48,27 @@ def coning_test(rng: np.random.Generator) -> Drawn:
     return values | {"imu.gyro_bias_tau": float(10.0 ** rng.uniform(1.0, 3.0))}
 
 
+def sculling_test(rng: np.random.Generator) -> Drawn:
+    """Instruments with errors of 100 ppm to 0.1 %, white noise, in half of the runs each a wandering bias and a motion
+    that is not the stated one; filters, output rate, algorithm and lever arm by chance.
+    """
+    size, white = 10.0 ** rng.uniform(-4.0, -3.0), 50e-6 * G0 * 10.0 ** rng.uniform(-1.0, 0.5)
+    gain, phase = 0.01 * rng.integers(2), 0.5 * DEG * rng.integers(2)
+    values: Drawn = {
+        "readings": 4, "cycles": 2, "window": 1.0, "frequencies": "3 8 20", "angle": rng.uniform(0.2, 0.7) * DEG,
+        "vibration": rng.uniform(3.0, 10.0), "axis": "xyz"[rng.integers(3)], "samples": int(rng.integers(1, 3)),
+        "sculling": bool(rng.integers(2)), "size": float(0.02 * rng.normal() * rng.integers(2)),
+        "bandwidth": float(rng.uniform(60.0, 300.0)), "acc_bandwidth": float(rng.uniform(60.0, 300.0)),
+        "u_angle": gain, "u_vibration": gain, "u_phase": phase, "table.angle_gain": gain * rng.normal(),
+        "table.force_gain": gain * rng.normal(), "table.phase_error": phase * rng.normal(),
+        "imu.gyro_scale": rng.normal(0.0, size, (3, 3)).tolist(),
+        "imu.acc_scale": rng.normal(0.0, size, (3, 3)).tolist(),
+    }  # fmt: skip
+    values |= {f"imu.{a}_acc": white for a in "xyz"}
+    values |= {f"imu.{a}_acc_bias": white / 5.0 * rng.integers(2) for a in "xyz"}
+    return values | {"imu.acc_bias_tau": float(10.0 ** rng.uniform(1.0, 3.0))}
+
+
 def vibration_rectification(rng: np.random.Generator) -> Drawn:
     """Gyro and accelerometer with coefficients by chance, white noise and, in half of the runs each, flicker, a control
     accelerometer that is off, one way only.
@@ -85,6 +106,7 @@ def turn_on_repeatability(rng: np.random.Generator) -> Drawn:
 
 DRAWN: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "coning_test": coning_test,
+    "sculling_test": sculling_test,
     "turn_on_repeatability": turn_on_repeatability,
     "vibration_rectification": vibration_rectification,
 }

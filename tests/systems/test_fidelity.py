@@ -95,6 +95,7 @@ TABLES = {
     "coning_test",
     "gyro_bandwidth",
     "gyro_dynamics",
+    "sculling_test",
     "stand_alignment",
     "table_position_test",
     "table_rate_test",

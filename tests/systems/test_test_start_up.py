@@ -1,10 +1,11 @@
-"""Start of a gyro test by program: every fault is named, none without one, self-tests against the truth, times by hand."""
+"""Start of a gyro test by program: every fault is named, none without one; self-tests and times by hand."""
 
 from __future__ import annotations
 
 import importlib
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 
@@ -91,7 +92,7 @@ def test_without_a_fault_all_is_gone_through(session: Session) -> None:
     assert found["loop"].estimate == pytest.approx(1.0, abs=5.0 * found["loop"].u)
     rows = found.tables[0].rows
     assert [r[-1] for r in rows] == ["done"] * 13
-    assert all(a[1] + a[2] == pytest.approx(b[1], abs=2e-3) for a, b in zip(rows, rows[1:], strict=False))
+    assert all(a[1] + a[2] == pytest.approx(b[1], abs=2e-3) for a, b in pairwise(rows))
 
 
 def test_the_torquer_is_measured_not_believed(session: Session) -> None:
