@@ -129,7 +129,7 @@ class MeasuredPlant:
             slope = (size[end] - size[near]) / (x[end] - x[near])
             inside = np.where(where, size[end] + slope * (at - x[end]), inside)
         found = np.exp(inside + 1j * np.interp(at, x, phase))
-        return np.where(w < 0.0, np.conj(found), found)
+        return np.asarray(np.where(w < 0.0, np.conj(found), found))
 
     def sampled(self, w: ArrayLike, T: float) -> Complex:
         """Return W(e^(j w T)); needs points to beyond half the sampling frequency.  Raises SampledLoopError."""
