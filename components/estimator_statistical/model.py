@@ -14,8 +14,8 @@ class EstimatorStatistical(SampledEstimator):
 
     An outlier alone has the weight 1, a reading among the others that of all that are within the width.  Of normal
     white noise it leaves *more* than the plain mean: with small widths, over many readings, 8/sqrt(27) = 1.54 of its
-    variance, with large ones 1.  What it is good for is outliers.  latency = (N - 1) Ts / 2: that of a ramp that stays within the
-    width.  Until N readings are there, those that are count.  A reading with valid = 0 is left out.
+    variance, with large ones 1.  What it is good for is outliers.  latency = (N - 1) Ts / 2: that of a ramp that
+    stays within the width.  Until N readings are there, those that are count.  A reading with valid = 0 is left out.
 
     Not modelled: a width that follows the noise.
     Source: Xia 2008, ch. 4, introduction (in words), with EX32.

@@ -67,5 +67,5 @@ def margins_table(text: str, loop: closed_form.SampledLoop | None) -> Table | No
         row[4] = float(np.abs(sampled.poles()).max())
         row[5] = 1e3 * delay if math.isfinite(delay) else None
     head = ["gain margin", "phase margin / °", "crossover / Hz", "distance to −1", "largest pole", "delay margin / ms"]
-    caption = "The law of the controller before the axis of `plant`, exactly sampled; a pole of 1 or more: unstable."
+    caption = "The law of the controller before the axis given, exactly sampled; a pole of 1 or more: unstable."
     return Table("rates.plant", "Sampled loop with the axis as data", caption, head, [row])
