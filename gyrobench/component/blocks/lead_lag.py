@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from gyrobench.component.component import Component
-from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State, sampled
+from gyrobench.component.composition import sampled
+from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State
 from gyrobench.component.math import Number, clip, maximum
 
 
@@ -65,7 +66,7 @@ class LeadLag(Component):
         self.der.lag = (self.error() - self.lag) / self.T1
         self.der.lead = (self.after_lag() - self.lead) / self.T2
         y = self.after_lead()
-        unlimited = self.unlimited()
+        unlimited = -self.K * (y + self.sum)
         self.der.sum = self.integral * y
         if self.waits(unlimited, y) > 0.5:
             self.der.sum = 0.0
