@@ -1,4 +1,4 @@
-"""A sampled controller before any linear plant: exact discretization, margins, poles, responses.  [CTRL-SAMPLED]
+"""A sampled controller before any linear plant: exact discretization, margins, poles, responses.  [SAMPLED-PLANT]
 
     loop = SampledLoop(Plant.of_polynomials([1.0], [2.56, 0.4, 0.0], delay=2e-3), [g, -a], [1.0, -b], T=5e-3)
     loop.poles(), loop.margins()

@@ -1,4 +1,4 @@
-"""Sampled loop with an axis given as data: a transfer function with delay, or a measured response.  [CTRL-SAMPLED]"""
+"""Sampled loop with an axis given as data: a transfer function with delay, or a measured response.  [SAMPLED-PLANT]"""
 
 from __future__ import annotations
 
