@@ -14,8 +14,7 @@ class StabilizerLeadLag(LeadLag):
     about the crossover.  The printed order is T1 > tau1 > tau2 > T2; `unordered` is 1 where it does not hold.  With a
     finite T1 the error at rest is not zero (as GSP ch. 5 says) but M / (K_m K_x K): that takes integral > 0.  With
     tau1 = T1 and tau2 = T2 what is left is K (1 + integral / s).  While v is limited and e pushes further, the integral
-    waits (no wind-up).  With T2 below the step a change of e comes tau2/T2 times as large at the beginning of a step
-    and has decayed at its end: where the integral waits for that, `saturated` is 1 although no v at an end is limited.
+    waits (no wind-up).
 
     K_u is for a rate signal (rate gyro, or gyro in rebalance); one whose signal is an angle is turned by its torquer.
 

@@ -12,6 +12,9 @@ class LeadLag(Component):
     """Common part: v = -G(s) (u + test - K_u command) with its limit and an integral that waits at it.
 
     G = K (1 + tau1 s)(1 + tau2 s) / ((1 + T1 s)(1 + T2 s)) (1 + integral / s)
+
+    With T2 below the step a change of e comes tau2/T2 times as large at the beginning of a step and has decayed at its
+    end: where the integral waits for that, `saturated` is 1 although no v at an end is limited.
     """
 
     K = Parameter(2.0, "1", "gain at rest, voltage per voltage; 0: the loop is open", min=0.0)

@@ -67,6 +67,7 @@ class SightTest(LoopTest):
         decoupler.u_axes[{two}] -> {axis}.u
         exciter.test[{three}] -> {axis}.test
         {axis}.v -> platform.v[{two}]
+        platform.theta[{3 - two}] -> {axis}.schedule
         """
         for axis, (two, three) in AXES.items()
     )  # fmt: skip
