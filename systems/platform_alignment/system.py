@@ -161,7 +161,7 @@ class PlatformAlignment(System):
             "platform.theta_0": [self["pitch"], self["roll"], -self["heading"]],
             **three_gyros(parts, self["crossover"]),
             **{f"{slot}.{n}?": getattr(sensors, field) for slot in MOUNTS for n, field in noise.items()},
-            **{f"accelerometers.white_{a}?": sensors.force for a in "xyz"},
+            **{f"accelerometers.{n}?": sensors.force for n in ("white", "white_x", "white_y", "white_z")},
             **self._controller(parts),
         }
 

@@ -12,6 +12,9 @@ from scipy.signal import lfilter
 from gyrobench.reduction.noise_model.agreement import with_spectrum
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
+from gyrobench.reduction.noise_model.ordinates import Ordinates
+from gyrobench.reduction.noise_model.prior import Prior
+from gyrobench.reduction.noise_model.search import maximize
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import deviations
@@ -101,6 +104,34 @@ def test_wild_samples_of_very_different_sizes() -> None:
         assert found >= set(at.tolist())
         others += len(found) - 8
     assert others <= 2
+
+
+def test_a_wild_sample_at_an_end_of_angle_noise() -> None:
+    """Angle noise Q = 1 beside N = 0.1: what others say of a sample within the record is known to 0.1 or so, of the
+    first and the last one to sqrt(Q2 + 0.01), as its outer angle is in no other: 4 there is wild, 3 Q is none.
+
+    Ten records have 20 ends, of which chance takes none for wild; before, a third of the records had one.
+    """
+    for seed in range(10):
+        rng, n = np.random.default_rng([6, seed]), 1000
+        x = 0.1 * rng.normal(size=n) + np.diff(rng.normal(size=n + 1))
+        assert not {0, n - 1} & set(complete(x).wild.tolist()), seed
+        at = (0, n - 1)[seed % 2]
+        x[at] += 10.0
+        assert at in complete(x).wild, seed
+
+
+def test_a_parameter_that_the_record_does_not_tell() -> None:
+    """The low-pass of white noise far below the angle noise tells nothing: Q is found beside it all the same, from -3.
+
+    Q2 = 1 is known to sqrt(2/8192) = 1.6 %.
+    """
+    rng = np.random.default_rng(1)
+    x = 0.005 * rng.normal(size=8192) + np.diff(rng.normal(size=8193))
+    data = Ordinates([x])
+    model = (NoiseTerm("white", "second"), NoiseTerm("quantization"))
+    start = np.array([2.0 * math.log(0.005), 1.79, -0.16, -3.0])
+    assert maximize(data, Prior(data), model, start).p[3] == pytest.approx(0.0, abs=4.0 * 0.016)
 
 
 @pytest.mark.parametrize(("share", "stated"), [(0.1, False), (1e-3, True)])

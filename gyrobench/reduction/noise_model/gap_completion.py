@@ -29,6 +29,7 @@ CORE = 3.0  # standard deviations of samples that no wild one is among
 LOCAL, PARTS = 512, 64  # samples, at least, and parts of a stretch, at most, of which the scatter is taken
 SWEEPS, LEAKS = 8, 0.1  # of wild samples; what is less than a part of the largest waits for the next
 AGAIN = 3.0  # of the limit of a sample alone: what is less far off is judged once more
+ENDS = 64  # samples from an end, within which the transform takes the noise for another one than it is
 ROUNDS, MOST_ROUNDS, AVERAGED = 4, 24, 8  # of spectrum and completion, at least, at most; the last that are averaged
 RESTS, STAYS = 0.03, 0.1  # change of the logarithm of a spectrum that needs no more rounds, and after the last
 ONWARD = 1.8  # how far the change of a round is carried on
@@ -252,12 +253,16 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
             if k:
                 break
             continue
-        found = np.zeros(x.size)
-        for _ in range(draws):
-            noise = np.zeros(x.size)
-            noise[at] = P.solve(at, fft.idct(rng.standard_normal(x.size) / np.sqrt(P.S), norm="ortho")[at])
-            found += fft.dct(noise, norm="ortho") ** 2 / draws
+        found, noise = _lacking(P, at, at, draws, rng)
         lost = lost + (found - lost) / (last + 1.0) if last > 0 else found
+    ends = _own_ends(x, wild, missing, P)
+    if ends.size:
+        at = np.flatnonzero(missing | wild)
+        wild[ends] = False
+        y[ends] = x[ends]
+        kept = np.flatnonzero(missing | wild)
+        lost, noise = _lacking(P, at, kept, AVERAGED * draws, rng) if kept.size else (np.zeros(x.size), None)
+        stays = stays or not kept.size
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
@@ -267,6 +272,51 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     return Completed(
         y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise, stays
     )
+
+
+def _lacking(
+    P: _Precision, at: NDArray[np.int64], kept: NDArray[np.int64], draws: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return the powers (n,) that the completion of the samples ``at`` lacks at those of them that are ``kept``, as a
+    mean of draws, and the last draw (n,).
+    """
+    lost, noise = np.zeros(P.S.size), np.zeros(P.S.size)
+    for _ in range(draws):
+        full = np.zeros(P.S.size)
+        full[at] = P.solve(at, fft.idct(rng.standard_normal(P.S.size) / np.sqrt(P.S), norm="ortho")[at])
+        noise = np.zeros(P.S.size)
+        noise[kept] = full[kept]
+        lost += fft.dct(noise, norm="ortho") ** 2 / draws
+    return lost, noise
+
+
+def _own_ends(x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: _Precision) -> NDArray[np.int64]:
+    """Return the wild samples near an end of x (n,) that differ from what the others say of them by no more than the
+    noise does there.
+
+    The transform takes a stretch for one that is reflected at its ends.  A sample differs from its conditional mean by
+    w'x, of variance w'Gw under the covariance G of the noise that goes on: the mean of S |W|^2.  Of an angle noise of
+    rms Q it is more by Q^2 for the first and the last sample, whose outer angles are in no other one.
+    """
+    n = x.size
+    near = np.flatnonzero(wild & (np.minimum(np.arange(n), np.arange(n)[::-1]) < ENDS))
+    if not near.size:
+        return near
+    at = np.flatnonzero(missing | wild)
+    S = np.append(P.S, P.S[-1])
+    S[0] = S[1]
+    highest = float(-special.ndtri(0.5 * FALSE / n))
+    off, size = np.empty(near.size), np.empty(near.size)
+    for i, t in enumerate(near.tolist()):
+        full = np.zeros(n)
+        full[at] = P.solve(at, (at == t).astype(float))
+        w = P(full)
+        W = np.abs(np.fft.rfft(w, 2 * n)) ** 2
+        W[1:-1] *= 2.0
+        size[i] = math.sqrt(float(W @ S) / (2.0 * n))
+        known = ~missing
+        off[i] = abs(float(w[known] @ x[known]))
+    return near[off < highest * size]
 
 
 def mostly_known(x: Array, extra: Array | None) -> bool:

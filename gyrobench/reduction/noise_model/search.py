@@ -16,6 +16,7 @@ from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
+FLAT = 1e-2  # information of a parameter below which the search leaves it where it is
 WIDEST = 0.25  # information of a parameter that the record does not tell: its volume is the prior's, some 5
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
@@ -61,8 +62,9 @@ def maximize(data: Ordinates, prior: Prior, model: Model, start: Array) -> Fitte
     f, g, H = at(p)
     damp = 1e-4
     for _ in range(STEPS):
-        size = np.sqrt(np.diag(H) + 1e-6)
-        step = -np.linalg.solve(H / np.outer(size, size) + damp * np.eye(q), g / size) / size
+        # what the record does not tell of a parameter is rounding: it must not make the steps of the others small
+        size = np.sqrt(np.diag(H) + FLAT)
+        step = -np.linalg.solve((H + FLAT * np.eye(q)) / np.outer(size, size) + damp * np.eye(q), g / size) / size
         step *= min(1.0, 2.0 / max(float(np.max(np.abs(step))), 1e-12))
         trial = np.clip(p + step, low, high)
         gain = -float(g @ (trial - p))
@@ -275,7 +277,12 @@ class ModelSearch:
             self.data.hold(self.resonances)
             at = self.best
             without = maximize(self.data, self.prior, at.model, at.p)
-            found = self._with(at, term, p)
+            # from where it was, and from what stands out without it: it may have stood for two that are narrower
+            again = self.peak(without)
+            tried = [self._with(at, term, p)]
+            if again is not None:
+                tried += [self._with(at, NoiseTerm(name), again) for name in PEAKS]
+            found = max(tried, key=lambda f: f.evidence)
             if found.evidence > without.evidence:
                 self._freeze(found)
             else:
