@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import importlib.util
 import sys
 import threading
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any
 
 from gyrobench.bench import standard_folder
@@ -48,6 +49,21 @@ def blamed(file: Path) -> Iterator[None]:
             "; a sum of thousands of terms, or as many brackets? part it" if isinstance(error, RecursionError) else ""
         )
         raise UserCodeError(f"{file}: cannot be used: {type(error).__name__}: {error}{many}") from error
+
+
+def import_file(path: Path, name: str) -> ModuleType:
+    """Import one file under a module name of its own, so that parts of two benches do not mix."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        with blamed(path):
+            spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
 
 
 class _DeadlineError(GyrobenchError):

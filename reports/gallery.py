@@ -21,6 +21,7 @@ SHOWN = {
     "angle_system_test": "first minus second reading",
     "drift_record": "Allan deviation",
     "gimbal_stabilization": "density of the line of sight",
+    "gimbal_tracking": "density of the tracking error",
     "gyro_magnetic_compass": "low-pass",
     "platform_four_gimbal": "Angles",
     "platform_single_axis": "Isolation",

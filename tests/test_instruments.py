@@ -15,6 +15,7 @@ from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
 from gyrobench.units import EARTH_RATE
 from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instruments
+from systems.north_finder.after import RandomErrors
 
 ALL = sorted(Bench(standard_folder()).instruments())
 TABLES = [n for n in ALL if find_instrument(n).kind == "turntable"]
@@ -173,6 +174,43 @@ def test_refused_parts(tmp_path: Path) -> None:
     file.write_text(MINE.replace("gyro_mems", "floated_gyro"), encoding="utf-8")
     with pytest.raises(UsageError, match="takes no data sheets"):
         parameters(read_instrument(file))
+
+
+def test_a_unit_of_three_gyros_by_hand() -> None:
+    """BMI088: 0.014 deg/s/sqrt(Hz) one-sided, 1 deg/s, 0.015 deg/s/K, 1 %, 0.1 deg/s/g; STIM300: 1 mrad, 0.5 deg/h."""
+    _, found = with_instruments("bmi088", {}, load_system("imu_positions"))
+    assert found["imu.y_gyro"] == pytest.approx(0.014 * DEG / math.sqrt(2.0))
+    assert found["imu.gyro_bias"] == pytest.approx([DEG] * 3)
+    assert found["imu.gyro_bias_T"] == pytest.approx([0.015 * DEG] * 3)
+    assert np.array(found["imu.gyro_scale"]) == pytest.approx(0.01 * np.eye(3))
+    assert np.array(found["imu.g_sensitivity"]) == pytest.approx(0.1 * DEG * np.eye(3))  # rad/s of each g
+    _, found = with_instruments("stim300", {}, load_system("sculling_test"))
+    assert found["imu.gyro_scale"][0] == pytest.approx([0.0, 1e-3, 1e-3]) and found["bandwidth"] == 262.0
+    # the largest Allan deviation of a Gauss-Markov process of this rms is the instability
+    times = np.geomspace(10.0, 3000.0, 400)
+    rms = RandomErrors(0.0, markov=found["imu.x_gyro_bias"], markov_tau=300.0)
+    largest = max(math.sqrt(0.5 * rms.change(t, t)) for t in times)
+    assert largest == pytest.approx(0.5 * DEG / 3600.0, rel=1e-3)
+    _, found = with_instruments("adis16488", {}, load_system("attitude_estimator"))
+    assert found["imu.noise_z_gyro"] == pytest.approx(0.3 * DEG / 60.0) and found["imu.noise_z_bias"] > 0.0
+
+
+def test_the_drift_of_a_platform() -> None:
+    """ln200: 1 deg/h; STIM300: a limit of 250 deg/h; KVH 1750: no bias, but 0.05 deg/h, 0.012 deg/sqrt(h)."""
+    dph = DEG / 3600.0
+    for sheet, bias in (("ln200", 1.0), ("stim300", 250.0 / math.sqrt(3.0)), ("kvh1750", 0.05)):
+        _, found = with_instruments(sheet, {}, load_system("platform_alignment"))
+        assert found["gyro_drift"] == pytest.approx(bias * dph)
+    test = load_system("platform_alignment").with_values(found)
+    assert vars(test.sensors) | {"white": 0.0} == vars(test.sensors) | {"white": 0.0, "bias": 0.05 * dph}
+    assert test.sensors.white == pytest.approx(0.012 * DEG / 60.0)
+
+
+def test_a_system_without_gyros_names_the_tests_of_a_sheet() -> None:
+    with pytest.raises(UsageError, match=r"gyro_bandwidth.*three gyros of a unit it goes into imu_positions"):
+        with_instruments("crg20", {}, load_system("table_rate_test"))
+    with pytest.raises(UsageError, match="floated gyro: imu_positions has no slot"):
+        with_instruments("draper", {}, load_system("imu_positions"))
 
 
 TABLE = """\

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 from gyrobench.component import Discrete, Input, Output, Parameter, sampled
-from gyrobench.component.blocks.gyro import SdfGyro
+from gyrobench.component.blocks.supply import SuppliedGyro
 from gyrobench.component.math import Number, Vector, cos, fabs, pi, sin, vector
 
 
-class FloatedGyro(SdfGyro):
+class FloatedGyro(SuppliedGyro):
     """Single-degree-of-freedom floated gyro.  [GYRO-DYN-1, GYRO-SDF-EOM, GYRO-STATIC-10, GYRO-COEFF-TIME-TEMP]
 
     Rate-integrating with K = 0; integrating with C = 0 as well; with a spring K > 0 a rate gyro.
@@ -44,6 +44,9 @@ class FloatedGyro(SdfGyro):
 
         M_dyn = dJ w_I' w_S' + J_IO (alpha_I' + w_O w_S') + J_OS (alpha_S' - w_O w_I') + J_SI (w_S'2 - w_I'2)
 
+    Supplies off their nominal values turn H into H (1 + f), which leaves the torques, and add to drift, torquer and
+    pickoff; see :class:`gyrobench.component.blocks.supply.SuppliedGyro`                               [GYRO-SUPPLY]
+
     Torque on the mount, given in case axes: -H (w_O + r) cos b along I, C r + K b + H (omega_d + k i (1 + ...))
     along O, +H (w_O + r) sin b along S.  With h_I = H sin b and M_I = -H w_O cos b it is M_I - h_I' along I: a mount
     that keeps its momentum with h_I in it needs no acceleration of the float.  h_I is given for the middle of the
@@ -51,13 +54,13 @@ class FloatedGyro(SdfGyro):
     step has determinant 1).  Computed with reaction = 1 only.
     The run ends where |b| reaches `stop`.
 
-    Not modelled: bearing and rotor compliance (third-order dynamics), nutation, how the float comes to move (v_float),
-    vibration, hysteresis and warm-up, contact of the float with its stop, torquer axis error; in M_react the float's
-    own inertia about I and S (count it with the mount).
+    Not modelled: bearing and rotor compliance (third-order dynamics), nutation, hunting of the wheel, how the float
+    comes to move (v_float), vibration, hysteresis and warm-up, contact of the float with its stop, torquer axis error;
+    in M_react the float's own inertia about I and S (count it with the mount).
     Source: Hu 1981, ch. 2; Xia 2008, sections 2.1, 2.2.2.2 (corrected).
     """
 
-    version = "1.4.0"
+    version = "1.5.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping; 0: integrating gyro", min=0.0)
     K = Parameter(0.0, "N.m/rad", "spring of the float; above 0: rate gyro", min=0.0)
@@ -116,13 +119,16 @@ class FloatedGyro(SdfGyro):
         along_i = self.D_I * (1.0 + self.p_I * age) + self.D_TI * self.dT[2]
         along_o = self.D_O * (1.0 + self.p_O * age) - self.D_TO * self.dT[1]
         along_s = self.D_S * (1.0 + self.p_S * age) - self.D_TS * self.dT[0]
-        return self.polynomial(fixed, vector([along_i, along_o, along_s]), x)
+        drift = self.polynomial(fixed, vector([along_i, along_o, along_s]), x)
+        if self.sensitive > 0.0:
+            drift = drift + self.by_supplies(x)
+        return drift
 
     def flow(self) -> None:
         w = self.mount @ self.omega
         sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
         rate = self.drift_rate()
-        torque = self.H * (sensed - rate - self.precession()) - self.C * self.float_rate
+        torque = self.H * self.speed() * (sensed - rate - self.precession()) - self.C * self.float_rate
         if self.K > 0.0:
             torque = torque - self.K * self.float_angle
         if self.dynamic > 0.0:
@@ -144,10 +150,12 @@ class FloatedGyro(SdfGyro):
     def outputs(self) -> None:
         if self.reaction:
             w_o = self.mount[1] @ self.omega
-            s = self.H * sin(self.float_angle)
-            c = self.H * cos(self.float_angle)
+            momentum = self.H * self.speed()
+            s = momentum * sin(self.float_angle)
+            c = momentum * cos(self.float_angle)
             turn = w_o + self.float_rate
-            along_o = self.C * self.float_rate + self.K * self.float_angle + self.H * (self.drift + self.precession())
+            held = momentum * (self.drift + self.precession())
+            along_o = self.C * self.float_rate + self.K * self.float_angle + held
             self.M_react = self.mount[2] * s * turn - self.mount[0] * c * turn + self.mount[1] * along_o
-            self.h_I = self.H * sin(self.float_angle + 0.5 * self.h * self.float_rate)
+            self.h_I = momentum * sin(self.float_angle + 0.5 * self.h * self.float_rate)
             self.M_I = -c * w_o

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from gyrobench.component import Component, Input, Output, Parameter, State
-from gyrobench.component.math import Number, clip
+from gyrobench.component import Output
+from gyrobench.component.blocks.lead_lag import LeadLag
 
 
-class StabilizerLeadLag(Component):
+class StabilizerLeadLag(LeadLag):
     """Stabilizer loop: lag and lead network with amplifier, gyro signal in, motor voltage out.  [STAB-FLOATED-2DOF]
 
         e = u + test                    v = -G(s) (e - K_u command), limited to +-v_max
@@ -22,53 +22,9 @@ class StabilizerLeadLag(Component):
     Source: GSP ch. 5, eq. 5-25, 5-26; STAB-FLOATED-2DOF; integral: F of PLATFORM-1AXIS.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
-    K = Parameter(2.0, "1", "gain at rest, voltage per voltage; 0: the loop is open", min=0.0)
-    tau1 = Parameter(0.2, "s", "lag: time constant of the numerator", min=0.0)
-    T1 = Parameter(2.0, "s", "lag: time constant of the denominator", above=0.0)
-    tau2 = Parameter(0.03, "s", "lead: time constant of the numerator", min=0.0)
-    T2 = Parameter(0.003, "s", "lead: time constant of the denominator", above=0.0)
-    integral = Parameter(0.0, "1/s", "corner of the integral part; 0: none", min=0.0)
-    K_u = Parameter(0.0, "V.s/rad", "gyro signal per rate, for the rate command; 0: no command", min=0.0)
-    v_max = Parameter(27.0, "V", "largest voltage", above=0.0)
-
-    u = Input(0.0, "V", "gyro signal")
-    test = Input(0.0, "V", "test signal added to it")
-    command = Input(0.0, "rad/s", "rate commanded to the platform")
-
-    v = Output("V", "voltage of the torque motor")
-    e = Output("V", "the signal inside the loop, u + test")
-    saturated = Output("1", "1 while the voltage is limited")
     unordered = Output("1", "1 where T1 > tau1 > tau2 > T2 does not hold")
 
-    lag = State(0.0, "V", "state of the lag network")
-    lead = State(0.0, "V", "state of the lead network")
-    sum = State(0.0, "V", "integral part")
-
-    def error(self) -> Number:
-        return self.u + self.test - self.K_u * self.command
-
-    def after_lag(self) -> Number:
-        return self.lag + self.tau1 / self.T1 * (self.error() - self.lag)
-
-    def after_lead(self) -> Number:
-        return self.lead + self.tau2 / self.T2 * (self.after_lag() - self.lead)
-
-    def flow(self) -> None:
-        self.der.lag = (self.error() - self.lag) / self.T1
-        self.der.lead = (self.after_lag() - self.lead) / self.T2
-        y = self.after_lead()
-        unlimited = -self.K * (y + self.sum)
-        self.der.sum = self.integral * y
-        if (unlimited > self.v_max and y < 0.0) or (unlimited < -self.v_max and y > 0.0):
-            self.der.sum = 0.0
-        if self.integral == 0.0:
-            self.der.sum = -self.sum  # stays 0, and leaves no pole at 0 in the linearization
-
     def outputs(self) -> None:
-        self.e = self.u + self.test
-        unlimited = -self.K * (self.after_lead() + self.sum)
-        self.v = clip(unlimited, -self.v_max, self.v_max)
-        self.saturated = 1.0 if self.v != unlimited else 0.0
         self.unordered = 0.0 if self.tau1 < self.T1 and self.tau2 < self.tau1 and self.tau2 > self.T2 else 1.0

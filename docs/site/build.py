@@ -36,6 +36,7 @@ CONTENTS = {
         "docs/worked_examples",
         "docs/real_records",
         "docs/data_sheets",
+        "docs/heading_after_minutes",
         "tests/benchmarks/README",
         "tests/spec/README",
     ],

@@ -65,8 +65,15 @@ def read_settings(file: Path) -> dict[str, str]:
 
 
 def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict[str, str], dict[str, Path]]:
-    """Return parts and mapping files by slot.  Raises UsageError for a mapping file that does not exist."""
+    """Return parts and mapping files by slot.  Raises UsageError for a file that does not exist.
+
+    A controller's file that stands here was named by the user, and so may be compiled.
+    """
+    from gyrobench.packaging.own_controller import allow
+
     parts = parse_assignments(part, "--part", "gyro=vendor.fmu")
+    for named in parts.values():
+        allow(named)
     maps = {k: Path(v) for k, v in parse_assignments(mapping, "--map", "gyro=vendor.toml").items()}
     for slot, file in maps.items():
         if not file.is_file():

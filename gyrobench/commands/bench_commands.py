@@ -94,7 +94,7 @@ def build(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Build parts into FMUs.
+    """Build parts, or controllers of your own (FILE.c, FILE.py), into FMUs.
 
     \b
     Example: gyrobench build floated_gyro --target python
@@ -102,13 +102,17 @@ def build(
     from gyrobench import packaging
     from gyrobench.files import cores
     from gyrobench.packaging.compiler import PLATFORMS
+    from gyrobench.packaging.own_controller import allow, is_controller
 
     bench = Bench.find()
     names = list(dict.fromkeys([*(parts or []), *(bench.parts() if every else ())]))
     if not names:
         raise UsageError(f"no part named; name one or more, or set --all; parts: {', '.join(bench.parts())}")
     for name in names:
-        bench.part_folder(name)
+        if is_controller(name):
+            allow(name)
+        else:
+            bench.part_folder(name)
     unknown = [p for p in platform or [] if p not in PLATFORMS]
     if unknown:
         raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")

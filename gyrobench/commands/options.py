@@ -38,8 +38,8 @@ Part = Annotated[
     list[str] | None,
     typer.Option(
         "--part",
-        metavar="SLOT=FMU|PART",
-        help="Put another part, or an FMU file, into a slot.  Repeatable.",
+        metavar="SLOT=FMU|PART|FILE",
+        help="Put another part, an FMU, or a controller of your own (.c, .py) into a slot.  Repeatable.",
         autocompletion=complete_slot,
     ),
 ]

@@ -20,13 +20,15 @@ def tune(
             "--want",
             metavar="'MEASURE=VALUE'",
             help="phase margin=40deg, gain margin=6dB, disk margin=0.5, delay margin=2ms, bandwidth>20Hz, peak S<6dB, "
-            "peak T<3dB, S at 1Hz<-40dB.  Repeatable.",
+            "peak T<3dB, S at 1Hz<-40dB, jitter=25urad (of a system with a line of sight).  Repeatable.",
         ),
     ] = None,
     over: Annotated[
         list[str] | None,
         typer.Option(
-            "--over", metavar="SLOT.PARAM=±30%|LOW..HIGH", help="Spread over which all of it must hold.  Repeatable."
+            "--over",
+            metavar="SLOT.PARAM=±30%|LOW..HIGH",
+            help="Spread over which all of it must hold: ±30%, ±0.1kg.m2, 1.5..2.5kg.m2.  Repeatable, up to six.",
         ),
     ] = None,
     structure: Annotated[

@@ -80,6 +80,7 @@ class Component:
     """Base of every part: collects the declarations and steps the equations (see the module's text)."""
 
     version: ClassVar[str] = "1.0.0"
+    _outside: ClassVar[Any] = None  # of a controller in C: what is compiled with it (packaging/own_controller)
     sources: ClassVar[dict[str, str]] = {}  # files of the part by module name, where it was loaded from a bench
     integrator: ClassVar[str] = "exponential"  # or "midpoint", "rk4"
     rk4_substeps: ClassVar[int] = 20  # of one internal step

@@ -29,6 +29,9 @@ class Dual:
         self.v = v
         self.d = d
 
+    def __repr__(self) -> str:
+        return f"Dual({self.v!r}, {self.d!r})"
+
     def __add__(self, o: Any) -> Dual:
         b = lift(o)
         return Dual(self.v + b.v, self.d + b.d)

@@ -114,6 +114,8 @@ def obstacle(program: Program, parts: Mapping[str, str], guids: Mapping[str, str
     others = [p.slot for p in program.parts if p.slot not in parts]
     if others:
         return f"{', '.join(others)}: not a native part of this bench"
+    if apart := [slot for slot, name in parts.items() if load_part(name, bench)._outside is not None]:
+        return f"{', '.join(apart)}: a controller in C of your own, which is compiled apart"
     whole = {g.at + j for p in program.parts for g in p.gets if not g.doubles for j in range(g.n)}
     if rounded := [p.slot for p in program.parts for g in p.sets if not (g.doubles or whole.issuperset(g.source))]:
         return f"{', '.join(rounded)}: a wire from a real to a whole number, whose range is checked in calls only"

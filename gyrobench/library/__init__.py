@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 from gyrobench.bench import UsageError
 from gyrobench.boundary import checked
 from gyrobench.errors import GyrobenchError
-from gyrobench.library.experiment import Experiment, File, Run, open_run
+from gyrobench.library.experiment import Experiment, File, Run, name_parts, open_run
 from gyrobench.library.many_runs import campaign, site, sweep
 from gyrobench.library.suite_experiment import SuiteExperiment, SuiteRun
 from gyrobench.record.record import Record
@@ -85,9 +85,10 @@ def load(
 ) -> Experiment:
     """Return a system of the bench, or of an SSP archive, ready to run.
 
-    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part or path of an FMU.  maps: slot ->
-    mapping file of a third-party FMU.  coupling: "sequential", or "parallel": each wire carries the value of the step
-    before.  instrument: data sheet (``instruments/NAME.toml``, or a file) of a gyro, of a turntable, or both.
+    values, options: as of :meth:`Experiment.set`.  parts: slot -> name of a part, path of an FMU, or file of a
+    controller of your own (.c, .py).  maps: slot -> mapping file of a third-party FMU.
+    coupling: "sequential", or "parallel": each wire carries the value of the step before.  instrument: data sheet
+    (``instruments/NAME.toml``, or a file) of a gyro, of a turntable, or both.
     from_run: folders of runs of other tests whose results give values of this one; values and options go before them.
     Raises errors of type GyrobenchError; UsageError for a suite.
     """
@@ -97,6 +98,7 @@ def load(
     if coupling not in ("sequential", "parallel"):
         raise UsageError(f"coupling = '{coupling}': one of sequential, parallel")
     test.coupling = "parallel" if coupling == "parallel" else ""
+    name_parts(parts)
     swaps: dict[str, Any] = dict(parts or {})
     title, sheet = with_instruments(instrument, swaps, test) if instrument else ("", {})
     test.instrument = title
@@ -120,6 +122,7 @@ def load_suite(
     test = load_test(name)
     if not isinstance(test, Suite):
         raise UsageError(f"{name} is one test, not a suite: gyrobench.load('{name}')")
+    name_parts(parts)
     suite = SuiteExperiment(test, parts or {}, maps or {})
     for key, value in {**(values or {}), **options}.items():
         suite.set(key, value)

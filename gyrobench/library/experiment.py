@@ -103,6 +103,14 @@ class _Prepared:
     close: Callable[[], object]
 
 
+def name_parts(parts: Mapping[str, File] | None) -> None:
+    """Note that the caller has named these parts: a controller's file may be compiled.  Raises UsageError."""
+    from gyrobench.packaging.own_controller import allow
+
+    for part in (parts or {}).values():
+        allow(part)
+
+
 class Experiment:
     """A system with its values and parts, ready to run.
 

@@ -10,6 +10,7 @@ from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies, initial_dependencies
 from gyrobench.packaging.documentation import LICENCE, is_standard
 from gyrobench.packaging.loading import sources
+from gyrobench.packaging.own_controller.c_law import UNIT
 from gyrobench.packaging.source import PartCode
 from gyrobench.packaging.tuning import tuning
 from gyrobench.units import OFFERED, base_unit, shown_in, unit
@@ -139,6 +140,11 @@ def licence(cls: type[Component]) -> dict[str, str]:
     return {"license": LICENCE} if is_standard(sources(cls).values()) else {}
 
 
+def c_units(cls: type[Component]) -> tuple[str, ...]:
+    """Return the files of C that are compiled beside that of the FMI version."""
+    return () if cls._outside is None else (UNIT,)
+
+
 def model_description(
     cls: type[Component], guid: str, identifier: str, target: str, sizes: Mapping[str, float] = EMPTY
 ) -> str:
@@ -177,7 +183,8 @@ def model_description(
     )
     if native:
         files = ET.SubElement(co, "SourceFiles")
-        ET.SubElement(files, "File", {"name": "fmi2.c"})
+        for name in ("fmi2.c", *c_units(cls)):
+            ET.SubElement(files, "File", {"name": name})
     root.append(units(cls.layout))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})

@@ -8,7 +8,7 @@ description; an array has that of its first element.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from gyrobench.component import Component, Scalar
 from gyrobench.packaging.dependencies import dependencies
@@ -43,12 +43,13 @@ def time_name(cls: type[Component]) -> str:
     return next(n for n in ("time", "simulation_time", "independent_time") if n not in taken)
 
 
-def build_description(identifier: str) -> str:
-    """Return sources/buildDescription.xml: how to compile the sources."""
+def build_description(identifier: str, beside: Iterable[str] = ()) -> str:
+    """Return sources/buildDescription.xml: how to compile the sources.  beside: C files beside fmi3.c."""
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     one = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     files = ET.SubElement(one, "SourceFileSet", {"language": "C11"})
-    ET.SubElement(files, "SourceFile", {"name": "fmi3.c"})
+    for name in ("fmi3.c", *beside):
+        ET.SubElement(files, "SourceFile", {"name": name})
     return xml_text(root)
 
 

@@ -14,12 +14,13 @@ from gyrobench.bench import Bench
 from gyrobench.component import Component
 from gyrobench.files import make_once, sha256, write_whole
 from gyrobench.packaging import compiler, native_target, python_target
-from gyrobench.packaging.description import model_description, summary
+from gyrobench.packaging.description import c_units, model_description, summary
 from gyrobench.packaging.description3 import build_description, model_description3
 from gyrobench.packaging.documentation import index_page, licence_text, licences, terminals
 from gyrobench.packaging.icon import icon, kind_of
 from gyrobench.packaging.loading import BuildError, load_part, sources
 from gyrobench.packaging.native_library import make_library
+from gyrobench.packaging.own_controller import is_controller
 from gyrobench.user_code import blamed
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # every zip entry: the same content gives the same file
@@ -51,7 +52,8 @@ def _tool_hash() -> str:
 def _content(cls: type[Component], name: str, target: str, fmi: int) -> str:
     """Return the hash of all that determines what an FMU computes."""
     texts = [f"{n}\n{f.read_text(encoding='utf-8')}" for n, f in sources(cls).items()]
-    return content_hash(*texts, _tool_hash(), target, str(fmi), name)
+    beside = (cls._outside.unit, cls._outside.glue) if cls._outside is not None else ()
+    return content_hash(*texts, _tool_hash(), target, str(fmi), name, *beside)
 
 
 def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
@@ -132,12 +134,17 @@ def build(
     """
     if target not in ("native", "python"):
         raise BuildError(f"target {target!r}: one of native, python")
+    file = isinstance(part, str) and is_controller(part)
     if fmi not in (2, 3) or (fmi == 3 and target == "python"):
         raise BuildError(f"FMI {fmi} {target}: there are FMI 2 native, FMI 2 python, FMI 3 native")
     platforms = platforms or (compiler.this_platform(),)
     cls = load_part(part, bench) if isinstance(part, str) else part
-    name = part if isinstance(part, str) else sources(cls)["model"].parent.name
+    name = part if isinstance(part, str) and not file else sources(cls)["model"].parent.name
     identifier = name
+    if file and str(part).endswith(".py"):
+        target, fmi = "python", 2
+    if cls._outside is not None and target == "python":
+        raise BuildError(f"{part}: a controller in C is built as a native FMU")
     with blamed(sources(cls)["model"]):
         what = _content(cls, name, target, fmi)
     readme = sources(cls)["model"].parent / "README.md"
@@ -161,7 +168,7 @@ def build(
         else:
             entries = _python_entries(cls, guid, identifier)
         if fmi == 3:
-            entries["sources/buildDescription.xml"] = build_description(identifier).encode()
+            entries["sources/buildDescription.xml"] = build_description(identifier, c_units(cls)).encode()
             entries["modelDescription.xml"] = model_description3(cls, guid, identifier, sizes).encode()
             entries |= terminals(cls)
         else:
@@ -174,6 +181,8 @@ def build(
 
     with blamed(sources(cls)["model"]):
         make_once(cached, write)
+    if file and out is None:
+        return cached  # two files of one name may stand in one system
     path = (out or home.fmus) / f"{name}{suffix}.fmu"
     if not path.exists() or sha256(path) != sha256(cached):
         path.parent.mkdir(parents=True, exist_ok=True)

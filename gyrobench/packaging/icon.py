@@ -47,9 +47,9 @@ WORDS = (
     ("controller", "controller|stabilizer|rebalance|servo|decoupler|cage|slaving|current|coupling"),
     ("plan", "sequencer|program|command|supervisor|sampler|monitor|earth_follower"),
     ("motor", "motor|slipring|bearing|tachometer"),
-    ("reader", "meter|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
+    ("reader", "meter|tracker|increments|inductosyn|gate|inverse|averager|reference|reading|sensor|card|theodolite"),
     ("place", "site|ground|surroundings|foundation|thermostat|chamber"),
-    ("source", "source|offset|turn_on|exciter|motion|manoeuvre|torque|vibration"),
+    ("source", "source|supply|target|offset|turn_on|exciter|motion|manoeuvre|torque|vibration"),
     ("gyro", "gyro"),
 )  # fmt: skip
 

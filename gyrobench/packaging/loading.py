@@ -7,7 +7,6 @@ bench, whether gyrobench is a checkout or an installed wheel.  A part may be mad
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import inspect
 import sys
 import threading
@@ -19,7 +18,8 @@ from types import ModuleType
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.user_code import blamed, check_attributes
+from gyrobench.packaging.own_controller import is_controller, load_controller
+from gyrobench.user_code import check_attributes, import_file
 
 ROOM = "components"
 _loaded: dict[str, tuple[type[Component], dict[Path, str]]] = {}  # by file: the class, and the hashes of its sources
@@ -29,21 +29,6 @@ _loading = threading.RLock()  # the modules of one part stand for ``components``
 
 class BuildError(GyrobenchError):
     """A part that cannot be built; the text says which and why."""
-
-
-def import_file(path: Path, name: str) -> ModuleType:
-    """Import one file under a module name of its own, so that parts of two benches do not mix."""
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        with blamed(path):
-            spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
 
 
 @contextmanager
@@ -76,8 +61,13 @@ def content_imports(folder: Path, part: Path | None = None) -> Iterator[dict[str
 
 
 def load_part(name: str, bench: Path | None = None) -> type[Component]:
-    """Return the Component class of components/<name>/model.py.  Raises BuildError if there is none, or two."""
+    """Return the Component class of components/<name>/model.py, or of a controller in a file of its own.
+
+    Raises BuildError if there is none, or two.
+    """
     with _loading:
+        if is_controller(name):
+            return load_controller(name)
         return _load(name, bench)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from gyrobench.bench import Bench
 from gyrobench.files import make_once
 from gyrobench.packaging import compiler
+from gyrobench.packaging.own_controller.c_law import UNIT
 
 GUID = re.compile(r"^#define MODEL_GUID (.*)\n", re.MULTILINE)
 
@@ -23,12 +24,14 @@ def make_library(files: Mapping[str, str], name: str, fmi: int, platform: str, l
     guid = GUID.search(files["model.c"])
     assert guid is not None
     face = {n: text for n, text in files.items() if n.startswith("fmi") or n == "instance.h"}
-    model = {n: text for n, text in files.items() if not n.startswith("fmi")}
+    model = {n: text for n, text in files.items() if not n.startswith("fmi") and n != UNIT}
     model["model.c"] = GUID.sub("", files["model.c"])
-    objects = _object(name, "instance.c", model, platform), _object(f"fmi{fmi}", f"fmi{fmi}.c", face, platform)
+    objects = [_object(name, "instance.c", model, platform), _object(f"fmi{fmi}", f"fmi{fmi}.c", face, platform)]
+    if UNIT in files:
+        objects.append(_object(f"{name}-{Path(UNIT).stem}", UNIT, {UNIT: files[UNIT]}, platform))
     own = library.with_suffix(".c")
     own.write_text(f"const char guid[40] = {guid[1]};\n", encoding="utf-8")
-    compiler.compile_library(own, library, (), platform, objects)
+    compiler.compile_library(own, library, (), platform, tuple(objects))
 
 
 def _object(name: str, unit: str, files: Mapping[str, str], platform: str) -> Path:

@@ -12,6 +12,7 @@ from gyrobench.component import Component, Scalar
 from gyrobench.packaging import elementary_tables
 from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
+from gyrobench.packaging.own_controller.c_law import UNIT
 from gyrobench.packaging.source import PartCode, member
 from gyrobench.packaging.translate import Translation
 from gyrobench.packaging.tuning import tuning
@@ -180,9 +181,13 @@ def face_files(extents: Iterable[int], fmi: int) -> dict[str, str]:
 
 
 def source_files(cls: type[Component], guid: str, fmi: int) -> dict[str, str]:
-    """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile."""
+    """Return all files that a C compiler needs, by name; ``fmi2.c`` (or ``fmi3.c``) is the one to compile.
+
+    A controller in C of the user's own has one more.
+    """
     return {
         "model.c": c_source(cls, guid),
         **runtime_files(),
         **face_files((n for v in variables(cls) for n in (len(v), *[0] * (len(v) - 1))), fmi),
+        **({} if cls._outside is None else {UNIT: cls._outside.unit}),
     }

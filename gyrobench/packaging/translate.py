@@ -399,6 +399,10 @@ class Translation:
         key = (code.function, code.placed.name if code.placed else "", shapes, dual)
         if key in self.procedures:
             return self.procedures[key]
+        if (outside := getattr(code.function, "outside", None)) is not None:  # the law of a controller in C
+            self.functions.append(outside.glue)
+            self.procedures[key] = Procedure("law_", (outside.size,))
+            return self.procedures[key]
         if key in self.under_way:
             raise caller.refuse(node, f"{code.node.name} calls itself: equations have no recursion")
         self.under_way.append(key)

@@ -29,6 +29,8 @@ CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M")
 FORMATS = (*(f"{d}{joint}{c}" for d in DAYS for joint in (" ", "T") for c in CLOCKS), *DAYS, *CLOCKS)
 NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))\s*")
+#: how a row of units writes the form of a date or clock time: TT.MM.JJJJ hh:mm:ss
+FORM_OF_TIME = re.compile(r"(?i)([dtmjyhs]{1,4})([.:/, -]+[dtmjyhsf]{1,4})+")
 SPELLED = {"grad": "deg", "sek": "s", "std": "h", "c": "degC", "°c": "degC", "volt": "V", "ampere": "A", "kelvin": "K"}
 #: name of the bench, or its beginning -> what laboratories call it
 CALLED = {
@@ -154,8 +156,8 @@ def _read_unit(text: str) -> str | None:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    found = [_read_unit(c) for c in cells]
-    return any(found) and all(f is not None or not c for f, c in zip(found, cells, strict=True))
+    found = [_read_unit("" if FORM_OF_TIME.fullmatch(c) else c) for c in cells]
+    return any(found) and all(f is not None for f in found)
 
 
 def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[FileColumn, ...]:

@@ -201,7 +201,7 @@ def _decimal_comma(cells: Iterable[str]) -> bool:
 
 
 def not_utf8(row: int) -> str:
-    return f"row {row}: not UTF-8 text; save the table as CSV (UTF-8)"
+    return f"row {row}: not UTF-8 text; save the table as CSV (UTF-8), or gyrobench fit writes a column map for it"
 
 
 def read_measured(

@@ -96,9 +96,12 @@ def _sentences(
     for name, fault in cells.items():
         if fault.rows:
             n = len(fault.rows)
-            why = "a date: write seconds from the first sample on" if DATE.match(fault.first) else sign
+            text = fault.first[:40]
+            why = sign if any(c.isdigit() for c in text) else f"a missing value? column map: absent = ['{text}']"
+            if DATE.match(text):
+                why = "a date: write seconds from the first sample on"
             problems.append(
-                f"column '{name}': {n} cell{'s are' if n > 1 else ' is'} not a number, the first: '{fault.first[:40]}' "
+                f"column '{name}': {n} cell{'s are' if n > 1 else ' is'} not a number, the first: '{text}' "
                 f"({why}; {row_list(fault.rows)})"
             )
     time, back = times

@@ -70,3 +70,13 @@ EXPOSED = (
     inp("B", "T", "magnetic field along the axes of the case", 3, optional=True),
     inp("dB", "T", "differences of the magnetic field over the gyro, axes of the case", 3, optional=True),
 )
+#: departures of the electrical supplies of a gyro from their nominal values, as the supply gives them
+SUPPLIES = (
+    out("wheel_frequency", "1", "frequency of the wheel supply, relative departure"),
+    out("wheel_voltage", "1", "voltage of the wheel supply, relative departure", optional=True),
+    out("wheel_phase", "rad", "asymmetry of the phases of the wheel supply", optional=True),
+    out("pickoff_excitation", "1", "excitation current of the pickoff, relative departure", optional=True),
+    out("torquer_excitation", "1", "excitation of torquer or suspension, relative departure", optional=True),
+)
+#: what a gyro takes of them
+SUPPLIED = tuple(replace(c, causality="input", optional=True) for c in SUPPLIES)

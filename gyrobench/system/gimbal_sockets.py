@@ -1,4 +1,4 @@
-"""Sockets of stabilized lines of sight: gimbal of two axes, decoupler of its rates, vibration of its base.
+"""Sockets of stabilized lines of sight: gimbal, decoupler of its rates, vibration of its base, target, tracker.
 
 Elements of two: (1) pitch about x, (2) yaw about z; the line of sight is y of the inner gimbal.  [GIMBAL-2AXIS]
 """
@@ -48,6 +48,32 @@ GIMBALS: tuple[Socket, ...] = (
             out("omega", "rad/s", "inertial rate of the base, base axes", 3),
             out("alpha", "rad/s2", "its derivative", 3),
             out("f", "m/s2", "specific force of the base, base axes", 3),
+        ),
+    ),
+    Socket(
+        "Target",
+        "direction of a target against a fixed frame, that of the tracker at the start: y along its line of sight",
+        (
+            inp("phase", "1", "number of the running phase", optional=True, whole=True),
+            out("direction", "1", "unit vector to the target, fixed frame", 3),
+            out("omega", "rad/s", "inertial rate of that direction, fixed frame", 3),
+            out("alpha", "rad/s2", "its derivative", 3),
+        ),
+    ),
+    Socket(
+        "Tracker",
+        "camera and image processing on a line of sight: how far the target is from it, in two axes",
+        (
+            inp("direction", "1", "unit vector to the target, fixed frame", 3),
+            inp("omega_target", "rad/s", "inertial rate of that direction, fixed frame", 3, optional=True),
+            inp("alpha_target", "rad/s2", "its derivative", 3, optional=True),
+            inp("omega", "rad/s", "inertial rate of the tracker, its axes", 3),
+            inp("alpha", "rad/s2", "its derivative", 3, optional=True),
+            out("error", "rad", "measured error of the line of sight, about x and z; + : the target is up, left", 2),
+            out("miss", "rad", "true error, about x and z", 2),
+            out("rate", "rad/s", "true inertial rate of the target's direction, about x and z of the tracker", 2),
+            out("acceleration", "rad/s2", "its derivative, about the same axes", 2),
+            limit_flag("lost", "1 while the target is lost"),
         ),
     ),
 )

@@ -124,6 +124,7 @@ LOOPS: tuple[Socket, ...] = (
             inp("rate", "rad/s", "measured rate", optional=True),
             inp("theta", "rad", "measured joint angle", optional=True),
             inp("M_load", "N.m", "outside torque to be added to M", optional=True),
+            inp("schedule", "", "signal that the gains follow", optional=True),
             out("v", "V", "voltage of the torque motor"),
             out("e", "V", "the signal inside the loop, u + test"),
             out("M", "N.m", "torque of a correction motor that belongs to the stabilizer, and M_load", optional=True),

@@ -158,6 +158,7 @@ def resolve(
         notes.append(f"the design is held at nominal values: it does not follow {', '.join(unseen)}")
     parts = PartValues(system, base, {**raw, **nominal})
     follow_factors(assembly, system, parts)
+    kept: dict[str, list[str]] = {}
     for name, value in system.flat_parameters(parts).items():
         where_known = name.endswith("?")
         name = name.rstrip("?")
@@ -165,11 +166,15 @@ def resolve(
         if slot not in assembly.bindings:
             raise InvalidValueError(f"{name}: {system.name} has no slot '{slot}'")
         bound = _target(parameter, assembly.bindings[slot])
-        if bound is not None:
+        if slot in assembly.keeps and parameter in assembly.bindings[slot].parameters:
+            kept.setdefault(slot, []).append(parameter)
+        elif bound is not None:
             chosen[name] = _si(name, value, bound)
         elif not where_known:
             text = f"{slot} has no parameter '{parameter.partition('[')[0]}' (set by {system.name}); it stays as it is"
             notes += [] if text in notes else [text]
+    notes += [f"{slot}: {', '.join(names)}: the values of its file, not those of the system's design"
+              for slot, names in kept.items()]  # fmt: skip
     notes += parts.notes
     chosen.update(overrides)
     starts: Starts = {slot: [] for slot in assembly.bindings}

@@ -18,7 +18,8 @@ def resolve_parts(
 ) -> tuple[dict[str, Path], dict[str, str]]:
     """Paths of the FMUs of all slots, and the target of those that were built (slot -> "native" | "python").
 
-    Something that ends in .fmu is a file; anything else is the name of a part of the bench, built if needed.
+    Something that ends in .fmu is a file, in .c or .py a controller of the user's own; anything else is the name of a
+    part of the bench, built if needed.
     Without a compiler the Python target is built, with a note.  prebuilt: part of the bench -> its FMU, which was built
     elsewhere.  Raises InvalidConfigurationError, BenchError and BuildError.
     """
@@ -43,7 +44,12 @@ def resolve_parts(
             built[slot] = "python" if paths[slot].stem.endswith("-python") else "native"
             continue
         from gyrobench.packaging import CompilerError, build
+        from gyrobench.packaging.own_controller import is_controller
 
+        if is_controller(part):
+            paths[slot] = build(str(part), bench=bench)
+            built[slot] = "python" if str(part).endswith(".py") else "native"
+            continue
         try:
             paths[slot] = build(str(part), target=target, bench=bench)
             built[slot] = target

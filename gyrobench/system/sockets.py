@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.component.declarations import element_names
-from gyrobench.system.connectors import EXPOSED, Connector, Shape, Socket, inp, limit_flag, out
+from gyrobench.system.connectors import EXPOSED, SUPPLIED, SUPPLIES, Connector, Shape, Socket, inp, limit_flag, out
 from gyrobench.system.gimbal_sockets import GIMBALS
 from gyrobench.system.loop_sockets import LOOPS
 from gyrobench.system.north_sockets import NORTH
@@ -64,6 +64,11 @@ SOCKETS: dict[str, Socket] = {
             ),
         ),
         Socket(
+            "Supply",
+            "electrical supplies of a gyro: departures from their nominal values",
+            SUPPLIES,
+        ),
+        Socket(
             "SdfGyro",
             "single-degree-of-freedom gyro, case inputs and torquer in, pickoff out",
             (
@@ -74,6 +79,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("dT", "K", "temperature differences along I, O, S", 3, optional=True),
                 inp("v_float", "m/s", "velocity of the float against the case along I, O, S", 3, optional=True),
                 *EXPOSED,
+                *SUPPLIED,
                 out("u", "V", "pickoff voltage"),
                 out("drift", "rad/s", "drift rate, precession sign (diagnostic)", optional=True),
                 out("b", "rad", "float angle (diagnostic)", optional=True),

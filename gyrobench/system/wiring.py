@@ -45,6 +45,7 @@ class Assembly:
     connections: list[Connection]
     order: ExecutionOrder
     notes: list[str] = field(default_factory=list)
+    keeps: set[str] = field(default_factory=set)  # slots with controllers of the user's own: the system sets no value
 
     def output(self, name: str) -> tuple[str, Bound]:
         """Slot and variable of "slot.output"; raises WiringError naming what the slot has."""

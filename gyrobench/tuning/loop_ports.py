@@ -11,13 +11,14 @@ from gyrobench.system.system import System
 @dataclass(frozen=True)
 class LoopPorts:
     """One loop of ``System.loops``.  slot: of its stabilizer; axis: element of the exciter's signals; angle: channel of
-    the angle that a load turns.
+    the angle that a load turns; kind: of the excitation that is added to its signal, test or command.
     """
 
     loop: str = "stabilizer"
     slot: str = "stabilizer"
     axis: int = 1
     angle: str = "platform.attitude"
+    kind: str = "test"
 
     @property
     def opened(self) -> str:
@@ -32,25 +33,26 @@ class LoopPorts:
     @property
     def test(self) -> str:
         """Return the channel with what is added there."""
-        return f"exciter.test[{self.axis}]"
+        return f"exciter.{self.kind}[{self.axis}]"
 
 
 STABILIZER = LoopPorts()
 
 
 def loops_of(system: System) -> dict[str, LoopPorts]:
-    """Return the loops whose stabilizer gives a voltage to a motor and which the plan can open, by name."""
+    """Return the loops whose stabilizer drives a motor, or commands a rate, and which the plan can open, by name."""
     wires = "\n".join(line.strip() for line in system.wires.splitlines())
     found = {}
     for loop, at in system.loops.items():
         slot, _, port = at.partition(".")
-        tested = re.search(rf"^exciter\.test\[(\d)\] -> {re.escape(slot)}\.test$", wires, re.M)
-        driven = re.search(rf"^{re.escape(slot)}(?: -> platform: v|\.v -> platform\.v(\[\d\]))$", wires, re.M)
+        tested = re.search(rf"^exciter\.(test|command)\[(\d)\] -> {re.escape(slot)}\.test$", wires, re.M)
+        to = r"(?: -> platform: v|\.v -> (?:platform\.v|decoupler\.command)(\[\d\]))"
+        driven = re.search(rf"^{re.escape(slot)}{to}$", wires, re.M)
         if port != "u" or tested is None or driven is None:
             continue
         element = driven[1] or ""
         angles = [a for a in (f"platform.attitude{element}", f"platform.los{element}") if a in system.channels]
-        ports = LoopPorts(loop, slot, int(tested[1]), angles[0] if angles else "")
+        ports = LoopPorts(loop, slot, int(tested[2]), angles[0] if angles else "", tested[1])
         if {ports.inside, ports.test} <= set(system.channels):
             found[loop] = ports
     return found

@@ -130,7 +130,8 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
 
 
 def loop_plan(
-    system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = ""
+    system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = "",
+    kind: str = "test",
 ) -> tuple[LoopPlan, float]:  # fmt: skip
     """Return the plan of a proof and the torque of its load step, N.m.
 
@@ -138,7 +139,7 @@ def loop_plan(
     """
     own = system.plan()
     phases = list(getattr(own, "phases", []))
-    sines = [p for p in phases if p.kind == "test" and p.amplitude and p.axis == axis]
+    sines = [p for p in phases if p.kind == kind and p.shape == "sine" and p.amplitude and p.axis == axis]
     load = next((p for p in phases if p.kind == "torque" and p.shape == "step" and p.axis == axis), None)
 
     def amplitude(f: float) -> float:
@@ -151,8 +152,8 @@ def loop_plan(
     fast = [f for f in frequencies if f * SLOWER > max(frequencies)]
     slow = [f for f in frequencies if f not in fast]
     sines_ahead = [
-        *sweep("loop", "test", slow, amplitude, axis=axis, periods=PERIODS // 3, settle=0.5 / slowest),
-        *sweep("loop", "test", fast, amplitude, axis=axis, periods=PERIODS, settle=0.5 / slowest),
+        *sweep("loop", kind, slow, amplitude, axis=axis, periods=PERIODS // 3, settle=0.5 / slowest),
+        *sweep("loop", kind, fast, amplitude, axis=axis, periods=PERIODS, settle=0.5 / slowest),
     ]
     plan = LoopPlan([rest, *sines_ahead, *steps, *(p for p in phases if ride and p.label == ride)])
     return plan, float(load.amplitude) if load else 0.0
@@ -168,7 +169,7 @@ def proof_of(
     step = system.step
     chosen = sine_frequencies(f, L, wishes, step)
     known = session.prepare(settings, seed)[2].parameters
-    v_max = known_limit(known, ports.slot)
+    v_max = known_limit(known, ports)
     effort = np.abs(G / (1.0 + L))
     found = None
     for share in SMALLER:
@@ -176,7 +177,7 @@ def proof_of(
         def size(x: float, most: float = share * DRIVEN * v_max) -> float:
             return most / float(np.interp(x, f, effort))
 
-        plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "")
+        plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "", ports.kind)
         record = _run(session, settings, at, plan, step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), seed)
         tried = _read(record, at, f, L, wishes, load, ports, sight)
         if found is None or not (tried.limits or tried.why_not):
@@ -206,10 +207,10 @@ def _read(
     ports: LoopPorts, sight: ExpectedJitter | None,
 ) -> Proof:  # fmt: skip
     phases = gates(record)
-    sines = [g for g in phases if g.kind == "test"]
+    sines = [g for g in phases if g.kind == ports.kind and g.shape == "sine"]
     judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
-    limit = known_limit(record.run.parameters, ports.slot)
+    limit = known_limit(record.run.parameters, ports)
     cut = _cut(phases, ports.slot, limit)
     noise = f"{ports.slot} (noise alone has its voltage at the limit of {limit:.3g} V {100.0 * cut:.2g} % of the time)"
     more = [noise + ", which takes gain from the loop"] if cut > CUT else []
@@ -229,9 +230,10 @@ def _read(
     return Proof(at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load, cut=cut)
 
 
-def known_limit(parameters: Mapping[str, Any], slot: str) -> float:
-    """Return the largest voltage of the motor, V: of controller or platform, what is less."""
-    return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
+def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
+    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less."""
+    slots = (ports.slot, "platform") if ports.kind == "test" else (ports.slot,)
+    return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in slots)
 
 
 def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:

@@ -12,8 +12,9 @@
     reading = "typical"                    # typical, one_sigma, maximum, minimum, or limit: plus or minus, of all units
     note = "rms in 1 Hz, one-sided"
 
-What becomes of the figures is written in :mod:`gyrobench.workflow.sheet_values`.  A gyro goes into the slot gyro; a
-turntable changes no part: it sets what the system's table has, and what is believed of it.  [GYRO-SHEET, TABLE-PRESETS]
+What becomes of the figures is written in :mod:`gyrobench.workflow.sheet_values`.  A gyro goes into the slot gyro, or
+three of them into a unit; a turntable changes no part: it sets what the system's table has, and what is believed of it.
+[GYRO-SHEET, TABLE-PRESETS]
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ from gyrobench.workflow import sheet_values
 from gyrobench.workflow.sheet_values import FIGURES, SETTINGS, SIGNED
 
 TABLE_SLOTS = ("table", "outer", "inner")
+TAKERS = "drift_record, rate_table_test, gyro_bandwidth, turn_on_repeatability, vibration_rectification, north_finder"
+UNITS = "imu_positions (with a chamber: over temperature), coning_test, sculling_test, attitude_estimator"
 TABLE_SOCKETS = ("Table", "ServoTable", "TwoAxisTable")
 
 
@@ -164,6 +167,28 @@ def table_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> di
     return found
 
 
+def unit_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dict[str, Any]:
+    """Return what a rate gyro's sheet sets in a system without a slot for one: three of them in its unit, or the
+    options of the drift of its gyros.  Raises UsageError, naming the tests that take it.
+    """
+    bench, found = Bench.find(), dict[str, Any]()
+    part = parts.get("imu", test.slots["imu"].part) if "imu" in test.slots else ""
+    if part in bench.parts():
+        declared = load_part(part, bench.folder).declarations
+        found |= {f"imu.{n}": v for n, v in sheet_values.unit(sheet, declared).items()}
+    found |= {n: v for n, v in sheet_values.drifts(sheet).items() if n in test.options}
+    if sheet.kind == "floated":
+        raise UsageError(f"the data sheet {sheet.title} is of a floated gyro: {test.name} has no slot for one")
+    if not found:
+        raise UsageError(
+            f"the data sheet {sheet.title} is of one gyro: {test.name} has no slot for it. Its tests are {TAKERS}; as "
+            f"three gyros of a unit it goes into {UNITS}, by its drift into platform_alignment"
+        )
+    if (own := test.options.get("bandwidth")) and own.sets and (bandwidth := sheet.si("bandwidth")):
+        found["bandwidth"] = bandwidth
+    return found
+
+
 def with_instruments(
     names: str | Sequence[str], parts: dict[str, str], test: System | Suite | None = None
 ) -> tuple[str, dict[str, Any]]:
@@ -187,7 +212,12 @@ def with_instruments(
                 raise UsageError(f"--instrument {name}: a turntable is for one test, not for a suite")
             found |= table_settings(sheet, test, parts)
             continue
+        if isinstance(test, System) and "gyro" not in test.slots:
+            found |= unit_settings(sheet, test, parts)
+            continue
         if parts.setdefault("gyro", sheet.part) != sheet.part:
             raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
         found |= settings(sheet)
+        if isinstance(test, System) and "u_bias" in test.options and (bias := sheet_values.believed_bias(sheet)):
+            found["u_bias"] = bias
     return "; ".join(titles), found

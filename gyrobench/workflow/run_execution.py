@@ -120,7 +120,8 @@ def _run(
         if checkpoints is not None and checkpoints.is_there and not isinstance(error, RunInterrupted):
             message += "; the same command with --resume goes on from its last checkpoint"
         if isinstance(error, RunInterrupted):
-            raise CommandInterrupted(f"{message} (gyrobench report lists what is missing)", error.record) from None
+            message += " (gyrobench report reduces it, or lists what is missing)"
+            raise CommandInterrupted(message, error.record) from None
         raise PostRunError(message, error.record) from None
     if folder is not None and checkpoints is not None:
         record.save(folder)

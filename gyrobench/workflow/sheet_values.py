@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
+from gyrobench.frames import G0
 
 if TYPE_CHECKING:
     from gyrobench.workflow.instruments import Instrument
@@ -88,6 +89,8 @@ SIGNED = COEFFICIENTS
 STIFFNESS, INERTIA = 2.672e5, 2.56
 #: least Allan deviation over the coefficient B of flicker noise, (2 ln 2 / pi)^0.5
 FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
+#: largest Allan deviation of a Gauss-Markov process over its rms, at 1.89 correlation times
+MARKOV_FLOOR = 0.6174
 #: figure -> parameter of a part, of each axis where it has two
 DIRECT = {
     "range": "range_max",
@@ -138,6 +141,50 @@ def rate_gyro(sheet: Instrument, part: type) -> dict[str, Any]:
     if lean := sheet.si("misalignment") or sheet.si("cross_axis"):
         found["axes"] = [[1.0, lean, 0.0], [0.0, 1.0, lean]]
     return found
+
+
+def wander(sheet: Instrument) -> float:
+    """Return the rms of a Gauss-Markov bias whose largest Allan deviation is the bias instability, 0 without one."""
+    return (sheet.si("bias_instability") or 0.0) / MARKOV_FLOOR
+
+
+def turn_on(sheet: Instrument) -> float:
+    """Return the bias at switch-on: as stated, or of a limit what one believes; without both the bias instability."""
+    return believed_bias(sheet) or sheet.si("bias_instability") or 0.0
+
+
+def believed_bias(sheet: Instrument) -> float:
+    """Return the standard uncertainty of the bias at switch-on: as stated, or of a limit; 0 without both."""
+    return sheet.si("bias") or (sheet.limit("bias") or 0.0) / math.sqrt(3.0)
+
+
+def unit(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a unit of three such gyros, SI, those that it declares; its accelerometers stay.
+
+    The sheet is the whole of the errors of the gyros: what it does not state is 0.  Sizes of errors are set positive,
+    on all axes.  A bias instability is a Gauss-Markov bias; a bias joins it where a unit has no steady one.
+    """
+    scale, lean = sheet.si("scale_error") or 0.0, sheet.si("misalignment") or sheet.si("cross_axis") or 0.0
+    bias, g = sheet.si("bias") or 0.0, (sheet.si("g_sensitivity") or 0.0) * G0
+    found: dict[str, Any] = {
+        "gyro_bias": [bias] * 3,
+        "gyro_scale": [[scale if i == j else lean for j in range(3)] for i in range(3)],
+        "g_sensitivity": [[g if i == j else 0.0 for j in range(3)] for i in range(3)],
+        "gyro_bias_T": [sheet.si("bias_temperature") or 0.0] * 3,
+        "gyro_scale_T": [sheet.si("scale_temperature") or 0.0] * 3,
+    }
+    for axis in "xyz":
+        found |= {f"{axis}_gyro_bias": wander(sheet), f"noise_{axis}_bias": math.hypot(bias, wander(sheet))}
+        found |= dict.fromkeys((f"{axis}_gyro", f"noise_{axis}_gyro"), density(sheet) or 0.0)
+    return {n: v for n, v in found.items() if n in declarations}
+
+
+def drifts(sheet: Instrument) -> dict[str, float]:
+    """Return the options of a system that takes the drift of its gyros by size, not a part: constant, wandering, white.
+
+    A sheet without a bias is taken to have one of the size of its bias instability, at least.
+    """
+    return {"gyro_drift": turn_on(sheet), "gyro_markov": wander(sheet), "gyro_white": density(sheet) or 0.0}
 
 
 def floated(sheet: Instrument) -> dict[str, Any]:

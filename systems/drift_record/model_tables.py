@@ -134,8 +134,9 @@ def model_texts(m: DriftModel, units: ChannelUnits) -> list[str]:
                    f"rms {number(g.sigma / units.si)} {units.unit}.")  # fmt: skip
     if (a := m.arima) is not None and a.over.flagged:
         out.append(
-            f"ARIMA(3,1,0): the first difference is over-differenced (correlation of neighbours {a.over.lag_one:.2f}); "
-            "differenced white noise has −0.75, −0.5, −0.25, which say nothing of the instrument."
+            "ARIMA(3,1,0): the first difference is over-differenced (correlation of neighbours "
+            f"{number(a.over.lag_one)}); differenced white noise has −0.75, −0.5, −0.25, which say nothing of the "
+            "instrument."
         )
     if (a := m.arima) is not None and a.level.determined:
         level = a.level

@@ -20,6 +20,7 @@ import numpy as np
 from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
+from gyrobench.reduction.drift.supplies import Supplies, rebalanced
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
@@ -66,6 +67,7 @@ class FixedPositionSetup(SiteSetup):
     u_scale_factor: float = 0.0
     u_current: float = 0.0
     quantum: float = 0.0
+    supplies: Supplies = field(default_factory=Supplies)
 
     @property
     def xyz(self) -> Array:
@@ -93,6 +95,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             rate=reads_rate(run),
             truth=truth_of(run, drift.NAMES),
             quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
+            supplies=Supplies() if reads_rate(run) else Supplies.of(run),
         )
 
     def problems(self) -> list[str]:
@@ -132,8 +135,11 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         ]
         if s.rate:
             return of_site
+        torque = s.k * self.current
+        readings = rebalanced(np.full_like(torque, s.input_rate), torque)
         return [
             *of_site,
+            *s.supplies.effects(found, readings, s.xyz, self.middle),
             CURRENT_OFFSET.effect(s, offset),
             CURRENT_RESOLUTION.effect(s.quantum / 12.0**0.5, offset),
         ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gyrobench.attitudes import attitude_problems
-from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import ATTITUDE, CORRECTIONS, NUISANCES, SITE, SUPPLY, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rate_reading import RateReading
 from gyrobench.system.plan import Plan
@@ -39,6 +39,7 @@ class FixedPosition(RateReading):
         | NUISANCES
         | CORRECTIONS
         | type_b("attitude", "latitude", "scale_factor", "current")
+        | SUPPLY
     )
     measured_data = MEASURED
 

@@ -4,34 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
-from gyrobench.reduction.loops.jitter import shortest
-from gyrobench.system.families import loop_test as loop
-from gyrobench.system.families.loop_test import LoopTest
+from gyrobench.record.vibration_spectrum import VibrationSpectrum
+from gyrobench.system.families.sight_test import AXES, SightTest
 from gyrobench.system.line_of_sight import Density, LineOfSight
-from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot
-
-from .spectra import SPECTRA
-
-DEG = math.pi / 180.0
-FORMS = ("yaw-pitch", "pitch-yaw")
-AXES = {"pitch": (1, 1), "yaw": (2, 3)}  # element of two, and of the exciter's three
-ON_INNER = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # gyro axes x, y along x (pitch) and z (yaw) of the inner gimbal
-INTEGRAL = 8.0  # crossover over the corner of the integral
-NOTCH = (0.1, 0.7)  # damping of its zeros and of its poles
-TONES = (0.3, 0.6, 0.85, 1.0, 1.2, 1.6, 2.2, 2.6, 3.0, 3.6)  # of the crossover
-NEVER = 100  # number of a phase that no plan has
-TEST = 0.3  # V (rad/s), of the test sines
 
 
-class GimbalStabilization(LoopTest):
+class GimbalStabilization(SightTest):
     """A rate gyro on the inner gimbal measures the rates of the line of sight; a proportional-integral controller with
     a notch on each axis holds them at 0, the outer one with 1/cos of the inner angle.
 
@@ -39,99 +21,10 @@ class GimbalStabilization(LoopTest):
     """
 
     title = "Stabilized line of sight on a gimbal of two axes"
-    spec = ("GIMBAL-2AXIS", "LOS-JITTER", "BASE-PSD", "GYRO-MEMS", "STABILIZER-LTI")
     reduction = "reduction"
-    bodies = """
-        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
-        outer gimbal: base, z platform.theta[2]
-        inner gimbal: outer gimbal, x platform.theta[1]
-    """
-    slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
-        "vibration": Slot("Vibration", "base_vibration"),
-        "platform": Slot("TwoAxisGimbal", "gimbal_two_axis"),
-        "gyro": Slot("RateGyro", "gyro_mems"),
-        "decoupler": Slot("LosDecoupler", "decoupler_los"),
-        **{axis: loop.stabilizer("stabilizer_lti", "rate") for axis in AXES},
-    }
-    wires = loop.MOVED + loop.FLOWN + LoopTest.wires + """
-        exciter.phase -> vibration.phase
-        motion -> vibration: omega=omega_b alpha=alpha_b f=f_b
-        vibration -> platform: omega=omega_b alpha=alpha_b f=f_b
-        platform -> gyro: omega f
-        gyro.rate -> decoupler.rate
-        platform -> decoupler: theta
-        """ + "".join(
-        f"""
-        load.M[{three}] -> platform.M_load[{two}]
-        exciter.command[{three}] -> decoupler.command[{two}]
-        decoupler.u_axes[{two}] -> {axis}.u
-        exciter.test[{three}] -> {axis}.test
-        {axis}.v -> platform.v[{two}]
-        """
-        for axis, (two, three) in AXES.items()
-    )  # fmt: skip
-    loops = {axis: f"{axis}.u" for axis in AXES}
-    options = {
-        "form": Option("yaw-pitch", str, f"order of the joints, the outer one first: {', '.join(FORMS)}"),
-        "pitch": Option(0.0, "rad", "joint angle about x at the start", -89 * DEG, 89 * DEG),
-        "yaw": Option(0.0, "rad", "joint angle about z at the start", -89 * DEG, 89 * DEG),
-        "crossover": Option(12.0, "Hz", "crossover of both loops, for the gains", 0.5, 100.0),
-        "bending": Option(42.0, "Hz", "mode of each motor against its gimbal; 0: rigid", 0.0),
-        "stiction": Option(0.0, "N.m", "break-away torque of each joint; 0.8 of it while it slips", 0.0),
-        "gyro_noise": Option("0.005deg/s/sqrt(Hz)", "rad/s/sqrt(Hz)", "one-sided noise density of the gyro", 0.0),
-        "gyro_bandwidth": Option(100.0, "Hz", "bandwidth of the gyro", 1.0, sets="gyro.bandwidth"),
-        "base": Option("1deg", "rad", "amplitude of the base at and below 1 Hz; falls with 1/f2; 0: no sines", 0.0),
-        "sweeps": Option(True, bool, "test sines for the margins of each axis"),
-        "load_step": Option(0.05, "N.m", "disturbance torque of the steps; 0: none", 0.0),
-        "psd": Option("vehicle", str, f"vibration of the base: {', '.join(SPECTRA)}, none, or a CSV file with spectra"),
-        "psd_scale": Option(1.0, "1", "factor on the vibration", 0.0, sets="vibration.scale"),
-        "ride": Option(60.0, "s", "length of the ride with vibration", 5.0, 3600.0),
-        "jitter_from": Option(1.0, "Hz", "lowest frequency of the jitter: a tracker or the user takes what is slower",
-                              0.05, 50.0),
-        **loop.PROFILE,
-    }  # fmt: skip
-    noises = ("gyro.white", "gyro.turn_on", "gyro.flicker_x", "gyro.flicker_y", "gyro.walk_x", "gyro.walk_y")
-    step = 2e-4
-    channels = (
-        "exciter.phase", "exciter.gate", "exciter.motion_angle[1]", "exciter.motion_angle[3]", "exciter.torque[1]",
-        "exciter.torque[3]", "exciter.test[1]", "exciter.test[3]",
-        *loop.three("motion.angle", "vibration.omega", "vibration.f"),
-        *(f"{n}[{k}]" for n in ("platform.los", "platform.theta") for k in (1, 2)),
-        "platform.keyhole", "decoupler.saturated", *(f"{axis}.{n}" for axis in AXES for n in ("e", "v")),
-    )  # fmt: skip
-    shown = ("platform.los", "platform.theta", "vibration.omega", "pitch.e yaw.e", "pitch.v yaw.v")
-    channel_period = 1e-3
-
-    def phases(self) -> list[LoopPhase]:
-        """Return loads, test sines of both loops, sines of the base about its axes, and the ride."""
-        fc, found = self["crossover"], []
-        for axis, (_, k) in AXES.items() if self["load_step"] else ():
-            found.append(LoopPhase(f"load {axis}", "torque", "step", k, self["load_step"], settle=1.0, dwell=1.0))
-        for axis, (_, k) in AXES.items() if self["sweeps"] else ():
-            tones = sorted([fc * x for x in TONES] + [x for x in (0.96 * self["bending"],) if fc < x < 4.0 * fc])
-            found += sweep(f"loop {axis}", "test", tones, TEST, axis=k, settle=1.0, periods=40)
-        for name, k in (("x", 1), ("z", 3)) if self["base"] else ():
-            found += sweep(f"base {name}", "motion", [1.0, 3.0, 8.0], self.swing, axis=k, settle=1.0, dwell=4.0)
-        return [*found, self.ride()]
-
-    def plan(self) -> LoopPlan:
-        """Return the phases, or the ride alone by a recorded motion."""
-        return LoopPlan([self.ride()] if self.values.get("profile") else self.phases())
-
-    def ride(self) -> LoopPhase:
-        """Return the ride, in which the base vibrates."""
-        return LoopPhase("ride", "hold", settle=3.0, dwell=self["ride"])
-
-    def swing(self, f: float) -> float:
-        """Return the amplitude of a sine of the base, rad."""
-        return float(self["base"] * min(1.0, 1.0 / (f * f)))
-
-    def spectrum(self) -> VibrationSpectrum | None:
-        """Return the vibration of the base.  Raises DataError and OSError, of a file."""
-        name = str(self["psd"])
-        if name == "none":
-            return None
-        return SPECTRA[name] if name in SPECTRA else read_spectrum(Path(name))
+    wires = SightTest.wires + "".join(
+        f"exciter.command[{three}] -> decoupler.command[{two}]\n" for two, three in AXES.values()
+    )
 
     def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
         """Return what makes the line of sight jitter, for a jitter that is wanted of a loop."""
@@ -175,93 +68,3 @@ class GimbalStabilization(LoopTest):
         free = {"platform.friction": [0.0, 0.0], "platform.stiction": [0.0, 0.0]}
         viscous = np.asarray(parameters["platform.viscous"]) + np.asarray(parameters["platform.friction"]) / rate
         return free, {**free, "platform.viscous": viscous.tolist()}
-
-    @property
-    def inner(self) -> str:
-        """Return the name of the inner joint."""
-        return "pitch" if self["form"] == FORMS[0] else "yaw"
-
-    def design(self, parts: PartValues) -> dict[str, Any]:
-        form = FORMS.index(self["form"])
-        spectrum = self.spectrum()
-        found: dict[str, Any] = {
-            "platform.form?": form,
-            "platform.step?": self.step,  # a mode of 60 Hz wants less than the millisecond of the part
-            "decoupler.form?": form,
-            "platform.theta_0": [self["pitch"], self["yaw"]],
-            "platform.bending": [self["bending"]] * 2,
-            "platform.stiction": [self["stiction"]] * 2,
-            "platform.friction": [0.8 * self["stiction"]] * 2,
-            "gyro.mount": ON_INNER,
-            "gyro.white?": self["gyro_noise"] / math.sqrt(2.0),
-            **(spectrum.parameters() if spectrum else {"vibration.points?": 0}),
-            "vibration.first?": next((k for k, p in enumerate(self.plan().phases, 1) if p.label == "ride"), NEVER),
-        }
-        for k, axis in enumerate(AXES):
-            found |= self.controller(axis, k, parts)
-        return found
-
-    def controller(self, axis: str, k: int, parts: PartValues) -> dict[str, Any]:
-        """Return the parameters of one stabilizer: K (1 + w_i/s) N(s), N a notch at the mode; |L| = 1 at crossover."""
-        wc = 2.0 * math.pi * self["crossover"]
-        w = 2.0 * math.pi * self["bending"]
-        s = 1j * wc
-        integral = wc / INTEGRAL
-        plant = parts["platform.k_t"][k] / parts["platform.R"][k] / (self.inertia(k, parts) * s)
-        zero, pole = (np.array([1.0, 2.0 * z / w, 1.0 / w**2]) if w else np.array([1.0]) for z in NOTCH)
-        if w:
-            zeta = parts["platform.bending_damping"][k]
-            plant *= (1.0 + 2.0 * zeta * s / w) / (1.0 + 2.0 * zeta * s / w + (s / w) ** 2)
-        ratio = s / (2.0 * math.pi * self["gyro_bandwidth"])
-        gyro = 1.0 / (1.0 + math.sqrt(2.0) * ratio + ratio**2)
-        of_s = np.polynomial.polynomial.polyval
-        shape = (1.0 + integral / s) * of_s(s, zero) / of_s(s, pole)
-        gain = 1.0 / abs(plant * gyro * shape)
-        num = gain * np.polynomial.polynomial.polymul([integral, 1.0], zero)
-        den = np.polynomial.polynomial.polymul([0.0, 1.0], pole)
-        return {
-            f"{axis}.form?": 1,
-            **{f"{axis}.{n}[{j}]?": float(x) for n, row in (("num", num), ("den", den)) for j, x in enumerate(row, 1)},
-            f"{axis}.K?": gain,
-            f"{axis}.integral?": integral,
-            **{f"{axis}.{n}?": 1.0 for n in ("tau1", "T1", "tau2", "T2")},
-            f"{axis}.v_max?": parts["platform.v_max"][k],
-        }
-
-    def inertia(self, k: int, parts: PartValues) -> float:
-        """Return the inertia that the motor of an axis turns at the start: kg.m2."""
-        form = FORMS.index(self["form"])
-        motor = parts["platform.J_motor"][k]
-        axis, outer, inner = 2 * k, parts["platform.I_outer"], parts["platform.I_inner"]
-        if k == form:
-            return float(motor + inner[axis][axis])
-        angle = self["pitch"] if form == 0 else self["yaw"]
-        c, s = math.cos(angle), math.sin(angle)
-        cross = inner[1][axis] * (1.0 if form == 0 else -1.0)
-        turned = s * s * inner[1][1] + c * c * inner[axis][axis] + 2.0 * s * c * cross
-        return float(motor + outer[axis][axis] + turned)
-
-    def check(self) -> list[str]:
-        problems = self.no_choice(form=FORMS)
-        if self["bending"] and self["bending"] < self["crossover"]:
-            problems.append(
-                f"crossover = {self['crossover']:g} Hz: above the mode at {self['bending']:g} Hz, which turns the "
-                "phase by 180 degrees; take a lower one"
-            )
-        if self["ride"] < shortest(self["jitter_from"]):
-            problems.append(
-                f"ride = {self['ride']:g} s: a jitter from {self['jitter_from']:g} Hz takes "
-                f"{shortest(self['jitter_from']):g} s or more"
-            )
-        if str(self["psd"]) not in (*SPECTRA, "none") and not Path(str(self["psd"])).is_file():
-            problems.append(f"psd = {self['psd']}: none of {', '.join(SPECTRA)}, none, and not a file")
-        return problems
-
-    def warnings(self) -> list[str]:
-        inner = self[self.inner]
-        if abs(inner) > 75 * DEG:
-            return [
-                f"the inner joint begins at {math.degrees(inner):.3g}°, in the keyhole: the gain of the outer loop is "
-                "held at that of 75°, and its motor may reach its limit"
-            ]
-        return []

@@ -19,6 +19,7 @@ from .model import AngleResponse
 from .steps import LEAST, TableTurn, turns_of
 
 FREQUENCIES = 8  # at least
+SLOWEST, FASTEST = 1e-6, 1e6  # Hz: beyond there is no table, and powers of them exceed the numbers
 TABLE, PICKOFF = "table.rate_read", "gyro.u"
 UNKNOWN = 1e-3  # of the points of a record that states none: any, the scatter about the curve takes its place
 
@@ -97,5 +98,7 @@ def _checked(f: Array, value: NDArray[Any], u: Array, table: Array, output: bool
         raise ReductionError("a frequency stands twice: one row for each is expected")
     if not (np.all(f > 0.0) and np.all(np.abs(value) > 0.0) and np.all(np.isfinite(value))):
         raise ReductionError("frequencies and amplitudes must be above 0")
+    if f.min() < SLOWEST or f.max() > FASTEST:
+        raise ReductionError(f"frequencies from {f.min():.3g} to {f.max():.3g} Hz: is their unit right?")
     order = np.argsort(f)
     return ShakenPoints(AngleResponse(f[order], value[order], u[order], output), table[order], known)

@@ -16,14 +16,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
 from gyrobench import units
 from gyrobench.result import Table
-from gyrobench.units import DEG
+from gyrobench.units import ARCMIN, DEG, DPH
+
+from . import plans
 
 MINUTES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
 MOST = 0.5  # rad, heading beyond which a standard deviation says nothing
@@ -128,6 +130,17 @@ def running(rate: RandomErrors, start: float, T: float, t: float) -> float:
     return math.hypot(start, t * math.sqrt(rate.change(T, t)))
 
 
+def lost(method: str, u_bias: float, latitude: float) -> list[str]:
+    """Return why one position determines no heading: three times the u of the bias is above the Earth rate; [] else."""
+    north = units.EARTH_RATE * math.cos(latitude)
+    if method != "strapdown" or 3.0 * u_bias <= north:
+        return []
+    return [
+        f"u_bias = {u_bias / DPH:.4g} °/h: one position determines no heading where three times this is above the "
+        f"horizontal Earth rate, {north / DPH:.4g} °/h; take the method strapdown two"
+    ]
+
+
 def in_words(time: float | None) -> str:
     """Return a time until a goal is reached."""
     if time is None:
@@ -138,29 +151,57 @@ def in_words(time: float | None) -> str:
     return f"after {time:.3g} s"
 
 
-def table(p: Mapping[str, Any], latitude: float, gravity: float) -> list[Table]:
-    """Return heading and level after minutes with the instruments of a run, from its parameters; [] without errors."""
+def table(p: Mapping[str, Any], latitude: float, gravity: float, bias: float = 0.0) -> list[Table]:
+    """Return heading and level after minutes with the instruments of a run, from its parameters; [] without errors.
+
+    bias: stated standard uncertainty of that of a gyro, rad/s, which may be more than the parameters of this one say.
+    """
     rate, force = (
         RandomErrors.of({n.removeprefix(f"{slot}."): v for n, v in p.items() if n.startswith(f"{slot}.")}, axis)
         for slot, axis in (("gyro", "y"), ("accelerometers", "x"))
     )
     if rate is None or not rate.mean(60.0):
         return []
+    rate = replace(rate, bias=max(rate.bias, bias))
     rows: list[list[Any]] = []
     for minutes in MINUTES:
         T = 60.0 * minutes
         tilt = level(force, gravity, T) if force else None
         values = [heading(rate, latitude, T, two=False, tilt=tilt or 0.0), heading(rate, latitude, T)]
         shown: list[Any] = [x / DEG if x < MOST else None for x in values]
-        rows.append([minutes, *shown, tilt / DEG if tilt is not None else None])
-    said = [
-        f"{goal:g}° in two positions {in_words(reached_after(rate, latitude, goal * DEG))}, "
-        f"in one {in_words(reached_after(rate, latitude, goal * DEG, two=False))}"
-        for goal in GOALS
-    ]
+        rows.append([minutes, *shown, tilt / ARCMIN if tilt is not None else None])
     caption = (
         "Standard deviations by bias, white noise, flicker and random walk of the instruments, closed form, of "
-        f"readings without moves; empty: beyond {MOST / DEG:.3g}°. Heading to " + "; to ".join(said)
+        f"readings without moves; empty: beyond {MOST / DEG:.3g}°"
     )
-    head = ["t / min", "σ(ψ), one position / °", "σ(ψ), two positions / °", "σ(tilt), one position / °"]
-    return [Table("after", "Heading and level after minutes", caption, head, rows)]
+    head = ["t / min", "σ(ψ), one position / °", "σ(ψ), two positions / °", "σ(tilt), one position / ′"]
+    times: list[list[Any]] = []
+    for goal in GOALS:
+        found = [reached_after(rate, latitude, goal * DEG, two=two) for two in (False, True)]
+        times.append([goal, *(None if t is None else t / 60.0 for t in found)])
+    return [
+        Table("after", "Heading and level after minutes", caption, head, rows),
+        Table("after.reached", "Time to a heading", "By the same errors; empty: never, in a day",
+              ["σ(ψ) / °", "one position / min", "two positions / min"], times),
+    ]  # fmt: skip
+
+
+def methods_table(density: float, time: float, settle: float, latitude: float, psi: float) -> list[Table]:
+    """Return what each method reaches in the same total time (s) with the white noise of this gyro; [] without both."""
+    if not density > 0.0 or not time > 0.0:
+        return []
+    rows: list[list[Any]] = []
+    for method in plans.PARTS:
+        reading = time - plans.overhead(method, 12, False, settle, 1e-3)
+        sigma = plans.reached(method, density, latitude, psi, reading) / ARCMIN if reading > 0.0 else None
+        strapdown = method.startswith("strapdown")
+        needs = "two gyro axes" if strapdown else "one gyro axis"
+        bias = "stays in the heading" if method == "strapdown" else "removed"
+        tilt = "measured" if strapdown or method == "tilt" else "taken for level"
+        rows.append([method, reading, sigma, needs, bias, tilt])
+    caption = (
+        f"Standard deviation of the heading by white noise of {density / DPH:.3g} °/h/√Hz, closed form, in the same "
+        "total time, moves of the head included"
+    )
+    head = ["method", "time of readings / s", "σ(ψ) / ′", "needs", "bias of the gyro", "tilt of the head"]
+    return [Table("methods", "Methods in the same time", caption, head, rows)]

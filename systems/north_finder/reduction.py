@@ -134,6 +134,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
+        problems += after.lost(s.method, s.u_bias, s.latitude)
         problems += window_problems(self.windows)
         if s.method == "null" and not problems:
             near = at_null(self.windows)
@@ -277,7 +278,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 "At rest the specific force points up: nose up makes f_y positive, right side down f_x negative.",
             ],
             tables=[
-                self._integrity(psi, A), *_methods(s, psi), *after.table(s.instruments or {}, s.latitude, s.gravity)
+                self._integrity(psi, A), *after.methods_table(s.density, s.time, s.settle, s.latitude, psi),
+                *after.table(s.instruments or {}, s.latitude, s.gravity, s.u_bias),
             ],
         )  # fmt: skip
 
@@ -367,27 +369,6 @@ reduce = Reduction.reduce
 
 def _doubt(id: str, text: str, *blocks: str) -> Reason:
     return Reason(id, text, blocks or ("pass", "fail"), severity="doubt")
-
-
-def _methods(s: NorthFinderSetup, psi: float) -> list[Table]:
-    """Return what each method reaches in the same total time with the noise of this gyro."""
-    if not s.density > 0.0 or not s.time > 0.0:
-        return []
-    rows: list[list[Any]] = []
-    for method in plans.PARTS:
-        reading = s.time - plans.overhead(method, 12, False, s.settle, 1e-3)
-        sigma = plans.reached(method, s.density, s.latitude, psi, reading) / ARCMIN if reading > 0.0 else None
-        strapdown = method.startswith("strapdown")
-        needs = "two gyro axes" if strapdown else "one gyro axis"
-        bias = "stays in the heading" if method == "strapdown" else "removed"
-        level = "measured" if strapdown or method == "tilt" else "taken for level"
-        rows.append([method, reading, sigma, needs, bias, level])
-    caption = (
-        f"Standard deviation of the heading by white noise of {s.density / DPH:.3g} °/h/√Hz, closed form, in the same "
-        "total time, moves of the head included"
-    )
-    head = ["method", "time of readings / s", "σ(ψ) / ′", "needs", "bias of the gyro", "tilt of the head"]
-    return [Table("methods", "Methods in the same time", caption, head, rows)]
 
 
 def setup_of(record: Record) -> NorthFinderSetup:

@@ -20,7 +20,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
 
-from . import plans
+from . import after, plans
 from .after import OWN, WHITE, RandomErrors
 from .measured import MEASURED
 
@@ -224,6 +224,7 @@ class NorthFinding(TableTest):
                 f"latitude = {math.degrees(self['latitude']):.4g}°: within 5° of a pole the horizontal Earth rate is "
                 "below 9 % of that at the equator; no north finder by Earth rate"
             )
+        problems += after.lost(self.chosen, self["u_bias"], self["latitude"])
         lost = plans.overhead(self.chosen, self["positions"], self["back"], self["settle"], self.step)
         least = 5.0 * self.step * (self["windows"] + self["positions"])
         if self.total - lost <= least:

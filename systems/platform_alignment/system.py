@@ -82,6 +82,10 @@ class PlatformAlignment(System):
     factors = COMMANDS
     options = SITE | {
         "grade": Option("navigation", str, f"grade of gyros and accelerometers: {', '.join(plans.GRADES)}"),
+        "gyro_drift": Option(0.0, "rad/s", "constant drift of each gyro (rms); 0: of the grade", 0.0),
+        "gyro_markov": Option(0.0, "rad/s", "Gauss-Markov drift of each gyro (rms); 0: of the grade", 0.0),
+        "gyro_white": Option(0.0, "rad/s/sqrt(Hz)", "white drift of each gyro; 0: of the grade", 0.0),
+        "accelerometer": Option(0.0, "m/s2", "bias of each accelerometer (rms); 0: of the grade", 0.0),
         "wanted": Option("5arcmin", "rad", "standard deviation of the heading that is ready for use", 1e-6),
         "positions": Option(1, int, "windows of the coarse heading: 1, or 2 half a turn apart", 1, 2),
         "order": Option(3, int, "order of the gyrocompass loop", 2, 3),
@@ -133,9 +137,11 @@ class PlatformAlignment(System):
 
     @property
     def sensors(self) -> plans.Sensors:
-        """Return what the controller is told of its sensors: the grade, and the options of type B."""
+        """Return what the controller is told of its sensors: the grade, what is given beside it, and type B."""
         grade = plans.GRADES.get(self["grade"], plans.GRADES["navigation"])
-        return replace(grade, latitude=self["u_latitude"], scale=self["u_scale"])
+        own = {"bias": "gyro_drift", "markov": "gyro_markov", "white": "gyro_white", "accelerometer": "accelerometer"}
+        given = {n: self[option] for n, option in own.items() if self[option]}
+        return replace(grade, **given, latitude=self["u_latitude"], scale=self["u_scale"])
 
     def settings(self, psi: float = math.pi / 2.0) -> plans.Settings:
         """Return the settings of the controller; psi: rough heading at switch-on, for the time of the turns."""
@@ -155,7 +161,7 @@ class PlatformAlignment(System):
             "platform.theta_0": [self["pitch"], self["roll"], -self["heading"]],
             **three_gyros(parts, self["crossover"]),
             **{f"{slot}.{n}?": getattr(sensors, field) for slot in MOUNTS for n, field in noise.items()},
-            **{f"accelerometers.white_{a}?": sensors.force for a in "xyz"},
+            **{f"accelerometers.{n}?": sensors.force for n in ("white", "white_x", "white_y", "white_z")},
             **self._controller(parts),
         }
 

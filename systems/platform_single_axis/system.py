@@ -43,6 +43,7 @@ class PlatformSingleAxisLoop(OneAxisTest):
         estimator.estimate -> stabilizer.u
         platform.i_motor -> stabilizer.i_motor
         platform.theta -> stabilizer.theta
+        platform.theta -> stabilizer.schedule
     """  # fmt: skip
     on_request = {
         "channel": OnRequest(

@@ -42,12 +42,14 @@ class ScullingMotion:
 
 @dataclass(frozen=True)
 class UnitErrors:
-    """Errors of a unit in axes of the table: gyro, acc (3, 3), 1 + scale factors and misalignments; levers (3, 3):
-    rows: accelerometers from the axis of the angle, m; None: exact.
+    """Errors of a unit in axes of the table: gyro, acc (3, 3), 1 + scale factors and misalignments; bias (3,) of the
+    accelerometers, m/s2, which rocks with the case; levers (3, 3): rows: accelerometers from the axis of the angle, m;
+    None: exact.
     """
 
     gyro: Array | None = None
     acc: Array | None = None
+    bias: Array | None = None
     levers: Array | None = None
 
 
@@ -79,7 +81,8 @@ class VelocityChain:
             return 1.0
         w, wn = 2.0 * math.pi * f, 2.0 * math.pi * bandwidth
         if not self.step:
-            return 1.0 / (1.0 - (w / wn) ** 2 + 1j * math.sqrt(2.0) * w / wn)
+            x = min(w / wn, 1e100)  # its square is a number
+            return 1.0 / (1.0 - x * x + 1j * math.sqrt(2.0) * x)
         pole, h = wn * cmath.exp(0.75j * math.pi), self.step
         z = cmath.exp(1j * w * h)
         p, q = pole, pole.conjugate()
@@ -101,7 +104,8 @@ class VelocityChain:
         turns = _fourier(angles[:, None], [self.gain(f, self.bandwidth) for f in harmonics])
         d = _series(turns, steps) * gyro[:, 0]
         read = _fourier(forces, [self.gain(f, self.acc_bandwidth) for f in harmonics])
-        e = h * (_series(read, steps) @ acc.T)
+        bias = np.zeros(3) if unit.bias is None else unit.bias
+        e = h * (_series(read, steps) @ acc.T + bias)
         parts = [self._increment(d[:, k * n : (k + 1) * n + 1], e[:, k * n : (k + 1) * n + 1])
                  for k in range(self.samples)]  # fmt: skip
         gained = _update(parts)
@@ -109,7 +113,7 @@ class VelocityChain:
         before[1:] = turns[1:] / (np.exp(1j * w * h * np.arange(1, len(turns))) - 1.0)[:, None]
         start = _series(before, psi)
         rotated = Rotation.from_rotvec(start * gyro[:, 0]).apply(gained)
-        return float(rotated[:, 2].mean()) / (T * self.samples) - self.gravity * float(acc[2, 2])
+        return float(rotated[:, 2].mean()) / (T * self.samples) - self.gravity * float(acc[2, 2]) - float(bias[2])
 
     def _steps(self, m: ScullingMotion, w: float, h: float, levers: Array) -> tuple[Array, Array]:
         """Return angle and mean force (., 3) of steps that begin at phases all round the period."""

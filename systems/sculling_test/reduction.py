@@ -234,7 +234,14 @@ def true_values(run: RunDocument, gravity: float) -> dict[str, float] | None:
     """Return what the parameters of a simulated unit make of the motions of the plan; None where they are not known."""
     p = run.parameters
     own = ("bandwidth", "acc_bandwidth", "period", "sculling")
-    known = ("imu.gyro_scale", "imu.acc_scale", "table.levers", *(f"increments.{n}" for n in own), "user.samples")
+    known = (
+        "imu.gyro_scale",
+        "imu.acc_scale",
+        "imu.acc_bias",
+        "table.levers",
+        *(f"increments.{n}" for n in own),
+        "user.samples",
+    )
     if any(n not in p for n in known):
         return None
     step = float(run.step or 0.0)
@@ -247,7 +254,8 @@ def true_values(run: RunDocument, gravity: float) -> dict[str, float] | None:
         face.T @ np.reshape(np.asarray(p[n], dtype=float), (3, 3)) @ face
         for n in ("imu.gyro_scale", "imu.acc_scale", "table.levers")
     )
-    unit = UnitErrors(np.eye(3) + gyro, np.eye(3) + acc, levers)
+    bias = face.T @ np.asarray(p["imu.acc_bias"], dtype=float)
+    unit = UnitErrors(np.eye(3) + gyro, np.eye(3) + acc, bias, levers)
     vibration = float(run.options["vibration"])
     frequencies = sorted({row.target for row in run.plan} - {0.0})
     angle = float(run.options["angle"])

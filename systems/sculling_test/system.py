@@ -150,7 +150,7 @@ class ScullingTest(System):
             "acceleration": "sampler.mean",
         },
     )
-    channels = ("imu.f_read[3]", "table.attitude[2]")
+    channels = ("sampler.mean",)
     channel_period = 0.5
     bodies = ""
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
-from gyrobench.reduction.drift import drift_terms
+from gyrobench.reduction.drift import drift_terms, supplies, window_regressors
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
 from gyrobench.reduction.setup.setups import TurningSetup
@@ -28,6 +28,7 @@ from gyrobench.reduction.setup.sources import INPUT_TO_OUTPUT, INPUT_TO_SPIN, TU
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
+    Effect,
     Findings,
     Location,
     Quantity,
@@ -100,6 +101,13 @@ class Reduction(TurningTest[TumbleSetup]):
 
     def quantity(self, name: str) -> Quantity:
         return drift_terms.quantity(self.setup, name, self.book)
+
+    def effects(self, found: Findings) -> list[Effect]:
+        """Return the sources of a tumble, and the supplies of the gyro."""
+        s, t, read = self.setup, self.turning, self.read
+        x = window_regressors.regressors(t, s.base, s.gravity, ("D_I", "D_O", "D_S"))
+        readings = supplies.rebalanced(self.rate(t), s.k * read.mean)
+        return [*super().effects(found), *s.supplies.effects(found, readings, x, (t.t_start + t.t_end) / 2.0)]
 
     def account(self, found: Findings) -> Account:
         s = self.setup

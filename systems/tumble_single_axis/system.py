@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from gyrobench import drift, frames
 from gyrobench.system.families.handed_axis import pole_axis
-from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SITE, TILT, TORQUER, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SITE, SUPPLY, TILT, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.tumble_test import TumbleTest
@@ -43,6 +43,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         | CORRECTIONS
         | type_b("axis", "mount", "remount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | type_b("pulse", "switching")
+        | SUPPLY
         | TORQUER
     )
     takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis()}

@@ -11,10 +11,10 @@ import numpy as np
 from gyrobench import drift
 from gyrobench.arrays import Array
 from gyrobench.system.families.handed_axis import pole_axis
-from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, TORQUER, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, FOLD, NUISANCES, SETTLE, SITE, SUPPLY, TORQUER, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import REBALANCE, RebalanceTest
-from gyrobench.system.families.table_test import TWO_AXES, sampled, surroundings
+from gyrobench.system.families.table_test import TWO_AXES, sampled, supply, surroundings
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
@@ -50,7 +50,7 @@ class TumbleTwoAxis(RebalanceTest):
         rebalance.i_read -> sampler_inner.x
         {sampled("sampler_inner", "table: angle_y_read")}
     """
-    on_request = surroundings("table: angle_x_read", TWO_AXES)
+    on_request = surroundings("table: angle_x_read", TWO_AXES) | supply()
     bodies = """
         outer ring: base table.base, x table.angle_x
         plate: outer ring, y table.angle_y
@@ -77,6 +77,7 @@ class TumbleTwoAxis(RebalanceTest):
         | type_b("square", "mount", "angle1", "angle2", "wobble",
                  axis="standard uncertainty of the outer axis against the pole")
         | type_b("scale_factor", "nonlinearity", "current", "pulse", "switching")
+        | SUPPLY
         | TORQUER
     )  # fmt: skip
     takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis("outer axis")}

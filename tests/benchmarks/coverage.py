@@ -151,6 +151,31 @@ def exposed(rng: Rng) -> Values:
     return {**floated(rng), **{f"gyro.{n}": rng.uniform(-1.0, 1.0) * v * DPH for n, v in sizes.items()}}
 
 
+def supplied(length: float) -> Callable[[Rng], Values]:
+    """A gyro whose supplies are off, and drift over a record of some ``length`` (s), by what is stated of them."""
+    supplies = {
+        "frequency": ("wheel_frequency", 1e-3),
+        "voltage": ("wheel_voltage", 1e-2),
+        "asymmetry": ("wheel_phase", 1e-2),
+        "pickoff": ("pickoff_excitation", 1e-2),
+        "torquer": ("torquer_excitation", 1e-2),
+    }
+
+    def values(rng: Rng) -> Values:
+        does = {
+            f"gyro.{n}": rng.uniform(-1.0, 1.0) * DPH
+            for n in ("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS")
+        }
+        found = {**floated(rng), **does, "gyro.k_E": rng.uniform(0.0, 0.1)}
+        for name, (option, largest) in supplies.items():
+            u = largest * rng.uniform()
+            found |= {f"u_{option}": u, f"supply.{name}_offset": u * rng.normal()}
+            found[f"supply.{name}_ramp"] = u * rng.normal() / length
+        return found
+
+    return values
+
+
 # ---------------------------------------------------------------------------------------------- noise of the parts
 def of_gyro(n: Noise, _: Values, size: float = 0.02 * DPH) -> Values:
     return {"gyro.white": n.white(size), "gyro.markov": n.markov(size), "gyro.markov_tau": n.tau, "gyro.pickoff": 5e-9}
@@ -214,6 +239,7 @@ STOPPING: Values = {"stops": 24, "stop_dwell": 1.75, "windows": 24, "dwell": 17.
 FAST: Values = {"table.acceleration": 20.0}
 CASES = {
     "tumble_single_axis": Case("tumble_single_axis", TURNING, floated, latitude(12.0, 78.0)),
+    "tumble_single_axis, supplies": Case("tumble_single_axis", TURNING, supplied(130.0), latitude(12.0, 78.0)),
     "tumble_single_axis, stops": Case("tumble_single_axis", STOPPING, floated, latitude(12.0, 78.0)),
     "tumble_two_channel, nine": Case(
         "tumble_two_channel", {**TURNING, **FAST}, two_channels, latitude(20.0, 70.0), of_two_channels
@@ -237,6 +263,13 @@ CASES = {
         latitude(0.0, 70.0),
     ),
     "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
+    "fixed_position, supplies": Case(
+        "fixed_position", {"dwell": 60.0}, supplied(60.0), latitude(0.0, 85.0), attitude=True
+    ),
+    "servo_vertical_level, supplies": Case(
+        "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0}, supplied(550.0), latitude(0.0, 70.0),
+        of_encoder,
+    ),
     "open_loop_drift": Case(
         "open_loop_drift", {"wait": 2.0, "dwell": 0.1}, floated, latitude(0.0, 85.0), of_pickoff(0.1, 0.02 * DPH),
         attitude=True,
@@ -332,10 +365,12 @@ def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> l
     system = load_system(case.system)
     if "channel" in case.values:  # it decides which slots there are
         system.set("channel", case.values["channel"])
-    with Session(system) as session:
-        probe = case.drawn(rng)
-        with seen_windows() as seen:
-            load_system(case.system).with_values(probe).reduce(session.run(probe, seed=1))
+    probe = case.drawn(rng)
+    for slot in system.on_request:
+        if any(n.startswith(f"{slot}.") for n in probe):
+            system.request(slot)
+    with Session(system) as session, seen_windows() as seen:
+        load_system(case.system).with_values(probe).reduce(session.run(probe, seed=1))
     t0, t1, readings = seen[0]
     window = float(np.median(t1 - t0))
     found = []

@@ -3,8 +3,9 @@
     python tests/benchmarks/data_sheets.py [--write] [NAME ...]
 
 Each sheet becomes a part; `drift_record` (an hour, 0.1 s), `rate_table_test`, `gyro_bandwidth` and
-`vibration_rectification` measure it, noise off where the figure is none of noise, so that a difference is one of the
-way from the sheet to the part and of the test.  --write: the table of docs/data_sheets.md anew; some minutes for all.
+`vibration_rectification` measure it, `imu_positions` with a chamber a unit of three of it; noise off where the figure
+is none of noise, so that a difference is one of the way from the sheet to the part and of the test.  --write: the table
+of docs/data_sheets.md anew; some minutes for all.
 """
 
 from __future__ import annotations
@@ -25,21 +26,17 @@ from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import Instrument, find_instrument, parameters, settings
+from gyrobench.workflow.instruments import Instrument, find_instrument, parameters, settings, with_instruments
 from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
 
 PAGE = standard_folder() / "docs" / "data_sheets.md"
 DEG = math.pi / 180.0
-DPH = DEG / 3600.0
+ARCSEC = DPH = DEG / 3600.0
 NEAR = 0.05
 KINDS = ("fibre", "laser", "vibrating")
 ROOM = 0.8  # of the range, up to which the table turns
 NOT_TESTED = {
     "output_rate": "sets nothing: a sample each communication step",
-    "bias_temperature": "the coefficient of the part; `imu_positions` with a chamber tests units, not single gyros",
-    "scale_temperature": "the coefficient of the part; `imu_positions` with a chamber tests units, not single gyros",
-    "misalignment": "needs turns about other axes: `imu_positions` tests units, not single gyros",
-    "cross_axis": "needs turns about other axes: `imu_positions` tests units, not single gyros",
     "range": "the part clips there; readings beyond it are refused",
     "resolution": "steps of the word are averaged out by the noise",
 }
@@ -181,10 +178,31 @@ def sensitivity(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
     yield Row(name, "g_sensitivity", printed, "vibration_rectification", c.estimate * DPH / G0 / value)
 
 
+def unit(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    """Yield misalignment and temperature coefficients, of a unit of three such gyros on a table with a chamber."""
+    asked = {"misalignment": ("Sg_xy", ARCSEC), "cross_axis": ("Sg_xy", ARCSEC),
+             "bias_temperature": ("bgT_x", DPH), "scale_temperature": ("SgT_x", 1e-6)}  # fmt: skip
+    there = {n: of for n, of in asked.items() if sheet.si(n) is not None}
+    if not there:
+        return
+    test = load_system("imu_positions")
+    test.request("chamber")
+    _, values = with_instruments(name, {}, test)
+    key = ("imu_positions", "")
+    if key not in tests.open:
+        tests.open[key] = Session("imu_positions", {"chamber": "thermal_chamber"})
+    options = {"nuisances": "none"}
+    record = tests.open[key].run({**options, **values, **dict.fromkeys(test.noises, 0.0)}, seed=3)
+    found = coefficients(test.with_values(options).reduce(record))
+    for figure, (c, size) in there.items():
+        ratio = found[c].estimate * size / (sheet.si(figure) or math.nan)
+        yield Row(name, figure, sheet.figures[figure].value, "imu_positions", ratio)
+
+
 def rows(tests: Tests, name: str) -> list[Row]:
     """Return a row for each figure of a sheet, in the order of FIGURES."""
     sheet = find_instrument(name)
-    found = {r.figure: r for test in (noise, rates, bandwidth, sensitivity) for r in test(tests, name, sheet)}
+    found = {r.figure: r for test in (noise, rates, bandwidth, sensitivity, unit) for r in test(tests, name, sheet)}
     for figure, printed in sheet.figures.items():
         if figure in found:
             continue

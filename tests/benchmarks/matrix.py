@@ -50,6 +50,7 @@ PLANS: dict[str, tuple[dict[str, Any], float | None]] = {
     "estimator_bench": ({"samples": 13000}, None),
     "fixed_position": ({"readings": 8, "dwell": 8.0, "settle": 1.0}, None),
     "gimbal_stabilization": ({"sweeps": False, "base": 0.0, "ride": 36.0}, 5e-4),
+    "gimbal_tracking": ({"sweeps": False, "base": 0.0, "acquire": 0.0, "ride": 36.0}, 5e-4),
     "gyro_magnetic_compass": ({}, 1.0),
     "gyrocompass": ({"phases": "settling undamped"}, 1.0),
     "north_finder": ({"time": 14.0, "heading": 1.745329, "windows": 8}, None),

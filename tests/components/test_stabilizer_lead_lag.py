@@ -90,6 +90,32 @@ def test_limit_without_wind_up():
     assert part.v > 0.4 and part.saturated == 0.0
 
 
+@pytest.mark.parametrize("step", [1e-3, 2e-4])
+def test_integral_that_waits_within_the_step_is_told(step):
+    """tau2/T2 = 200, K = 2: a jump of 0.1 V is 40 V at the beginning of a step of 1 ms, 100 T2, and 0.2 V at its end.
+
+    The limit of 27 V is met within: the integral waits for the whole step, or for the first of five internal ones, and
+    goes on in the next.  Without a limit in reach, with T2 = the step, or without an integral nothing waits.
+    """
+    given = {"tau1": 1.0, "T1": 1.0, "tau2": 2e-3, "T2": 1e-5, "integral": 3.0, "step": step}
+
+    def flags(**other):
+        part = started(**(given | other))
+        part.u = 0.1
+        found = []
+        for k in range(2):
+            part.do_step(1e-3 * k, 1e-3)
+            assert abs(part.v) < 1.0
+            found.append(part.saturated)
+        return found, part.sum
+
+    told, sum_ = flags()
+    assert told == [1.0, 0.0] and sum_ == pytest.approx(3.0 * 0.1 * (2e-3 - step), rel=0.1)
+    told, sum_ = flags(v_max=50.0)
+    assert told == [0.0, 0.0] and sum_ > 3.0 * 0.1 * 2e-3
+    assert flags(integral=0.0)[0] == flags(tau2=2e-3, T2=1e-3)[0] == [0.0, 0.0]
+
+
 @pytest.mark.parametrize("given, flag", [({}, 0.0), ({"tau1": 2.5}, 1.0), ({"tau2": 0.3}, 1.0), ({"T2": 0.03}, 1.0)])
 def test_order_is_flagged(given, flag):
     assert started(**given).unordered == flag

@@ -21,7 +21,7 @@ from gyrobench.packaging.dependencies import reached
 from gyrobench.packaging.reference import read_reference
 from gyrobench.packaging.source import PartCode
 
-SIZES = {"rad/s": 1e-3, "rad": 1e-3, "A": 1e-3, "V": 1e-3}
+SIZES = {"rad/s": 1e-3, "A": 1e-3, "V": 1e-3, "1": 1e3}
 
 
 class Traced:

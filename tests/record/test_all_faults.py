@@ -57,7 +57,8 @@ def test_time_series(tmp_path: Path) -> None:
         "column 'temperature': wrong unit [deg]",
         "row 37: '# note = late' stands among the rows",
         "a row has not the 3 cells of the header; the first: '7,0.5' (row 14)",
-        "column 'current': 1 cell is not a number, the first: 'off' (the decimal sign of this file is a point; row 10)",
+        "column 'current': 1 cell is not a number, the first: 'off' "
+        "(a missing value? column map: absent = ['off']; row 10)",
         "time does not increase in 1 row, the first: '17.5' (row 27)",
     ]
     assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
@@ -72,6 +73,7 @@ def test_drift_record(tmp_path: Path) -> None:
         "row 1: '# chanel = rate': unknown key 'chanel'; did you mean 'channel'",
         "samples = averages: must be 'means'",
         "a row has not the 3 cells of the header; the first: '5,0.5' (row 9)",
-        "column 'rate': 1 cell is not a number, the first: 'off' (the decimal sign of this file is a point; row 7)",
+        "column 'rate': 1 cell is not a number, the first: 'off' "
+        "(a missing value? column map: absent = ['off']; row 7)",
     ]
     assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said

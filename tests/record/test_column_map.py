@@ -200,6 +200,20 @@ def test_proposal_for_a_drift_record_of_a_logger(tmp_path: Path) -> None:
     assert outcome.record.run.series["unused"] == []
 
 
+def test_proposal_with_a_form_of_dates_in_the_row_of_units(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{k};02.03.2026 22:15:{k:02d};10,{k};23,5;OK\n" for k in range(9))
+    head = "Messprotokoll;;;;\n\nNr.;Uhrzeit;Omega, roh (°/h);Temp. in °C;Status\n;TT.MM.JJJJ hh:mm:ss;°/h;°C;-\n"
+    log.write_text(head + rows, encoding="cp1252")
+    layout = find_layout(log)
+    assert (layout.skip, layout.below, layout.decimal) == (2, 1, ",")
+    assert [(c.name, c.unit) for c in layout.columns][1:4] == [
+        ("Uhrzeit", ""),
+        ("Omega, roh", "°/h"),
+        ("Temp.", "degC"),
+    ]
+
+
 def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
     """Their units are not guessed: each is asked for."""
     rows = "".join(f"{0.01 * k:.2f},{k % 7},{k % 5},{20 + k % 3}\n" for k in range(600))

@@ -175,6 +175,7 @@ def test_from_a_run() -> None:
     r = system.reduce(Record(T.record(s, drift.STANDARD, turn=36), {}, document))
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
     assert "before the end of its plan" in r.warnings[0] and r.simulated and r.provenance["plan"] == plan
+    assert next(x for x in r.reasons if x.id == "record.incomplete").blocks == ("pass", "fail")
     del document.parameters["gyro.k"]
     with pytest.raises(ReductionError, match="scale factor unknown"):
         T.reduction.Reduction.setup_of(document)

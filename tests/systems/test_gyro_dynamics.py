@@ -207,6 +207,13 @@ def test_mistakes_are_named(tmp_path: Path, kind: str, said: str) -> None:
     assert said in reasons[0] if said else not reasons
 
 
+def test_a_frequency_that_is_none(tmp_path: Path) -> None:
+    rows = sines()
+    rows[:, 0] *= 1e-300
+    with pytest.raises(ReductionError, match="is their unit right"):
+        measured(tmp_path, SINES, rows)
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [({"lowest": 400.0}, "must be below highest"), ({"axis": "spin"}, "input or output"), ({"steps": 2}, "at least 3"),

@@ -11,8 +11,9 @@ import pytest
 from gyrobench import units
 from gyrobench.component.blocks.random_drift import INNER, OUTER, RATIO, RELAXATIONS
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import find_instrument, parameters
+from gyrobench.workflow.instruments import find_instrument, parameters, with_instruments
 from systems.north_finder.after import RandomErrors, heading, in_words, level, reached_after, running, table
+from systems.north_finder.reduction import NorthFinderSetup, Reduction
 
 DEG = math.pi / 180.0
 DPH = DEG / 3600.0
@@ -84,6 +85,15 @@ def test_a_sheet_runs_without_density(sheet: str, stated: float) -> None:
     assert RandomErrors.of({"electronics": 0.0, "optical": 1.0}) is None
     system = load_system("north_finder")
     assert any("density" in p for p in system.check_parameters({"gyro.electronics": 0.0, "gyro.optical": 1.0}))
+
+
+def test_a_bias_beyond_the_earth_rate_gives_no_heading_in_one_position() -> None:
+    """mpu6050: within 20 °/s, u 41570 °/h, of a horizontal Earth rate of 10.6 °/h; ln200: 1 °/h, three times less."""
+    for sheet, u, lost in (("mpu6050", 20.0 * 3600.0 / math.sqrt(3.0), True), ("ln200", 1.0, False)):
+        _, values = with_instruments(sheet, {}, load_system("north_finder"))
+        assert values["u_bias"] == pytest.approx(u * DPH)
+        setup = NorthFinderSetup(latitude=45.0 * DEG, gravity=9.8, method="strapdown", u_bias=values["u_bias"])
+        assert any("take the method strapdown two" in p for p in Reduction({}, setup).problems()) == lost
 
 
 def test_the_page_is_what_its_script_makes() -> None:

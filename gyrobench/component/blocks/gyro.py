@@ -237,9 +237,13 @@ class SdfGyro(Component):
         """Return the precession rate by the torquer."""
         return torquer_rate(self.k * (1.0 + self.k_T * self.temperature), self.k2, self.k3, self.i)
 
+    def gain(self) -> Number:
+        """Return the gain of the pickoff, V/rad."""
+        return self.K_sg
+
     def outputs(self) -> None:
         self.drift = self.drift_rate()
         self.b = self.float_angle
-        unlimited = self.K_sg * self.float_angle + self.noise.pickoff
+        unlimited = self.gain() * self.float_angle + self.noise.pickoff
         self.u = clip(unlimited, -self.u_max, self.u_max)
         self.saturated = 1.0 if self.u != unlimited else 0.0

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from gyrobench import drift, frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import pulses as pulse_sources
 from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
+from gyrobench.reduction.drift.supplies import Supplies
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.setup.run_metadata import number, truth_of
@@ -43,12 +44,13 @@ AXES = {"I": "X", "O": "Y", "S": "Z"}
 @dataclass(frozen=True, kw_only=True)
 class OneLoopSetup(RebalanceSetup):
     """One rebalance loop.  k: torquer scale factor, rad/s/A.  quantum: resolution of the current reading.  pulses:
-    those of a pulse-width rebalance, where the current was counted.
+    those of a pulse-width rebalance, where the current was counted.  supplies: what the gyro's supplies do.
     """
 
     k: float
     quantum: float = 0.0
     pulses: Pulses | None = None
+    supplies: Supplies = field(default_factory=Supplies)
     u_pulse: float = 0.0
     u_switching: float = 0.0
 
@@ -59,6 +61,7 @@ class OneLoopSetup(RebalanceSetup):
         shared["truth"] = truth_of(run, drift.NAMES)
         shared["quantum"] = float(run.parameters.get("rebalance.resolution", 0.0))
         shared["pulses"] = Pulses.of(run)
+        shared["supplies"] = Supplies.of(run)
         return super().of(run, **{**shared, **own})
 
     def problems(self, folding: bool = True) -> list[str]:

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels, composite, drift_terms, servo_regression
+from gyrobench.reduction.drift.supplies import Supplies
 from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
 from gyrobench.reduction.estimation.linear_fit import Regression
@@ -49,6 +50,7 @@ class HeldSetup(SiteSetup):
     gain: float = 0.0
     k_locked: float = 0.0
     k: float = 0.0
+    supplies: Supplies = field(default_factory=Supplies)
     u_scale_factor: float = 0.0
     u_axis: float = 0.0
     u_mount: float = 0.0
@@ -72,6 +74,7 @@ class HeldSetup(SiteSetup):
             "k_locked": p.get(f"gyro.k_{channel}", 0.0) if channel else 0.0,
             "truth": channels.truth_in(run, channel),
             "remount": remount_of(run),
+            "supplies": Supplies.of(run),
         }
         made = super().of(run, **{**known, **own})
         return replace(made, errors=channels.errors_in(made.errors, channel))
@@ -122,10 +125,21 @@ class HeldTest(DriftReduction[H]):
         return Regression(quantities, X, y, h.t_start, h.t_end, groups, noise="readings", candidates=weighed)
 
     def effects(self, found: Findings) -> list[Effect]:
-        known = servo_regression.effects(self.held, self.setup.place, found, self.columns, self.phase, self.setup)
-        if self.held.torqued is None:
-            return known
-        return [*known, TORQUER_SCALE.effect(self.setup, found.error(-self.held.torqued))]
+        s, h = self.setup, self.held
+        known = servo_regression.effects(h, s.place, found, self.columns, self.phase, s)
+        if h.torqued is not None:
+            known.append(TORQUER_SCALE.effect(s, found.error(-h.torqued)))
+        return [*known, *s.supplies.effects(found, self._by_supplies(), self._gravity(), (h.t_start + h.t_end) / 2.0)]
+
+    def _gravity(self) -> Array:
+        """Return the means of (X, Y, Z) over the windows (n, 3)."""
+        return servo_regression.design(self.held, self.setup.place, ("D_I", "D_O", "D_S"))
+
+    def _by_supplies(self) -> dict[str, Array]:
+        """Return what Supplies.effects asks for: theta' + omega_E = (omega_d + k i)/(1 + f)."""
+        turned = servo_regression.drift_rate(replace(self.held, torqued=None), self.setup.place)
+        torque = np.zeros_like(turned) if self.held.torqued is None else self.held.torqued
+        return {"frequency": -turned, "drift": np.ones_like(turned), "torque": torque}
 
     def mine(self, phase: int) -> NDArray[np.bool_]:
         """Return the rows (n,) of a phase."""

@@ -24,7 +24,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
-from gyrobench.reduction.drift import drift_terms
+from gyrobench.reduction.drift import drift_terms, supplies
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.pulses import CurrentWindows
 from gyrobench.reduction.estimation import nuisances
@@ -134,12 +134,15 @@ class RestTest(DriftReduction[S]):
         return found.error(rate, self.design(other) - found.X) / SMALL
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the sources that such a test has: mount of the gyro, torquer, current reading."""
-        s = self.setup
+        """Return the sources that such a test has: mount of the gyro, torquer, current reading, supplies."""
+        s, axes = self.setup, self.axes
+        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
+        readings = supplies.rebalanced(self.rate(axes), s.k * self.read.mean)
         turned = (self.believed(found, frames.rotation(d, SMALL) @ self.axes) for d in np.eye(3))
         return [
             *(TURNED[n].effect(s, e) for n, e in zip(("input", "output", "spin"), turned, strict=True)),
             *drift_terms.torquer_effects(s, found, s.k, self.read, s.quantum, s.pulses),
+            *s.supplies.effects(found, readings, -axes @ frames.U * s.gamma, (t0 + t1) / 2.0),
         ]
 
     @property

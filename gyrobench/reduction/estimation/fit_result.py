@@ -248,7 +248,7 @@ def budget_lines(fit: Findings, effects: Sequence[Effect], random: str) -> list[
         for id, unit, source, size, changes, said in sources:
             change = float(changes[j]) / q.scale
             if size > 0.0 and abs(change) * size > 1e-9 * u_a:
-                per = q.unit if unit == "1" else f"{q.unit}/{unit}"
+                per = q.unit if unit == "1" else f"{q.unit}·{unit[2:]}" if unit.startswith("1/") else f"{q.unit}/{unit}"
                 line = (size, unit, change, per, abs(change) * size, q.unit, q.title, said)
                 lines.append(BudgetLine(id, source, *line))
     return lines

@@ -111,6 +111,8 @@ def _corrected(c: Coefficient, taken: float) -> Coefficient:
 
 def _widened(c: Coefficient, part: float) -> Coefficient:
     """U2 = (k u)2 + (1.96 part)2: the step's part has many degrees of freedom."""
+    if part == 0.0:
+        return c  # its interval may be one-sided
     half, u = math.hypot(c.k * c.u, NORMAL * part), math.hypot(c.u, part)
     z = (c.estimate - c.truth) / u if c.z is not None and c.truth is not None and u > 0.0 else c.z
     k = half / u if u > 0.0 else c.k

@@ -16,6 +16,7 @@ from gyrobench.reduction.series.deviations import Deviation
 ENOUGH = 0.95  # of the averaging times
 PART = 0.1  # of the record: longest averaging time
 SHORTEST = 2  # samples: least averaging time
+NARROW = 0.5  # rad, phase over an averaging time below which a cell is narrow against its frequency
 LOW_CELLS, CELLS = 4000, 1 << 15  # of the spectrum that decides the degrees of freedom: equal logarithms, equal width
 
 
@@ -103,7 +104,9 @@ def with_spectrum(own: Deviation, model: Model, p: Array, spread: float = 1.0) -
         # the mean of sin^8(m omega/2) over each cell, which may hold many of its periods
         wave = np.array([np.cos(k * m * omega) * np.sinc(0.5 * k * m * width / np.pi) for k in (1, 2, 3, 4)])
         eighth = (35.0 - 56.0 * wave[0] + 28.0 * wave[1] - 8.0 * wave[2] + wave[3]) / 128.0
-        fourth = float(np.sum(width * y * y * np.maximum(eighth, 0.0))) * 4.0 / (np.pi * m**4)
+        # at low frequency the sum cancels to rounding errors, which y of a random walk magnifies; the cells are narrow
+        eighth = np.where(m * omega < NARROW, np.sin(0.5 * m * omega) ** 8, np.maximum(eighth, 0.0))
+        fourth = float(np.sum(width * y * y * eighth)) * 4.0 / (np.pi * m**4)
         edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / fourth)
     edf = np.maximum(edf / max(spread, 1.0), 1.0)
     low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))

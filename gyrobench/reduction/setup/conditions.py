@@ -76,7 +76,7 @@ def reasons(record: Record) -> list[Reason]:
         found.append(Reason(TYPE_B_UNSTATED, text, blocks=("pass",), severity="doubt"))
     if not run.complete:
         text = f"The run stopped at {run.stopped_at or 0.0:.6g} s, before the end of its plan."
-        found.append(Reason("record.incomplete", text, severity="error"))
+        found.append(Reason("record.incomplete", text, blocks=("pass", "fail"), severity="error"))
     return found
 
 

@@ -12,7 +12,8 @@ A system has sources of its own by declaring them in its folder, in the same way
 
 The way of a statement ``--set u_axis=60arcsec``:
 
-1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI.
+1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI, into
+   the field of the same name, which the setup of the test must have.
 2. ``effects`` of the test pairs it with what one unit does to the data: :meth:`Source.effect`.
 3. ``with_set_up`` (estimation.effects) puts size times error into the covariance of the data, but for a source that is
    relative to the reading, and takes corrections out of the data.
@@ -184,6 +185,26 @@ TURNED = {
 REMOUNT = Source("mount.scatter", "drift from mount to mount", "rad/s", "u_remount", "of each mount by itself")
 LATITUDE = Source("latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",))
 GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity")
+
+# ------------------------------------------------------------------------------------------------ its supplies
+#: departure of each at the start of the record; its drift over the record is a source beside it: :func:`drifting`
+SUPPLIES = {
+    name: Source(f"supply.{name}", title, unit, option, "departure from the nominal value, at the start")
+    for name, title, unit, option in (
+        ("frequency", "frequency of the wheel supply", RELATIVE, "u_wheel_frequency"),
+        ("voltage", "voltage of the wheel supply", RELATIVE, "u_wheel_voltage"),
+        ("phase", "phases of the wheel supply", "rad", "u_wheel_phase"),
+        ("pickoff", "excitation of the pickoff", RELATIVE, "u_pickoff_excitation"),
+        ("torquer", "excitation of torquer or suspension", RELATIVE, "u_torquer_excitation"),
+    )
+}
+
+
+def drifting(source: Source) -> Source:
+    """Return the drift of a supply, whose change over the record is as uncertain as its departure at the start."""
+    unit, note = "rad/s" if source.unit == "rad" else "1/s", "over the record as uncertain as at the start"
+    return replace(source, id=f"{source.id}.drift", name=f"{source.name}, drift", unit=unit, option="", note=note)
+
 
 # ------------------------------------------------------------------------------------------------ current and readings
 TORQUER_SCALE = Source(

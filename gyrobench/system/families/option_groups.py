@@ -63,6 +63,11 @@ _TYPE_B = {
     "pulse": ("A", "standard uncertainty of the positive less the negative current of a pulse rebalance"),
     "switching": ("s", "standard uncertainty of the switching time of a pulse rebalance"),
     "time": ("1", "relative standard uncertainty of the time base"),
+    "wheel_frequency": ("1", "relative std. unc. of the wheel's frequency, and of its change over the record"),
+    "wheel_voltage": ("1", "relative std. unc. of the wheel's voltage, and of its change over the record"),
+    "wheel_phase": ("rad", "std. unc. of the phases of the wheel's supply, and of its change over the record"),
+    "pickoff_excitation": ("1", "relative std. unc. of the pickoff's excitation, and of its change over the record"),
+    "torquer_excitation": ("1", "the same of the excitation of torquer or suspension"),
 }
 
 
@@ -73,3 +78,11 @@ def type_b(*names: str, **meanings: str) -> dict[str, Option]:
     """
     known = {**{n: _TYPE_B[n][1] for n in names}, **meanings}
     return {f"u_{n}": Option(0.0, _TYPE_B[n][0], text, 0.0) for n, text in known.items()}
+
+
+#: electrical supplies of the gyro  [GYRO-SUPPLY]
+SUPPLY = {
+    "supply_terms": Option(
+        "", str, "what supplies do to the gyro (D_pickoff=0.1deg/h, D_US=1deg/h/g ...); empty: as set"
+    ),
+} | type_b("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled, surroundings
+from gyrobench.reduction.drift.supplies import supply_problems
+from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled, supply, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Slot
 
@@ -34,7 +35,7 @@ class RebalanceTest(TableTest):
 
     slots: ClassVar[Mapping[str, Slot]] = on_table(table="Table", gyro="SdfGyro", rebalance="Rebalance")
     wires = TableTest.wires + REBALANCE
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings() | supply()
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "rebalance.meter")
     channels: ClassVar[tuple[str, ...]] = ("gyro.u", "rebalance.i", "gyro.drift")
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, *pulse_errors("rebalance"))
@@ -68,7 +69,7 @@ class RebalanceTest(TableTest):
         ]
 
     def check(self) -> list[str]:
-        problems = super().check()
+        problems = super().check() + supply_problems(self.values)
         if self.step > STEP_MAX:
             problems.append(
                 f"step = {self.step:g} s: the rebalance loop exchanges once a step and needs at most {STEP_MAX:g} s"
@@ -87,6 +88,7 @@ class TwoChannelTest(RebalanceTest):
         **{f"rebalance_{a}": Slot("Rebalance") for a in "xy"},
         **{f"sampler_{a}": Slot("Sampler", "sampler") for a in "xy"},
     }
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
     wires = (
         TABLE
         + """

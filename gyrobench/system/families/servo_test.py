@@ -22,7 +22,7 @@ from gyrobench import frames
 from gyrobench.attitudes import SERVO_ATTITUDES
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.configurable import Option
-from gyrobench.system.families.option_groups import SITE, type_b
+from gyrobench.system.families.option_groups import SITE, SUPPLY, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.servo_channel import CHANNEL, ChannelTest, gyro_on_table, own_name
 from gyrobench.system.families.servo_expectation import Expected, capture_problems
@@ -33,6 +33,7 @@ from gyrobench.system.families.table_test import (
     TableTest,
     on_table,
     sampled,
+    supply,
     surroundings,
 )
 from gyrobench.system.lab_record import read_record
@@ -99,7 +100,7 @@ class ServoTest(ChannelTest, TableTest):
     gyro -> sampler: u=x saturated=flag
     {sampled()}
     """
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=ON_STAND)
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings(turned=ON_STAND) | supply()
     bodies = """
         stand: mounts stand
         table: stand, base table.base, x table.tilt[1], y table.tilt[2], z table.angle
@@ -121,6 +122,7 @@ class ServoTest(ChannelTest, TableTest):
             axis="standard uncertainty of the table axis, about each axis, each phase",
             mount="standard uncertainty of the input axis against the table axis",
         )
+        | SUPPLY
     )
     shorter: ClassVar[str] = "ask for less travel"  # what to do where a travel takes too long
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, "stand.base", "stand.mounts")

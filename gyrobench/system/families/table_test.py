@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.system.connectors import Socket
+from gyrobench.system.connectors import SUPPLIES, Socket
 from gyrobench.system.families.option_groups import GYRO_NOISES, SITE
 from gyrobench.system.families.physical_form import physical_drift
 from gyrobench.system.part_values import PartValues
@@ -79,6 +79,13 @@ def surroundings(angle: str = "table: angle_read", turned: str = ONE_AXIS) -> di
     return {"surroundings": OnRequest(slots, wires, columns, ("surroundings.temperature",))}
 
 
+def supply() -> dict[str, OnRequest]:
+    """Return the slot with the electrical supplies of the gyro."""
+    names = " ".join(c.name for c in SUPPLIES)
+    slots = {"supply": Slot("Supply", "supply")}
+    return {"supply": OnRequest(slots, f"supply -> gyro: {names}", channels=("supply.wheel_frequency",))}
+
+
 class TableTest(System):
     """The sequencer moves the table through the plan; the sampler averages a reading over windows of each phase.
 
@@ -145,6 +152,6 @@ class OpenLoopTest(TableTest):
     gyro -> sampler: u=x saturated=flag
     """
     )
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings() | supply()
     open: ClassVar[tuple[str, ...]] = ("gyro.i",)
     noises: ClassVar[tuple[str, ...]] = SDF_NOISES

@@ -119,10 +119,10 @@ def _records(reader: Reader, name: str, step: Step) -> None:
 
 
 def _runs_of_days(reader: Reader, name: str, step: Step) -> None:
-    """Write the file that the page shows: the one column `run` with the folders of runs."""
+    """Write the file that the page shows, the one column `run`, and these runs: of one plan, each with its seed."""
     (text,) = (s.text for s in reader.steps if s.kind == "shown" and s.text.startswith("run\n"))
-    for folder in text.split()[1:]:
-        _saved_run(reader, folder, step)
+    folders = [reader.here / f for f in text.split()[1:]]
+    _short_runs(reader, folders, folders[0].parent.name)
     reader.write(name, text)
 
 

@@ -6,7 +6,7 @@ a test signal where a loop is opened.
     vibration of the base     T_base / s       on the rates of the base that were recorded
     acceleration              T_torque u x     on its acceleration; unbalance u, at the mean joint angles
     dry friction, cogging     T_torque         on the torques that the recorded joint angles make
-    roll times joint angle    S / s, T_torque  on the rate and the torque of second order (roll_coupling)
+    roll times joint angle    S / s, T_torque  on the rate and the torque of second order (sight_roll)
     noise of the gyro         T_test F / cos   F its filter; 1/cos of the outer axis alone; by its density
 
 The linear model takes a contact for a spring and cogging for its slope.  Where the joints move by more than
@@ -30,12 +30,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyrobench.arrays import Array
+from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.jitter import Complex, Spectra, segments, spectra
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.margins import excitation_response
-
-from .roll_coupling import roll_coupling
+from gyrobench.reduction.loops.sight_roll import roll_coupling
 
 PAIR = (0, 1)  # pitch, yaw
 EXCITED = (1, 3)  # their elements of the exciter
@@ -64,10 +64,13 @@ class Ride:
     angles: tuple[float, float]  # mean joint angles, rad
 
 
-def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float) -> Ride | None:
-    """Return what the ride shows; None where it is too short for its lowest frequency, Hz."""
+def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float, sight: tuple[str, str] = LOS) -> Ride | None:
+    """Return what the ride shows; None where it is too short for its lowest frequency, Hz.
+
+    sight: channels of the angles whose jitter it is.
+    """
     dt = float(gate.t[1] - gate.t[0])
-    los = [spectra(dt, gate[name], lowest) for name in LOS]
+    los = [spectra(dt, gate[name], lowest) for name in sight]
     if los[0] is None or los[1] is None:
         return None
 
@@ -117,6 +120,14 @@ def contact(theta: Array, of: Mapping[str, float], presliding: float) -> Array:
     return found
 
 
+def closed_model(found: LoopFindings) -> LinearModel:
+    """Return the closed linear model with the step.  Raises LookupError where there is none."""
+    model = found.linear.closed.discrete
+    if model is None:
+        raise LookupError("no linear model")
+    return model
+
+
 class Ways:
     """Responses of the line of sight (rows pitch, yaw) in the closed linear model.
 
@@ -124,9 +135,7 @@ class Ways:
     """
 
     def __init__(self, found: LoopFindings, f: Array, slides: bool) -> None:
-        model = found.linear.closed.discrete
-        if model is None:
-            raise LookupError("no linear model")
+        model = closed_model(found)
         p = found.record.run.parameters
 
         def to(names: tuple[str, ...], kind: str, axes: tuple[int, ...]) -> Complex:
@@ -207,7 +216,19 @@ class JitterSource:
     part: Array
 
 
-def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[str, JitterSource]:
+@dataclass(frozen=True)
+class MoreSources:
+    """Sources beside those of the gimbal: what they move, with phases (line of sight, segments, frequencies), and
+    densities of independent ones (line of sight, frequencies).
+    """
+
+    moved: Mapping[str, Complex]
+    noise: Mapping[str, Array]
+
+
+def by_source(
+    found: LoopFindings, ride: Ride, use: NDArray[np.bool_], more: MoreSources | None = None
+) -> dict[str, JitterSource]:
     """Return the sources of the line of sight at the frequencies of its spectra that are used.
 
     Raises LookupError without a linear model of the parts that is needed.
@@ -233,6 +254,7 @@ def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[s
     along = np.eye(2)[outer]
     add("roll times joint angle", ways.rate[:, outer, None] * along, ride.second[0])
     add("roll times joint angle", (ways.torque * at_the_body(p, f)[:, None, :])[:, :, outer], ride.second[1])
+    moved |= more.moved if more else {}
     whole = sum(moved.values(), np.zeros((), complex))
     sources = {
         name: JitterSource(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))
@@ -243,7 +265,7 @@ def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_]) -> dict[s
     if white and "gyro.bandwidth" in p:
         density = _gyro(p, ride, ways, 2.0 * white**2)
         sources["noise of the gyro"] = JitterSource(density, density)
-    return sources
+    return sources | {name: JitterSource(y, y) for name, y in (more.noise if more else {}).items()}
 
 
 def _gyro(p: Mapping[str, Any], ride: Ride, ways: Ways, density: float) -> Array:

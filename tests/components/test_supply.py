@@ -1,0 +1,84 @@
+"""Supplies of a gyro: their time functions, and what a floated gyro makes of them, against its equation of motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from wired import BENCH
+
+from gyrobench.packaging.loading import load_part
+
+Supply, Gyro = load_part("supply", BENCH), load_part("floated_gyro", BENCH)
+OUTPUTS = ("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")
+BLOCKS = ("frequency", "voltage", "asymmetry", "pickoff", "torquer")
+
+
+def test_departure_in_time() -> None:
+    """offset + ramp t + step + swing sin(2 pi t / 4 + 0.3), each output by its own parameters: 1, 2 ... 5 times."""
+    one = {"offset": 1e-3, "ramp": 2e-5, "step": -4e-3, "swing": 3e-4}
+    values = {f"{b}_{n}": k * v for k, b in enumerate(BLOCKS, 1) for n, v in one.items()}
+    part = Supply(step_time=2.5, period=4.0, phase=0.3, **values)
+    part.initialize()
+    for j in range(5):
+        t = float(j)
+        if j:
+            part.do_step(t - 1.0, 1.0)
+        expected = 1e-3 + 2e-5 * t - 4e-3 * (t >= 2.5) + 3e-4 * math.sin(math.pi * t / 2.0 + 0.3)
+        got = [getattr(part, n) for n in OUTPUTS]
+        assert got == pytest.approx([k * expected for k in range(1, 6)], rel=1e-12)
+
+
+def test_wander_has_its_rms_and_correlation() -> None:
+    """e^(-1/5) from one second to the next; the standard error of both over 8000 values is below 3 %."""
+    part = Supply(tau=5.0, pickoff_wander=2e-4, seed=3)
+    part.initialize()
+    x = []
+    for k in range(8000):
+        part.do_step(float(k), 1.0)
+        x.append(part.pickoff_excitation)
+    a = np.array(x)
+    assert a.std() == pytest.approx(2e-4, rel=0.1)
+    assert np.corrcoef(a[1:], a[:-1])[0, 1] == pytest.approx(math.exp(-0.2), abs=0.03)
+    assert part.wheel_frequency == 0.0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_floated_gyro_against_its_torques(seed: int) -> None:
+    """J b'' + C b' = H (1 + f)(w_I cos b - w_S sin b) + torques.  Those of drift and torquer are the nominal ones, for
+    they do not turn with the wheel; reaction torques go with the square of the excitation.
+    """
+    rng = np.random.default_rng(seed)
+    f, v, p, e, a = rng.normal(size=5) * 0.02
+    w, g, i = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 6.0, 1e-3
+    given = dict(
+        zip(("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS"), rng.normal(size=6) * 3e-6, strict=True)
+    )
+    gyro = Gyro(white=0.0, markov=0.0, pickoff=0.0, k_E=0.7, reaction=True, **given)
+    gyro.initialize()
+    for name, x in zip(OUTPUTS, (f, v, p, e, a), strict=True):
+        setattr(gyro, name, x)
+    for j in range(3):
+        gyro.omega[j], gyro.f[j] = w[j], g[j]
+    gyro.i = i
+    for n in range(20):
+        gyro.do_step(n * 1e-3, 1e-3)
+    X, Y, Z = -g / 9.80665
+    D_I, D_S = gyro.D_I + given["D_UI"] * v + given["D_PI"] * p, gyro.D_S + given["D_US"] * v + given["D_PS"] * p
+    D_F = gyro.D_F + given["D_pickoff"] * ((1 + e) ** 2 - 1) + given["D_torquer"] * ((1 + a) ** 2 - 1)
+    nominal = D_F + D_I * X + gyro.D_O * Y + D_S * Z + gyro.D_II * X * X + gyro.D_SS * Z * Z
+    nominal += gyro.D_IO * X * Y + gyro.D_OS * Y * Z + gyro.D_IS * X * Z
+    torque = -gyro.H * (nominal + gyro.k * (1 + 0.7 * a) * i)
+
+    def rhs(_: float, y: np.ndarray) -> list[float]:
+        sensed = w[0] * math.cos(y[0]) - w[2] * math.sin(y[0])
+        return [y[1], (gyro.H * (1 + f) * sensed + torque - gyro.C * y[1]) / gyro.J]
+
+    b, rate = solve_ivp(rhs, (0.0, 0.02), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y[:, -1]
+    assert gyro.b == pytest.approx(b, rel=1e-10)
+    assert gyro.u == pytest.approx(gyro.K_sg * (1 + e) * b, rel=1e-10)
+    assert gyro.drift == pytest.approx(nominal / (1 + f), rel=1e-12)
+    assert gyro.h_I == pytest.approx(gyro.H * (1 + f) * math.sin(b + 0.5e-3 * rate), rel=1e-6)
+    assert gyro.M_react[1] == pytest.approx(gyro.C * rate - torque, rel=1e-9)

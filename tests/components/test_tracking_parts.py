@@ -1,0 +1,170 @@
+"""Target, tracker and tracking controller by hand: kinematics, delay, resolution, field of view, limits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from wired import BENCH
+
+from gyrobench.component import ComponentError
+from gyrobench.linear.part_linearization import jacobians
+from gyrobench.packaging import load_part
+
+Target = load_part("moving_target", BENCH)
+Tracker = load_part("optical_tracker", BENCH)
+Controller = load_part("tracking_controller", BENCH)
+H = 1e-3
+SINES = {"kind": 1, "rate": [0.2, -0.4], "amplitude": [0.3, 0.5], "frequency": 0.7, "lead": 1.1}
+
+
+def moved(t: float, **given: Any) -> Any:
+    """Return a target that has moved for t s, at once."""
+    part = Target(**given)
+    part.initialize()
+    part.do_step(0.0, t)
+    return part
+
+
+@pytest.mark.parametrize("given", [SINES, {"kind": 2, "distance": 300.0, "velocity": [40.0, -60.0, 15.0]}])
+@pytest.mark.parametrize("t", [0.4, 3.1])
+def test_rates_are_derivatives_of_the_direction(given: dict[str, Any], t: float) -> None:
+    """omega = u x u', alpha its derivative: central differences over 2e-4 s, error h2/6 of the third derivative."""
+    d = 1e-4
+    before, now, after = (moved(t + x, **given) for x in (-d, 0.0, d))
+    u = [np.array(p.direction) for p in (before, now, after)]
+    assert np.linalg.norm(u[1]) == pytest.approx(1.0, abs=1e-15)
+    assert np.array(now.omega) == pytest.approx(np.cross(u[1], (u[2] - u[0]) / (2 * d)), abs=1e-6)
+    slope = (np.array(after.omega) - np.array(before.omega)) / (2 * d)
+    assert np.array(now.alpha) == pytest.approx(slope, abs=1e-6)
+
+
+def test_fly_by_is_fastest_where_it_is_nearest() -> None:
+    """500 m past at 100 m/s from 1000 m: nearest after 866 m, 8.66 s; v/d = 0.2 rad/s, no acceleration."""
+    part = moved(5.0 * math.sqrt(3.0), kind=2, distance=1000.0, velocity=[50.0, -50.0 * math.sqrt(3.0), 0.0])
+    assert np.array(part.omega) == pytest.approx([0.0, 0.0, -0.2], abs=1e-12)
+    assert np.array(part.alpha) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_target_waits_for_its_phase_and_does_not_fly_through_the_tracker() -> None:
+    part = Target(first=3, **SINES)
+    part.initialize()
+    part.do_step(0.0, 1.0)
+    assert part.direction == [0.0, 1.0, 0.0] and part.omega == [0.0, 0.0, 0.0]
+    with pytest.raises(ComponentError, match="leads through the tracker"):
+        Target(kind=2, velocity=[0.0, -10.0, 0.0]).initialize()
+
+
+def tracked(count: int, omega: tuple[float, float, float] = (0.0, 0.0, 0.0), at: Any = None, **given: Any) -> list[Any]:
+    """Return (miss, error, lost) after each millisecond."""
+    part = Tracker(image_noise=0.0, **given)
+    part.omega = list(omega)
+    if at is not None:
+        part.direction = [-math.sin(at(0.0)), math.cos(at(0.0)), 0.0]
+    part.initialize()
+    found = []
+    for k in range(count):
+        if at is not None:
+            a = at((k + 1) * H)
+            part.direction = [-math.sin(a), math.cos(a), 0.0]
+        part.do_step(k * H, H)
+        found.append((list(part.miss), list(part.error), part.lost))
+    return found
+
+
+def test_place_of_a_fixed_target_in_a_turning_tracker() -> None:
+    """A constant rate for 0.3 s against scipy's rotation: s = R(-w t) y."""
+    w = np.array([0.3, 0.2, -0.5])
+    miss = tracked(300, tuple(w))[-1][0]
+    s = Rotation.from_rotvec(-0.3 * w).apply([0.0, 1.0, 0.0])
+    assert miss == pytest.approx([math.atan2(s[2], s[1]), math.atan2(-s[0], s[1])], abs=1e-9)
+
+
+def test_images_are_late_by_exposure_processing_and_hold() -> None:
+    """Yaw 0.2 t: exposed 10 to 14 ms, mean 0.2 x 12 ms = 2.4 mrad, there from 14 + 7 = 21 ms to 31 ms."""
+    found = tracked(40, at=lambda t: 0.2 * t, period=0.01, exposure=0.004, processing=0.007)
+    errors = [e[1] for _, e, _ in found]
+    assert errors[20:30] == pytest.approx([2.4e-3] * 10, abs=1e-12)
+    assert errors[30] == pytest.approx(4.4e-3, abs=1e-12)
+
+
+def test_an_instant_is_exposed_without_a_mean() -> None:
+    """Without exposure the error is that of the beginning of the frame, 10 ms, there at 10 + 1 + 4 ms."""
+    found = tracked(20, at=lambda t: 0.2 * t, period=0.01, exposure=0.0, processing=0.004)
+    assert found[14][1][1] == pytest.approx(0.2 * 0.01, abs=1e-12)
+
+
+def test_pixels_and_field_of_view() -> None:
+    """1.23 mrad in pixels of 0.1 mrad is 1.2; 6 mrad is outside of +-5 mrad: no error, lost."""
+    given = {"period": 0.01, "exposure": 0.004, "processing": 0.002, "pixel": 1e-4, "field": 0.01}
+    seen = tracked(10, at=lambda t: 1.23e-3, **given)[-1]
+    assert seen[1][1] == pytest.approx(1.2e-3, abs=1e-15) and seen[2] == 0.0
+    lost = tracked(10, at=lambda t: 6e-3, **given)[-1]
+    assert lost[1] == [0.0, 0.0] and lost[2] == 1.0
+
+
+def test_noise_of_the_images() -> None:
+    """400 images: rms of each axis 3e-5 within 5 of its standard deviations, 1/sqrt(800)."""
+    part = Tracker(image_noise=3e-5, period=0.003, exposure=0.001, processing=0.002)
+    part.initialize()
+    values = []
+    for k in range(1200):
+        part.do_step(k * H, H)
+        if part.images > len(values):
+            values.append(list(part.error))
+    rms = np.sqrt(np.mean(np.square(values), axis=0))
+    assert rms == pytest.approx([3e-5, 3e-5], rel=5 / math.sqrt(800))
+    assert abs(np.corrcoef(np.array(values).T)[0, 1]) < 5 / math.sqrt(400)
+
+
+@pytest.mark.parametrize("f", [1.0, 5.0, 11.0])
+def test_linear_model_is_delay_and_averages(f: float) -> None:
+    """T = 2 + 10 + 5 ms; up to f T = 0.19 within 0.3 % and 0.1 degrees."""
+    part = Tracker(period=0.01, exposure=0.004, processing=0.01)
+    part.initialize()
+    a, b, c, d = jacobians(part, ["direction[3]"], ["error[1]"])
+    s = 2j * math.pi * f
+    got = complex((c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d)[0, 0])
+    want = np.exp(-s * 0.017) * np.sinc(f * 0.01) * np.sinc(f * 0.004)
+    assert got / want == pytest.approx(1.0, abs=0.004)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"exposure": 0.02}, "longer than period"),
+        ({"processing": 0.08}, "more than 7 images"),
+        ({"processing": 0.0105}, "processing = 0.0105 s must be whole communication steps"),
+        ({"exposure": 0.001, "processing": 0.001}, "three communication steps or more"),
+    ],
+)
+def test_impossible_images_are_refused(given: dict[str, float], message: str) -> None:
+    with pytest.raises(ComponentError, match=message):
+        tracked(1, **given)
+
+
+def test_controller_by_hand() -> None:
+    """u = 2 mrad for 0.5 s: K (1 + 0.5 w_i) u = 8 x 2 x 2 mrad = 32 mV, with the minus."""
+    part = Controller(K=8.0, integral=2.0)
+    part.initialize()
+    part.u = 2e-3
+    for k in range(500):
+        part.do_step(k * H, H)
+    assert part.v == pytest.approx(-0.032, abs=1e-12) and part.saturated == 0.0
+
+
+def test_controller_keeps_its_rate_and_acceleration() -> None:
+    """80 mV are wanted at once: 2 V/s give 2 mV in each millisecond, up to 50 mV; the integral waits there."""
+    part = Controller(K=8.0, integral=2.0, v_max=0.05, slope_max=2.0)
+    part.initialize()
+    part.u = -0.01
+    values = []
+    for k in range(60):
+        part.do_step(k * H, H)
+        values.append(part.v)
+        assert part.saturated == 1.0
+    assert np.diff(values[:20]) == pytest.approx(2e-3, abs=1e-12)
+    assert values[-1] == pytest.approx(0.05) and part.sum == 0.0

@@ -1,0 +1,189 @@
+"""The tracking gimbal: lag, margins and error against models of its own in scipy; checks; budget; refusals."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from gyrobench.engine.session import Session
+from gyrobench.record.frequency_response import model_response
+from gyrobench.record.record import Record
+from gyrobench.reduction.loops.margins import grid, margins
+from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.system import load_system
+
+RIDE = {"sweeps": False, "base": 0.0, "load_step": 0.0, "acquire": 0.0, "ride": 8.0, "jitter_from": 5.0}
+QUIET = {"psd": "none", "gyro_noise": 0.0, "image_noise": 0.0, "pixel": 0.0}
+DRIFTLESS = {f"gyro.{n}": 0.0 for n in ("turn_on", "flicker_x", "flicker_y", "walk_x", "walk_y")}
+FRAME, EXPOSURE, PROCESSING = 0.01, 0.004, 0.01  # s
+J, BAND, FC = 0.08, 100.0, 12.0  # kg.m2 about yaw, Hz, Hz
+
+
+def tracked(parameters: dict[str, Any] | None = None, **options: Any) -> tuple[Any, Record]:
+    """Return result and record of a short ride alone, or of what the options ask for."""
+    system: Any = load_system("gimbal_tracking")
+    for name, value in (RIDE | options).items():
+        system.set(name, value)
+    with Session(system) as session:
+        record = session.run(parameters or {}, seed=3)
+    return system.reduce(record), record
+
+
+def rate_loop() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return A, B, C of the closed rate loop about yaw of a rigid gimbal: command in, rate out; 0.4 N.m/A, 1 Ohm.
+
+    J w' = 0.4 v - 0.01 w,  y'' = b2 (w - y) - sqrt(2) b y',  v = -K (e + w_i int e),  e = y - command
+    """
+    b, wc = 2 * math.pi * BAND, 2 * math.pi * FC
+    wi = wc / 8.0
+    s = 1j * wc
+    gyro = b * b / (s * s + math.sqrt(2.0) * b * s + b * b)
+    K = 1.0 / abs(0.4 / (J * s) * gyro * (1.0 + wi / s))
+    # states: w, y, y', integral of e
+    A = np.array([
+        [-0.01 / J, -0.4 * K / J, 0.0, -0.4 * K * wi / J],
+        [0.0, 0.0, 1.0, 0.0],
+        [b * b, -b * b, -math.sqrt(2.0) * b, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+    ])  # fmt: skip
+    return A, np.array([0.4 * K / J, 0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def gains(track: float, kind: int) -> tuple[float, float]:
+    """Return K and the corner of a tracking controller: |L| = 1 at ``track``, delay without effect on it."""
+    A, B, C = rate_loop()
+    s = 2j * math.pi * track
+    corner = 2 * math.pi * track / 6.0 if kind == 2 else 0.0
+    closed = C @ np.linalg.solve(s * np.eye(4) - A, B)
+    return abs(s) / abs(closed * (1.0 + corner / s)), corner
+
+
+def in_scipy(angle: Any, seconds: float, track: float, kind: int) -> np.ndarray:
+    """Return the error over time, each ms, of a rigid gimbal that follows an angle by images: exact steps, own code."""
+    h = 1e-3
+    A, B, C = rate_loop()
+    K, corner = gains(track, kind)
+    n = 6  # 4 of the rate loop, line of sight, integral of the error
+    M = np.zeros((n + 1, n + 1))
+    M[:4, :4], M[4, :4], M[5, n] = A, C, 1.0
+    M[:4, 5], M[:4, n] = B * K * corner, B * K
+    step = expm(M * h)
+    x, held, coming, errors = np.zeros(n), 0.0, {}, []
+    exposed: list[float] = []
+    frame, long, wait = round(FRAME / h), round(EXPOSURE / h), round(PROCESSING / h)
+    for k in range(round(seconds / h)):
+        now = angle(k * h) - x[4]
+        errors.append(now)
+        if k % frame == 0:
+            exposed = []
+        if k % frame <= long:
+            exposed.append(now)
+        if k % frame == long:
+            coming[k + wait] = float(np.trapezoid(exposed)) / long
+        held = coming.pop(k, held)
+        x = (step @ np.append(x, held))[:n]
+    return np.array(errors)
+
+
+def test_lag_of_a_constant_rate() -> None:
+    """Type 1: error = rate/K_v, K_v = K; without viscous friction beside: the rate loop is of type 1 itself."""
+    result, record = tracked(DRIFTLESS, **QUIET, type=1, bending=0.0, target_yaw=0.02, target_pitch=-0.001)
+    K = gains(1.5, 1)[0]
+    assert record.run.parameters["track_yaw.K"] == pytest.approx(K, rel=1e-3)
+    assert result["bias yaw"].estimate == pytest.approx(0.02 / K * 1e6, rel=1e-3)
+    assert result["bias pitch"].estimate == pytest.approx(-0.001 / K * 1e6, rel=5e-3)
+    assert result["bias yaw"].closed == pytest.approx(0.02 / K * 1e6, rel=1e-3)
+    assert result["inside"].estimate == 0.0  # 2 mrad are not below 200 µrad
+
+
+@pytest.mark.parametrize("kind", [1, 2])
+def test_fly_by_against_a_model_in_scipy(kind: int) -> None:
+    """300 m past at 100 m/s from 600 m: error of the ride within 1 % of its largest."""
+    result, record = tracked(
+        **QUIET, type=kind, bending=0.0, target="flyby", distance=600.0, passing=300.0, speed=100.0, field=0.2
+    )
+    towards = 100.0 * math.sqrt(0.75)  # m/s, and 50 m/s across, to the right
+    c = record.channels
+    ride = c["exciter.phase"] == c["exciter.phase"].max()
+    t = c["time"][ride] - c["time"][ride][0]
+    own = in_scipy(lambda x: -math.atan2(50.0 * x, 600.0 - towards * x), 14.0, 1.5, kind)
+    got = c["tracker.miss[2]"][ride]
+    assert np.max(np.abs(got - np.interp(t, np.arange(own.size) * 1e-3, own))) < 0.01 * np.max(np.abs(own))
+    name = f"K_{'va'[kind - 1]} yaw"
+    assert result[name].estimate == pytest.approx(result[name].closed, rel=0.01)
+    assert result["bias yaw"].estimate == pytest.approx(result["bias yaw"].closed, abs=0.01e6 * np.max(np.abs(own)))
+
+
+def test_margins_of_a_loop_with_delay() -> None:
+    """L = K (1 + w_i/s) T_r(s)/s e^(-s 17 ms) sinc sinc, T_r by hand, against the linear model: 0.5 %, 0.3°, 0.1 dB."""
+    system: Any = load_system("gimbal_tracking")
+    for name, value in (RIDE | {"bending": 0.0}).items():
+        system.set(name, value)
+    with Session(system) as session:
+        loop = session.prepare({}, 1)[2].linear.loops["track yaw"].discrete
+    f = grid(0.1, 30.0)
+    A, B, C = rate_loop()
+    K, corner = gains(1.5, 2)
+    s = 2j * np.pi * f
+    closed = np.array([C @ np.linalg.solve(x * np.eye(4) - A, B) for x in s])
+    L = K * (1.0 + corner / s) / s * closed * np.exp(-0.017 * s) * np.sinc(f * FRAME) * np.sinc(f * EXPOSURE)
+    own, got = margins(f, L), margins(f, model_response(loop, f)[:, 0, 0])
+    assert got.crossover == pytest.approx(own.crossover, rel=5e-3)
+    assert got.phase == pytest.approx(own.phase, abs=0.3)
+    assert 20 * math.log10(got.upper / own.upper) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.long
+def test_noise_of_the_images_and_its_budget() -> None:
+    """Still target and base, type 1: T of first order K/(s + K) passes noise of sigma as sigma2 T_f K/2 sinc2.
+
+    2 sigma2 T_f int |T|2 df = 2 sigma2 T_f K/4, without delay; delay and rate loop raise it by about a tenth.
+    """
+    still = {**QUIET, "target": "rest", "image_noise": 1e-4}
+    result, _ = tracked(**still, type=1, jitter_from=1.0, ride=36.0, field=0.1)
+    K = gains(1.5, 1)[0]
+    by_hand = 1e2 * math.sqrt(FRAME * K / 2.0)
+    assert by_hand < result["error yaw"].estimate < 1.25 * by_hand
+    c = result["jitter"]
+    assert abs(c.estimate - c.closed) < c.k * c.u + 0.02 * c.closed
+    rows = next(t for t in result.tables if t.id == "budget.sources").rows
+    assert rows[0][0] == "noise of the images" and rows[0][3] > 99.0
+
+
+def test_a_lost_target_is_said_and_nothing_passes() -> None:
+    """Type 1 with 0.1 rad/s lags by 10 mrad, outside of +-5 mrad."""
+    result, _ = tracked(**QUIET, type=1, target_yaw=0.1, field=0.01)
+    reason = next(r for r in result.reasons if r.id == "target.lost")
+    assert "ride" in reason.text and "pass" in reason.blocks and "error" in reason.names
+
+
+def test_limit_of_the_rate_is_said() -> None:
+    result, _ = tracked(**QUIET, target_yaw=0.02, rate_max=0.01, field=2.0)
+    assert any("A limit was active in track_yaw, in: ride" in text for text in result.warnings)
+
+
+def test_times_that_are_no_whole_steps() -> None:
+    """60 images a second: 16.667 ms are 83.33 steps of 0.2 ms, 83 are taken."""
+    system: Any = load_system("gimbal_tracking")
+    system.set("frames", 60.0)
+    assert system.warnings() == ["frames: 16.667 ms is no whole number of steps of 0.2 ms; 16.6 ms is taken"]
+    assert system.times()["period"] == pytest.approx(0.0166)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"target": "moon"}, "must be one of rest, constant, sine, circle, flyby"),
+        ({"track": 5.0}, "below a quarter of the rate loop's crossover, 3 Hz here"),
+        ({"exposure": 0.02}, "longer than 0.01 s from image to image"),
+        ({"processing": 0.1}, r"0.07 s \(7 images\) at most"),
+        ({"target": "flyby", "passing": 2000.0}, "farther than distance"),
+    ],
+)
+def test_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidConfigurationError, match=message):
+        tracked(**options)
