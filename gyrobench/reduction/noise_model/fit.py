@@ -230,18 +230,18 @@ class _Judge:
 
 
 def _middle(models: Sequence[Fitted], clouds: Sequence[Cloud]) -> Fitted:
-    """Return, of models that are worth the same, the one whose N is nearest to the middle of that of all draws."""
+    """Return the first of models that are worth the same, or, if its N is not in the middle half of all draws, the one
+    whose N is nearest to their median.
+    """
     figure = size_of("white")
     values, weights = weighted(clouds, figure)
     if len(models) == 1 or not values.size:
         return models[0]
-    middle = quantile(values, weights, 0.5)
-
-    def off(f: Fitted) -> float:
-        own = figure(f.model, f.p[None])
-        return math.inf if own is None else abs(float(own[0]) - middle)
-
-    return min(models, key=off)
+    low, median, high = (quantile(values, weights, q) for q in (0.25, 0.5, 0.75))
+    own = [math.inf if (v := figure(f.model, f.p[None])) is None else float(v[0]) for f in models]
+    if low <= own[0] <= high or math.isinf(own[0]):
+        return models[0]
+    return models[int(np.argmin(np.abs(np.array(own) - median)))]
 
 
 # ------------------------------------------------------------------ figures of the draws
