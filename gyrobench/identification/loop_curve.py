@@ -145,16 +145,19 @@ def _window(count: int, size: int) -> NDArray[np.intp]:
     return np.asarray(first[:, None] + np.arange(size))
 
 
-def noise_level(s: MeasuredResponse) -> Array:
-    """Return the variance of a response: its logarithm on parabolas, less the mean of that of chi-squared."""
+def noise_level(s: MeasuredResponse, kernel: Array = PARABOLA) -> Array:
+    """Return the variance of a response: its logarithm on parabolas, less the mean of that of chi-squared.
+
+    kernel: weights of a point and of those beside it.
+    """
     half = s.dof / 2.0
     own = 2.0 * (s.u * np.abs(s.value)) ** 2
     least = (SMALLEST * np.abs(s.value).max()) ** 2
     log = np.log(np.maximum(own, least)) - (digamma(half) - np.log(half))
-    reach = PARABOLA.size // 2
+    reach = kernel.size // 2
     if log.size <= reach:
         return np.full(log.size, float(np.exp(log.mean())))
-    return np.asarray(np.exp(np.convolve(np.pad(log, reach, mode="reflect"), PARABOLA, "valid")))
+    return np.asarray(np.exp(np.convolve(np.pad(log, reach, mode="reflect"), kernel, "valid")))
 
 
 def _fits(d: Array, value: Complex, variance: Array, dof: Array, draw: Complex, rational: bool) -> _Models:

@@ -1,8 +1,10 @@
 """Physical parameters of a plant from its measured response: values, covariance, test of the model.
 
-Weighted least squares over all frequencies, weights of the stated noise; the covariance is that of first order.  What
-is left, over its noise, is chi-squared where the model describes the plant; more of it (p < 0.001) is lack of fit: the
-uncertainties are widened by Birge's ratio, and the frequency is named at which the model is furthest off.
+Weighted least squares over all frequencies; the covariance is that of first order.  A weight is of the noise of the
+lines beside, relative to the gain of the model, not of the line itself: else lines that the noise has made small
+count more, and the gain comes out low.  What is left, over its noise, is chi-squared where the model describes the
+plant; more of it (p < 0.001) is lack of fit: the uncertainties are widened by Birge's ratio, and the frequency is
+named at which the model is furthest off.
 Source: Pintelon 2012, 9.11 (least squares in the frequency domain) and 11.3 (test of the cost).
 """
 
@@ -13,13 +15,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError, suggest_names
-from gyrobench.identification.loop_curve import noise_level
+from gyrobench.identification.loop_curve import PARABOLA, noise_level
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_model import (
     MODE,
@@ -43,6 +46,10 @@ ALIKE = 1e-7  # smallest over largest singular value of the sensitivities: below
 FREQUENCIES = 60  # at which a mode is looked for
 TRIES = 5  # of the best of them
 SPARE = 6  # numbers more than parameters
+OTHERS = np.where(np.arange(PARABOLA.size) == PARABOLA.size // 2, 0.0, PARABOLA)
+OTHERS = OTHERS / OTHERS.sum()  # the noise of a line by its neighbours alone
+WILD = 3.0
+WEIGHINGS = 3  # with the noise at the gain of the model
 
 
 @dataclass(frozen=True)
@@ -284,19 +291,42 @@ def _rough(problem: _PlantProblem) -> dict[str, float]:
     return {"J": J, "viscous": J * np.pi * f[0], "k_t": k_t, "k_e": k_t, "R": R, "L": 1e-3 * R, "delay": 1e-3}
 
 
+def _chosen(plant: MeasuredResponse, lines: NDArray[np.bool_]) -> MeasuredResponse:
+    return MeasuredResponse(*(getattr(plant, n)[lines] for n in ("f", "value", "u", "dof", "center", "radius")))
+
+
+def _relative_noise(plant: MeasuredResponse) -> Array:
+    """Return the noise of each line over its gain, from the lines beside it; inf where its input is not determined.
+
+    Its own gain must not decide on its weight, nor whether it is used: what the noise has made small would count more
+    (or less).  A line whose own noise is WILD times as large keeps that.
+    """
+    there = np.isfinite(plant.radius) & np.isfinite(plant.u)
+    noise = np.full(there.size, np.inf)
+    if np.any(there):
+        lines = _chosen(plant, there)
+        relative = replace(lines, value=np.ones_like(lines.value))  # the noise of a resonance is as large as its gain
+        beside = np.sqrt(noise_level(relative, OTHERS) / 2.0)
+        noise[there] = np.where(lines.u > WILD * beside, lines.u, beside)
+    return noise
+
+
 def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str]) -> PlantFit:
     """Return the parameters of a measured plant; texts as of :func:`parse_fit`.  Raises UsageError and DataError."""
     free, known, held = parse_fit(texts)
     model = _model(record, free, known, held)
-    good = plant.determined & (plant.u < LARGEST_U)
+    noise = _relative_noise(plant)
+    good = noise < LARGEST_U
     if 2 * int(good.sum()) < len(free) + SPARE:
         said = f"{int(good.sum())} frequencies with a plant above the noise are too few to find {len(free)} parameters"
         raise DataError(record.name, [said])
-    kept = MeasuredResponse(*(getattr(plant, n)[good] for n in ("f", "value", "u", "dof", "center", "radius")))
+    kept, noise = _chosen(plant, good), noise[good]
     f, value = kept.f, kept.value
-    relative = replace(kept, value=np.ones_like(value))  # the noise of a resonance is as large as its gain
-    sigma = np.sqrt(noise_level(relative) / 2.0) * np.abs(value)
+    sigma = noise * np.abs(value)
     problem, x = _found(_PlantProblem(model, known, free, f, value), sigma)
+    for _ in range(WEIGHINGS):
+        sigma = noise * np.abs(problem.response(x))
+        x = problem.solved(x, sigma)
     by = problem.sensitivity(x, sigma)
     size = np.linalg.norm(by, axis=0)
     singular, right = np.linalg.svd(by / np.where(size > 0.0, size, 1.0))[1:]

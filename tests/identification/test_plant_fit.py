@@ -19,6 +19,7 @@ from gyrobench.identification.loop_margins import Margin
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.plant_model import PlantModel
+from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.identification.wanted_margins import parse_wanted
 
 UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
@@ -54,6 +55,42 @@ def test_parameters_of_random_platforms(platforms: list[tuple]) -> None:
         assert fit.values["J"] == pytest.approx(loop.truth["J"], rel=0.02)
     assert len(platforms) > 6 and lacking <= 1
     assert np.mean(np.abs(z) < 1.96) > 0.85 and 0.6 < np.std(z) < 1.4
+
+
+def test_noise_of_a_line_does_not_decide_on_its_weight() -> None:
+    """200 lines of 15 %, each weighted by its own gain, would make it low by several u; the mean of z is 0 here.
+
+    P = y/u with complex Gaussian noise in both, its size known as from 43 periods (chi-squared of 42 degrees).  Mean of
+    60 records within three of its u, standard deviation within four of its own.
+    """
+    rng, f = np.random.default_rng(5), np.linspace(1.0, 60.0, 200)
+    truth = {"J": 0.05, "viscous": 0.8}
+    g = 1.0 / (2j * np.pi * f * truth["J"] + truth["viscous"])
+    z = []
+    for _ in range(60):
+        y, u = (1.0 + 0.106 * (rng.standard_normal(200) + 1j * rng.standard_normal(200)) * s for s in (0.9, 0.43589))
+        size = 0.106 * np.sqrt(rng.chisquare(42, 200) / 42.0)  # one part of y/u - 1, of y = 1
+        plant = MeasuredResponse(f, g * y / u, size / np.abs(y), np.full(200, 42.0), g, np.zeros(200))
+        record = LoopRecord("own", H, np.zeros(9), np.zeros(9), np.zeros(9), "plant input", UNITS)
+        fit = fit_plant(record, plant, list(truth))
+        z.append([(fit.values[n] - v) / fit.u(n) for n, v in truth.items()])
+    assert np.all(np.abs(np.mean(z, axis=0)) < 3.0 / np.sqrt(60.0))
+    assert np.all(np.abs(np.std(z, axis=0) - 1.0) < 0.28) and np.mean(np.abs(z) > 1.96) < 0.11
+
+
+def test_a_wild_line_does_not_pull() -> None:
+    """One line of 200 is off by a factor of three, as its own noise says: it moves J by less than a third of u."""
+    rng, f = np.random.default_rng(6), np.linspace(1.0, 60.0, 200)
+    g = 1.0 / (2j * np.pi * f * 0.05 + 0.8)
+    value = g * (1.0 + 0.01 * (rng.standard_normal(200) + 1j * rng.standard_normal(200)))
+    record = LoopRecord("own", H, np.zeros(9), np.zeros(9), np.zeros(9), "plant input", UNITS)
+    fits = []
+    for factor, u in ((1.0, 0.01), (3.0, 0.25)):
+        value[40] *= factor
+        size = np.where(np.arange(200) == 40, u, 0.01)
+        plant = MeasuredResponse(f, value.copy(), size, np.full(200, 42.0), g, np.zeros(200))
+        fits.append(fit_plant(record, plant, ["J", "viscous"]))
+    assert abs(fits[1].values["J"] - fits[0].values["J"]) < fits[0].u("J") / 3.0
 
 
 def test_what_the_model_lacks_is_said(platforms: list[tuple]) -> None:
