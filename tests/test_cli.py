@@ -109,7 +109,7 @@ def test_values_of_a_file(gyrobench: Call, tmp_path: Path) -> None:
         "table.tilt[1]": "1e-05",
     }  # fmt: skip
     code, out, err = gyrobench("show", NAME, "--set", "@v.toml", "--set", "latitude=60deg")
-    assert (code, err) == (0, "") and "latitude        60°" in out and "turns           3" in out
+    assert (code, err) == (0, "") and re.search(r"latitude +60°", out) and re.search(r"turns +3", out)
     (tmp_path / "v.toml").write_text("[gyro]\nwite = 0.0\n")
     assert "gyro has no parameter 'wite'; nearest: white" in gyrobench("show", NAME, "--set", "@v.toml")[2]
     (tmp_path / "v.toml").write_text("date = 2026-01-01\n")
@@ -120,6 +120,7 @@ def test_values_of_a_file(gyrobench: Call, tmp_path: Path) -> None:
 REFUSED = [
     (["run", "tumbl_single_axis"], "no system 'tumbl_single_axis'; did you mean tumble_single_axis?"),
     (["show", "tumble_single"], "did you mean tumble_single_axis"),
+    (["run", NAME, "--set", "type_b=none"], "type_b: what measured data say"),
     (["run", NAME, "--set", "latitud=45deg"], "latitud: no such option of tumble_single_axis; options: latitude"),
     (["run", NAME, "--set", "gyr.D_I=3"], "--set gyr.D_I: no slot 'gyr'; did you mean gyro?"),
     (["run", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from gyrobench.component import Discrete, Noise, Output, Parameter, State
+from gyrobench.component import Discrete, Input, Noise, Output, Parameter, State
 from gyrobench.component.blocks.surroundings import RoomAndField
 from gyrobench.component.math import Number, clip, vector
 
@@ -27,7 +27,7 @@ class Thermostat(RoomAndField):
     Source: Hu 1981, section 5.8, item 2 (5); GSP ch. 5, section 5.2.1; the control law is our own.
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
 
     offset = Parameter(-45.0, "K", "room at the start, above the temperature of the coefficients")
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
@@ -45,6 +45,8 @@ class Thermostat(RoomAndField):
     sensor_3 = Noise(0.0, "K/sqrt(Hz)", "noise density of the sensor of shell 3")
     tau = Parameter(300.0, "s", "time constant of the instrument against the innermost shell", above=0.0)
     cold = Parameter(False, bool, "1: all begins at the temperature of the room, 0: at the set points")
+
+    on = Input(1.0, "1", "0: the heaters are off, and their integrals stand still")
 
     heat = Output("W", "power of the heaters", shape=(STAGES,))
     shell = Output("K", "temperatures of the shells above that of the coefficients", shape=(STAGES,))
@@ -100,6 +102,8 @@ class Thermostat(RoomAndField):
         e = self.errors()
         for k in range(STAGES):
             asked[k] = asked[k] + self.K_p[k] * e[k] + self.K_i[k] * self.q[k]
+            if self.on == 0.0:
+                asked[k] = 0.0
         return vector(asked)
 
     def flow(self) -> None:
@@ -121,6 +125,8 @@ class Thermostat(RoomAndField):
                 self.der.T[k] = (clip(asked[k], 0.0, self.power[k]) + gained[k]) / self.capacity[k]
                 self.der.q[k] = e[k]
                 if (asked[k] > self.power[k] and e[k] > 0.0) or (asked[k] < 0.0 and e[k] < 0.0):
+                    self.der.q[k] = 0.0
+                if self.on == 0.0:
                     self.der.q[k] = 0.0
         self.der.held = (self.T[2] - self.held) / self.tau
 

@@ -167,6 +167,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("u", "V", "pickoff voltage"),
                 inp("mode", "1", "mode of the table", whole=True),
                 inp("command", "", "current wanted in servo mode, A", optional=True),
+                inp("angle", "rad", "table angle as read", optional=True),
                 out("i", "A", "torquer current"),
             ),
         ),

@@ -188,6 +188,11 @@ class System(Configurable):
         else:
             import difflib
 
+            if name == "type_b":
+                raise InvalidValueError(
+                    "type_b: what measured data say of the set-up's uncertainties (reduce --data); the set-up of a run "
+                    "is as ideal as its parameters, and the options u_... state what is not"
+                )
             near = difflib.get_close_matches(name, list(self.options), n=3, cutoff=0.4) or list(self.options)
             raise InvalidValueError(
                 f"{name}: no such option of {self.name}; options: {', '.join(near) or 'none'}; a parameter of a part "

@@ -46,7 +46,7 @@ def loops_of(system: System) -> dict[str, LoopPorts]:
     for loop, at in system.loops.items():
         slot, _, port = at.partition(".")
         tested = re.search(rf"^exciter\.(test|command)\[(\d)\] -> {re.escape(slot)}\.test$", wires, re.M)
-        to = r"(?: -> platform: v|\.v -> (?:platform\.v|decoupler\.command)(\[\d\]))"
+        to = r"(?: -> platform: v|\.v -> (?:platform\.v|decoupler\.command|commands\.u)(\[\d\]))"
         driven = re.search(rf"^{re.escape(slot)}{to}$", wires, re.M)
         if port != "u" or tested is None or driven is None:
             continue

@@ -17,7 +17,7 @@ from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.trade import Trade
-from gyrobench.tuning.wishes import JITTER, Wish
+from gyrobench.tuning.wishes import Wish
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
 def range_text(r: Range) -> str:
     """Return a range as text."""
     low, high = (units.format_quantity(float(f"{x:.4g}"), r.unit) for x in (r.low, r.high))
-    return f"{r.name} {low} to {high}"
+    return f"{r.name} {low} to {high}".replace(f" {r.unit}", f" {units.display(r.unit)}")
 
 
 def _lines(t: LoopTuning) -> list[str]:
@@ -192,7 +192,7 @@ def _lines(t: LoopTuning) -> list[str]:
         for w in p.wishes:
             end = "" if w.kept else "  ! below what is wanted"
             end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
-            lines.append(f"  {w.wish.name}: {w.wish.shown(w.value)}{margin_text(w)}{end}")
+            lines.append(f"  {w.wish.name}: {measured_text(w)}{end}")
         if p.limits:
             lines.append(f"  at its limit in the test sines: {p.limits}")
         if p.step is not None:
@@ -212,21 +212,8 @@ def _lines(t: LoopTuning) -> list[str]:
     return [*lines, "", f"{title}: {values}", "", t.command]
 
 
-def margin_text(w: ProvenWish) -> str:
-    """Return the expanded uncertainty of a measured wish as text."""
+def measured_text(w: ProvenWish) -> str:
+    """Return a measured wish as text, with its expanded uncertainty."""
     if w.bound:
-        return " or more (as far as sines above the noise reach)"
-    if not math.isfinite(w.value) or not w.U > 0.0:
-        return ""
-    match w.wish.unit:
-        case "rad" if w.wish.name == JITTER:
-            return f" ± {1e6 * w.U:.2g} µrad"
-        case "rad":
-            return f" ± {math.degrees(w.U):.2g}°"
-        case "":
-            return f" ± {20.0 * math.log10(1.0 + w.U / max(w.value, 1e-15)):.2g} dB"
-        case "s":
-            return f" ± {1e3 * w.U:.2g} ms"
-        case "Hz":
-            return f" ± {w.U:.2g} Hz"
-    return f" ± {w.U:.2g}"
+        return f"{w.wish.shown(w.value)} or more (as far as sines above the noise reach)"
+    return w.wish.shown(w.value, w.U if math.isfinite(w.value) else 0.0)

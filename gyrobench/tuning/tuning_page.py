@@ -27,7 +27,7 @@ from gyrobench.report.style import styled
 from gyrobench.tuning import tuning_figures as draw
 from gyrobench.tuning.proof import ProvenWish
 from gyrobench.tuning.trade import Trade
-from gyrobench.tuning.tuned_loop import LoopTuning, margin_text, range_text, where
+from gyrobench.tuning.tuned_loop import LoopTuning, measured_text, range_text, where
 
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
 
@@ -50,7 +50,7 @@ def page(t: LoopTuning) -> Page:
     ]
     with styled():
         sections = [
-            Section("Wishes and what came", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
+            Section("Wishes", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
             *([Section("Trade of two wishes", "trade", _trade(t.trade))] if t.trade else []),
             Section("Margins", "margins", _margins(t)),
             Section("Sensitivities and open loop", "responses", _responses(t)),
@@ -146,7 +146,7 @@ def _proven(point: str, w: ProvenWish) -> list[Any]:
     state = ("holds", "pass") if w.kept else ("below what is wanted", "fail")
     if w.kept and not w.agrees:
         state = ("holds, unlike the linear model", "warn")
-    cells = [point, w.wish.name, minus(w.wish.shown(w.value) + margin_text(w)), minus(w.wish.shown(w.expected))]
+    cells = [point, w.wish.name, minus(measured_text(w)), minus(w.wish.shown(w.expected))]
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
 
 

@@ -53,22 +53,31 @@ class Wish:
         """Return how far a value fulfils the wish: 1 just so, more is better."""
         return got / self.value if self.least else self.value / max(got, 1e-300)
 
-    def shown(self, value: float) -> str:
-        """Return a value of this measure as text with its unit."""
-        if math.isinf(value):
-            return "unlimited"
+    def printed(self, value: float) -> tuple[float, str]:
+        """Return a value of this measure as it is printed, and the unit behind it."""
         match self.unit:
             case "rad" if self.name == JITTER:
-                return f"{1e6 * value:.3g} µrad"
+                return 1e6 * value, " µrad"
             case "rad":
-                return f"{math.degrees(value):.3g}°"
+                return math.degrees(value), "°"
             case "":
-                return f"{20.0 * math.log10(max(value, 1e-15)):.3g} dB"
+                return 20.0 * math.log10(max(value, 1e-15)), " dB"
             case "s":
-                return f"{1e3 * value:.3g} ms"
+                return 1e3 * value, " ms"
             case "Hz":
-                return f"{value:.4g} Hz"
-        return f"{value:.3g}"
+                return value, " Hz"
+        return value, ""
+
+    def shown(self, value: float, U: float = 0.0) -> str:
+        """Return a value of this measure as text with its unit; U: its expanded uncertainty, which says how finely."""
+        if math.isinf(value):
+            return "unlimited"
+        number, unit = self.printed(value)
+        wide = abs(self.printed(value + U)[0] - number)
+        if not wide > 0.0:
+            return f"{number:.{4 if self.unit == 'Hz' else 3}g}{unit}"
+        decimals = max(0, 1 - math.floor(math.log10(wide)))
+        return f"{number:.{decimals}f}{unit} ± {wide:.{decimals}f}{unit}"
 
     def __str__(self) -> str:
         return f"{self.name} {'at least' if self.least else 'at most'} {self.shown(self.value)}"

@@ -158,7 +158,11 @@ def _coefficients(a: Analysed, run: RunDocument, truth: Mapping[str, float], sev
     out = [_coefficient(a, term, several, truth.get(term), relative) for term in TERMS]
     units = a.of.units
     least, when = a.noise.minimum.deviation, a.noise.minimum.tau
-    meaning = f"bias instability as the least Allan deviation, at {noise_tables.range_text(when)} s"
+    meaning = "bias instability as the least Allan deviation"
+    if least.determined:
+        meaning += f", at {noise_tables.range_text(when)} s"
+    else:
+        least = replace(least, low=0.0)  # what it falls to later is not in the record
     why = "" if least.determined else "not determined: the deviation still falls at the longest averaging time"
     name = _named(LEAST_DEVIATION, a, several)
     return [*out, _stated(a, name, meaning, units.unit, least, units.si, why, None, relative, not several)]

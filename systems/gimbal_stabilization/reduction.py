@@ -39,6 +39,6 @@ class Reduction(SightReduction):
         return [
             *told(found.coefficients, f"The line of sight jitters by {{jitter}} rms{self.cause}."),
             *margins(found, *AXES),
-            *told(found.coefficients, "A base that swings about x and z reaches it smaller by {-isolation x 1 Hz} and "
-                  "{-isolation z 1 Hz} at 1 Hz."),
+            *told(found.coefficients, "A swing of the base about x and z reaches the line of sight smaller by "
+                  "{-isolation x 1 Hz} and {-isolation z 1 Hz} at 1 Hz."),
         ]  # fmt: skip

@@ -72,7 +72,7 @@ class GimbalTracking(SightTest):
         "track": Option(1.5, "Hz", "crossover of both tracking loops, for the gains", 0.05, 20.0),
         "type": Option(2, int, "type of the tracking loops: 1 proportional, 2 with an integral", 1, 2),
         "rate_max": Option(1.0, "rad/s", "largest rate commanded", 1e-3, sets="track_pitch.v_max track_yaw.v_max"),
-        "acceleration_max": Option(50.0, "rad/s2", "largest acceleration commanded", 1e-3,
+        "acceleration_max": Option(100.0, "rad/s2", "largest acceleration commanded", 1e-3,
                                    sets="track_pitch.slope_max track_yaw.slope_max"),
         "frames": Option(100.0, "Hz", "images in a second", 1.0, 5000.0),
         "exposure": Option(4e-3, "s", "time of exposure", 0.0, 1.0),
@@ -89,7 +89,7 @@ class GimbalTracking(SightTest):
         "passing": Option(500.0, "m", "fly-by: distance where it is nearest", 0.1),
         "speed": Option(60.0, "m/s", "fly-by: speed, to the right", 0.0),
         "accuracy": Option(2e-4, "rad", "wanted: error of the line of sight, both axes together, below this", 1e-7),
-        "acquire": Option(3e-3, "rad", "step of the wanted direction, each axis; 0: none", 0.0),
+        "acquire": Option(2e-3, "rad", "step of the wanted direction, each axis; 0: none", 0.0),
     }  # fmt: skip
     noises = (*SightTest.noises, "tracker.image_noise")
     channels = (

@@ -12,11 +12,22 @@ from gyrobench.frames import G0
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import cross_axis, response
-from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Gate, LoopReduction, Point, margins, told
+from gyrobench.reduction.loops.loop_toolkit import (
+    ARCSEC,
+    Account,
+    Gate,
+    LoopReduction,
+    LoopResult,
+    Point,
+    Record,
+    margins,
+    told,
+)
 from gyrobench.reduction.loops.platform_measures import peak_noise
 from gyrobench.reduction.loops.rides import share, still
 
 from .budget import budget
+from .optical_reduction import OpticalReduction
 
 AXES = ("pitch", "roll", "azimuth")
 RATES = (
@@ -29,6 +40,12 @@ ANGLES = tuple(f"platform.attitude[{k}]" for k in (1, 2, 3))
 
 class Reduction(LoopReduction):
     """Loads, commands, motion of the base, loops and drift of a platform of three gimbals."""
+
+    @classmethod
+    def from_record(cls, record: Record) -> LoopResult:
+        """Return what a record says, of one with an optical loop what that does.  Raises ReductionError."""
+        optical = "tracker.miss[1]" in record.channels
+        return OpticalReduction.from_record(record) if optical else super().from_record(record)
 
     def measure(self) -> Account:
         found = self.found

@@ -15,13 +15,13 @@ from gyrobench.system.part_files import has_port
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Option, Slot
 
-from . import rate_loops
+from . import optical_loop, rate_loops
 
 DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
 GYROS = tuple(MOUNTS)
 ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
-ANGLE, RATE = "angle", "rate"
+ANGLE, RATE, OPTICAL = "angle", "rate", "optical"
 SERVO = "servo_three_loop"
 #: the motors of a servo with a current loop: of the part as it is
 MOTOR = {"k_t": 1.0, "R": 2.0, "L": 4e-3, "k_e": 1.0}
@@ -36,7 +36,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
 
     loops = rate: the gyros are rebalanced, their currents the rates, and each axis has a current, a rate and a position
-    loop.
+    loop; loops = optical: a tracking loop on the line of sight outside of them.
 
     [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL, SERVO-3LOOP; Xia 2008, section 1.3.2, ch. 5]
     """
@@ -84,9 +84,18 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         "frequency": Option(1.0, "Hz", "frequency of the commanded sine", 0.1, 5.0),
         "sweeps": Option(True, bool, "test sines for the margins of each axis"),
         "loops": Option(
-            ANGLE, str, "angle: floated gyros and stabilizers; rate: rebalanced gyros, servos of three loops"
+            ANGLE,
+            str,
+            "angle: floated gyros and stabilizers; rate: rebalanced gyros, servos of three loops; optical: with a "
+            "tracking loop outside",
         ),
-        "track": Option(0.0, "Hz", "crossover of the position loops on the joint angles, loops = rate; 0: none", 0.0),
+        "track": Option(
+            0.0,
+            "Hz",
+            "crossover of the position loops on the joint angles, loops = rate, 0: none; of the tracking loops, "
+            "loops = optical, 0: an eighth of crossover",
+            0.0,
+        ),
         **loop.hold(30.0, 5.0),
         **loop.PROFILE,
     }
@@ -107,7 +116,17 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     @property
     def rates(self) -> bool:
         """Return whether the gyros are rebalanced and the servos take rates."""
-        return str(self["loops"]) == RATE
+        return str(self["loops"]) in (RATE, OPTICAL)
+
+    @property
+    def optical(self) -> bool:
+        """Return whether a tracking loop is outside of the rate loops."""
+        return str(self["loops"]) == OPTICAL
+
+    @property
+    def tracking(self) -> float:
+        """Return the crossover of the tracking loops, Hz."""
+        return float(self["track"] or self["crossover"] / 8.0)
 
     def place(self, slot: str, part: str | Path, bench: Path | None = None) -> None:
         super().place(slot, part, bench)
@@ -122,7 +141,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     def _arrange(self) -> None:
         """Give the system the slots and wires of its loops; those that were asked for stay."""
         asked = [slot for slot in self.on_request if slot in self.slots]
-        for changed in ("slots", "wires", "on_request", "factors", "channels", "noises"):
+        for changed in ("slots", "wires", "on_request", "factors", "channels", "noises", "loops", "shown"):
             vars(self).pop(changed, None)
         if self.rates:
             wanted, more = rate_loops.on_request()
@@ -134,13 +153,27 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
                 factors={**rate_loops.FACTORS, **more},
                 noises=(*self.noises, *(f"{slot}.meter" for slot in rate_loops.NAMES)),
             )
+        if self.optical:
+            vars(self).update(
+                slots={**self.slots, **optical_loop.slots()},
+                wires=optical_loop.wires(self.wires),
+                factors={k: v for k, v in self.factors.items() if k not in optical_loop.INSTEAD} | optical_loop.FACTORS,
+                channels=tuple(dict.fromkeys((*self.channels, *optical_loop.CHANNELS))),
+                noises=(*self.noises, "tracker.image_noise"),
+                loops={**self.loops, **optical_loop.LOOPS},
+                shown=("tracker.miss", "tracker.error", "tracker.rate", *self.shown),
+            )
         vars(self)["channels"] = self._with_limits()
         for slot in asked:
             self.request(slot)
 
     def phases(self) -> list[LoopPhase]:
-        """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift."""
-        f, fc = self["frequency"], self["crossover"]
+        """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift; with
+        an optical loop the test sines of all loops, and the ride.
+        """
+        if self.optical:
+            return [*self.sines(), *optical_loop.phases(self.tracking, self["hold"], self["sweeps"])]
+        f = self["frequency"]
         rate = self["swing"] * 2.0 * math.pi * f
         phases = [
             LoopPhase(f"load {a}", "torque", "step", k, self["load_step"], settle=3.0, dwell=3.0)
@@ -154,12 +187,19 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
             phases += sweep("base x", "motion", [1.0, 2.0, 5.0], lambda f: size / (4.0 * f * f), settle=6.0, dwell=4.0)
         for k, (axis, hertz) in enumerate(zip("xyz", (0.5, 0.7, 0.9), strict=True) if self["swing"] else (), 1):
             phases += sweep(f"base {axis}", "motion", [hertz], self["swing"], axis=k, settle=6.0, periods=4)
-        if self["sweeps"]:
-            for k, axis in enumerate(AXES, 1):
-                tones = [fc * x for x in (0.3, 0.6, 0.9, 1.2, 2.0, 3.5)]
-                size = RATE_TEST if self.rates else ANGLE_TEST
-                phases += sweep(f"loop {axis}", "test", tones, size, axis=k, settle=4.0, periods=20)
-        return [*phases, LoopPhase("drift", "hold", settle=3.0, dwell=self["hold"])]
+        return [*phases, *self.sines(), LoopPhase("drift", "hold", settle=3.0, dwell=self["hold"])]
+
+    def sines(self) -> list[LoopPhase]:
+        """Return the test sines of each axis."""
+        found, size = [], RATE_TEST if self.rates else ANGLE_TEST
+        for k, axis in enumerate(AXES if self["sweeps"] else (), 1):
+            tones = [self["crossover"] * x for x in (0.3, 0.6, 0.9, 1.2, 2.0, 3.5)]
+            found += sweep(f"loop {axis}", "test", tones, size, axis=k, settle=4.0, periods=20)
+        return found
+
+    def crossovers(self) -> dict[str, float]:
+        """Return those of the stabilizers, or of the tracking loops outside of them."""
+        return dict.fromkeys(optical_loop.LOOPS, self.tracking) if self.optical else super().crossovers()
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         found: dict[str, Any] = {
@@ -175,18 +215,22 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     def servos(self, parts: PartValues) -> dict[str, Any]:
         """Return the parameters of rebalanced gyros and of servos with three loops."""
         start = [self[n] for n in AXES]
-        return {
+        track = 0.0 if self.optical else self["track"]
+        found = {
             "commands.theta_f_max?": 80 * DEG,
-            **rate_loops.design(parts, self["crossover"], self["track"], start, MOTOR),
+            **rate_loops.design(parts, self["crossover"], track, start, MOTOR),
         }
+        if self.optical:
+            found |= optical_loop.design(self["crossover"], self.tracking, len(self.plan().phases))
+        return found
 
     def check(self) -> list[str]:
-        problems = [*super().check(), *self.no_choice(loops=(ANGLE, RATE))]
+        problems = [*super().check(), *self.no_choice(loops=(ANGLE, RATE, OPTICAL))]
         if self["track"] > 0.0 and not self.rates:
-            problems.append("track: a position loop is one of loops = rate")
+            problems.append("track: a position loop is one of loops = rate, a tracking loop one of loops = optical")
         if self["track"] > rate_loops.SLOWER * self["crossover"]:
             problems.append(
-                f"track = {self['track']:g} Hz: a position loop is slower than a fifth of the rate loop, up to "
+                f"track = {self['track']:g} Hz: the outer loop is slower than a fifth of the rate loop, up to "
                 f"{rate_loops.SLOWER * self['crossover']:g} Hz here"
             )
         if self.rates and self.step > CURRENT_STEP:

@@ -79,8 +79,8 @@ class RebalanceLoopTest(RebalanceTest):
         return [float(x) * DPH for x in self["small"].replace(",", " ").split()]
 
     def plan(self) -> Plan:
-        """At rest, each rate in both senses, the same in reverse order, the small rates, at rest: a trend in time is
-        not taken for one in the rate.  The table takes the Earth rate off the small ones.
+        """At rest, each rate in both senses, the same in reverse order, the small rates likewise, at rest: a trend in
+        time is not taken for one in the rate.  The table takes the Earth rate off the small ones.
         """
         try:
             rates, small = self.rates(), self.small_rates()
@@ -98,7 +98,7 @@ class RebalanceLoopTest(RebalanceTest):
             label = f"{sense * r / DPH:+.6g} °/h felt".replace("-", "−")
             way = abs(rate) * gate
             slow.append(Phase(label, "rate", FACE, rate, settle=settle, travel=n * way, window=way))
-        return Plan([rest, *there, *reversed(there), *slow, rest], {FACE: ON_TABLE})
+        return Plan([rest, *there, *reversed(there), *slow, *reversed(slow), rest], {FACE: ON_TABLE})
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         return {**super().parameters(parts), **{f"gyro.{name}?": 0.0 for name in drift.NAMES}}  # the float alone

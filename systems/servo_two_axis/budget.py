@@ -28,16 +28,25 @@ ON_PLATE = {n: replace(TURNED[n], name=f"gyro on the plate, about {n}") for n in
 
 
 def effects(
-    channel: int, found: Findings, seen: Track, phase: NDArray[np.int_], names: tuple[str, ...], setup: HeldSetup
+    channel: int,
+    found: Findings,
+    seen: Track,
+    phase: NDArray[np.int_],
+    names: tuple[str, ...] | None,
+    setup: HeldSetup,
 ) -> list[Effect]:
     """Return all sources with their sensitivities.  channel: 0 x, 1 y.  Each mount is set up by itself: its errors are
-    independent of those of the others, and so are sine and cosine of an angle error.
+    independent of those of the others, and so are sine and cosine of an angle error.  names: coefficients that are
+    fitted; None: composite drifts, which no geometry changes.
     """
     site = setup.place
-    y, X = seen.inertial(site)[:, channel], seen.design(site, names)
+    y = seen.inertial(site)[:, channel]
 
     def moved(other: Track) -> Array:
-        return found.error(other.inertial(site)[:, channel] - y, other.design(site, names) - X) / SMALL
+        change = other.inertial(site)[:, channel] - y
+        if names is None:
+            return found.error(change) / SMALL
+        return found.error(change, other.design(site, names) - seen.design(site, names)) / SMALL
 
     def both(which: str) -> Array:
         return np.array([moved(one) for one in other[which]])

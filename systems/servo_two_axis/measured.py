@@ -31,6 +31,8 @@ TEMPLATE = """\
 # outer, inner: angles of the two axes at the start and the end of the window, right-handed about X and Y, counted on
 #   through the turns.  At 0, 0 the gyro's x axis (outer gimbal) lies along X, its y axis (inner gimbal) along Y.
 #   Rows of a mount follow one another; a row begins where the one before it ended.
+# current_x, current_y: where the torquers keep both angles at 0 ("levelled = true", k_x and k_y their scale factors):
+#   current that precesses the rotor about x (of the torquer about y, k_y), and about y (k_x).
 # mean_x, std_x, mean_y, std_y: pickoff voltages, n samples, flagged (suspect samples): optional.
 # Units in brackets may be others of the same kind (rad, arcsec, min, h ...).
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg]
@@ -38,6 +40,7 @@ phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],
 COLUMNS = (
     *(c for c in WINDOW_COLUMNS if not c.name.startswith("angle") and c.name not in ("mean", "std")),
     *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
+    *(CsvColumn(f"current_{a}", "A", f"torquer current that precesses about {a}", required=False) for a in "xy"),
     *(CsvColumn(f"{c}_{a}", "V", f"{a} pickoff voltage", required=False) for a in "xy" for c in ("mean", "std")),
 )
 NEEDED = {"latitude": "45.75deg"}

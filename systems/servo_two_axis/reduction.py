@@ -24,6 +24,7 @@ from gyrobench.reduction.drift import channels, drift_terms, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -39,9 +40,10 @@ from gyrobench.reduction.toolkit import (
     Table,
     truth_of,
 )
+from gyrobench.result import DriftTestResult
 from gyrobench.units import DPH
 
-from . import budget, closed, geometry, refusals
+from . import budget, closed, geometry, levelled, refusals
 from .windows import ANGLES, track
 
 REQUIRED = ("phase", "t_start", "t_end", *ANGLES)
@@ -57,11 +59,16 @@ CONVENTIONS = (
 
 @dataclass(frozen=True, kw_only=True)
 class TwoAxisServoSetup(HeldSetup):
-    """terms: of the model of a channel.  gains: of the pickoffs about x and y, V/rad."""
+    """terms: of the model of a channel.  gains: of the pickoffs about x and y, V/rad.  levelled: the torquers keep both
+    angles at 0.  torquers: their scale factors, by the axis they precess about, rad/s/A.
+    """
 
     terms: int = 9
     gains: Mapping[str, float] = field(default_factory=dict)
+    levelled: bool = False
+    torquers: Mapping[str, float] = field(default_factory=dict)
     u_square: float = 0.0
+    u_current: float = 0.0
 
     def names(self, channel: str) -> tuple[str, ...]:
         """Return the coefficients of a channel."""
@@ -144,15 +151,28 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> TwoAxisServoSetup:
+        level, other = bool(run.options.get("levelled", False)), levelled.OTHER
+        known = {n: float(run.options.get(n) or run.parameters.get(f"gyro.{n}") or 0.0) for n in ("k_x", "k_y")}
         return TwoAxisServoSetup.of(
             run,
+            levelled=level,
+            torquers={a: known[f"k_{other[a]}"] for a in "xy"},
+            **({"remount": None} if level else {}),
             terms=int(run.options.get("terms", 9)),
             gains={a: run.parameters.get(f"gyro.K_sg_{a}", 0.0) for a in "xy"},
             truth=truth_of(run, [n for c in "xy" for n in drift.NAMES_2DOF[c]]),
         )
 
-    def of_channel(self, name: str) -> ServoChannel:
-        return ServoChannel(self, name)
+    def of_channel(self, name: str) -> ServoChannel | levelled.LevelChannel:
+        return levelled.LevelChannel(self, name) if self.setup.levelled else ServoChannel(self, name)
+
+    def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
+        """Return the numbers that matter, as sentences."""
+        if not self.setup.levelled:
+            return super().overview(results)
+        every = [c for r in results.values() for c in r.coefficients]
+        named = [c.name for c in every if c.name.startswith("ω_d")]
+        return told(every, *(f"Composite drift {n} = {{{n}}}." for n in named))
 
     def problems(self) -> list[str]:
         s, known = self.setup, {f"mount {m}": m for m in geometry.MOUNTS}
@@ -165,8 +185,11 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         self.phase = every[self.held]
         self.mount = np.array([known[s.labels[p]] for p in self.phase.tolist()])
         base = {m: geometry.base(m, s.latitude) for m in set(self.mount.tolist())}
-        w = {c: np.asarray(self.windows[c], dtype=float)[self.held] for c in REQUIRED}
+        w_all = {c: np.asarray(v)[self.held] for c, v in self.windows.items()}
+        w = {c: w_all[c].astype(float) for c in REQUIRED}
         self.seen = track(w, self.phase, np.array([base[m] for m in self.mount.tolist()]))
+        if s.levelled or "current_x" in w_all or "current_y" in w_all:
+            return self._levelled_problems(w)
         self.X = {c: self.seen.design(s.place, s.names(c)) for c in "xy"}
         inner = np.concatenate([w["inner_start"], w["inner_end"]])
         if wrong := self._record_problems(inner):
@@ -174,6 +197,28 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         place = (s.latitude, s.gamma, s.earth_rate)
         self.book = closed.reduce(self.seen.middle(), self.mount, place, s.terms)
         return []
+
+    def _levelled_problems(self, w: Mapping[str, Array]) -> list[str]:
+        """Return why the rows of a levelled record cannot be reduced; w: :data:`REQUIRED`."""
+        s, missing = self.setup, [n for n in ("current_x", "current_y") if n not in self.windows]
+        if not s.levelled:
+            return ["the record has currents of the torquers: state levelled = true, or leave them out"]
+        if missing:
+            return [f"column {', '.join(missing)} is missing: levelled asks for the currents of both torquers"]
+        if unknown := [f"k_{levelled.OTHER[a]}" for a, k in s.torquers.items() if not k > 0.0]:
+            return [f"{', '.join(unknown)} unknown: give the scale factor of the torquer, as k_x = 17.2deg/h/mA"]
+        held = {n: np.asarray(v, dtype=float)[self.held] for n, v in self.windows.items() if n.startswith("current_")}
+        self.torqued = levelled.torqued(s, held)
+        return levelled.problems(s, {n: w[n] for n in ANGLES}) + self._tracking_problems()
+
+    def _tracking_problems(self) -> list[str]:
+        s, found = self.setup, []
+        for a in "xy":
+            part = {k: self.windows[f"{k}_{a}"] for k in ("mean", "std") if f"{k}_{a}" in self.windows}
+            if len(part) == 2:
+                problems = servo_regression.tracking_problems(part, self.held, s.gains.get(a, 0.0), s.tracking)
+                found += [f"{a} axis: {text}" for text in problems]
+        return found
 
     def _record_problems(self, inner: Array) -> list[str]:
         """Return why the rows cannot be reduced: gimbal lock (inner angles, rad), tracking, rank."""
@@ -184,11 +229,7 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
                 f"gimbal lock: the inner angle reaches {math.degrees(worst):.4g}°, "
                 f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; leave out the windows beyond"
             )
-        for a in "xy":
-            part = {k: self.windows[f"{k}_{a}"] for k in ("mean", "std") if f"{k}_{a}" in self.windows}
-            if len(part) == 2:
-                problems = servo_regression.tracking_problems(part, self.held, s.gains.get(a, 0.0), s.tracking)
-                found += [f"{a} axis: {text}" for text in problems]
+        found += self._tracking_problems()
         for c, X in self.X.items():
             seen = regression.examine(X, s.names(c))
             if seen.short:
@@ -200,6 +241,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         return found
 
     def reasons(self) -> list[Reason]:
+        if self.setup.levelled:
+            return []
         k = refusals.condition(self.X)
         if k <= refusals.WARN:
             return []
@@ -209,6 +252,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         return [Reason("mounts.weak", text)]
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:
+        if self.setup.levelled:
+            return levelled.tables(self)
         found = {c: test.found for c, test in self.each.items()}
         return [t for t in (self._mounts_table(found), _book_table(found), _shared_table(found)) if t.rows]
 

@@ -165,7 +165,7 @@ def option_problems(options: Mapping[str, Any], step: float, earth_rate: float) 
         found.append(f"mounts: {len(mounts)} are given, the plan has room for 24")
     if 12.0 * options["window"] > options["time"]:
         found.append(f"window = {options['window']:g} s in a time of {options['time']:g} s: too few windows")
-    if found or mounts is None:
+    if found or mounts is None or options["levelled"]:
         return found
     turned = options["time"] + options["settle"]  # the table turns while the loops settle
     values = (earth_rate, options["terms"])
@@ -201,7 +201,7 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
                 f"{reach:.3g} rad/s; index more slowly"
             )
     names = {c: drift.NAMES_2DOF[c] for c in "xy"}
-    if found or not all(f"gyro.{n}" in parameters for c in "xy" for n in names[c]):
+    if found or options["levelled"] or not all(f"gyro.{n}" in parameters for c in "xy" for n in names[c]):
         return found
     x, y = (drift.at_points({n: parameters[f"gyro.{n}"] for n in names[c]}) for c in "xy")
 
@@ -220,6 +220,16 @@ def model_problems(parameters: Mapping[str, Any], mounts: Sequence[int], options
                 "take another mount"
             )
     return found or _capture_problems(parameters, mounts, options["latitude"], earth_rate, rates)
+
+
+def current_problems(parameters: Mapping[str, Any], currents: Mapping[int, tuple[float, float]]) -> list[str]:
+    """Return compensating currents (A, about x and y of each mount) that a cage does not give."""
+    found = []
+    for axis, cage in enumerate(("cage_x", "cage_y")):
+        most, limit = max(abs(i[axis]) for i in currents.values()), parameters.get(f"{cage}.i_max", math.inf)
+        if most > 0.9 * limit:
+            found.append(f"levelled asks for {most * 1e3:.3g} mA, {cage}.i_max = {limit * 1e3:.3g} mA leaves no room")
+    return found
 
 
 def _capture_problems(

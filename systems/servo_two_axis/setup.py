@@ -7,7 +7,7 @@ between site and outer table: it turns what the site says into the axes of the m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gyrobench.system.connectors import Socket, inp, out
@@ -92,13 +92,40 @@ COLUMNS = {
 }
 
 
-def plan(mounts: Sequence[int], time: float, window: float, settle: float) -> Plan:
-    """Return each mount after a phase that brings both axes to 0 with the rotor caged."""
+#: samplers of the compensating currents, which precess the rotor about x and about y
+METERS = {"x": "torquing_x", "y": "torquing_y"}
+LEVELLED = f"""
+    sequencer -> cage_x: target=command
+    sequencer -> cage_y: target_y=command
+    outer -> cage_x: angle_read=angle
+    inner -> cage_y: angle_read=angle
+    cage_x -> torquing_x: i=x
+    cage_y -> torquing_y: i=x
+    {sampled("torquing_x", "outer: angle_read")}
+    {sampled("torquing_y", "inner: angle_read")}
+"""
+LEVELLING = 0.1  # 1/s: a table that the torquers keep level comes to rest at the drift over it
+
+
+def plan(
+    mounts: Sequence[int], time: float, window: float, settle: float, currents: Mapping[int, tuple[float, float]]
+) -> Plan:
+    """Return each mount after a phase that brings both axes to 0 with the rotor caged.
+
+    currents: compensating ones of a mount, A, about x and y; none where the torquers are idle.
+    """
     phases = []
     for m in mounts:
+        about_x, about_y = currents.get(m, (0.0, 0.0))
         phases.append(Phase(f"mount {m}: to the start", "index", FACE, settle=1.0, dwell=0.1, window=0.1))
-        phases.append(Phase(f"mount {m}", "servo", FACE, settle=settle, dwell=time, window=window))
+        times = {"settle": settle, "dwell": time, "window": window}
+        phases.append(Phase(f"mount {m}", "servo", FACE, about_x, target_y=about_y, **times))
     return Plan(phases, {FACE: NEXT})
+
+
+def levelling(parts: PartValues) -> dict[str, Any]:
+    """Return the gains that keep both axes at 0 by the torquers."""
+    return {"cage_x.K_a": LEVELLING / float(parts["gyro.k_y"]), "cage_y.K_a": LEVELLING / float(parts["gyro.k_x"])}
 
 
 def parameters(parts: PartValues, mounts: Sequence[int]) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import BudgetLine, Reason, Response, Table
 
+from .axis_as_data import margins_table
 from .closed_form import SampledLoop
 
 PPM = 1e-6
@@ -172,6 +173,8 @@ class Reduction(MeasureReduction):
             found.measure(f"ripple {rate / ERU:.6g} ERU", "standard deviation of the tracking error", "arcsec",
                           _rms(np.array(sizes)), math.hypot(*u_each) / len(both), scale=ARCSEC)  # fmt: skip
         rows = [self._row(r) for r in self.readings]
+        axis = margins_table(str(run.options.get("plant", "")), SampledLoop.of(run.parameters, run.step))
+        found.tables += [axis] if axis is not None else []
         found.tables.append(Table("rates.readouts", "Rates by the three readouts", READOUTS, COLUMNS, rows))
         limited = int(np.sum(w["flagged"] > 0.0)) if "flagged" in w else 0
         text = (

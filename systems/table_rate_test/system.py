@@ -14,6 +14,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.units import ARCSEC
 
+from .axis_as_data import SampledLoopError, plant_of
 from .closed_form import SampledLoop
 from .measured import MEASURED
 
@@ -81,6 +82,7 @@ class TableRateTest(System):
         "u_angle2": Option(0.15 * ARCSEC, "rad", "error of the readings twice a turn, std. unc. of its amplitude", 0.0),
         "u_cycle": Option(0.1 * ARCSEC, "rad", "error twice in a cycle of the scale, std. unc. of its amplitude", 0.0),
         "u_reading": Option(0.0, "rad", "noise of a reading beyond its rounding, standard uncertainty", 0.0),
+        "plant": Option("", str, "angle per torque of the real axis: 'num | den | delay' or a table of its response"),
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }
     windows = Windows.of(
@@ -155,6 +157,10 @@ class TableRateTest(System):
         found = [f"rates = {', '.join(wrong)}: a rate must be 0.01 to 1999.9 ERU"] if wrong else []
         if not rates or len(rates) > 98:
             found.append(f"{len(rates)} phases: 1 to 49 rates are possible")
+        try:
+            plant_of(str(self["plant"]))
+        except SampledLoopError as problem:
+            found.append(str(problem))
         return found
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:

@@ -296,6 +296,11 @@ CASES = {
          "window": 2.4, "settle": 2.0},
         two_channels, latitude(30.0, 68.0), of_two_encoders,
     ),
+    "servo_two_axis, levelled": Case(
+        "servo_two_axis",
+        {"levelled": True, "mounts": "1 2 8", "time": 60.0, "window": 1.0, "settle": 2.0},
+        two_channels, latitude(0.0, 80.0), of_two_encoders,
+    ),
     "pickoff_scale_factor": Case(
         "pickoff_scale_factor", {}, lambda rng: {**floated(rng), "gyro.K_sg": rng.uniform(8.0, 10.0)},
         latitude(0.0, 85.0), of_pickoff(0.1, 0.1 * DPH),
@@ -363,8 +368,8 @@ def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> l
     """What each run of a case is given: values and a seed."""
     rng = np.random.default_rng(seed)
     system = load_system(case.system)
-    if "channel" in case.values:  # it decides which slots there are
-        system.set("channel", case.values["channel"])
+    for name in {"channel", "levelled"} & set(case.values):  # they decide which slots there are
+        system.set(name, case.values[name])
     probe = case.drawn(rng)
     for slot in system.on_request:
         if any(n.startswith(f"{slot}.") for n in probe):

@@ -84,6 +84,7 @@ PLANS: dict[str, tuple[dict[str, Any], float | None]] = {
     "table_rate_test": ({"rates": "100 999.99", "dwell": 5.0, "least": 20, "settle": 1.0}, None),
     "table_servo_loop": ({"hold": 1.0}, 2.5e-4),
     "table_supervision": ({"repeats": 1, "pairs": 0, "quiet": 10.0}, None),
+    "test_start_up": ({"dwell": 6.0}, None),
     "vertical_gyro": ({"time": 20.0}, None),
     "torquer_scale_factor": ({"currents": "20 60 100", "range": "0.5deg", "range_large": "2deg", "windows": 5}, None),
     "tumble_single_axis": (

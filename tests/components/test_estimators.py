@@ -22,6 +22,7 @@ SAMPLED = [
     "estimator_lti",
     "estimator_coloured",
     "estimator_sage_husa",
+    "estimator_statistical",
     "estimator_wavelet",
 ]
 FULL = ["estimate", "variance", "innovation", "nis"]

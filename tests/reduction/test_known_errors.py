@@ -18,7 +18,8 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.run_metadata import Remount
-from gyrobench.reduction.setup.sources import Effect
+from gyrobench.reduction.setup.sources import Effect, Source
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = units.factor("deg/h")
 N = 120
@@ -26,6 +27,12 @@ T0 = 10.0 * np.arange(N)
 ANGLE = 2.0 * np.pi * np.arange(N) / 40.0
 X = np.column_stack([np.ones(N), np.cos(ANGLE)])
 HALVES = np.array([np.arange(N) < 60, np.arange(N) >= 60]).astype(float)  # one constant of each mount
+
+
+def test_a_set_up_without_the_field_of_a_source_says_so() -> None:
+    source = Source("mount.flip", "flip of the mount", "rad", "u_flip")
+    with pytest.raises(ReductionError, match="takes its uncertainty from u_flip, and the set-up Remount has no"):
+        source.effect(Remount())
 
 
 def line(y: Any) -> Findings:

@@ -35,6 +35,7 @@ def test_vendor_gyro_fits_through_its_mapping(foreign: Foreign) -> None:
     assert binding.parameters["k"].gain == pytest.approx(DPH / 1e-3, rel=1e-14)  # rad/s per A
     assert binding.parameters["T_FLOAT"].gain == 1e-3  # unmapped: own name, SI by its unit
     inputs = ["alpha", "dT", "v_float", "temperature", "B", "dB"]
+    inputs += ["wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation"]
     assert binding.absent == [*inputs, "drift", "b", "M_react", "h_I", "M_I", "saturated"]
 
 

@@ -215,6 +215,13 @@ def test_a_gauss_markov_drift_is_reported_as_a_filter_takes_it(tmp_path: Path) -
 
 @pytest.mark.usefixtures("no_arma")
 @pytest.mark.long
+def test_a_deviation_that_only_falls_bounds_the_least_one_from_above(tmp_path: Path) -> None:
+    """White noise alone: no minimum, so no time of it, and nothing below which it cannot be."""
+    rate = 0.1 * np.random.default_rng(3).standard_normal(4000)
+    found = reduce(write(tmp_path / "r.csv", {"time [s]": np.arange(4000.0), "rate [deg/h]": rate}))["B_min"]
+    assert found.no_value and found.interval[0] == 0.0 < found.interval[1] < 0.1 and " at " not in found.meaning
+
+
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.
 

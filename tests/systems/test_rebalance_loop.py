@@ -12,6 +12,8 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
+from gyrobench.packaging import build
+from gyrobench.reduction.drift.small_rates import SmallRates
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
@@ -267,3 +269,33 @@ def test_threshold_and_scale_factor_at_each_rate(pwm: Session) -> None:
     assert found["κ"].estimate == pytest.approx(plain["κ"].estimate, abs=plain["κ"].u)
     with pytest.raises(GyrobenchError, match="small"):
         pwm.run({**QUICK, "small": "200"}, 1)
+
+
+def test_threshold_of_a_reading_in_steps() -> None:
+    """An analog loop read in steps q = 1 deg/h, with a drift of 0.2 deg/h and hardly any noise, answers from q/2 - 0.2
+    deg/h = 0.3 deg/h on, in one of the senses: half of a step there, (q/2)/r = 1.43 of the rate 0.35.
+    """
+    small = {"range": "0.1deg/s", "rates": "0.3 0.6 1", "small": "0.05 0.15 0.27 0.35 0.8", "gyro.D_F": 0.2 * ARCSEC}
+    steps = {"rebalance.resolution": ARCSEC / (17.2e3 * ARCSEC), "rebalance.meter": 0.0}
+    with Session(NAME, {"rebalance": build("rebalance_analog")}) as session:
+        result = run(session, {**STILL, **small, **steps})
+    assert result["threshold"].interval == pytest.approx((0.27, 0.35))
+    rows = next(t for t in result.tables if t.id == "rate.small").rows
+    assert [row[3] for row in rows] == ["no", "no", "no", "yes", "yes"]
+    assert [row[1] for row in rows] == pytest.approx([0.0, 0.0, 0.0, 0.5 / 0.35, 1.0 / 0.8 * 0.5 + 0.5 / 0.8], abs=0.02)
+
+
+def test_a_drift_between_repeats_is_no_answer() -> None:
+    """Readings that agree within a phase and not from phase to phase: their scatter within says u = 0.002, the means of
+    the repeats 0.25.  Of a rate that is answered in one of two repeats alone nothing is said.
+    """
+    w = np.repeat([1.0, -1.0, 2.0, -2.0, -2.0, 2.0, -1.0, 1.0], 10)
+    offset = np.repeat([0.2, -0.3, 0.3, -0.2, 0.3, -0.3, 0.2, -0.2], 10)
+    y = w + offset + 0.005 * np.random.default_rng(2).normal(size=80)
+    phase = np.repeat(np.arange(8), 10)
+    plain, seen = SmallRates.of(w, y, 0.005), SmallRates.repeated(w, y, phase)
+    assert np.all(plain.u < 0.002)
+    assert seen.u[0] == pytest.approx(0.25, rel=0.4) and np.all(seen.margin > 3.0 * seen.u)
+    stepped = np.where(np.abs(w) == 1.0, np.where(phase < 4, w, 0.0), w)
+    once = SmallRates.repeated(w, stepped, phase)
+    assert once.ratio[0] == pytest.approx(0.5) and once.bounds is not None and once.bounds[0] == 0.0

@@ -111,3 +111,10 @@ def test_a_loop_without_a_margin_gets_one() -> None:
     wishes, notes = with_margin(parse_wishes(["bandwidth>20Hz"]))
     assert [str(w) for w in wishes] == ["bandwidth at least 20 Hz", "peak S at most 6 dB"] and len(notes) == 1
     assert with_margin(wishes) == (wishes, [])
+
+
+def test_a_value_is_rounded_to_its_uncertainty() -> None:
+    """A gain of 3.55 ± 0.055 is 11.005 dB, and 20 lg(3.605/3.55) = 0.134 dB more at its upper end."""
+    margin, phase, _ = parse_wishes(["gain margin=6dB", "phase margin=40deg", FAST])
+    assert margin.shown(3.55, 0.055) == "11.00 dB ± 0.13 dB" and margin.shown(3.55) == "11 dB"
+    assert phase.shown(math.radians(41.26), math.radians(12.0)) == "41° ± 12°"

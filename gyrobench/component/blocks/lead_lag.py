@@ -66,7 +66,7 @@ class LeadLag(Component):
         self.der.lag = (self.error() - self.lag) / self.T1
         self.der.lead = (self.after_lag() - self.lead) / self.T2
         y = self.after_lead()
-        unlimited = self.unlimited()
+        unlimited = -self.K * (y + self.sum)
         self.der.sum = self.integral * y
         if self.waits(unlimited, y) > 0.5:
             self.der.sum = 0.0

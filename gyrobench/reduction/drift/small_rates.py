@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.result import Coefficient, Table
@@ -16,7 +18,8 @@ from gyrobench.units import DEG
 SMALL = 0.02  # of the largest rate: rates below it are left to the threshold, but those at rest
 SAME = 1e-3  # relative: rates that are the same but for the sense
 HALF = 0.5  # of the response that a rate should have
-SURE = 2.0  # standard uncertainties between a ratio and the half of a response
+SURE = 2.0  # standard uncertainties between a ratio and the half of a response, of readings that are not repeated
+FALSE = 0.05  # probability that any rate of a plan with repeats is surely answered, or not, where it is not so
 MEANING = "threshold: rate at which the gyro begins to answer with half of it, between two rates of the plan"
 
 
@@ -24,12 +27,14 @@ MEANING = "threshold: rate at which the gyro begins to answer with half of it, b
 class SmallRates:
     """Response over rate of each small rate (n,), half the difference of both senses, with its u; rates rise, rad/s.
 
-    unit, scale: of the rates as printed, rad/s per unit.
+    margin (n,): by how much a ratio must differ from the half of a response to be surely on its side.  unit, scale: of
+    the rates as printed, rad/s per unit.
     """
 
     rate: Array
     ratio: Array
     u: Array
+    margin: Array
     unit: str = "°/s"
     scale: float = DEG
 
@@ -37,26 +42,53 @@ class SmallRates:
     def of(cls, w: Array, y: Array, noise: float, unit: str = "°/s", scale: float = DEG) -> SmallRates:
         """w, y: rates and readings, rad/s; noise: standard deviation of a reading."""
         rows = []
-        for r in _distinct(np.abs(w)):
-            plus, minus = (np.abs(s * w - r) < SAME * r for s in (1.0, -1.0))
-            if plus.any() and minus.any():
-                half = 0.5 * (float(y[plus].mean()) - float(y[minus].mean()))
-                u = 0.5 * noise * math.sqrt(1.0 / np.count_nonzero(plus) + 1.0 / np.count_nonzero(minus))
-                rows.append((r, half / r, u / r))
-        columns = [np.array([row[k] for row in rows]) for k in range(3)]
-        return cls(columns[0], columns[1], columns[2], unit, scale)
+        for r, plus, minus in _both_senses(w):
+            u = 0.5 * noise * math.sqrt(1.0 / np.count_nonzero(plus) + 1.0 / np.count_nonzero(minus))
+            rows.append((r, _half(y, plus, minus) / r, u / r, SURE * u / r))
+        rate, ratio, u_ratio, margins = _columns(rows)
+        return cls(rate, ratio, u_ratio, margins, unit, scale)
+
+    @classmethod
+    def repeated(cls, w: Array, y: Array, phase: NDArray[np.int_], unit: str = "°/s", scale: float = DEG) -> SmallRates:
+        """Return the same of readings in phases (n,) that repeat each rate: what drifts from phase to phase is seen.
+
+        The variance of a ratio is the larger of three: of the readings and of the means of repeated phases, each pooled
+        over all rates, and of the repeats of this rate alone, for a rate that is answered now and then scatters more
+        than others.  margin: Student's quantiles of each for FALSE, shared by all rates but in the last.
+        """
+        cells = list(_both_senses(w))
+        means = [[[y[side & (phase == p)] for p in np.unique(phase[side])] for side in sides] for _, *sides in cells]
+        reading, dof_reading = _pooled([x for sides in means for side in sides for x in side])
+        between, dof_between = _pooled([np.array([x.mean() for x in side]) for sides in means for side in sides])
+        shared = 1.0 - 0.5 * FALSE / max(len(cells), 1)
+        rows = []
+        for (r, plus, minus), sides in zip(cells, means, strict=True):
+            within = math.sqrt(reading * sum(1.0 / np.count_nonzero(side) for side in (plus, minus)))
+            own = [np.array([x.mean() for x in side]) for side in sides]
+            alone = sum(float(np.var(x, ddof=1)) / x.size for x in own if x.size > 1)
+            sizes = (
+                (within, dof_reading, shared),
+                (math.sqrt(between * sum(1.0 / len(side) for side in sides)), dof_between, shared),
+                (math.sqrt(alone), sum(x.size - 1 for x in own), 1.0 - 0.5 * FALSE),
+            )
+            u = 0.5 * max(size for size, *_ in sizes) / r
+            known = [float(stats.t.ppf(p, dof)) * size for size, dof, p in sizes if dof]
+            margin = max(known, default=math.inf)
+            rows.append((r, _half(y, plus, minus) / r, u, 0.5 * margin / r))
+        rate, ratio, u_ratio, margins = _columns(rows)
+        return cls(rate, ratio, u_ratio, margins, unit, scale)
 
     @property
     def silent(self) -> bool:
         """Whether a rate is surely not answered."""
-        return bool(np.any(self.ratio + SURE * self.u < HALF))
+        return bool(np.any(self.ratio + self.margin < HALF))
 
     @property
     def bounds(self) -> tuple[float, float] | None:
         """Largest rate surely without and least rate surely with half of the response; 0 and infinity where none is;
         None where a rate above one that responds does not, or the readings do not say it of any.
         """
-        answers, silent = self.ratio - SURE * self.u > HALF, self.ratio + SURE * self.u < HALF
+        answers, silent = self.ratio - self.margin > HALF, self.ratio + self.margin < HALF
         low = float(self.rate[silent].max()) if silent.any() else 0.0
         high = float(self.rate[answers].min()) if answers.any() else math.inf
         return (low, high) if low < high and (answers.any() or silent.any()) else None
@@ -73,9 +105,11 @@ class SmallRates:
             return _without(nothing, "not determined: the readings of the small rates are too noisy", math.nan)
         low, high = (x / self.scale for x in self.bounds)
         if low == 0.0:
-            return _without(nothing, f"below {high:.4g} {self.unit}: every rate of the plan is answered", high)
+            return _without(
+                nothing, f"below {high:.4g} {self.unit}: none of the plan is surely without an answer", high
+            )
         if math.isinf(high):
-            return _without(nothing, f"above {low:.4g} {self.unit}: no rate of the plan is answered", math.nan)
+            return _without(nothing, f"above {low:.4g} {self.unit}: none of the plan is surely answered", math.nan)
         u = (high - low) / math.sqrt(12.0)  # nothing is known between the two
         return Coefficient(
             "threshold", MEANING, self.unit, 0.5 * (low + high), u, math.sqrt(3.0), (low, high), truth=shown,
@@ -86,10 +120,10 @@ class SmallRates:
         if not self.rate.size:
             return []
         rows = [
-            [r / self.scale, x, u, "yes" if x - SURE * u > HALF else "no" if x + SURE * u < HALF else "not sure"]
-            for r, x, u in zip(self.rate.tolist(), self.ratio.tolist(), self.u.tolist(), strict=True)
+            [r / self.scale, x, u, "yes" if x - m > HALF else "no" if x + m < HALF else "not sure"]
+            for r, x, u, m in zip(*(v.tolist() for v in (self.rate, self.ratio, self.u, self.margin)), strict=True)
         ]
-        caption = "Half the difference of both senses over the rate; a response: more than half, by two u"
+        caption = "Half the difference of both senses over the rate; a response: surely more than half"
         return [
             Table(
                 "rate.small",
@@ -114,6 +148,28 @@ def _without(c: Coefficient, why: str, high: float) -> Coefficient:
         c.name, c.meaning, c.unit, math.nan, math.nan, c.k, (0.0, high) if math.isfinite(high) else c.interval,
         truth=c.truth, no_value=why,
     )  # fmt: skip
+
+
+def _both_senses(w: Array) -> Iterator[tuple[float, NDArray[np.bool_], NDArray[np.bool_]]]:
+    """Yield each size of the rates w (n,) that is there in both senses, with the rows of either."""
+    for r in _distinct(np.abs(w)):
+        plus, minus = (np.abs(s * w - r) < SAME * r for s in (1.0, -1.0))
+        if plus.any() and minus.any():
+            yield r, plus, minus
+
+
+def _half(y: Array, plus: NDArray[np.bool_], minus: NDArray[np.bool_]) -> float:
+    return 0.5 * (float(y[plus].mean()) - float(y[minus].mean()))
+
+
+def _columns(rows: list[tuple[float, float, float, float]]) -> list[Array]:
+    return [np.array([row[k] for row in rows]) for k in range(4)]
+
+
+def _pooled(groups: list[Array]) -> tuple[float, int]:
+    """Return the variance within groups, and its degrees of freedom."""
+    dof = sum(x.size - 1 for x in groups)
+    return (sum(float(np.sum((x - x.mean()) ** 2)) for x in groups) / dof, dof) if dof else (0.0, 0)
 
 
 def _distinct(values: Array) -> list[float]:

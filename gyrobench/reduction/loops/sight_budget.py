@@ -35,7 +35,7 @@ from gyrobench.reduction.loops.jitter import Complex, Spectra, segments, spectra
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.margins import excitation_response
-from gyrobench.reduction.loops.sight_roll import roll_coupling
+from gyrobench.reduction.loops.sight_roll import as_at_the_start, roll_coupling
 
 PAIR = (0, 1)  # pitch, yaw
 EXCITED = (1, 3)  # their elements of the exciter
@@ -93,7 +93,7 @@ def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float, sight: tuple[str,
     second = roll_coupling(gate, p, BASE, THETA)
     return Ride(
         (los[0], los[1]),
-        [cut(gate[name]) for name in BASE],
+        [cut(y) for y in as_at_the_start(gate, p, BASE, THETA)],
         [cut(gate[f"vibration.f[{k}]"]) for k in (1, 2, 3)],
         {name: [cut(m) for m in pair] for name, pair in made.items()},
         (cut(second.rate), cut(second.torque)),

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyrobench.component.set_up import SINES
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 if TYPE_CHECKING:
     from gyrobench.arrays import Array
@@ -77,6 +78,12 @@ class Source:
             return float(sizes)
         if isinstance(sizes, Mapping):
             return float(sizes.get(self.option, 0.0))
+        if not hasattr(sizes, self.option):
+            kind = type(sizes).__name__
+            raise ReductionError(
+                f"the source of error {self.id} takes its uncertainty from {self.option}, and the set-up {kind} has no "
+                f"such field: write `{self.option}: float = 0.0` in {kind}"
+            )
         return float(getattr(sizes, self.option))
 
 
