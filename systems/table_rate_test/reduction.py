@@ -28,7 +28,7 @@ from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import BudgetLine, Reason, Response, Table
 
-from .axis_as_data import margins_table
+from .axis_as_data import SampledLoopError, margins_table
 from .closed_form import SampledLoop
 
 PPM = 1e-6
@@ -173,8 +173,7 @@ class Reduction(MeasureReduction):
             found.measure(f"ripple {rate / ERU:.6g} ERU", "standard deviation of the tracking error", "arcsec",
                           _rms(np.array(sizes)), math.hypot(*u_each) / len(both), scale=ARCSEC)  # fmt: skip
         rows = [self._row(r) for r in self.readings]
-        axis = margins_table(str(run.options.get("plant", "")), SampledLoop.of(run.parameters, run.step))
-        found.tables += [axis] if axis is not None else []
+        self._axis()
         found.tables.append(Table("rates.readouts", "Rates by the three readouts", READOUTS, COLUMNS, rows))
         limited = int(np.sum(w["flagged"] > 0.0)) if "flagged" in w else 0
         text = (
@@ -264,6 +263,16 @@ class Reduction(MeasureReduction):
         jitter = _rms(r.rows["jitter"][1:]) / ERU if "jitter" in r.rows else None
         tracking = (r.mean / ARCSEC, r.ripple[0] / ARCSEC)
         return [r.rate / ERU, r.error / PPM, u / PPM, *beside, *tracking, jitter]
+
+    def _axis(self) -> None:
+        """Add the margins with the axis as data; a file that is gone or too short is a warning, the rates stand."""
+        text = str(self.run.options.get("plant", ""))
+        try:
+            axis = margins_table(text, SampledLoop.of(self.run.parameters, self.run.step))
+        except SampledLoopError as problem:
+            self.found.warn("plant", f"No margins with the axis as data: {problem}.")
+            return
+        self.found.tables += [axis] if axis is not None else []
 
     def _change_of_rate(self) -> None:
         """Show the largest change of rate, and measure its torque where the linear loop is known."""
