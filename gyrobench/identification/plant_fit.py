@@ -1,10 +1,10 @@
 """Physical parameters of a plant from its measured response: values, covariance, test of the model.
 
-Weighted least squares over all frequencies; the covariance is that of first order.  A weight is of the noise of the
-lines beside, relative to the gain of the model, not of the line itself: else lines that the noise has made small
-count more, and the gain comes out low.  What is left, over its noise, is chi-squared where the model describes the
-plant; more of it (p < 0.001) is lack of fit: the uncertainties are widened by Birge's ratio, and the frequency is
-named at which the model is furthest off.
+Weighted least squares over all frequencies.  A weight is of the noise of the lines beside, relative to the gain of the
+model, not of the line itself: else lines that the noise has made small count more, and the gain comes out low.  The
+covariance is that of first order, by each line's own noise.  What is left, over its noise, is chi-squared where the
+model describes the plant; more of it (p < 0.001) is lack of fit: the uncertainties are widened by Birge's ratio, and
+the frequency is named at which the model is furthest off.
 Source: Pintelon 2012, 9.11 (least squares in the frequency domain) and 11.3 (test of the cost).
 """
 
@@ -342,9 +342,10 @@ def fit_plant(record: LoopRecord, plant: MeasuredResponse, texts: Sequence[str])
     p = float(fdtrc(spare, float(kept.dof.sum()), square))
     values = problem.values(x)
     scale = np.array([1.0 if n in SIGNED else values[n] for n in free])
-    covariance = (
-        np.asarray(np.linalg.inv(by.T @ by), float) * np.outer(scale, scale) * (max(square, 1.0) if p < LACK else 1.0)
-    )
+    inverse = np.linalg.inv(by.T @ by)
+    own = np.tile(kept.u * np.abs(value) / sigma, 2)  # beside a resonance the noise of a line is not that of its weight
+    covariance = np.asarray(inverse @ (by.T * own**2) @ by @ inverse, float) * np.outer(scale, scale)
+    covariance *= max(square, 1.0) if p < LACK else 1.0
     g = problem.response(x)
     k = int(np.argmax(np.abs((value - g) / sigma)))
     worst = 20.0 * math.log10(1.0 + abs(value[k] / g[k] - 1.0)), float(f[k])
