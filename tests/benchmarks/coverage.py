@@ -151,8 +151,11 @@ def exposed(rng: Rng) -> Values:
     return {**floated(rng), **{f"gyro.{n}": rng.uniform(-1.0, 1.0) * v * DPH for n, v in sizes.items()}}
 
 
-def supplied(length: float) -> Callable[[Rng], Values]:
-    """A gyro whose supplies are off, and drift over a record of some ``length`` (s), by what is stated of them."""
+def supplied(length: float, way: str = "ramp") -> Callable[[Rng], Values]:
+    """A gyro whose supplies are off, and drift over a record of some ``length`` (s), by what is stated of them.
+
+    way: "step" or "swing", a ripple, of the size stated in place of the drift: what the budget does not know.
+    """
     supplies = {
         "frequency": ("wheel_frequency", 1e-3),
         "voltage": ("wheel_voltage", 1e-2),
@@ -170,7 +173,10 @@ def supplied(length: float) -> Callable[[Rng], Values]:
         for name, (option, largest) in supplies.items():
             u = largest * rng.uniform()
             found |= {f"u_{option}": u, f"supply.{name}_offset": u * rng.normal()}
-            found[f"supply.{name}_ramp"] = u * rng.normal() / length
+            found[f"supply.{name}_{way}"] = u * rng.normal() / (length if way == "ramp" else 1.0)
+        if way != "ramp":
+            found |= {"supply.step_time": rng.uniform(0.2, 1.0) * length, "supply.phase": rng.uniform(0.0, 6.28)}
+            found["supply.period"] = length * 10.0 ** rng.uniform(-1.3, 0.5)
         return found
 
     return values
@@ -265,6 +271,12 @@ CASES = {
     "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
     "fixed_position, supplies": Case(
         "fixed_position", {"dwell": 60.0}, supplied(60.0), latitude(0.0, 85.0), attitude=True
+    ),
+    "fixed_position, supplies in steps": Case(
+        "fixed_position", {"dwell": 60.0}, supplied(60.0, "step"), latitude(0.0, 85.0), attitude=True
+    ),
+    "fixed_position, supplies with ripple": Case(
+        "fixed_position", {"dwell": 60.0}, supplied(60.0, "swing"), latitude(0.0, 85.0), attitude=True
     ),
     "servo_vertical_level, supplies": Case(
         "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0}, supplied(550.0), latitude(0.0, 70.0),

@@ -9,9 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from gyrobench.commands.cli import app
 from gyrobench.component import ComponentError
+from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
+from gyrobench.linear.crossovers import crossovers
 from gyrobench.linear.sampled_model import sampled_step
 from gyrobench.packaging import build, load_part
 from gyrobench.packaging.compiler import system_compiler
@@ -19,6 +23,8 @@ from gyrobench.packaging.instance import Fmu, InstanceError, Plain
 from gyrobench.packaging.own_controller import allow
 from gyrobench.packaging.own_controller.c_law import SIGNATURE
 from gyrobench.packaging.validate import validate
+from gyrobench.system.binding import SocketMismatchError
+from gyrobench.system.configurable import InvalidConfigurationError
 
 H = 5e-4  # s, communication step
 DECLARED = """\
@@ -245,3 +251,27 @@ def test_only_what_the_user_names_is_compiled(tmp_path: Path) -> None:
     script.write_text("raise SystemExit('executed')\n")
     with pytest.raises(GyrobenchError, match="compiled only where you name it yourself"):
         load_part(str(script))
+
+
+@pytest.mark.long
+def test_in_a_system_it_keeps_its_values_and_its_inputs_are_those_of_the_slot(
+    files: dict[str, str], tmp_path: Path
+) -> None:
+    """The design of the system sets K of its own part to hundreds; the loop crosses by the K of the file."""
+    with Session("platform_single_axis", {"stabilizer": files["c"]}) as session:
+        document = session.prepare()[2]
+        assert document.parameters["stabilizer.K"] == 20.0
+        assert session.prepare({"stabilizer.K": 15.0})[2].parameters["stabilizer.K"] == 15.0
+        assert document.linear is not None and document.linear.loops["stabilizer"].discrete is not None
+        ((f, margin),) = crossovers(document.linear.loops["stabilizer"].discrete, 10.0)
+        assert f == pytest.approx(9.70, abs=0.04) and margin == pytest.approx(65.1, abs=1.0)  # measured: 9.70, 65.1
+        assert "compiled apart" in session._obstacle()
+    misprinted = named(tmp_path, "my.c", C.replace("@input     test ", "@input     tset "))
+    with pytest.raises(InvalidConfigurationError, match=r"input tset, which nothing .* gives; did you mean test"):
+        Session("platform_single_axis", {"stabilizer": misprinted})
+    lacking = named(tmp_path, "less.c", C.replace("@output    e ", "@output    ee "))
+    with pytest.raises(SocketMismatchError, match=r"e: missing \(output, V: the signal inside the loop"):
+        Session("platform_single_axis", {"stabilizer": lacking})
+    words = ["sweep", "platform_single_axis", "--part", f"stabilizer={files['c']}", "--over", "crossover=8,9 Hz"]
+    refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "sweep")])
+    assert refused.exit_code != 0 and "workers compile no files: gyrobench build" in str(refused.exception)

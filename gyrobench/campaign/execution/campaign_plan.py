@@ -22,6 +22,7 @@ from gyrobench.campaign.execution.axes import MOST, QUANTITY, Axis, AxisValue, D
 from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, tool_digest
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
+from gyrobench.packaging.own_controller import is_controller
 from gyrobench.system.parameters import followed
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.suite import Suite, load_test
@@ -307,6 +308,10 @@ class _Planner:
     def _assign(self, system: System, parts: Mapping[str, str]) -> Assigned:
         """Build the parts of a system, check that they fit, and put them into the bundle."""
         require_slots(system)
+        for slot, name in parts.items():
+            if is_controller(name):
+                fmu = f"fmus/{Path(name).stem}{'-python' if name.endswith('.py') else ''}.fmu"
+                raise UsageError(f"{slot}: {name}: workers compile no files: gyrobench build {name}, and name {fmu}")
         files = {s: str(self.definition.path(p)) if p.endswith(".fmu") else p for s, p in parts.items()}
         check_fmu_files(files)
         maps = {}

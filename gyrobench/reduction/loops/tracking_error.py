@@ -26,6 +26,7 @@ SLOW = 300.0  # crossover over the frequency at which the coefficients are taken
 SLIGHT = 0.02  # of the largest lag and of the scatter of the error: a lag that scatters by less is constant
 FINE = 100.0  # samples in a period of the crossover, for the lag
 SETTLED = 8.0  # periods of it, in which the loop settles
+DRAWN = 200  # readings of the noise, for a probability
 POINTS = 600  # of the response
 
 
@@ -99,9 +100,18 @@ class TrackingError:
             edge = 100.0 * (1.0 - 0.025 ** (1.0 / self._independent()))
             interval = (100.0 - edge, 100.0) if share else (0.0, edge)
             return 100.0 * share, 0.5 * edge / 1.96, interval
-        u, dof = _scatter(inside)
+        u, dof = _scatter(inside - self._expected(wanted))
         half = float(special.stdtrit(dof, 0.975)) * u
         return 100.0 * share, 100.0 * u, (100.0 * max(0.0, share - half), 100.0 * min(1.0, share + half))
+
+    def _expected(self, wanted: float) -> Array:
+        """Return the probability at each time to be inside, where the rest of the ride's noise is about the lag."""
+        noise = self.e - self.lag
+        drawn = noise[:, :: max(1, noise.shape[1] // DRAWN)]
+        found = np.zeros(noise.shape[1])
+        for x, y in drawn.T:
+            found += np.hypot(self.lag[0] + x, self.lag[1] + y) < wanted
+        return np.asarray(found / drawn.shape[1])
 
     def _independent(self) -> float:
         y = self.size**2

@@ -27,7 +27,7 @@ NEAR = 0.1  # periods of the crossover about a time
 UNSURE = 0.25  # of a settling time, its u: more says nothing
 NOTHING = 1e-3  # of a period of the crossover over 2 pi: a c1 below is 0
 LEAST = 5.0  # u of an error by a motion: less is not measured
-STANDS_OUT = 10.0  # u of the change, or more: a step that stands above the noise
+STANDS_OUT = 10.0  # rms of the noise, or more: a step that stands above it
 MEASURED = ("f_c", "PM", "GM", "GRM")
 
 
@@ -67,12 +67,12 @@ class TrackingMeasures(LoopReduction):
         found = self.found
         k = 0 if gate.axis == 1 else 1
         axis = tuple(SIGHT)[k]
-        step = found.step(gate, MISS[k], scale=MICRO, unit="µrad", y_name=f"tracking error, {axis}", quiet=self.ride())
+        step = found.step(gate, MISS[k], scale=MICRO, unit="µrad", y_name=f"tracking error, {axis}")
         none = ""
-        if step.u_change * STANDS_OUT > abs(step.change):
+        noise = float(np.std(gate.rest(MISS[k])))
+        if noise * STANDS_OUT > abs(step.change):
             none = f"the step is less than {STANDS_OUT:g} times its noise"
         size = abs(step.change) or math.inf
-        noise = float(np.std(gate.rest(MISS[k])))
         u = math.hypot(step.u_change, LIFTED * noise)
         found.measure(f"overshoot {axis}", "of a step of the wanted direction", "%", 100.0 * step.overshoot,
                       100.0 * u / size, no_value=none)  # fmt: skip

@@ -212,11 +212,10 @@ class _Judge:
 
         ranked = sorted(self.found.seen.values(), key=worth, reverse=True)
         near = [f for f in ranked if worth(f) > worth(ranked[0]) - posterior.WINDOW][:TRIED_MODELS]
-        tried = list[tuple[float, Fitted]]()
-        for f in near:
-            tried.append((self.share(allan(f.model, f.p, tau, self.means)), f))
-            if tried[-1][0] == 1.0:
-                return f
+        tried = [(self.share(allan(f.model, f.p, tau, self.means)), f) for f in near]
+        agree = [f for share, f in tried if share == 1.0]
+        if agree:
+            return _middle([f for f in agree if worth(f) > worth(agree[0]) - SIMPLER], clouds)
         for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
             order = np.argsort(-cloud.log)[:TRIED]
             order = order[cloud.log[order] > np.max(cloud.log) - DEEP]
@@ -228,6 +227,21 @@ class _Judge:
                         return tried[-1][1]
         best = max(tried, key=lambda t: t[0])
         return best[1] if best[0] > tried[0][0] + 0.05 else tried[0][1]
+
+
+def _middle(models: Sequence[Fitted], clouds: Sequence[Cloud]) -> Fitted:
+    """Return the first of models that are worth the same, or, if its N is not in the middle half of all draws, the one
+    whose N is nearest to their median.
+    """
+    figure = size_of("white")
+    values, weights = weighted(clouds, figure)
+    if len(models) == 1 or not values.size:
+        return models[0]
+    low, median, high = (quantile(values, weights, q) for q in (0.25, 0.5, 0.75))
+    own = [math.inf if (v := figure(f.model, f.p[None])) is None else float(v[0]) for f in models]
+    if low <= own[0] <= high or math.isinf(own[0]):
+        return models[0]
+    return models[int(np.argmin(np.abs(np.array(own) - median)))]
 
 
 # ------------------------------------------------------------------ figures of the draws

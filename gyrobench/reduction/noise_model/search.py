@@ -98,7 +98,8 @@ def volume(model: Model, information: Array) -> float:
     count = int(filters.sum())
     if count:
         logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
-    return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * count
+    whole = sum(t.filter.startswith("mean") for t in model)  # its number of samples was sought as that of any mean
+    return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * (count + whole)
 
 
 def canonical(model: Model, p: Array) -> tuple[Model, Array]:
