@@ -54,11 +54,11 @@ def margins_table(text: str, loop: closed_form.SampledLoop | None) -> Table | No
     if plant is None or loop is None:
         return None
     b, g, a, scale = loop.gains()
-    if not isinstance(plant, Plant):
-        sampled = SampledLoop(plant, (scale * g, -scale * a), (1.0, -b), loop.T)
+    if isinstance(plant, Plant):
+        late: Plant | MeasuredPlant = Plant(plant.A, plant.B, plant.C, plant.delay + loop.delay)
     else:
-        late = Plant(plant.A, plant.B, plant.C, plant.delay + loop.delay)
-        sampled = SampledLoop(late, (scale * g, -scale * a), (1.0, -b), loop.T)
+        late = MeasuredPlant(plant.w, plant.values * np.exp(-1j * plant.w * loop.delay))
+    sampled = SampledLoop(late, (scale * g, -scale * a), (1.0, -b), loop.T)
     m = sampled.margins()
     finite = [x if math.isfinite(x) else None for x in (m.gain, math.degrees(m.phase), m.crossover / 2.0 / math.pi)]
     row: list[float | None] = [*finite, m.modulus, None, None]

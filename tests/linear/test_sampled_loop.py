@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -134,8 +135,11 @@ def test_the_rate_test_takes_an_axis_as_data(tmp_path) -> None:  # type: ignore[
     f = np.geomspace(0.1, 5e3, 3000)
     lines = [f"{x!r},{1.0 / (J * (2.0 * math.pi * x) ** 2)!r},-180.0" for x in f.tolist()]
     (tmp_path / "axis.csv").write_text("frequency_hz,gain,phase_deg\n" + "\n".join(lines))
-    (measured,) = data.margins_table(str(tmp_path / "axis.csv"), loop).rows
-    assert measured[:4] == pytest.approx(row[:4], rel=5e-3) and measured[4:] == [None, None]
+    for delay in (0.0, 0.3 * T):  # of the controller: it comes on top of either
+        late = replace(loop, delay=delay)
+        (row,) = data.margins_table("1 | 2.56 0 0", late).rows
+        (measured,) = data.margins_table(str(tmp_path / "axis.csv"), late).rows
+        assert measured[:4] == pytest.approx(row[:4], rel=5e-3) and measured[4:] == [None, None]
     assert data.margins_table("", loop) is None
     for text, words in (("1 | 1", "higher degree"), ("a | b", "falling powers"), ("no.csv", "columns frequency_hz")):
         assert words in load_system("table_rate_test").with_values({"plant": text}).check()[0]
