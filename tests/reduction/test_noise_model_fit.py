@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model.agreement import with_spectrum
-from gyrobench.reduction.noise_model.fit import fit_noise
+from gyrobench.reduction.noise_model.fit import about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
 from gyrobench.reduction.noise_model.ordinates import Ordinates
 from gyrobench.reduction.noise_model.prior import Prior
@@ -27,6 +27,12 @@ def markov(n: int, sigma: float, tau: float, rng: np.random.Generator) -> np.nda
     start = [a * sigma * rng.normal()]
     out: np.ndarray = lfilter([1.0], [1.0, -a], sigma * math.sqrt(1.0 - a * a) * rng.normal(size=n), zi=start)[0]
     return out
+
+
+def test_a_value_outside_the_draws_is_not_the_end_of_its_interval() -> None:
+    assert about(2.0, 1.0, 3.0) == (1.0, 3.0)
+    assert about(4.0, 1.0, 2.0) == (1.0, 16.0)  # 4 is 4 times the lower end, so the upper one is 4 times 4
+    assert about(1.0, 2.0, 4.0) == (0.25, 4.0)
 
 
 @pytest.mark.parametrize(

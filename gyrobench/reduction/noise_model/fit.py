@@ -264,7 +264,18 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
         return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
-    return Estimate(value, min(low, value), max(high, value), True)
+    return Estimate(value, *about(value, low, high), True)
+
+
+def about(value: float, low: float, high: float) -> tuple[float, float]:
+    """Return the interval of the draws; where the value that is reported lies outside, they lack what makes it so (the
+    bands of one model), and the interval reaches as far beyond the value, by a factor, as they lie on this side.
+    """
+    if value > high:
+        return low, value * value / low
+    if value < low:
+        return value * value / high, high
+    return low, high
 
 
 def _beside_any_drift(
@@ -358,7 +369,7 @@ def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, 
     low, high = np.quantile(np.min(curves, axis=1), [0.025, 0.975])
     early, late = np.quantile(m[place], [0.025, 0.975])
     reached = k < m.size - 1 and bool(np.mean(place == m.size - 1) < 0.025)
-    least = Estimate(float(own[k]), min(float(low), float(own[k])), max(float(high), float(own[k])), reached)
+    least = Estimate(float(own[k]), *about(float(own[k]), float(low), float(high)), reached)
     when = Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached)
     return Minimum(times(least, scale.size), times(when, scale.tau0), reached)
 
