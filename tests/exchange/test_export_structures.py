@@ -135,7 +135,7 @@ def test_initial_unknowns_and_the_time_of_fmi_3(tmp_path: Path) -> None:
     gyro = read_model_description(str(build("floated_gyro", out=tmp_path)))
     assert gyro.initialUnknowns and all(u.dependencies is not None for u in (*gyro.initialUnknowns, *gyro.outputs))
     u = next(x for x in gyro.initialUnknowns if x.variable.name == "u")
-    assert {d.name for d in u.dependencies} == {"K_sg", "u_max", "pickoff", "seed", "float_angle"}
+    assert {d.name for d in u.dependencies} == {"K_sg", "u_max", "pickoff", "seed", "float_angle", "pickoff_excitation"}
     of_3 = read_model_description(str(build("floated_gyro", fmi=3, out=tmp_path)))
     at_0 = [v for v in of_3.modelVariables if v.valueReference == 0]
     assert [(v.name, v.causality) for v in at_0] == [("time", "independent")]

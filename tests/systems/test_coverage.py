@@ -120,8 +120,15 @@ READ: dict[str, tuple[Any, int]] = {  # what is read, runs of the benchmark
 }
 
 
+#: of the benchmark alone: slots that a case has beside those of its system, or readings that the loop holds at 0
+RUN_ONLY = {
+    "tumble_single_axis, supplies", "fixed_position, supplies", "fixed_position, supplies in steps",
+    "fixed_position, supplies with ripple", "servo_vertical_level, supplies", "servo_two_axis, levelled",
+}  # fmt: skip
+
+
 def test_every_case_is_here() -> None:
-    assert set(READ) == set(benchmark.CASES)
+    assert set(READ) | RUN_ONLY == set(benchmark.CASES)
 
 
 def ratios(name: str, runs: int) -> Array:

@@ -113,7 +113,7 @@ def test_position_loops_hold_the_joint_angles() -> None:
     [
         (["loops=three"], "loops = three: must be one of angle, rate"),
         (["track=1Hz"], "track: a position loop is one of loops = rate"),
-        (["loops=rate", "track=3Hz"], "track = 3 Hz: a position loop is slower than a fifth of the rate loop"),
+        (["loops=rate", "track=3Hz"], "track = 3 Hz: the outer loop is slower than a fifth of the rate loop"),
     ],
 )
 def test_refused(command: Command, tmp_path: Path, sets: list[str], said: str) -> None:

@@ -50,7 +50,7 @@ class SuppliedGyro(SdfGyro):
     D_US = Parameter(0.0, "rad/s", "D_S per relative change of the wheel voltage")
     D_PI = Parameter(0.0, "rad/s", "D_I per radian of asymmetry of the wheel's phases")
     D_PS = Parameter(0.0, "rad/s", "D_S per radian of asymmetry of the wheel's phases")
-    k_E = Parameter(0.0, "1", "torquer scale factor per excitation, relative; 0: permanent magnet, 1: microsyn")
+    k_E = Parameter(0.0, "1", "share of the excitation in the torquer's constant; 0: permanent magnet, 1: microsyn")
 
     wheel_frequency = Input(0.0, "1", "frequency of the wheel supply, relative departure")
     wheel_voltage = Input(0.0, "1", "voltage of the wheel supply, relative departure")
