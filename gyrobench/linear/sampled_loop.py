@@ -1,8 +1,8 @@
 """A sampled controller before any linear plant: exact discretization, margins, poles, responses.  [SAMPLED-PLANT]
 
-    loop = SampledLoop(Plant.of_polynomials([1.0], [2.56, 0.4, 0.0], delay=2e-3), [g, -a], [1.0, -b], T=5e-3)
+    loop = DigitalLoop(AnalogPlant.of_polynomials([1.0], [2.56, 0.4, 0.0], delay=2e-3), [g, -a], [1.0, -b], T=5e-3)
     loop.poles(), loop.margins()
-    SampledLoop(MeasuredPlant(frequency, response), ...)             # a table that was measured
+    DigitalLoop(MeasuredPlant(frequency, response), ...)             # a table that was measured
 
 The plant hangs behind a zero-order hold of period T.  One given by polynomials or matrices, with a delay, is exact:
 
@@ -38,11 +38,11 @@ ALIASES = 400  # to either side
 
 
 class SampledLoopError(GyrobenchError):
-    """What cannot be sampled or closed."""
+    """A plant that cannot be sampled, a loop that cannot be closed."""
 
 
 @dataclass(frozen=True)
-class Plant:
+class AnalogPlant:
     """x' = A x + B u(t - delay), y = C x; one input, one output, strictly proper."""
 
     A: Array
@@ -51,7 +51,7 @@ class Plant:
     delay: float = 0.0
 
     @classmethod
-    def of_polynomials(cls, num: ArrayLike, den: ArrayLike, delay: float = 0.0) -> Plant:
+    def of_polynomials(cls, num: ArrayLike, den: ArrayLike, delay: float = 0.0) -> AnalogPlant:
         """Return num(s)/den(s) e^(-s delay), coefficients from the highest power of s on.  Raises SampledLoopError."""
         n, d = np.trim_zeros(np.atleast_1d(num), "f"), np.trim_zeros(np.atleast_1d(den), "f")
         if not (np.isfinite(n).all() and np.isfinite(d).all() and math.isfinite(delay) and delay >= 0.0):
@@ -146,10 +146,10 @@ class MeasuredPlant:
 
 
 @dataclass(frozen=True)
-class Margins:
+class DigitalMargins:
     """Smallest margins of a loop: gain (above 1), phase (rad) with its crossover (rad/s), distance to -1; inf: none.
 
-    A delay between the samples changes W in size too: :meth:`SampledLoop.delay_margin`, not phase over crossover.
+    A delay between the samples changes W in size too: :meth:`DigitalLoop.delay_margin`, not phase over crossover.
     """
 
     gain: float
@@ -159,10 +159,10 @@ class Margins:
 
 
 @dataclass(frozen=True)
-class SampledLoop:
+class DigitalLoop:
     """Feedback -1 around D(z) W(z); D = num(z)/den(z), coefficients from the highest power of z on."""
 
-    plant: Plant | MeasuredPlant
+    plant: AnalogPlant | MeasuredPlant
     num: Sequence[float]
     den: Sequence[float]
     T: float
@@ -178,8 +178,8 @@ class SampledLoop:
         return np.asarray(controller * self.plant.sampled(w, self.T))
 
     def closed(self) -> tuple[Array, Array, Array]:
-        """Return (F, G, C) of the closed loop from the reference to the output.  Of a Plant alone."""
-        if not isinstance(self.plant, Plant):
+        """Return (F, G, C) of the closed loop from the reference to the output.  Of a AnalogPlant alone."""
+        if not isinstance(self.plant, AnalogPlant):
             raise SampledLoopError("measured plant: it has margins, and no poles or responses over time")
         F, G, C = self.plant.step(self.T)
         den = np.asarray(self.den, dtype=float) / self.den[0]
@@ -208,7 +208,7 @@ class SampledLoop:
     def delay_margin(self, most: float = 4.0, parts: int = 80) -> float:
         """Return the delay in addition, s, from which on the loop is unstable, by its poles; inf: none up to most T."""
         plant = self.plant
-        if not isinstance(plant, Plant):
+        if not isinstance(plant, AnalogPlant):
             raise SampledLoopError("measured plant: it has margins, and no poles or responses over time")
 
         def stable(late: float) -> bool:
@@ -224,7 +224,7 @@ class SampledLoop:
             low, high = (middle, high) if stable(middle) else (low, middle)
         return float(low)
 
-    def margins(self) -> Margins:
+    def margins(self) -> DigitalMargins:
         """Return the smallest margins up to half the sampling frequency."""
         import control
 
@@ -235,7 +235,7 @@ class SampledLoop:
         up = gains[gains > 1.0]
         turn = np.radians(phases)
         best = int(np.argmin(np.abs(turn))) if turn.size else -1
-        return Margins(
+        return DigitalMargins(
             float(up.min(initial=math.inf)),
             float(turn[best]) if best >= 0 else math.inf,
             float(moduli.min(initial=math.inf)),

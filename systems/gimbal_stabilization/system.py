@@ -22,6 +22,10 @@ class GimbalStabilization(SightTest):
 
     title = "Stabilized line of sight on a gimbal of two axes"
     reduction = "reduction"
+    slots = SightTest.with_parts(
+        motion="base_motion", load="load_torque", vibration="base_vibration", platform="gimbal_two_axis",
+        gyro="gyro_mems", decoupler="decoupler_los", pitch="stabilizer_lti", yaw="stabilizer_lti",
+    )  # fmt: skip
     wires = SightTest.wires + "".join(
         f"exciter.command[{three}] -> decoupler.command[{two}]\n" for two, three in AXES.values()
     )

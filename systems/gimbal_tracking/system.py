@@ -41,7 +41,16 @@ class GimbalTracking(SightTest):
     spec = ("TRACK-LOOP", "TRACK-IMAGE", "LOS-TARGET", "GIMBAL-2AXIS", "LOS-JITTER", "BASE-PSD")
     reduction = "reduction"
     test = 0.02
-    slots = SightTest.slots | {
+    slots = SightTest.with_parts(
+        motion="base_motion",
+        load="load_torque",
+        vibration="base_vibration",
+        platform="gimbal_two_axis",
+        gyro="gyro_mems",
+        decoupler="decoupler_los",
+        pitch="stabilizer_lti",
+        yaw="stabilizer_lti",
+    ) | {
         "target": Slot("Target", "moving_target"),
         "tracker": Slot("Tracker", "optical_tracker"),
         **{f"track_{axis}": loop.stabilizer("tracking_controller", "angle") for axis in AXES},

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.linear.sampled_loop import MeasuredPlant, Plant, SampledLoop, SampledLoopError
+from gyrobench.linear.sampled_loop import AnalogPlant, DigitalLoop, MeasuredPlant, SampledLoopError
 from gyrobench.result import Table
 
 from . import closed_form
@@ -17,7 +17,7 @@ COLUMNS = ("frequency_hz", "gain", "phase_deg")
 __all__ = ["SampledLoopError", "margins_table", "plant_of"]
 
 
-def plant_of(text: str) -> Plant | MeasuredPlant | None:
+def plant_of(text: str) -> AnalogPlant | MeasuredPlant | None:
     """Return the plant of the option: "num | den | delay", falling powers of s, rad/(N.m) and s, or a CSV file with
     columns frequency_hz, gain (rad/(N.m)), phase_deg; None for "".  Raises SampledLoopError.
     """
@@ -33,7 +33,7 @@ def plant_of(text: str) -> Plant | MeasuredPlant | None:
         raise SampledLoopError(
             f"plant = {text!r}: numbers by falling powers of s, as in '1 | 2.56 0.4 0 | 0.002', or a file .csv"
         ) from None
-    return Plant.of_polynomials(num, den, delay)
+    return AnalogPlant.of_polynomials(num, den, delay)
 
 
 def _measured(path: Path) -> MeasuredPlant:
@@ -54,15 +54,15 @@ def margins_table(text: str, loop: closed_form.SampledLoop | None) -> Table | No
     if plant is None or loop is None:
         return None
     b, g, a, scale = loop.gains()
-    if isinstance(plant, Plant):
-        late: Plant | MeasuredPlant = Plant(plant.A, plant.B, plant.C, plant.delay + loop.delay)
+    if isinstance(plant, AnalogPlant):
+        late: AnalogPlant | MeasuredPlant = AnalogPlant(plant.A, plant.B, plant.C, plant.delay + loop.delay)
     else:
         late = MeasuredPlant(plant.w, plant.values * np.exp(-1j * plant.w * loop.delay))
-    sampled = SampledLoop(late, (scale * g, -scale * a), (1.0, -b), loop.T)
+    sampled = DigitalLoop(late, (scale * g, -scale * a), (1.0, -b), loop.T)
     m = sampled.margins()
     finite = [x if math.isfinite(x) else None for x in (m.gain, math.degrees(m.phase), m.crossover / 2.0 / math.pi)]
     row: list[float | None] = [*finite, m.modulus, None, None]
-    if isinstance(plant, Plant):
+    if isinstance(plant, AnalogPlant):
         delay = sampled.delay_margin()
         row[4] = float(np.abs(sampled.poles()).max())
         row[5] = 1e3 * delay if math.isfinite(delay) else None

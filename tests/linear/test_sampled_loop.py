@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gyrobench.linear.sampled_loop import MeasuredPlant, Plant, SampledLoop, SampledLoopError
+from gyrobench.linear.sampled_loop import AnalogPlant, DigitalLoop, MeasuredPlant, SampledLoopError
 from gyrobench.system.system import load_system
 
 J, T = 2.56, 5e-3
@@ -32,7 +32,7 @@ def deadbeat(p: float = 0.0) -> tuple[list[float], list[float]]:
 def test_sampling_is_that_of_python_control(num: list[float], den: list[float]) -> None:
     oracle = control.sample_system(control.tf(num, den), T, "zoh")
     wanted = oracle(np.exp(1j * W * T))
-    assert Plant.of_polynomials(num, den).sampled(W, T) == pytest.approx(wanted, rel=1e-7)
+    assert AnalogPlant.of_polynomials(num, den).sampled(W, T) == pytest.approx(wanted, rel=1e-7)
 
 
 @pytest.mark.parametrize("delay", [5e-3, 12.5e-3, 1.2e-3])
@@ -41,7 +41,7 @@ def test_a_delay_is_exact(delay: float) -> None:
     the modified z-transform gives as the same plant with the output read T - m after the last sample.
     """
     num, den = PLANTS[1]
-    plant = Plant.of_polynomials(num, den)
+    plant = AnalogPlant.of_polynomials(num, den)
     d, m = divmod(delay, T)
     A, B, C = plant.A, plant.B, plant.C
     whole = control.sample_system(control.ss(A, B[:, None], np.eye(3), np.zeros((3, 1))), T, "zoh")
@@ -53,18 +53,18 @@ def test_a_delay_is_exact(delay: float) -> None:
         if m > 1e-9
         else [C @ s for s in states]
     )
-    assert Plant(A, B, C, delay).sampled(W, T) == pytest.approx(np.array(wanted) * z**-d, rel=1e-9)
+    assert AnalogPlant(A, B, C, delay).sampled(W, T) == pytest.approx(np.array(wanted) * z**-d, rel=1e-9)
 
 
 def test_loop_of_the_source() -> None:
     """J = 2.56, T = 5 ms, deadbeat: step 0, 1.25, 1.75, 1, 1 (CTRL-SAMPLED); poles all at 0; unstable with a delay of
     more than 0.36 T.
     """
-    loop = SampledLoop(Plant.of_polynomials([1.0], [J, 0.0, 0.0]), *deadbeat(), T)
+    loop = DigitalLoop(AnalogPlant.of_polynomials([1.0], [J, 0.0, 0.0]), *deadbeat(), T)
     assert loop.follow(np.ones(6)) == pytest.approx([0.0, 1.25, 1.75, 1.0, 1.0, 1.0], abs=1e-9)
     assert np.abs(loop.poles()).max() < 1e-4  # a triple root: 1e-16 to the power of a third
     for share, stable in ((0.35, True), (0.37, False)):
-        late = SampledLoop(Plant.of_polynomials([1.0], [J, 0.0, 0.0], share * T), *deadbeat(), T)
+        late = DigitalLoop(AnalogPlant.of_polynomials([1.0], [J, 0.0, 0.0], share * T), *deadbeat(), T)
         assert bool(np.abs(late.poles()).max() < 1.0) == stable
     assert loop.delay_margin() == pytest.approx(0.36 * T, abs=0.005 * T)
 
@@ -73,7 +73,7 @@ def test_loop_of_the_source() -> None:
 def test_follows_as_a_continuous_simulation_between_the_samples(delay: float) -> None:
     """A plant with a mode: solve_ivp from sample to sample, the controller as a recursion by hand."""
     num, den = MODE
-    plant = Plant.of_polynomials(num, den, delay)
+    plant = AnalogPlant.of_polynomials(num, den, delay)
     (g, a), (_, b) = deadbeat(0.6)
     x, e_last, u_last, held = np.zeros(4), 0.0, 0.0, 0.0
     out = []
@@ -87,41 +87,41 @@ def test_follows_as_a_continuous_simulation_between_the_samples(delay: float) ->
                 x = solve_ivp(lambda t, s, v=value: plant.A @ s + plant.B * v, (0.0, length), x, rtol=1e-10,
                               atol=1e-16).y[:, -1]  # fmt: skip
         e_last, u_last, held = e, u, u
-    found = SampledLoop(plant, [g, a], [1.0, b], T).follow(1e-3 * np.minimum(np.arange(60), 20))
+    found = DigitalLoop(plant, [g, a], [1.0, b], T).follow(1e-3 * np.minimum(np.arange(60), 20))
     assert found == pytest.approx(np.array(out), abs=1e-6 * max(1.0, np.abs(out).max()))
 
 
 def test_gain_margin_is_where_the_loop_becomes_unstable() -> None:
     num, den = PLANTS[1]
     top, bottom = deadbeat(0.7)
-    m = SampledLoop(Plant.of_polynomials(num, den), top, bottom, T).margins()
+    m = DigitalLoop(AnalogPlant.of_polynomials(num, den), top, bottom, T).margins()
     for share, stable in ((0.99, True), (1.01, False)):
-        more = SampledLoop(Plant.of_polynomials(num, den), [share * m.gain * c for c in top], bottom, T)
+        more = DigitalLoop(AnalogPlant.of_polynomials(num, den), [share * m.gain * c for c in top], bottom, T)
         assert bool(np.abs(more.poles()).max() < 1.0) == stable
 
 
 def test_a_measured_response_gives_the_margins_of_the_plant_that_it_is_of() -> None:
     """2000 points to 20 times the sampling frequency; the sum over the aliases against the exact discretization."""
     num, den = MODE
-    plant = Plant.of_polynomials(num, den)
+    plant = AnalogPlant.of_polynomials(num, den)
     w = np.geomspace(0.1, 40.0 * math.pi / T, 4000)
     measured = MeasuredPlant(w, plant.response(w))
     assert measured.sampled(W, T) == pytest.approx(plant.sampled(W, T), rel=1e-2)
-    exact = SampledLoop(plant, *deadbeat(0.7), T).margins()
-    found = SampledLoop(measured, *deadbeat(0.7), T).margins()
+    exact = DigitalLoop(plant, *deadbeat(0.7), T).margins()
+    found = DigitalLoop(measured, *deadbeat(0.7), T).margins()
     assert found.phase == pytest.approx(exact.phase, abs=2e-3) and found.gain == pytest.approx(exact.gain, rel=2e-3)
 
 
 def test_what_cannot_be_sampled_is_refused() -> None:
     with pytest.raises(SampledLoopError, match="must be of higher degree"):
-        Plant.of_polynomials([1.0, 0.0], [1.0, 0.0])
+        AnalogPlant.of_polynomials([1.0, 0.0], [1.0, 0.0])
     with pytest.raises(SampledLoopError, match="below half the sampling frequency, 100 Hz"):
         MeasuredPlant(np.arange(1.0, 9.0), np.ones(8) + 0j).sampled([1.0], T)
     with pytest.raises(SampledLoopError, match="frequencies must rise"):
         MeasuredPlant(np.array([1.0, 3.0, 2.0, 4.0]), np.ones(4) + 0j)
     measured = MeasuredPlant(np.arange(1.0, 900.0), np.ones(899) + 0j)
     with pytest.raises(SampledLoopError, match="margins, and no poles"):
-        SampledLoop(measured, [1.0], [1.0], T).poles()
+        DigitalLoop(measured, [1.0], [1.0], T).poles()
 
 
 def test_the_rate_test_takes_an_axis_as_data(tmp_path) -> None:  # type: ignore[no-untyped-def]

@@ -1,6 +1,7 @@
 """Tests of a line of sight on a gimbal of two axes: a rate gyro on the inner gimbal, two loops, a base that vibrates.
 
 class Mine(SightTest):
+    slots = SightTest.with_parts(platform="...", ...)
     wires = SightTest.wires + ...
     options = {**SightTest.options, ...}
 """
@@ -47,12 +48,12 @@ class SightTest(LoopTest):
         outer gimbal: base, z platform.theta[2]
         inner gimbal: outer gimbal, x platform.theta[1]
     """
-    slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
-        "vibration": Slot("Vibration", "base_vibration"),
-        "platform": Slot("TwoAxisGimbal", "gimbal_two_axis"),
-        "gyro": Slot("RateGyro", "gyro_mems"),
-        "decoupler": Slot("LosDecoupler", "decoupler_los"),
-        **{axis: loop.stabilizer("stabilizer_lti", "rate") for axis in AXES},
+    slots = LoopTest.slots | {
+        "vibration": Slot("Vibration"),
+        "platform": Slot("TwoAxisGimbal"),
+        "gyro": Slot("RateGyro"),
+        "decoupler": Slot("LosDecoupler"),
+        **{axis: loop.stabilizer(signal="rate") for axis in AXES},
     }
     wires = loop.MOVED + loop.FLOWN + LoopTest.wires + """
         exciter.phase -> vibration.phase
