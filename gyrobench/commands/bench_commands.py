@@ -94,7 +94,7 @@ def build(
     ] = None,
     out: Out = None,
 ) -> None:
-    """Build parts, or controllers of your own (FILE.c, FILE.py), into FMUs.
+    """Build FMUs of parts, or of own controllers (FILE.c, FILE.py).
 
     \b
     Example: gyrobench build floated_gyro --target python
