@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.jitter import Complex, segments
 from gyrobench.reduction.loops.loop_toolkit import Account, margins, told
-from gyrobench.reduction.loops.margins import excitation_response
+from gyrobench.reduction.loops.margins import excitation_responses
 from gyrobench.reduction.loops.sight_budget import EXCITED, LOS, MoreSources, Ride, closed_model
 from gyrobench.reduction.loops.sight_reduction import AXES, SightReduction
 from gyrobench.reduction.loops.tracking_measures import MISS, RATE, TrackingMeasures
@@ -88,8 +88,7 @@ class Reduction(TrackingMeasures, SightReduction):
     @staticmethod
     def _ways(model: LinearModel, names: Sequence[str], f: Array) -> Complex:
         """Return (frequency, name, axis) of the responses to what is added to the error of the image."""
-        rows = [[excitation_response(model, "command", k, name, f) for k in EXCITED] for name in names]
-        return np.asarray(np.moveaxis(np.array(rows), 2, 0))
+        return excitation_responses(model, "command", EXCITED, names, f)
 
     def _images(self, sight: Complex, f: Array) -> dict[str, Array]:
         """Return the densities by noise and resolution of the images, held from frame to frame."""

@@ -26,25 +26,33 @@ DENSE = 2000  # points of a response on which margins are looked for
 
 
 def excitation_response(model: LinearModel, kind: str, axis: int, output: str, f: Sequence[float] | Array) -> Complex:
-    """Return the response of a channel ("slot.output") to an excitation.
+    """Return the response (frequency,) of a channel to an excitation of an axis; see :func:`excitation_responses`."""
+    return excitation_responses(model, kind, (axis,), (output,), f)[:, 0, 0]
+
+
+def excitation_responses(
+    model: LinearModel, kind: str, axes: Sequence[int], outputs: Sequence[str], f: Sequence[float] | Array
+) -> Complex:
+    """Return the responses (frequency, output, axis) of channels ("slot.output") to an excitation.
 
     kind: torque, command, test, or motion (angle of the base), which moves angle, rate and acceleration at once; they
     are summed as 1, s, s^2.  Raises KeyError where the model has no such output or the excitation is not wired.
     """
     names = ("motion_angle", "motion_rate", "motion_acceleration") if kind == "motion" else (kind,)
-    if output not in model.outputs:
-        raise KeyError(f"{output}: unknown channel of the linear model; available: {', '.join(model.outputs)}")
-    all_of_them = model_response(model, f)[:, model.outputs.index(output), :]
+    for output in outputs:
+        if output not in model.outputs:
+            there = ", ".join(model.outputs)
+            raise KeyError(f"{output}: unknown channel of the linear model; available: {there}")
+    every = model_response(model, f)[:, [model.outputs.index(o) for o in outputs], :]
     s = 2j * np.pi * np.asarray(f, float)
-    total = np.zeros(s.size, complex)
-    connected = False
-    for power, name in enumerate(names):
-        for j, wired in enumerate(model.inputs):
-            if wired.partition(".")[2] == f"{name}[{axis}]":
-                total += s**power * all_of_them[:, j]
-                connected = True
-    if not connected:
-        raise KeyError(f"{kind} on axis {axis} is not connected in this system")
+    total = np.zeros((s.size, len(outputs), len(axes)), complex)
+    for k, axis in enumerate(axes):
+        wired = [(power, j) for power, name in enumerate(names) for j, x in enumerate(model.inputs)
+                 if x.partition(".")[2] == f"{name}[{axis}]"]  # fmt: skip
+        if not wired:
+            raise KeyError(f"{kind} on axis {axis} is not connected in this system")
+        for power, j in wired:
+            total[:, :, k] += (s**power)[:, None] * every[:, :, j]
     return total
 
 

@@ -34,7 +34,7 @@ from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.jitter import Complex, Spectra, segments, spectra
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
-from gyrobench.reduction.loops.margins import excitation_response
+from gyrobench.reduction.loops.margins import excitation_responses
 from gyrobench.reduction.loops.sight_roll import as_at_the_start, roll_coupling
 
 PAIR = (0, 1)  # pitch, yaw
@@ -139,8 +139,7 @@ class Ways:
         p = found.record.run.parameters
 
         def to(names: tuple[str, ...], kind: str, axes: tuple[int, ...]) -> Complex:
-            rows = [[excitation_response(model, kind, k, name, f) for k in axes] for name in names]
-            return np.asarray(np.moveaxis(np.array(rows), 2, 0))
+            return excitation_responses(model, kind, axes, names, f)
 
         self.f = f
         stiff = stiffness(p, f, slides)
