@@ -216,6 +216,9 @@ def test_a_state_of_another_part_is_refused(form: str, instance: Callable) -> No
 
 
 # ---------------------------------------------------------------------------------------- instances
+STEPS = {"optical_tracker": 30}  # until the first image is there
+
+
 @pytest.mark.long
 def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callable) -> None:
     """All alive at once, each with a seed or a time of its own, stepped in turn; ten are looked at."""
@@ -244,7 +247,8 @@ def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callabl
 
     for k, c in enumerate(ids):
         start(c, k)
-    for n in range(5):
+    steps = STEPS.get(part, 5)
+    for n in range(steps):
         for c in ids:
             assert library.fmi2DoStep(ctypes.c_void_p(c), doubles(n * 1e-3), doubles(1e-3), 1) == 0
     seen = set()
@@ -255,7 +259,7 @@ def test_a_thousand_native_instances(part: str, fmu: Callable, instance: Callabl
         if seeded:
             alone.set({"seed": k})
         alone.initialize()
-        for n in range(5):
+        for n in range(steps):
             alone.step(n * 1e-3, 1e-3)
         assert alone.get(outputs) == list(values)
         seen.add(tuple(values))

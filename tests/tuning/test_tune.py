@@ -27,7 +27,9 @@ from gyrobench.tuning.tune_loop import tunable, tune
 from gyrobench.tuning.wishes import parse_wishes
 
 NAMES = ["platform_single_axis", "stabilizer_floated_2dof", "stabilizer_sdf"]
-SEVERAL = ["gimbal_stabilization", "platform_four_gimbal", "platform_three_axis", "platform_three_gimbal"]
+SEVERAL = [
+    "gimbal_stabilization", "gimbal_tracking", "platform_four_gimbal", "platform_three_axis", "platform_three_gimbal",
+]  # fmt: skip
 WISHES = ["phase margin=40deg", "gain margin=6dB", "disk margin=0.5", "bandwidth>10Hz"]
 
 
