@@ -16,7 +16,6 @@ of them with 2/3 of their product sin(2 w T)/(2 w T) + 8/3 sin2(w T/2) sin(w T)/
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from typing import Any, Self
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.linear.butterworth import butterworth_gain
 
 AXES = "xyz"
 FINE = 64  # samples in an interval whose sampling is unknown
@@ -48,24 +48,11 @@ class Chain:
         given = {n: o[n] for n in ("interval", "bandwidth", "coning", "samples")}
         return cls(step=step, **given)
 
-    def gain(self, f: float) -> float:
-        """Return the gain of the filter at f (Hz): of samples of the Butterworth filter, its input held over a step."""
-        if not self.bandwidth:
-            return 1.0
-        w, wn = 2.0 * math.pi * f, 2.0 * math.pi * self.bandwidth
-        if not self.step:
-            return 1.0 / math.hypot(1.0, (w / wn) * (w / wn))  # no power: it may exceed the numbers
-        pole, h = wn * cmath.exp(0.75j * math.pi), self.step  # y = 1 + (p* e^(p t) - p e^(p* t))/(p - p*) to a step
-        z = cmath.exp(1j * w * h)
-        p, q = pole, pole.conjugate()
-        a, b = cmath.exp(p * h), cmath.exp(q * h)
-        return abs((q * (a - 1.0) / (z - a) - p * (b - 1.0) / (z - b)) / (p - q))
-
     def kappa(self, f: float, theta: float) -> float:
         """Return the share of the coning at f (Hz, either sense) and half-angle theta (rad) that is computed."""
         w, T = 2.0 * math.pi * abs(f), self.interval
         n = max(1, round(T / self.step)) if self.step else FINE
-        h, gain = T / n, self.gain(abs(f))
+        h, gain = T / n, abs(butterworth_gain(abs(f), self.bandwidth, self.step))
         psi = w * h * np.arange(-1, n * self.samples + 1)
         xy = gain * math.sin(theta) * np.diff(np.column_stack([np.cos(psi), np.sin(psi)]), axis=0)
         d = np.column_stack([xy, np.full(len(xy), -(1.0 - math.cos(theta)) * w * h)])  # the first: the step before

@@ -12,7 +12,6 @@ share of the coning of the same algorithm (Roscoe 2001), H the real part of the 
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,10 +21,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gyrobench.arrays import Array
+from gyrobench.linear.butterworth import butterworth_gain
 
-AXES = "xyz"
-#: axis of the case along the vertical -> rows: axes x, y, z of the case in table axes
-FACES = {a: np.roll(np.eye(3), k + 1, axis=0) for k, a in enumerate(AXES)}
 FINE = 64  # samples in an interval whose sampling is unknown
 PHASES = 16
 
@@ -75,21 +72,6 @@ class VelocityChain:
         names = ("interval", "bandwidth", "acc_bandwidth", "sculling", "samples", "size")
         return cls(step=step, gravity=gravity, **{n: o[n] for n in names})
 
-    def gain(self, f: float, bandwidth: float) -> complex:
-        """Return the gain of a Butterworth filter at f (Hz): of its samples, the input held over a step."""
-        if not bandwidth:
-            return 1.0
-        w, wn = 2.0 * math.pi * f, 2.0 * math.pi * bandwidth
-        if not self.step:
-            x = min(w / wn, 1e100)  # its square is a number
-            return 1.0 / (1.0 - x * x + 1j * math.sqrt(2.0) * x)
-        pole, h = wn * cmath.exp(0.75j * math.pi), self.step
-        z = cmath.exp(1j * w * h)
-        p, q = pole, pole.conjugate()
-        a, b = cmath.exp(p * h), cmath.exp(q * h)
-        # z: the input held over a step is that of its end here
-        return z * (q * (a - 1.0) / (z - a) - p * (b - 1.0) / (z - b)) / (p - q)
-
     def rise(self, m: ScullingMotion, unit: UnitErrors | None = None) -> float:
         """Return the mean vertical acceleration that the user computes, less that at rest, m/s2."""
         unit = unit or UnitErrors(levers=self.size * np.outer([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
@@ -101,9 +83,9 @@ class VelocityChain:
         psi = 2.0 * math.pi * np.arange(PHASES) / PHASES
         steps = psi[:, None] + w * h * np.arange(-1, n * self.samples)  # begins; the first: the step before
         harmonics = m.frequency * np.arange(PHASES // 2 + 1)
-        turns = _fourier(angles[:, None], [self.gain(f, self.bandwidth) for f in harmonics])
+        turns = _fourier(angles[:, None], [butterworth_gain(f, self.bandwidth, self.step) for f in harmonics])
         d = _series(turns, steps) * gyro[:, 0]
-        read = _fourier(forces, [self.gain(f, self.acc_bandwidth) for f in harmonics])
+        read = _fourier(forces, [butterworth_gain(f, self.acc_bandwidth, self.step) for f in harmonics])
         bias = np.zeros(3) if unit.bias is None else unit.bias
         e = h * (_series(read, steps) @ acc.T + bias)
         parts = [self._increment(d[:, k * n : (k + 1) * n + 1], e[:, k * n : (k + 1) * n + 1])

@@ -42,10 +42,11 @@ from gyrobench.reduction.toolkit import (
     told,
     window_problems,
 )
+from gyrobench.system.families.strapdown_motion import FACES
 from gyrobench.units import DEG
 
 from . import mistakes
-from .closed import FACES, ScullingMotion, UnitErrors, VelocityChain, reading
+from .closed import ScullingMotion, UnitErrors, VelocityChain, reading
 
 COLUMNS = ("t_start", "t_end", "frequency", "angle", "vibration", "acceleration")
 LEAST = 2  # readings at rest, and in each motion
