@@ -18,6 +18,7 @@ SCATTER = 0.01  # least robust scatter of the residuals, over u, which an outlie
 OFF = 6.0  # u: a point further from the curve
 LEAD = 0.2  # rad, at the end of the pass band: more than any gyro, or a late reading of the table, makes
 BETTER = 0.1  # of chi2 that is left when two rows are exchanged back
+FITS = 0.02  # rms of ln H off the curve from which on the unit of the phases is tried
 
 
 def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
@@ -44,6 +45,9 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
         return
     if abs(found.value[0] - 1.0) > FAR:
         yield Reason("response.factor", factor_sentence(float(found.value[0])), blocked, severity="doubt")
+    if unit := list(_phase_unit(r, found)):
+        yield from unit
+        return
     late = r.phase[r.gain > r.gain[0] - 0.5 * math.log(2.0)]
     if late[-1] > LEAD:
         text = (
@@ -52,6 +56,19 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
         )
         yield Reason("response.lead", text, blocked, severity="doubt")
     yield from _rows(r, found)
+
+
+def _phase_unit(r: GyroResponse, found: Figures) -> Iterator[Reason]:
+    """Name phases in the other unit of angle: the curve then fits them and the gains."""
+    left = np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)
+    if math.sqrt(float(np.mean(left**2))) < FITS:
+        return
+    for words, factor in (("rad, given as °", 180.0 / math.pi), ("°, given as rad", math.pi / 180.0)):
+        tried = (fitted(GyroResponse(r.f, r.gain, r.phase * factor, r.u), n) for n in (1, 2, 3, 4))
+        if any(c is not None and c.chi2 < BETTER * found.curve.chi2 for c in tried):
+            text = f"The phases fit the gains of no gyro; they do in {words}. Check their unit."
+            yield Reason("response.phase_unit", text, ("pass", "fail"), severity="doubt")
+            return
 
 
 def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:

@@ -200,7 +200,7 @@ class Reduction(DriftReduction[RateTableSetup]):
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth = (self.setup.truth or {}).get("threshold")
         added = self.small.coefficient(truth)
-        reasons = handling.implausible(result.coefficients[0])
+        reasons = handling.implausible(*result.coefficients[:2])
         return replace(
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],

@@ -187,6 +187,8 @@ def mistaken(kind: str) -> np.ndarray:
         rows[:, 3] *= -1.0
     elif kind == "unit":
         rows[:, 2] *= 3600.0
+    elif kind == "rad":
+        rows[:, 3] *= math.pi / 180.0
     elif kind == "integral":
         rows[:, 2] /= w
         rows[:, 3] -= 90.0
@@ -206,6 +208,7 @@ def mistaken(kind: str) -> np.ndarray:
         ("sense", "response.sense", "reversed"),
         ("sign", "response.lead", "opposite sign"),
         ("unit", "response.factor", "°/h"),
+        ("rad", "response.phase_unit", "in rad, given as °"),
         ("integral", "response.angle", "integral of the rate"),
         ("derivative", "response.angle", "derivative of the rate"),
         ("rows", "response.exchanged", "Hz and"),

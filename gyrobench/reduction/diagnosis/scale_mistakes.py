@@ -1,8 +1,11 @@
-"""Mistakes that multiply all readings of a rate alike: senses and units, named by the factor that they make."""
+"""Mistakes that multiply all readings of a rate or a force alike: senses and units, named by the factor they make."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+
+from gyrobench.units import G0
 
 NEAR = 0.1  # of a factor that a mistake has
 #: reading over rate -> what makes it
@@ -18,9 +21,28 @@ FACTORS = {
     1.0e-3: "the reading is in a thousand of its unit",
 }
 
+#: reading of an accelerometer over the specific force -> what makes it
+FORCES = {
+    -1.0: "up and down, or the sense of the accelerometer, are reversed",
+    G0: "the reading is in m/s² and was given as g",
+    1.0 / G0: "the reading is in g and was given as m/s²",
+    1000.0: "the reading is in mg and was given as g",
+    1.0e-3: "the reading is in g and was given as mg",
+}
+
 
 def factor_sentence(ratio: float) -> str:
     """Return that a gyro reads so many times the rate, with the mistake that makes such a factor where one is known."""
-    known = [text for f, text in FACTORS.items() if abs(ratio / f - 1.0) < NEAR]
-    hint = f": {known[0]}?" if known else ""
+    hint = _hint(ratio, FACTORS)
     return f"The gyro reads {ratio:.4g} times the rate{hint} Check the senses and units of rates and readings."
+
+
+def force_sentence(ratio: float) -> str:
+    """Return the same of an accelerometer and the specific force."""
+    hint = _hint(ratio, FORCES)
+    return f"The accelerometer reads {ratio:.4g} times the force{hint} Check the senses and units of its readings."
+
+
+def _hint(ratio: float, known: Mapping[float, str]) -> str:
+    found = [text for f, text in known.items() if abs(ratio / f - 1.0) < NEAR]
+    return f": {found[0]}?" if found else "."
