@@ -272,7 +272,7 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
         return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
-    beside = figure(at.model, found.beside_a_weak_band(at)[None]) if name in FAST else None
+    beside = figure(at.model, found.beside_weak_bands(at)[None]) if name in FAST else None
     if beside is not None:
         ratio = math.exp(0.5 * float(beside[0] - own[0]))
         low, high = low * min(ratio, 1.0), high * max(ratio, 1.0)

@@ -32,7 +32,7 @@ STARTS: dict[str, list[list[float]]] = {
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
-WEAK = 1.0  # the same of a band that nothing shows, and that nothing excludes
+WEAK = 2  # bands that may be, though nothing shows them
 
 
 @dataclass(frozen=True)
@@ -313,14 +313,21 @@ class ModelSearch:
         self.seen = {}
         self.fit(at.model, at.p)
 
-    def beside_a_weak_band(self, at: Fitted) -> Array:
-        """Return the parameters (q,) of a model beside the band that may be where the powers stand out most, though not
-        clearly; those of the model itself where they do not.
+    def beside_weak_bands(self, at: Fitted) -> Array:
+        """Return the parameters (q,) of a model beside the bands that may be where the powers stand out most, though
+        not clearly.
         """
-        start = self.peak(at, clear=WEAK)
-        if start is None:
-            return at.p
-        return max((self._with(at, NoiseTerm(name), start) for name in PEAKS), key=lambda f: f.evidence).p[:-3]
+        found, bands = at, list(self.resonances)
+        for _ in range(WEAK):
+            start = self.peak(found, clear=math.inf)
+            if start is None:
+                break
+            more = max((self._with(found, NoiseTerm(name), start) for name in PEAKS), key=lambda f: f.evidence)
+            bands.append((more.model[-1], more.p[-3:]))
+            self.data.hold(bands)
+            found = replace(more, model=more.model[:-1], p=more.p[:-3])
+        self.data.hold(self.resonances)
+        return found.p
 
     def _with(self, at: Fitted, term: NoiseTerm, start: Array) -> Fitted:
         return maximize(self.data, self.prior, (*at.model, term), np.concatenate([at.p, start]))
