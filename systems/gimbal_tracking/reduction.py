@@ -16,7 +16,7 @@ from gyrobench.reduction.loops.sight_budget import EXCITED, LOS, MoreSources, Ri
 from gyrobench.reduction.loops.sight_reduction import AXES, SightReduction
 from gyrobench.reduction.loops.tracking_measures import MISS, RATE, TrackingMeasures
 
-from .sources import TARGET, image_density, image_noises
+from .sources import TARGET, image_density, image_noises, prediction
 
 PAIR = (0, 1)
 
@@ -95,6 +95,6 @@ class Reduction(TrackingMeasures, SightReduction):
         """Return the densities by noise and resolution of the images, held from frame to frame."""
         p = self.run.parameters
         period, noise, pixel = (float(p.get(f"tracker.{n}", 0.0)) for n in ("period", "image_noise", "pixel"))
-        shape = np.sum(np.abs(sight) ** 2, axis=2).T
+        shape = np.sum(np.abs(sight) ** 2, axis=2).T * np.abs(prediction(p, f)) ** 2
         found = {name: shape * image_density(period, s)(f) for name, s in image_noises(noise, pixel).items()}
         return {name: y for name, y in found.items() if np.any(y)}

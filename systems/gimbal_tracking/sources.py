@@ -25,6 +25,18 @@ def image_density(period: float, sigma: float) -> Density:
     return lambda f: 2.0 * period * sigma**2 * np.sinc(f * period) ** 2
 
 
+def prediction(parameters: Mapping[str, Any], f: Array) -> Array:
+    """Return the response of the prediction of an error from image to image, 1 without one; f: Hz."""
+    p = {n: float(parameters.get(f"tracker.{n}", 0.0)) for n in ("order", "ahead", "bandwidth")}
+    if p["order"] < 0.5:
+        return np.ones(np.shape(f), complex)
+    s, x = 2j * np.pi * f / p["bandwidth"], p["bandwidth"] * p["ahead"]
+    if p["order"] < 1.5:
+        return np.asarray((1.0 + (2.0**0.5 + x) * s) / (1.0 + 2.0**0.5 * s + s**2))
+    ahead = 1.0 + (2.0 + x) * s + (2.0 + 2.0 * x + 0.5 * x * x) * s**2
+    return np.asarray(ahead / (1.0 + 2.0 * s + 2.0 * s**2 + s**3))
+
+
 def target_rates(parameters: Mapping[str, Any], t: Array) -> Array:
     """Return the inertial rates of the direction to the target about x and z, rad/s (2, times).
 
