@@ -99,7 +99,7 @@ class GimbalTracking(SightTest):
         "pixel": Option(2e-5, "rad", "resolution of the error; 0: none", 0.0, sets="tracker.pixel"),
         "image_noise": Option(2e-5, "rad", "noise of each image and axis, rms", 0.0),
         "prediction": Option("none", str, f"of the error over the delay of its image: {', '.join(PREDICTED)}"),
-        "index": Option(0.3, "1", "prediction: Kalata's tracking index, motion in an image over its noise", 1e-6, 100.0),
+        "index": Option(0.3, "1", "prediction: Kalata's tracking index, motion in an image over noise", 1e-6, 100.0),
         "field": Option(0.02, "rad", "field of view, full angle", 1e-5, 2.9, sets="tracker.field"),
         "target": Option("constant", str, f"motion of the target in the ride: {', '.join(TARGETS)}"),
         "target_pitch": Option(1e-3, "rad/s", "target: constant rate about x, up"),

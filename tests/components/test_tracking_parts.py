@@ -208,10 +208,10 @@ def test_filter_of_the_prediction_is_that_of_the_tracking_index(order: int) -> N
     H = np.eye(1, n)
     Q = G @ G.T * (index / period**2) ** 2  # rms over the noise of an image, 1
     M = solve_discrete_are(F.T, H.T, Q, np.eye(1))
-    K = (M @ H.T / (H @ M @ H.T + 1.0)).ravel()
+    found = (M @ H.T / (H @ M @ H.T + 1.0)).ravel()
     w = index ** (1.0 / n) / period
     gains = [[math.sqrt(2.0) * w, w * w], [2 * w, 2 * w * w, w**3]][order - 1]
-    assert K == pytest.approx(np.array(gains) * period, rel={1: 0.02, 2: 0.08}[order])
+    assert found == pytest.approx(np.array(gains) * period, rel={1: 0.02, 2: 0.08}[order])
 
 
 def test_a_predicted_error_follows_a_constant_rate() -> None:

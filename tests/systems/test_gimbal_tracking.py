@@ -180,10 +180,10 @@ def test_noise_of_predicted_images_and_the_lag_of_a_sine() -> None:
     plain = np.array([3j * np.pi, 0.2j * np.pi])
     A, B, C = rate_loop()
     closed = np.array([C @ np.linalg.solve(x * np.eye(4) - A, B) for x in plain])
-    K = record.run.parameters["track_yaw.K"]
-    assert K == pytest.approx(gains(1.5, 1)[0] / abs(rate_ahead(plain[0])), rel=1e-3)
+    gain = record.run.parameters["track_yaw.K"]
+    assert gain == pytest.approx(gains(1.5, 1)[0] / abs(rate_ahead(plain[0])), rel=1e-3)
     s = plain[1]
-    error = 5e-4 / abs(1.0 + K * rate_ahead(s) * closed[1] * np.exp(-0.017 * s) / s)
+    error = 5e-4 / abs(1.0 + gain * rate_ahead(s) * closed[1] * np.exp(-0.017 * s) / s)
     t, e = (record.channels[n] for n in ("time", "tracker.miss[2]"))
     ride = t > t[-1] - 30.0  # three periods
     wave = np.exp(-0.2j * np.pi * t[ride])
