@@ -41,8 +41,8 @@ class OpticalTracker(Component):
 
     Not modelled: size and contrast of the target, optics, rotation of the image during the exposure, a rolling shutter,
     noise that depends on the motion blur, loss of single images.
-    Source: equations of our own; delay of an imaging tracker in the loop: Masten 2008; filter: Kalata 1984, Bar-Shalom
-    2001 (section 6.5), here in its limit of small indices, images without end.
+    Source: equations of our own; delay of an imaging tracker in the loop: Masten 2008; filter: Kalata 1984,
+    Barshalom 2001 (section 6.5), here in its limit of small indices, images without end.
     """
 
     version = "1.0.0"

@@ -14,7 +14,7 @@ Density = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class SightSource:
-    """What moves a line of sight: a random signal at an input of the linear model, independent of all others.
+    """A random signal that moves a line of sight, at an input of the linear model and independent of all others.
 
     name: in words; the squares of those with one name are added.  kind, axis: excitation "motion" (angle of the base,
     rad), "test" or "command" (signal of a loop, V), or an output of a part of ``LineOfSight.moved_by`` with its

@@ -62,9 +62,11 @@ class SightModel:
 
         moved = []
         for source in self.sources.sources:
-            own = source.loop == self.ports.loop
-            ways = (0.0j * fine, 0.0j * fine + 1.0) if own else both(source.kind, source.axis)
-            moved.append(MovedSight(source.name, *ways, source.density(fine)))
+            if source.loop == self.ports.loop:
+                w, u = 0.0j * fine, 0.0j * fine + 1.0
+            else:
+                w, u = both(source.kind, source.axis)
+            moved.append(MovedSight(source.name, w, u, source.density(fine)))
         return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis))
 
 
