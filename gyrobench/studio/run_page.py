@@ -14,7 +14,7 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
-from gyrobench.studio.frame import CopyLines, Studio, address, counted, frame, inside, search_field, told
+from gyrobench.studio.frame import CopyLines, PageSeen, Studio, address, counted, frame, inside, search_field, told
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
@@ -76,9 +76,11 @@ def _add_job_page(studio: Studio) -> None:
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
-            gone = {"there": False}
+            gone, seen = {"there": False}, PageSeen()
 
             def show() -> None:
+                if not seen.now:
+                    return
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
                 message.set_text(
@@ -95,7 +97,7 @@ def _add_job_page(studio: Studio) -> None:
                 if now.state == "done" and place and not message.text and not gone["there"] and not command:
                     gone["there"] = True
                     ui.navigate.to(address("run", place))
-                chart.look()
+                chart.look(last=not now.active)
                 if not now.active:
                     timer.deactivate()
 
@@ -285,8 +287,11 @@ def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> None:
 def _watch(studio: Studio, place: ui.element) -> None:
     """Show the jobs that have not ended, as they are now."""
     rows: dict[str, tuple[ui.element, ui.label, ui.label]] = {}  # kept while the job is under way: its link is clicked
+    seen = PageSeen()
 
     def look() -> None:
+        if not seen.now:
+            return
         jobs = {j.key: j for j in studio.jobs.all() if j.active}
         for key in [*rows]:
             if key not in jobs:
