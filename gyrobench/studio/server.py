@@ -154,7 +154,8 @@ def serve(
         # what strangers ask for is no line of the terminal, nor what is cut off when the studio ends
         logging.getLogger("nicegui").setLevel(logging.ERROR)
         logging.getLogger("engineio.server").setLevel(logging.CRITICAL)
-        logging.getLogger("uvicorn.error").addFilter(lambda _: not server.should_exit)
+        for name in ("uvicorn.error", "nicegui"):
+            logging.getLogger(name).addFilter(lambda _: not server.should_exit)
         server.run(sockets=[listener])
 
 
