@@ -132,6 +132,10 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.get_by_role("button", name="Run").click()
     page.wait_for_url("**/job/**")
     address = page.url
+    page.get_by_role("heading", name="Fixed-position test").wait_for()
+    page.get_by_role("link", name="Change its values").click()  # the form as it was filled in
+    page.wait_for_function("document.querySelector('.code').textContent.includes('20000000s')")
+    assert page.get_by_label("dwell", exact=True).input_value() == "20000000s"
     page.goto(base_of(studio) + "/")  # the page of the run is closed
     page.goto(address)
     page.wait_for_function("parseFloat(document.querySelector('[role=progressbar]').ariaValueNow) > 0")
