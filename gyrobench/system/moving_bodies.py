@@ -118,7 +118,8 @@ def _window_angles(record: Record, at: AnyArray) -> Array | None:
     begin, end, first, last = (np.asarray(record.windows[e], dtype=float) for e in edges)
     times, angles = np.stack([begin, end], axis=1).ravel(), np.stack([first, last], axis=1).ravel()
     order = np.argsort(times, kind="stable")
-    return np.interp(np.asarray(record.channels["time"], dtype=float)[at], times[order], angles[order])
+    rows = np.asarray(record.channels["time"], dtype=float)[at]
+    return np.asarray(np.interp(rows, times[order], angles[order]), dtype=float)
 
 
 def _parameter(parameters: Mapping[str, object], name: str) -> float | None:

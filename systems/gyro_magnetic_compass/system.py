@@ -107,8 +107,9 @@ class GyroMagneticCompass(LoopTest):
     noises = ("gyro.white", "sensor.white")
     step = 0.1
     channels = (
-        "exciter.phase", "exciter.gate", "exciter.test[1]", "exciter.command[1]", "motion.angle[1]", "motion.angle[2]", "motion.angle[3]",
-        "gyro.psi", "sensor.psi", "slaving.error", "slaving.rate", "slaving.cut",
+        "exciter.phase", "exciter.gate", "exciter.test[1]", "exciter.command[1]",
+        *(f"motion.angle[{k}]" for k in (1, 2, 3)), "gyro.psi", "sensor.psi", "slaving.error", "slaving.rate",
+        "slaving.cut",
     )  # fmt: skip
     shown = ("motion.angle", "gyro.psi sensor.psi", "slaving.error", "slaving.rate", "slaving.cut")
     channel_period = 0.1
