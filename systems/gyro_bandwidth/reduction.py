@@ -14,7 +14,7 @@ import numpy as np
 
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
-from gyrobench.reduction.loops.loop_toolkit import Account, MeasureReduction, Point, ReductionError, Table, told
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
 from gyrobench.reduction.loops.response_errors import (
     COSINE,
     READING_GAIN,
@@ -154,7 +154,11 @@ class Reduction(MeasureReduction):
     def _neighbours_alike(self) -> bool:
         """Return whether the residuals of neighbours, without which u of the points is not known, are alike."""
         r, c = self.response, self.figures.curve
-        of = lambda p: logarithm(p, r.f) / r.u  # noqa: E731
+
+        def of(p: Array) -> Array:
+            out: Array = logarithm(p, r.f) / r.u
+            return out
+
         size = np.array([1.0, 1.0 / c.highest, *np.ones(c.poles)])
         return alike(of, c.p, size, np.vstack([r.gain, r.phase]) / r.u - of(c.p)) < LEAST
 

@@ -171,7 +171,7 @@ def test_a_file_of_sines(tmp_path: Path) -> None:
 
 
 def test_scatter_that_is_none(tmp_path: Path) -> None:
-    """Without u the scatter takes its place: a filter of the pickoff, 1 ms, moves tau by many u, and no word was said."""
+    """Without u the scatter takes its place: a filter of the pickoff, 1 ms, moves tau by many u; no word was said."""
     rows = sines()
     low_pass = 1.0 / (1.0 + 2j * np.pi * rows[:, 0] * 1e-3)
     rows[:, 2] *= np.abs(low_pass) ** 2

@@ -38,8 +38,8 @@ FORCES = {
 
 
 def factor_sentence(ratio: float, factors: Mapping[float, str] = FACTORS) -> str:
-    """Return that an instrument reads so many times what acts on it, with the mistake that makes such a factor where one
-    is known.  factors: of a rate (FACTORS), its amplitudes (AMPLITUDES) or of specific force (FORCES).
+    """Return that an instrument reads so many times what acts on it, with the mistake that makes such a factor where
+    one is known.  factors: of a rate (FACTORS), its amplitudes (AMPLITUDES) or of specific force (FORCES).
     """
     nearest = min(factors, key=lambda f: abs(ratio / f - 1.0))  # 57.3 and 60 are not far apart
     hint = f": {factors[nearest]}?" if abs(ratio / nearest - 1.0) < NEAR else "."
