@@ -48,10 +48,11 @@ from gyrobench.result import BudgetLine, Series, Test
 from gyrobench.system.families.servo_channel import OTHER, own_name
 
 from . import marks, row_checks
-from .budget import AMMETER, RANGES, TorquerSetup
+from .budget import TorquerSetup
 from .estimates import DPH, KU, UNIT, of_table, of_windows
 from .precession import Precession, precession
 from .row_checks import MA
+from .sources import AMMETER, RANGES
 
 RANDOM = "random drift, angle readings and current, with the linearity error"
 COMPUTED = "Both senses have equal rates in every row: computed, not measured; the drift is then no finding."
@@ -127,7 +128,7 @@ class Reduction:
         s, number = self.setup, self.e.numbers[j]
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
-        b = [abs(value) * s.u_current, abs(value) * s.u_time] if unit == UNIT else []
+        b = [abs(value) * AMMETER.size(s), abs(value) * TIME_BASE.size(s)] if unit == UNIT else []
         b = [*b, self.e.of_step[j] * size]
         if self.e.reported:
             b = (np.vstack([np.zeros((1, 6)), *self.by_source])[:, j] * size).tolist()

@@ -4,6 +4,8 @@
         def problems(self): ...                # what makes setup or record impossible
         def regression(self): ...              # data, design matrix, quantities, what they are drawn against
         def effects(self, found): ...          # sources of error of the set-up, with what they do to the data
+        @Source(...)                           # one of its own: what an error of one unit does to the data
+        def level(self, found): ...
         def account(self, found): ...          # method, equation, conventions, tables of its own
 
         setup_of = ...                         # run.json -> setup
@@ -30,7 +32,7 @@ from gyrobench.reduction.estimation.fit_result import Account, fit_result
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.sources import Effect
+from gyrobench.reduction.setup.sources import Effect, declared
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftTestResult
 
@@ -72,7 +74,7 @@ class DriftReduction(Generic[S]):
         return found
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the sources of error of the set-up, with what they do to the data."""
+        """Return the sources of error of the set-up, with what they do to the data, beside the declared ones."""
         return []
 
     def test(self, found: Findings) -> None:
@@ -96,6 +98,11 @@ class DriftReduction(Generic[S]):
         return [*told(coefficients, *sentences), found.noise_sentence(), *found.nuisance_sentences()]
 
     # ------------------------------------------------------------------------------ what follows
+    def all_effects(self, found: Findings) -> list[Effect]:
+        """Return the declared sources, each with the error of the data of its method, then :meth:`effects`."""
+        own = [source.effect(self.setup, getattr(self, n)(found)) for n, source in declared(type(self)).items()]
+        return [*own, *self.effects(found)]
+
     @classmethod
     def reduce(cls, windows: Mapping[str, Array], setup: S) -> DriftTestResult:
         """Return what the windows of a record say.  Raises ReductionError with everything that is wrong."""
@@ -112,9 +119,9 @@ class DriftReduction(Generic[S]):
         """Return what the data say, without the checks of :meth:`problems`."""
         setup = self.setup
         found = self.fitted()
-        found = with_set_up(self.derived(found), self.effects, setup.corrections, self.elsewhere, setup.remount)
+        found = with_set_up(self.derived(found), self.all_effects, setup.corrections, self.elsewhere, setup.remount)
         self.test(found)
-        effects = [*self.effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
+        effects = [*self.all_effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
         return self.finished(found, effects)
 
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:
