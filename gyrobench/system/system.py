@@ -36,7 +36,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
 from gyrobench.reduction.setup.sources import Source, declared
-from gyrobench.system.configurable import Configurable, InvalidConfigurationError, Option, load_configurable
+from gyrobench.system.configurable import (
+    Configurable,
+    InvalidConfigurationError,
+    Option,
+    lacking_methods,
+    load_configurable,
+)
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
 from gyrobench.system.sockets import Socket
@@ -176,7 +182,7 @@ class System(Configurable):
         from gyrobench.system.families.option_groups import type_b
 
         sources = list(sources)
-        cls.options = {**type_b(*(s for s in sources if s.option)), **cls.options}
+        cls.options = {**cls.options, **(type_b(*(s for s in sources if s.option)) | dict(cls.options))}
         new = {s.parameter for s in sources} - {"", *cls.assumed}
         cls.assumed = (*cls.assumed, *sorted(new))
 
@@ -366,6 +372,7 @@ class System(Configurable):
             parts = ", ".join(f'{slot}="..."' for slot in empty)
             lacks.append(f"slot {', '.join(empty)}: no part; name it by with_parts({parts})")
         named = self.reduction if isinstance(self.reduction, str) else ""
+        lacks += [] if isinstance(self.reduction, str) else lacking_methods(self.reduction)
         if named and self.folder and not (self.folder / f"{named}.py").is_file():
             missing = f'reduction = "{named}": no file {named}.py in {self.folder}'
             lacks.append(f"{missing}; write a class Reduction with from_record(record) there")

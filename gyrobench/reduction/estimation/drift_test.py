@@ -19,6 +19,7 @@ handling errors in a measured record, and the reasons that withhold a verdict.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -53,6 +54,7 @@ class DriftReduction(Generic[S]):
 
     # ------------------------------------------------------------------------------ what a test states
     @classmethod
+    @abstractmethod
     def setup_of(cls, run: RunDocument) -> S:
         """Return the setup that a run.json describes."""
         raise NotImplementedError
@@ -61,6 +63,7 @@ class DriftReduction(Generic[S]):
         """Return what makes setup or record impossible, as sentences."""
         return []
 
+    @abstractmethod
     def regression(self) -> Regression:
         """Return the data with their linear model.  May raise ReductionError."""
         raise NotImplementedError
@@ -80,6 +83,7 @@ class DriftReduction(Generic[S]):
     def test(self, found: Findings) -> None:
         """Add F tests of what the model leaves out (:meth:`Findings.f_test`)."""
 
+    @abstractmethod
     def account(self, found: Findings) -> Account:
         """Return what the test says of itself, beside its figures."""
         raise NotImplementedError

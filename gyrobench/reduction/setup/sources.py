@@ -81,7 +81,7 @@ class Source:
     @property
     def meaning(self) -> str:
         """What the option states."""
-        return self.doc or f"standard uncertainty: {self.name}"
+        return self.doc or f"{self.name}, standard uncertainty"
 
     def effect(self, sizes: Any, error: Array | None = None, **more: Any) -> Effect:
         """Return the source with what it does to the data of a test; see gyrobench.reduction.estimation.effects.
