@@ -34,6 +34,7 @@ from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, chan
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
+    Account,
     Array,
     Coefficient,
     DriftTestResult,
@@ -151,7 +152,7 @@ class Reduction:
         seen = p is not None and p < 0.05
         text = "the scale factor depends on the current" if seen else "no curvature beyond the scatter"
         noise = "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
-        return DriftTestResult(
+        account = Account(
             method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
             sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
             equation="K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n",
@@ -164,16 +165,23 @@ class Reduction:
                 if self.fit is None
                 else "Noise, white, Gauss-Markov and of the angle readings, estimated from all windows together.",
             ],
+        )
+        numbers: dict[str, Any] = {
+            "series": [self._series()],
+            "correlation": regression.correlation(covariance).tolist(),
+            "condition": regression.examine(curve, ("K_1", "K_3")).condition,
+            "rank": 2,
+            "dof": float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
+            "noise": self._noise(),
+            "tests": [Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
+            "residual_std": e.scatter / KU,
+            "residual_unit": UNIT,
+        }
+        return DriftTestResult(
+            **account.statements(),
+            **numbers,
+            **self.setup.stated(),
             coefficients=coefficients,
-            series=[self._series()],
-            correlation=regression.correlation(covariance).tolist(),
-            condition=regression.examine(curve, ("K_1", "K_3")).condition,
-            rank=2,
-            dof=float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
-            noise=self._noise(),
-            tests=[Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
-            residual_std=e.scatter / KU,
-            residual_unit=UNIT,
             budget=self._budget(),
             type_b=changes_by_source(e.reported, self.sources, self.by_source) if e.reported else [],
             tables=self._tables(),
@@ -184,9 +192,7 @@ class Reduction:
                 f"Largest departure from it, at {i[e.worst_at] / MA:g} mA: {{linearity}}.",
                 "Drift along the axis {drift}.",
             ),
-            instrument=self.setup.instrument,
             simulated=self.setup.truth is not None,
-            site=self.setup.shown,
         )
 
     def _torquer(self) -> list[str]:

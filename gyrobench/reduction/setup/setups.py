@@ -62,6 +62,10 @@ class Setup:
         """Return the site as a report prints it."""
         return dict(self.site)
 
+    def stated(self) -> dict[str, Any]:
+        """Return the fields of a result that say where, and of which instrument."""
+        return {"site": self.shown, "instrument": self.instrument}
+
 
 @dataclass(frozen=True, kw_only=True)
 class SiteSetup(Setup):
