@@ -141,7 +141,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     def _arrange(self) -> None:
         """Give the system the slots and wires of its loops; those that were asked for stay."""
         asked = [slot for slot in self.on_request if slot in self.slots]
-        for changed in ("slots", "wires", "on_request", "factors", "channels", "noises", "loops", "shown"):
+        for changed in (*"slots wires on_request factors channels noises loops shown".split(), "channel_period"):
             vars(self).pop(changed, None)
         if self.rates:
             wanted, more = rate_loops.on_request()
@@ -162,6 +162,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
                 noises=(*self.noises, "tracker.image_noise"),
                 loops={**self.loops, **optical_loop.LOOPS},
                 shown=("tracker.miss", "tracker.error", "tracker.rate", *self.shown),
+                channel_period=optical_loop.CHANNEL_PERIOD,
             )
         vars(self)["channels"] = self._with_limits()
         for slot in asked:
