@@ -6,8 +6,8 @@ loop, rebalance_loop_test, an analog loop.  A reading in steps q answers with no
 samples of the current that scatter by s about it, the mean reading at the rate r is  m(r + b),  m(x) = q sum over n of
 [Phi((x - (n - 1/2) q)/s) - Phi((-x - (n - 1/2) q)/s)], and the threshold is the least r with (m(r + b) - m(b -
 r))/(2 r) = 1/2.  s is taken from a run of the same noise that is read without steps; what drifts slowly is no part of
-it.  Each run draws q, drift, the rates of the plan and the noise of the gyro: white, Gauss-Markov or both, with a correlation
-time from a reading to the whole test.
+it.  Each run draws q, drift, the rates of the plan and the noise of the gyro: white, Gauss-Markov or both, with a
+correlation time from a reading to the whole test.
 
 table, rate_table_test, a fibre-optic gyro with the dead band d, whose threshold is d/sqrt(3/4) whatever its noise: each
 run draws d, the rates, white noise and, in half of the runs each, a random walk and flicker noise.
