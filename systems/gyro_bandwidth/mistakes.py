@@ -7,18 +7,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
+from gyrobench.reduction.diagnosis.scale_mistakes import AMPLITUDES, factor_sentence
 from gyrobench.result import Reason
 
-from .response import Figures, GyroResponse, fitted, logarithm
+from .response import Figures, GyroResponse, curves, fitted, logarithm
 
 FAR = 0.1  # error of the gain at low frequency from which on something else than the gyro is meant
 STEEP = 0.2  # of a slope of 1 or -1, and of a right angle, rad
 SCATTER = 0.01  # least robust scatter of the residuals, over u, which an outlier widens where it is not stated
 OFF = 6.0  # u: a point further from the curve
+ROUGH = 0.01  # rms of the residuals, ln gain and rad: more than a gyro leaves
 LEAD = 0.2  # rad, at the end of the pass band: more than any gyro, or a late reading of the table, makes
 BETTER = 0.1  # of chi2 that is left when two rows are exchanged back
-FITS = 0.02  # rms of ln H off the curve from which on the unit of the phases is tried
 
 
 def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
@@ -44,10 +44,7 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
         yield Reason("response.sense", text.replace("-", "−"), blocked, severity="doubt")
         return
     if abs(found.value[0] - 1.0) > FAR:
-        yield Reason("response.factor", factor_sentence(float(found.value[0])), blocked, severity="doubt")
-    if unit := list(_phase_unit(r, found)):
-        yield from unit
-        return
+        yield Reason("response.factor", factor_sentence(float(found.value[0]), AMPLITUDES), blocked, severity="doubt")
     late = r.phase[r.gain > r.gain[0] - 0.5 * math.log(2.0)]
     if late[-1] > LEAD:
         text = (
@@ -55,20 +52,23 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
             "opposite sign? A lag is negative."
         )
         yield Reason("response.lead", text, blocked, severity="doubt")
+    if _in_radians(r, found):
+        text = (
+            "Gain and phase belong to one response where the phases are 57.3 times as large. Are they in rad and were "
+            "given as °?"
+        )
+        yield Reason("response.radians", text, blocked, severity="doubt")
+        return
     yield from _rows(r, found)
 
 
-def _phase_unit(r: GyroResponse, found: Figures) -> Iterator[Reason]:
-    """Name phases in the other unit of angle: the curve then fits them and the gains."""
+def _in_radians(r: GyroResponse, found: Figures) -> bool:
+    """Return whether gain and phase are of one curve, as they are not as given, where the phases are larger by 57.3."""
     left = np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)
-    if math.sqrt(float(np.mean(left**2))) < FITS:
-        return
-    for words, factor in (("rad, given as °", 180.0 / math.pi), ("°, given as rad", math.pi / 180.0)):
-        tried = (fitted(GyroResponse(r.f, r.gain, r.phase * factor, r.u), n) for n in (1, 2, 3, 4))
-        if any(c is not None and c.chi2 < BETTER * found.curve.chi2 for c in tried):
-            text = f"The phases fit the gains of no gyro; they do in {words}. Check their unit."
-            yield Reason("response.phase_unit", text, ("pass", "fail"), severity="doubt")
-            return
+    if float(np.sqrt(np.mean(left * left))) < ROUGH:
+        return False
+    again = curves(GyroResponse(r.f, r.gain, np.degrees(r.phase), r.u))
+    return any(c.chi2 < BETTER * found.curve.chi2 for c in again)
 
 
 def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:

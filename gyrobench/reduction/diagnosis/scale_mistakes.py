@@ -1,11 +1,11 @@
-"""Mistakes that multiply all readings of a rate or a force alike: senses and units, named by the factor they make."""
+"""Mistakes that multiply all readings of a rate alike: senses and units, named by the factor that they make."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
-from gyrobench.units import G0
+from gyrobench.frames import G0
 
 NEAR = 0.1  # of a factor that a mistake has
 #: reading over rate -> what makes it
@@ -21,28 +21,28 @@ FACTORS = {
     1.0e-3: "the reading is in a thousand of its unit",
 }
 
-#: reading of an accelerometer over the specific force -> what makes it
+
+AMPLITUDES = FACTORS | {
+    2.0: "the reading is peak to peak, or the rate half of that",
+    0.5: "the rate is peak to peak, or the reading half of that",
+    math.sqrt(2.0): "the rate is an rms value and the reading an amplitude",
+    math.sqrt(0.5): "the reading is an rms value and the rate an amplitude",
+}
 FORCES = {
-    -1.0: "up and down, or the sense of the accelerometer, are reversed",
+    -1.0: "up and down are reversed",
     G0: "the reading is in m/s² and was given as g",
     1.0 / G0: "the reading is in g and was given as m/s²",
-    1000.0: "the reading is in mg and was given as g",
-    1.0e-3: "the reading is in g and was given as mg",
+    1000.0: FACTORS[1000.0],
+    1.0e-3: FACTORS[1.0e-3],
 }
 
 
-def factor_sentence(ratio: float) -> str:
-    """Return that a gyro reads so many times the rate, with the mistake that makes such a factor where one is known."""
-    hint = _hint(ratio, FACTORS)
+def factor_sentence(ratio: float, factors: Mapping[float, str] = FACTORS) -> str:
+    """Return that an instrument reads so many times what acts on it, with the mistake that makes such a factor where
+    one is known.  factors: of a rate (FACTORS), its amplitudes (AMPLITUDES) or of specific force (FORCES).
+    """
+    nearest = min(factors, key=lambda f: abs(ratio / f - 1.0))  # 57.3 and 60 are not far apart
+    hint = f": {factors[nearest]}?" if abs(ratio / nearest - 1.0) < NEAR else "."
+    if factors is FORCES:
+        return f"The accelerometer reads {ratio:.4g} times gravity{hint} Check the senses and units of the readings."
     return f"The gyro reads {ratio:.4g} times the rate{hint} Check the senses and units of rates and readings."
-
-
-def force_sentence(ratio: float) -> str:
-    """Return the same of an accelerometer and the specific force."""
-    hint = _hint(ratio, FORCES)
-    return f"The accelerometer reads {ratio:.4g} times the force{hint} Check the senses and units of its readings."
-
-
-def _hint(ratio: float, known: Mapping[float, str]) -> str:
-    found = [text for f, text in known.items() if abs(ratio / f - 1.0) < NEAR]
-    return f": {found[0]}?" if found else "."
