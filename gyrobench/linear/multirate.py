@@ -85,10 +85,9 @@ def multirate_step(part: Component, inputs: list[str], outputs: list[str], step:
 
 def _between(steps: list[SampledStep]) -> list[SampledStep]:
     """Return the steps with those states alone that the inputs reach and that reach an output."""
-    a = sum(np.abs(s.a) for s in steps) > 0.0
-    given, shown = (np.any([np.any(m, axis=k) for m in mm], axis=0) for k, mm in
-                    ((1, [s.b for s in steps]), (0, [s.c for s in steps])))  # fmt: skip
-    use = reached(a, given[:, None]) & reached(a.T, shown[:, None])
+    a = np.sum([np.abs(s.a) for s in steps], axis=0)
+    b, c = np.hstack([s.b for s in steps]), np.vstack([s.c for s in steps])
+    use = reached(a, b) & reached(a.T, c.T)
     return [
         SampledStep(
             [n for n, u in zip(s.names, use, strict=True) if u], s.a[np.ix_(use, use)], s.b[use], s.c[:, use], s.d

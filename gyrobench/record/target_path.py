@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import CsvColumn, DataError, read_measured
@@ -120,14 +121,14 @@ def along(t: Array, angles: Array, at: Array) -> tuple[Array, Array]:
     return value, np.where((at[:, None] < t[0]) | (at[:, None] >= t[-1]), 0.0, rate)
 
 
-def _kept(t: Array, angles: Array, tolerance: float) -> tuple[Array, float]:
+def _kept(t: Array, angles: Array, tolerance: float) -> tuple[NDArray[np.intp], float]:
     """Return the rows to keep, POINTS at most, and how far the path is off the others, rad.
 
     Each interval that is off by more is halved, the worst first, until none is or the points are used up.
     """
     if t.size <= POINTS:
         return np.arange(t.size), 0.0
-    keep = np.unique(np.linspace(0, t.size - 1, FIRST + 1).astype(int))
+    keep = np.unique(np.linspace(0, t.size - 1, FIRST + 1).astype(np.intp))
     while True:
         miss = np.max(np.abs(along(t[keep], angles[keep], t)[0] - angles), axis=1)
         worst = np.maximum.reduceat(miss[:-1], keep[:-1])
