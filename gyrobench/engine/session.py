@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import suggest_names
 from gyrobench.engine import preflight
 from gyrobench.engine.checkpoint import CheckpointManager, ResumeError
 from gyrobench.engine.execution import Ending, Job, execute
@@ -103,7 +102,8 @@ class Session:
         self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
         self.notes += self.assembly.notes
-        self._check_controllers()
+        if found := preflight.controller_problems(self.assembly, self.names):
+            raise InvalidConfigurationError(self.system.name, found)
         self.program = build_program(self.assembly)
         self.gains = [(c.gain, c.offset) for c in self.assembly.connections]
         self.base = defaults(self.assembly)
@@ -129,24 +129,6 @@ class Session:
             if isinstance(error, FmuCallError):
                 raise RunError(str(error)) from None
             raise
-
-    def _check_controllers(self) -> None:
-        """Let controllers of the user's own keep their values; refuse inputs of theirs that nothing is connected to."""
-        from gyrobench.packaging.own_controller import is_controller
-
-        wired = {(c.target, c.input.element) for c in self.assembly.connections}
-        for slot in (s for s, name in self.names.items() if is_controller(name)):
-            self.assembly.keeps.add(slot)
-            binding = self.assembly.bindings[slot]
-            known = [c.name for c in binding.socket.connectors if c.causality == "input"]
-            unknown = [n for n in binding.inputs if n.split("[")[0] not in known and (slot, n) not in wired]
-            problems = [
-                f"{slot}: {self.names[slot]} declares the input {n}, which nothing in this slot gives; "
-                + suggest_names(n.split("[")[0], known)
-                for n in dict.fromkeys(n.split("[")[0] for n in unknown)
-            ]
-            if problems:
-                raise InvalidConfigurationError(self.system.name, problems)
 
     def _choose(self, engine: str | None) -> str:
         if engine == "reference":
