@@ -87,7 +87,7 @@ def test_list_is_narrowed_by_words(gyrobench: Call) -> None:
     found = json.loads(gyrobench("list", "Floated", "gyro", "--json")[1])
     assert "floated_gyro" in [r["name"] for r in found["parts"]]
     assert "gyro_dynamics" in [r["name"] for r in found["systems"]]
-    assert not any("site" == r["name"] for rows in found.values() for r in rows)
+    assert not any(r["name"] == "site" for rows in found.values() for r in rows)
     out = gyrobench("list", "TEST-TUMBLE1-SDF")[1]
     assert out.startswith("systems\n  tumble_single_axis ") and "parts" not in out.split("\n")
     code, _, err = gyrobench("list", "tumbel")

@@ -23,7 +23,7 @@ from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import RunState
 from gyrobench.engine.run_board import RunBoard
 from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressReport, Schedule
-from gyrobench.errors import GyrobenchError
+from gyrobench.engine.run_errors import ParameterRefusedError, RunError, RunInterrupted
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument, package_versions
@@ -36,27 +36,6 @@ from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
 
 TIMEOUT = 60.0  # s
-
-
-class RunError(GyrobenchError):
-    """A run that did not end as it should; ``record`` holds what was recorded until then (or None)."""
-
-    exit_code = 3
-
-    def __init__(self, message: str, record: Record | None = None) -> None:
-        self.record = record
-        kept = "" if record is None or record.folder is None else f"\nthe record until then is kept in {record.folder}"
-        super().__init__(message + kept)
-
-
-class RunInterrupted(RunError):
-    """The user stopped the run."""
-
-
-class ParameterRefusedError(RunError):
-    """A part refuses its parameters, before the first step."""
-
-    exit_code = 2
 
 
 ENGINES = ("native", "linked", "reference")

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coverage import CASES, Noise
+from coverage import CASES
+from coverage_draws import Noise
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record

@@ -12,7 +12,8 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from coverage import DPH, Case, Rng, Values, coverage, floated, latitude, of_encoder, sign
+from coverage import DPH, Case, Rng, Values, coverage, of_encoder
+from coverage_draws import floated, latitude, sign
 
 from gyrobench import frames
 

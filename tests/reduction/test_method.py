@@ -16,10 +16,11 @@ from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.estimation.sentences import plus_minus
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.sources import Effect
