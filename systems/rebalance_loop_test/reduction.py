@@ -134,7 +134,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
         slow = ~resting & (np.abs(felt) < small_rates.SMALL * s.largest) if s.has_small else np.zeros_like(resting)
         self.still = {n: np.asarray(v)[resting] for n, v in w.items()}  # resolution, noise, ripple
         indicated = np.asarray(w["mean"], dtype=float) * s.k
-        self.small = small_rates.SmallRates.repeated(felt[slow], indicated[slow], self.phase[slow], "°/h", DPH)
+        self.small = small_rates.SmallRates.of(felt[slow], indicated[slow], self.phase[slow], "°/h", DPH)
         out = slow | (resting & self.small.silent)
         self.windows = {n: np.asarray(v)[~out] for n, v in w.items()}
         self.phase = self.phase[~out]

@@ -21,10 +21,9 @@ they were:
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,209 +32,16 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
-
-from coverage_draws import (
-    ARCSEC,
-    DPH,
-    G0,
-    Noise,
-    Rng,
-    Values,
-    accelerometer,
-    attitude,
-    exposed,
-    floated,
-    latitude,
-    on_springs,
-    pulses,
-    simple_channels,
-    supplied,
-    torquer,
-    two_channels,
-)
-
 import gyrobench as gb
-from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
 from gyrobench.system.system import load_system
 
+sys.path.insert(0, str(Path(__file__).parent))  # a campaign loads this file by its path
+
+from coverage_cases import ALL, CORNERS, Case, Noise, Values
+
 SCRIPT = "tests/benchmarks/coverage.py"
-
-
-#: Corners of the population: correlation time in windows, share, reading.
-CORNERS = {
-    "white": (1.0, 0.0, 0.0),
-    "markov-1": (1.0, 1.0, 0.0),
-    "markov-5": (5.0, 1.0, 0.0),
-    "both-3": (3.0, 0.5, 0.0),
-    "hidden-8": (8.0, 0.3, 0.0),
-    "slow-8": (8.0, 1.0, 0.0),
-    "slow-20": (20.0, 0.5, 0.0),
-    "slow-1000": (1000.0, 1.0, 0.0),
-}
-
-
-# ---------------------------------------------------------------------------------------------- noise of the parts
-def of_gyro(n: Noise, _: Values, size: float = 0.02 * DPH) -> Values:
-    return {"gyro.white": n.white(size), "gyro.markov": n.markov(size), "gyro.markov_tau": n.tau, "gyro.pickoff": 5e-9}
-
-
-def of_two_channels(n: Noise, _: Values) -> Values:
-    size = 0.02 * DPH
-    each = {"white": n.white(size), "markov": n.markov(size), "pickoff": 5e-9}
-    return {"gyro.markov_tau": n.tau, **{f"gyro.{k}_{c}": v for k, v in each.items() for c in "xy"}}
-
-
-def of_accelerometer(n: Noise, _: Values) -> Values:
-    size = 20e-6 * G0
-    own = {"white": n.white(size), "markov": n.markov(size), "markov_tau": n.tau}
-    return {f"accelerometer.{k}": v for k, v in own.items()}
-
-
-def of_encoder(n: Noise, values: Values) -> Values:
-    """Errors of the angle readings are quanta."""
-    return {**of_gyro(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
-
-
-def of_encoder_2dof(n: Noise, values: Values) -> Values:
-    return {**of_two_channels(n, values), "table.quantum": n.error(0.02 * DPH) * math.sqrt(12.0)}
-
-
-def of_two_encoders(n: Noise, values: Values) -> Values:
-    quantum = n.error(0.02 * DPH) * math.sqrt(12.0)
-    return {**of_two_channels(n, values), "outer.quantum": quantum, "inner.quantum": quantum}
-
-
-def of_pickoff(dwell: float, size: float) -> Callable[[Noise, Values], Values]:
-    """Errors of the voltage readings are white noise over the dwell; H = C in the standard gyro."""
-
-    def values(n: Noise, drawn: Values) -> Values:
-        gain = drawn.get("gyro.K_sg", 10.0)  # V per rad of the case
-        return {**of_gyro(n, drawn, size), "gyro.pickoff": gain * n.error(size) * math.sqrt(dwell)}
-
-    return values
-
-
-@dataclass(frozen=True)
-class Case:
-    """A system on a shortened plan."""
-
-    system: str
-    values: Values
-    truth: Callable[[Rng], Values]
-    latitude: Callable[[Rng], float]
-    noise: Callable[[Noise, Values], Values] = of_gyro
-    attitude: bool = False
-
-    def drawn(self, rng: Rng) -> Values:
-        found = {**self.values, **self.truth(rng), "latitude": self.latitude(rng)}
-        return {**found, "attitude": attitude(rng)} if self.attitude else found
-
-
-TURNING: Values = {"rate": 0.15, "windows": 24, "dwell": 17.5, "settle": 2.0}
-STOPPING: Values = {"stops": 24, "stop_dwell": 1.75, "windows": 24, "dwell": 17.5, "settle": 2.0,
-                    "table.index_rate": 1.0, "table.acceleration": 1.0}  # fmt: skip
-FAST: Values = {"table.acceleration": 20.0}
-CASES = {
-    "tumble_single_axis": Case("tumble_single_axis", TURNING, floated, latitude(12.0, 78.0)),
-    "tumble_single_axis, supplies": Case("tumble_single_axis", TURNING, supplied(130.0), latitude(12.0, 78.0)),
-    "tumble_single_axis, stops": Case("tumble_single_axis", STOPPING, floated, latitude(12.0, 78.0)),
-    "tumble_two_channel, nine": Case(
-        "tumble_two_channel", {**TURNING, **FAST}, two_channels, latitude(20.0, 70.0), of_two_channels
-    ),
-    "tumble_two_channel, simple": Case(
-        "tumble_two_channel", {**TURNING, **FAST, "model": "simple"}, simple_channels, latitude(20.0, 70.0),
-        of_two_channels,
-    ),
-    "tumble_two_axis": Case(
-        "tumble_two_axis",
-        {"dwell": 3.0, "settle": 2.0, "inner_rate": 0.05, "rebalance.i_max": 1.0, "table.index_rate[1]": 1.0,
-         "table.acceleration": [1.0, 1.0]},
-        floated, latitude(12.0, 78.0),
-    ),
-    "eight_position": Case(
-        "eight_position", {"dwell": 1.5, "settle": 1.5, "readings": 2}, lambda rng: two_channels(rng, 10),
-        latitude(0.0, 70.0), of_two_channels,
-    ),
-    "table_environment": Case(
-        "table_environment", {"dwell": 225.0, "readings": 90, "tilting": 100.0 * ARCSEC, "settle": 2.0}, exposed,
-        latitude(0.0, 70.0),
-    ),
-    "fixed_position": Case("fixed_position", {"dwell": 60.0}, floated, latitude(0.0, 85.0), attitude=True),
-    "fixed_position, supplies": Case(
-        "fixed_position", {"dwell": 60.0}, supplied(60.0), latitude(0.0, 85.0), attitude=True
-    ),
-    "fixed_position, supplies in steps": Case(
-        "fixed_position", {"dwell": 60.0}, supplied(60.0, "step"), latitude(0.0, 85.0), attitude=True
-    ),
-    "fixed_position, supplies with ripple": Case(
-        "fixed_position", {"dwell": 60.0}, supplied(60.0, "swing"), latitude(0.0, 85.0), attitude=True
-    ),
-    "servo_vertical_level, supplies": Case(
-        "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0}, supplied(550.0), latitude(0.0, 70.0),
-        of_encoder,
-    ),
-    "open_loop_drift": Case(
-        "open_loop_drift", {"wait": 2.0, "dwell": 0.1}, floated, latitude(0.0, 85.0), of_pickoff(0.1, 0.02 * DPH),
-        attitude=True,
-    ),
-    "accelerometer_multipoint": Case(
-        "accelerometer_multipoint", {"dwell": 1.0, "settle": 1.0}, accelerometer, latitude(0.0, 85.0), of_accelerometer
-    ),
-    "accelerometer_multipoint, 12": Case(
-        "accelerometer_multipoint", {"dwell": 1.0, "settle": 1.0, "points": 12, "mounts": "a"}, accelerometer,
-        latitude(0.0, 85.0), of_accelerometer,
-    ),
-    "servo_vertical_level": Case(
-        "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0}, floated, latitude(0.0, 70.0), of_encoder
-    ),
-    "servo_polar": Case(
-        "servo_polar",
-        {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "time": 172.4, "window": 4.8, "dwell": 48.0,
-         "settle": 2.0},
-        floated, latitude(12.0, 78.0), of_encoder,
-    ),
-    "servo_two_axis": Case(
-        "servo_two_axis",
-        {"site.earth_rate": 500.0 * frames.EARTH_RATE, "cage_x.i_max": 10.0, "cage_y.i_max": 10.0, "time": 172.8,
-         "window": 2.4, "settle": 2.0},
-        two_channels, latitude(30.0, 68.0), of_two_encoders,
-    ),
-    "servo_two_axis, levelled": Case(
-        "servo_two_axis",
-        {"levelled": True, "mounts": "1 2 8", "time": 60.0, "window": 1.0, "settle": 2.0},
-        two_channels, latitude(0.0, 80.0), of_two_encoders,
-    ),
-    "pickoff_scale_factor": Case(
-        "pickoff_scale_factor", {}, lambda rng: {**floated(rng), "gyro.K_sg": rng.uniform(8.0, 10.0)},
-        latitude(0.0, 85.0), of_pickoff(0.1, 0.1 * DPH),
-    ),
-    "torquer_scale_factor": Case(
-        "torquer_scale_factor",
-        {"currents": "5 10 20 40 70 100", "range": "0.5deg", "range_large": "5deg", "windows": 10},
-        torquer, latitude(0.0, 85.0), of_encoder,
-    ),
-    "rebalance_loop_test": Case(
-        "rebalance_loop_test", {"gate": 0.5, "rest": 20, "readings": 6, "settle": 1.5}, pulses, latitude(0.0, 85.0)
-    ),
-}  # fmt: skip
-
-#: counted here alone, without a short count among the tests
-ALONE = {
-    "servo_polar, y axis": Case(
-        "servo_polar",
-        {"channel": "y", "site.earth_rate": 500.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "lock.i_max": 10.0,
-         "time": 172.4, "window": 4.8, "dwell": 48.0, "settle": 2.0},
-        two_channels, latitude(12.0, 78.0), of_encoder_2dof,
-    ),
-    "position_sensitivity": Case(
-        "position_sensitivity", {"dwell": 10.0, "settle": 1.0}, on_springs, latitude(0.0, 85.0), of_two_channels,
-        attitude=True,
-    ),
-}  # fmt: skip
-ALL = CASES | ALONE
 
 
 # ---------------------------------------------------------------------------------------------- counting
