@@ -63,7 +63,7 @@ class SightModel:
         moved = []
         for source in self.sources.sources:
             if source.loop == self.ports.loop:
-                w, u = np.zeros(fine.shape, dtype=np.complex128), np.ones(fine.shape, dtype=np.complex128)
+                w, u = np.zeros(fine.size, complex), np.ones(fine.size, complex)
             else:
                 w, u = both(source.kind, source.axis)
             moved.append(MovedSight(source.name, w, u, source.density(fine)))
