@@ -62,7 +62,6 @@ class TurnOnSetup(Setup):
 
     limit: float
     exponentials: int = -1
-    u_time: float = 0.0
 
 
 class Reduction(DriftReduction[TurnOnSetup]):
