@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 MORE = 1.3  # of the rate of the cone: more drift than no coning terms at all make
 ACROSS = 3.0  # times the drift along the axis of the cone: another axis, where it is a good part of the cone's rate
 PART = 0.02
+GYROS = 0.05  # of the rate of the cone: more than scale factors and misalignments make
+CLEAR = 4.0  # standard uncertainties
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
@@ -37,6 +39,26 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
     w = record.windows
     for words, f in TIME.items():
         yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+
+
+def other_chain(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) -> Iterator[Reason]:
+    """Yield that the drift along the axis of the cone is not that of the stated chain, by more than gyros explain."""
+    own = AXES.index(setup.axis)
+    y = np.asarray(windows[f"drift_{setup.axis}"], dtype=float)
+    rest = y[cones.number < 0]
+    for k, (f, theta) in enumerate(cones.cones):
+        rate, stated = cone_rate(f, theta), float(setup.chain.drift(f, theta, own)[own])
+        here = y[cones.number == k]
+        u = float(np.hypot(np.std(rest, ddof=1) / np.sqrt(rest.size), np.std(here, ddof=1) / np.sqrt(here.size)))
+        drift = float(here.mean() - rest.mean())
+        if abs(drift - stated) > GYROS * abs(rate) + CLEAR * u:
+            text = (
+                f"At {f:g} Hz the attitude drifts by {drift / rate:.3g} of ω (1 − cos θ), the stated filter, output "
+                f"and algorithm make {stated / rate:.3g}: they, or the cone, are not as stated, whatever the table "
+                "beside says."
+            )
+            yield Reason("coning.stated", text.replace("-", "−"))
+            return
 
 
 def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) -> Iterator[Reason]:

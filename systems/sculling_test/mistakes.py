@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 MORE = 1.3  # of the reading: more than with nothing taken back at all
 PART = 0.02  # of the reading: the other sign
+INSTRUMENTS = 0.05  # of the reading: more than scale factors and misalignments make
+CLEAR = 4.0  # standard uncertainties
 REST = 0.5  # m/s2 at rest: gravity is still there
 
 
@@ -33,6 +35,24 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
     w = record.windows
     for words, f in TIME.items():
         yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+
+
+def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:
+    """Yield that the acceleration is not that of the stated chain, by more than the instruments explain."""
+    y = np.asarray(windows["acceleration"], dtype=float)
+    rest = y[motions.number < 0]
+    for k, m in enumerate(motions.motions):
+        read, stated, here = reading(m, setup.chain.gravity), setup.chain.rise(m), y[motions.number == k]
+        u = float(np.hypot(np.std(rest, ddof=1) / np.sqrt(rest.size), np.std(here, ddof=1) / np.sqrt(here.size)))
+        found = float(here.mean() - rest.mean())
+        if abs(found - stated) > INSTRUMENTS * abs(read) + CLEAR * u:
+            text = (
+                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the stated "
+                f"filters, algorithm and lever arm make {stated / read:.3g}: they, or the motion, are not as stated, "
+                "whatever the table beside says."
+            )
+            yield Reason("sculling.stated", text.replace("-", "−"))
+            return
 
 
 def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:
