@@ -4,9 +4,10 @@
 
 A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another
 city, a meter that is off by a factor, two gyros of a north finder exchanged are fitted as well as the truth.  So each
-of :func:`mistakes` is made in a copy of the record.  Where the copy can be fitted as well - no F test of the two scatters with p < LEVEL - and an estimate
-changes by more than its u, the record rests on that mistake not having been made, and passes only where it states so:
-``arrangement = checked``.  A plan whose redundancy shows a mistake is not asked about it.
+of :func:`mistakes` is made in a copy of the record.  Where the copy can be fitted as well - no F test of the two
+scatters with p < LEVEL - and an estimate changes by more than its u, the record rests on that mistake not having been
+made, and passes only where it states so: ``arrangement = checked``.  A plan whose redundancy shows a mistake is not
+asked about it.
 
 The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
 mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
