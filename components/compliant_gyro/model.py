@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 from gyrobench.component import Parameter, State
-from gyrobench.component.blocks.gyro import SdfGyro
+from gyrobench.component.blocks.supply import SuppliedGyro
 from gyrobench.component.math import cos, sin
 
 
-class CompliantGyro(SdfGyro):
+class CompliantGyro(SuppliedGyro):
     """Floated gyro with elastic rotor bearing and gimbal: third-order dynamics.  [GYRO-DYN-3, GYRO-STATIC-10]
 
     Axes I, O, S are those of the mount, v_gyro = mount v_case.  The rotor axis turns by x against the case about I and
@@ -31,12 +31,15 @@ class CompliantGyro(SdfGyro):
     All ten terms may be given; there is no choice of `terms`, no ageing and no temperature differences (use
     floated_gyro).  T_m, k_T, B and dB as there.
 
+    Supplies off their nominal values turn H into H (1 + f), which leaves the torques on the float, and add to drift,
+    torquer and pickoff; see :class:`gyrobench.component.blocks.supply.SuppliedGyro`                     [GYRO-SUPPLY]
+
     Not modelled: transverse inertia of the rotor (nutation; 1e-6 kg.m2 changes the response at 10 Hz by less than
     1e-3), drift torque on the rotor instead of the float, damping in the bearing, and what floated_gyro leaves out.
     Source: Hu 1981, ch. 2, eq. 2-57..2-67.
     """
 
-    version = "1.2.0"
+    version = "1.3.0"
 
     C = Parameter(0.2, "N.m.s/rad", "float damping", above=0.0)
     K_I = Parameter(400.0, "N.m/rad", "stiffness of rotor bearing and gimbal about I", above=0.0)
@@ -47,11 +50,12 @@ class CompliantGyro(SdfGyro):
 
     def flow(self) -> None:
         w = self.mount @ self.omega
+        momentum = self.H * self.speed()
         sensed = w[0] * cos(self.float_angle) - w[2] * sin(self.float_angle)
         spring = self.K_O * self.rotor_O  # torque of the rotor on the float
-        self.der.rotor_I = spring / self.H - sensed
-        self.der.rotor_O = -self.K_I / self.H * self.rotor_I - self.float_rate - w[1]
+        self.der.rotor_I = spring / momentum - sensed
+        self.der.rotor_O = -self.K_I / momentum * self.rotor_I - self.float_rate - w[1]
         self.der.float_angle = self.float_rate
         rate = self.drift_rate() + self.precession()
-        torque = spring - self.H * rate - self.C * self.float_rate
+        torque = spring - momentum * rate - self.C * self.float_rate
         self.der.float_rate = torque / self.J - self.mount[1] @ self.alpha

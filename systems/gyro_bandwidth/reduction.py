@@ -15,14 +15,8 @@ import numpy as np
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import (
-    COSINE,
-    READING_GAIN,
-    READING_LAG,
-    Sensitivity,
-    predicted_shifts,
-)
-from gyrobench.reduction.setup.sources import TIME_BASE, Source
+from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.units import DEG
 
 from .mistakes import mistakes

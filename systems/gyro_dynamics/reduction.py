@@ -26,23 +26,16 @@ from gyrobench.reduction.loops.loop_toolkit import (
     told,
     trace,
 )
-from gyrobench.reduction.loops.response_errors import (
-    COSINE,
-    READING_GAIN,
-    READING_LAG,
-    Sensitivity,
-    predicted_shifts,
-)
-from gyrobench.reduction.setup.sources import STATED, TIME_BASE, Source
+from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 
 from .mistakes import mistakes
 from .model import AngleResponse, DynamicFigures, figures, response, values_near
 from .points import points_of
+from .sources import PICKOFF, SPIN
 from .steps import StepFigures, figures_of
 from .truth import true_values
 
-PICKOFF = Source("pickoff.scale", "pickoff gain", "1", "u_pickoff", STATED)
-SPIN = Source("gyro.spin", "spin angular momentum", "1", "u_spin", STATED)
 #: name, meaning, unit, SI per unit, in the order of model.read_off
 FIGURES = (
     ("g", "angle of the float over that of the case at low frequency, H/C", "1", 1.0),

@@ -21,6 +21,8 @@ DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
 GYROS = tuple(MOUNTS)
 ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
+#: what the choice of loops changes
+ARRANGED = ("slots", "wires", "on_request", "factors", "channels", "channel_period", "noises", "loops", "shown")
 ANGLE, RATE, OPTICAL = "angle", "rate", "optical"
 SERVO = "servo_three_loop"
 #: the motors of a servo with a current loop: of the part as it is
@@ -141,7 +143,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     def _arrange(self) -> None:
         """Give the system the slots and wires of its loops; those that were asked for stay."""
         asked = [slot for slot in self.on_request if slot in self.slots]
-        for changed in ("slots", "wires", "on_request", "factors", "channels", "noises", "loops", "shown"):
+        for changed in ARRANGED:
             vars(self).pop(changed, None)
         if self.rates:
             wanted, more = rate_loops.on_request()
@@ -162,6 +164,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
                 noises=(*self.noises, "tracker.image_noise"),
                 loops={**self.loops, **optical_loop.LOOPS},
                 shown=("tracker.miss", "tracker.error", "tracker.rate", *self.shown),
+                channel_period=optical_loop.CHANNEL_PERIOD,
             )
         vars(self)["channels"] = self._with_limits()
         for slot in asked:

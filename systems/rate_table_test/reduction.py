@@ -112,9 +112,8 @@ class Reduction(DriftReduction[RateTableSetup]):
         self.full = float(np.max(np.abs(self.table)))
         still = np.abs(self.table) < 1e-9 * max(self.full, 1e-12)
         self.large = still | (np.abs(self.table) > small_rates.SMALL * self.full)
-        self.small = small_rates.SmallRates.of(
-            self.w[~self.large], self.y[~self.large], small_rates.pooled_std(levels(self.table), self.y)
-        )
+        phase = np.asarray(w["phase"]).astype(int) if self.setup.steps else small_rates.phases(self.w)
+        self.small = small_rates.SmallRates.of(self.w[~self.large], self.y[~self.large], phase[~self.large])
         if self.small.silent:
             self.large &= ~still
         if self.setup.steps:

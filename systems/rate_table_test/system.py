@@ -64,11 +64,11 @@ class RateTableTest(TableTest):
 
     def rates(self) -> list[float]:
         """Return the table rates of the plan in their order, rad/s: the sweep, then the small rates of the gyro, whose
-        part of the Earth rate the table takes off.
+        part of the Earth rate the table takes off, there and back: what drifts is no response.
         """
         earth = earth_rate(self.values)
         small = [sense * r - earth for r in self.small_rates() for sense in (1.0, -1.0)]
-        return [*sweep(self["full_scale"], self["steps"], self["cycles"]), *small]
+        return [*sweep(self["full_scale"], self["steps"], self["cycles"]), *small, *reversed(small)]
 
     def plan(self) -> Plan:
         try:

@@ -1,6 +1,8 @@
 """Rows of the program -> time line, what each self-test found against its limits, why a start was broken off.
 
-Self-tests: mean of the repeats with its t interval; times: sampling of the program.  What was not reached has no value.
+Self-tests: mean of the repeats with its t interval; times: sampling of the program.  A start that was broken off has
+failed: the figure ``start`` counts its faults, of which none is allowed.  What it did not reach has no value
+and no limit.
 [TEST-START-UP]
 """
 
@@ -24,6 +26,7 @@ from gyrobench.reduction.loops.loop_toolkit import (
     told,
     trace,
 )
+from gyrobench.result import Limit
 
 STEPS = (
     "heater on", "wheel on", "reference", "pickoff null", "excitation on", "torquer", "loop closed", "loop step",
@@ -72,15 +75,20 @@ class Reduction(MeasureReduction):
         reason = int(w["reason"].max())
         self.why = REASONS[reason - 1] if reason else ""
         at = int(w["step"][np.argmax(w["reason"] > 0.0)]) if reason else 0
-        none = f"the start was broken off: {self.why}" if reason else "the program did not get there"
+        none = f"not reached: {self.why}, in step {at}" if reason else "the program did not get there"
+        meaning = "faults by which the program broke the start off"
         if reason:
-            text = f"The start was broken off in step {at}: {self.why}."
-            self.found.reasons.append(Reason("start.broken", text, ("pass",), severity="doubt"))
+            text = f"The start failed in step {at}: {self.why}. The program has broken it off there."
+            self.found.reasons.append(Reason("start.broken", text, severity="error"))
+            meaning = f"faults by which the program broke the start off: {self.why}, in step {at}"
+        if reason or int(w["step"].max()) == len(STEPS):
+            self.found.measure("start", meaning, "1", float(reason > 0), limit=(None, 0.0))
         for step, (name, meaning, option) in TIMES.items():
             limit = float(self.run.options[option])
             took = self._took(step, limit)
             u = float(self.run.step) / math.sqrt(12.0)
-            self.found.measure(name, meaning, "s", took, u, limit=(None, limit), closed=expected(p).get(step),
+            asked = self._asked((None, limit), took is not None)
+            self.found.measure(name, meaning, "s", took, u, limit=asked, closed=expected(p).get(step),
                                no_value="" if took is not None else none)  # fmt: skip
         for test in self._tests(p):
             self._self_test(test, none)
@@ -115,6 +123,10 @@ class Reduction(MeasureReduction):
             SelfTest(9, "angle", "table angle as read, less its target", -angle, angle),
         ]  # fmt: skip
 
+    def _asked(self, limit: Limit, reached: bool) -> Limit | None:
+        """Return the limit of a figure; none of one that a start which was broken off did not reach."""
+        return limit if reached or not self.why else None
+
     def _of(self, step: int) -> Array:
         """Return the values of a step's rows."""
         return np.asarray(self.rows["value"][self.rows["step"] == step], dtype=float)
@@ -133,7 +145,7 @@ class Reduction(MeasureReduction):
         values = self._of(test.step) / scale
         limit = (test.low / scale, test.high / scale)
         if values.size < int(self.run.parameters["program.repeats"]):
-            self.found.measure(test.name, test.meaning, unit, None, limit=limit, no_value=none)
+            self.found.measure(test.name, test.meaning, unit, None, limit=self._asked(limit, False), no_value=none)
             return
         mean, u = float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size))
         if test.step == 9:  # all readings may be rounded alike
@@ -178,7 +190,7 @@ class Reduction(MeasureReduction):
 
     def summary(self) -> list[str]:
         if self.why:
-            return [f"The start was broken off: {self.why}."]
+            return [f"The start failed: {self.why}."]
         return told(
             self.found.coefficients,
             "Start, self-tests, test and shutdown were gone through; nothing was found wrong.",

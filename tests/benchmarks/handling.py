@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from coverage import CASES
+from coverage_cases import CASES
 from laboratory import Laboratory, Sheet, wide
 
 from gyrobench.errors import GyrobenchError

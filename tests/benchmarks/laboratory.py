@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coverage import CASES, Noise
+from coverage_cases import CASES, Noise
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record

@@ -12,7 +12,8 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from coverage import DPH, Case, Rng, Values, coverage, floated, latitude, of_encoder, sign
+from coverage import coverage
+from coverage_cases import DPH, Case, Rng, Values, floated, latitude, of_encoder, sign
 
 from gyrobench import frames
 

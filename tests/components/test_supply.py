@@ -11,7 +11,7 @@ from wired import BENCH
 
 from gyrobench.packaging.loading import load_part
 
-Supply, Gyro = load_part("supply", BENCH), load_part("floated_gyro", BENCH)
+Supply, Gyro, Compliant = (load_part(n, BENCH) for n in ("supply", "floated_gyro", "compliant_gyro"))
 OUTPUTS = ("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")
 BLOCKS = ("frequency", "voltage", "asymmetry", "pickoff", "torquer")
 
@@ -82,3 +82,42 @@ def test_floated_gyro_against_its_torques(seed: int) -> None:
     assert gyro.drift == pytest.approx(nominal / (1 + f), rel=1e-12)
     assert gyro.h_I == pytest.approx(gyro.H * (1 + f) * math.sin(b + 0.5e-3 * rate), rel=1e-6)
     assert gyro.M_react[1] == pytest.approx(gyro.C * rate - torque, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_compliant_gyro_against_its_torques(seed: int) -> None:
+    """H (1 + f) between rotor and gimbal, the torques of drift and torquer at the nominal H; rotor and float as in
+    GYRO-DYN-3, integrated by scipy.
+    """
+    rng = np.random.default_rng(seed)
+    f, v, p, e, a = rng.normal(size=5) * 0.02
+    w, g, i = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 6.0, 1e-3
+    names = ("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS")
+    given = dict(zip(names, rng.normal(size=6) * 3e-6, strict=True))
+    gyro = Compliant(white=0.0, markov=0.0, pickoff=0.0, k_E=0.7, **given)
+    gyro.initialize()
+    for name, x in zip(OUTPUTS, (f, v, p, e, a), strict=True):
+        setattr(gyro, name, x)
+    for j in range(3):
+        gyro.omega[j], gyro.f[j] = w[j], g[j]
+    gyro.i = i
+    for n in range(20):
+        gyro.do_step(n * 1e-3, 1e-3)
+    X, Y, Z = -g / 9.80665
+    D_F = gyro.D_F + given["D_pickoff"] * ((1 + e) ** 2 - 1) + given["D_torquer"] * ((1 + a) ** 2 - 1)
+    nominal = D_F + (gyro.D_I + given["D_UI"] * v + given["D_PI"] * p) * X + gyro.D_O * Y
+    nominal += (gyro.D_S + given["D_US"] * v + given["D_PS"] * p) * Z + gyro.D_II * X * X + gyro.D_SS * Z * Z
+    nominal += gyro.D_IO * X * Y + gyro.D_OS * Y * Z + gyro.D_IS * X * Z
+    torque, H = -gyro.H * (nominal + gyro.k * (1 + 0.7 * a) * i), gyro.H * (1 + f)
+
+    def rhs(_: float, y: np.ndarray) -> list[float]:
+        b, rate, about_i, about_o = y
+        sensed = w[0] * math.cos(b) - w[2] * math.sin(b)
+        spring = gyro.K_O * about_o
+        rotor = [spring / H - sensed, -gyro.K_I / H * about_i - rate - w[1]]
+        return [rate, (spring + torque - gyro.C * rate) / gyro.J, *rotor]
+
+    b = solve_ivp(rhs, (0.0, 0.02), [0.0] * 4, method="DOP853", rtol=1e-12, atol=1e-18).y[0, -1]
+    assert gyro.b == pytest.approx(b, rel=1e-8)
+    assert gyro.u == pytest.approx(gyro.K_sg * (1 + e) * b, rel=1e-8)
+    assert gyro.drift == pytest.approx(nominal / (1 + f), rel=1e-12)

@@ -30,6 +30,7 @@ assert _spec is not None and _spec.loader is not None
 benchmark: Any = importlib.util.module_from_spec(_spec)
 sys.modules["coverage_of_systems"] = benchmark
 _spec.loader.exec_module(benchmark)
+cases: Any = sys.modules["coverage_cases"]
 
 Array = np.ndarray[Any, Any]
 SIZE = 1e-7  # rad/s, standard deviation of a window: 0.02 deg/h
@@ -128,12 +129,12 @@ RUN_ONLY = {
 
 
 def test_every_case_is_here() -> None:
-    assert set(READ) | RUN_ONLY == set(benchmark.CASES)
+    assert set(READ) | RUN_ONLY == set(cases.CASES)
 
 
 def ratios(name: str, runs: int) -> Array:
     """Errors over half widths (runs, coefficients)."""
-    case, read = benchmark.CASES[name], READ[name][0]
+    case, read = cases.CASES[name], READ[name][0]
     system, rng = load_system(case.system), np.random.default_rng(7)
     records = []
     with Session(case.system) as session, benchmark.seen_windows() as seen:
@@ -147,7 +148,7 @@ def ratios(name: str, runs: int) -> Array:
     ratio = []
     for run in range(runs):
         drawn, record = records[run % 3]
-        n = benchmark.Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
+        n = cases.Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
         read_so = read(record.windows, record.run.parameters, rng, n)
         result = drawn.reduce(Record({**record.windows, **read_so}, {}, record.run))
         ratio.append(

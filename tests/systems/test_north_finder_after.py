@@ -109,7 +109,7 @@ def test_a_bias_beyond_the_earth_rate_gives_no_heading_in_one_position() -> None
     for sheet, u, lost in (("mpu6050", 20.0 * 3600.0 / math.sqrt(3.0), True), ("ln200", 1.0, False)):
         _, values = with_instruments(sheet, {}, load_system("north_finder"))
         assert values["u_bias"] == pytest.approx(u * DPH)
-        setup = NorthFinderSetup(latitude=45.0 * DEG, gravity=9.8, method="strapdown", u_bias=values["u_bias"])
+        setup = NorthFinderSetup(latitude=45.0 * DEG, gravity=9.8, method="strapdown", sizes=values)
         assert any("take the method strapdown two" in p for p in Reduction({}, setup).problems()) == lost
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
-from gyrobench.result import LoopResult
+from gyrobench.reduction.estimation.verdict import conclude
+from gyrobench.result import NO_VERDICT, LoopResult
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
 
@@ -34,6 +35,8 @@ NAMED = {
     "table angle": (9, "table angle wrong"),
     "wheel brake": (12, "wheel does not run down"),
 }
+#: figure -> its step; the wheel is braked after a test that was broken off, too
+FIGURES = {"t heat": 1, "t wheel": 2, "reference": 3, "null": 4, "torquer": 6, "t close": 7, "loop": 8, "angle": 9}
 SHORT = {"dwell": 6.0}
 
 
@@ -59,9 +62,17 @@ def test_a_fault_breaks_the_start_off_by_its_name(session: Session, fault: str) 
     record = session.run({"fault": fault, **SHORT, **({"dwell": 60.0} if "lost" in fault else {})}, seed=3)
     found = reduced(session, record)
     assert [r.text for r in found.reasons if r.id == "start.broken"] == [
-        f"The start was broken off in step {step}: {name}."
+        f"The start failed in step {step}: {name}. The program has broken it off there."
     ]
-    assert found.verdict != "pass"
+    judged = conclude(found, record)
+    assert (judged.verdict, judged["start"].verdict) == ("fail", "fail")
+    assert judged["start"].meaning.endswith(f": {name}, in step {step}")
+    for c in judged.coefficients:
+        own = FIGURES.get(c.name, step)
+        if own > step:
+            assert c.no_value == f"not reached: {name}, in step {step}" and c.verdict == NO_VERDICT, c.name
+        elif own < step:
+            assert c.verdict == "pass", c.name
     w = record.windows
     assert w["step"][-1] == 13  # all is off in the end
     line = {row[0]: row for row in found.tables[0].rows}
@@ -84,6 +95,7 @@ def test_without_a_fault_all_is_gone_through(session: Session) -> None:
     record = session.run(SHORT, seed=5)
     found = reduced(session, record)
     assert found.verdict == "pass" and not found.reasons
+    assert found["start"].estimate == 0.0
     assert found["t wheel"].estimate == pytest.approx(-80.0 * math.log(1.0 - 0.3125) + 2.0, abs=5e-3)
     assert found["t brake"].estimate == pytest.approx(80.0 * math.log(6.5e-3 / 4.01e-3), abs=5e-3)
     for name in ("reference", "null", "torquer", "angle"):

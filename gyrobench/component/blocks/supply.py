@@ -79,6 +79,12 @@ class SuppliedGyro(SdfGyro):
         along_s = self.D_US * self.wheel_voltage + self.D_PS * self.wheel_phase
         return reaction + vector([along_i, 0.0, along_s]) @ x
 
+    def static_drift(self, x: Vector) -> Number:
+        drift = super().static_drift(x)
+        if self.sensitive > 0.0:
+            drift = drift + self.by_supplies(x)
+        return drift
+
     def gain(self) -> Number:
         return super().gain() * (1.0 + self.pickoff_excitation)
 

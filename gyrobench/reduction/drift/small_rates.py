@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,6 @@ from gyrobench.units import DEG
 SMALL = 0.02  # of the largest rate: rates below it are left to the threshold, but those at rest
 SAME = 1e-3  # relative: rates that are the same but for the sense
 HALF = 0.5  # of the response that a rate should have
-SURE = 2.0  # standard uncertainties between a ratio and the half of a response, of readings that are not repeated
 FALSE = 0.05  # probability that any rate of a plan with repeats is surely answered, or not, where it is not so
 MEANING = "threshold: rate at which the gyro begins to answer with half of it, between two rates of the plan"
 
@@ -39,18 +37,10 @@ class SmallRates:
     scale: float = DEG
 
     @classmethod
-    def of(cls, w: Array, y: Array, noise: float, unit: str = "°/s", scale: float = DEG) -> SmallRates:
-        """w, y: rates and readings, rad/s; noise: standard deviation of a reading."""
-        rows = []
-        for r, plus, minus in _both_senses(w):
-            u = 0.5 * noise * math.sqrt(1.0 / np.count_nonzero(plus) + 1.0 / np.count_nonzero(minus))
-            rows.append((r, _half(y, plus, minus) / r, u / r, SURE * u / r))
-        rate, ratio, u_ratio, margins = _columns(rows)
-        return cls(rate, ratio, u_ratio, margins, unit, scale)
+    def of(cls, w: Array, y: Array, phase: NDArray[np.int_], unit: str = "°/s", scale: float = DEG) -> SmallRates:
+        """Return the responses in readings of phases (n,) that repeat each rate: what drifts between phases is seen.
 
-    @classmethod
-    def repeated(cls, w: Array, y: Array, phase: NDArray[np.int_], unit: str = "°/s", scale: float = DEG) -> SmallRates:
-        """Return the same of readings in phases (n,) that repeat each rate: what drifts from phase to phase is seen.
+        w, y: rates and readings (n,), rad/s.
 
         The variance of a ratio is the larger of three: of the readings and of the means of repeated phases, each pooled
         over all rates, and of the repeats of this rate alone, for a rate that is answered now and then scatters more
@@ -180,9 +170,7 @@ def _distinct(values: Array) -> list[float]:
     return found
 
 
-def pooled_std(level: NDArray[Any], y: Array) -> float:
-    """Return the standard deviation of readings at the same level (numbers from 0), pooled; NaN of one at each."""
-    n = np.bincount(level)
-    mean = np.bincount(level, weights=y) / np.maximum(n, 1)
-    dof = y.size - int(np.count_nonzero(n))
-    return math.sqrt(float(np.sum((y - mean[level]) ** 2)) / dof) if dof > 0 else math.nan
+def phases(w: Array) -> NDArray[np.int_]:
+    """Return the number of the phase of each row (n,), from 0: rows that follow one another at the same rate w."""
+    changes = np.abs(np.diff(w)) > SAME * np.abs(w[1:])
+    return np.concatenate([[0], np.cumsum(changes)])
