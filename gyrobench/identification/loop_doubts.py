@@ -1,4 +1,4 @@
-"""What speaks against one linear loop behind a record: two halves that differ, L that does not fall.
+"""Doubts about one linear loop behind a record: two halves that differ, L that does not fall.
 
 **Halves.** Of the response to each period, at the n lines of the excitation, the means of the first and of the
 second half of the periods differ by d_1, those of every other one by d_2; at the m harmonics between the lines, where
