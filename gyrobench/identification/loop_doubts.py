@@ -24,7 +24,8 @@ from gyrobench.identification.line_spectrum import periods_used
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.ratios import MeasuredResponse
 
-Complex, Rows = NDArray[np.complexfloating[Any, Any]], NDArray[np.bool_]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Rows = NDArray[np.bool_]
 LEVEL = 1e-6  # of the test of the halves
 MOVED = 0.02  # relative change of the response that counts, rms over the lines
 PERIODS = 4  # after the transient
