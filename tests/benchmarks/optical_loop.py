@@ -54,7 +54,7 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     return {
         **motion, **gyros,
         "pitch": float(rng.uniform(-40.0, 40.0)) * DEG, "azimuth": float(rng.uniform(-60.0, 60.0)) * DEG,
-        "crossover": crossover, "track": track, "hold": float(rng.uniform(20.0, 60.0)) / track,
+        "crossover": crossover, "track": track, "hold": max(5.0, float(rng.uniform(20.0, 60.0)) / track),
         "target.frequency": track * 10.0 ** float(rng.uniform(-2.0, -0.8)), "target.lead": float(rng.uniform(0.0, 6.0)),
         "tracker.image_noise": noise, "tracker.pixel": noise * float(rng.choice([0.0, rng.uniform(0.0, 2.0)])),
         "tracker.period": frame, "tracker.exposure": 0.4 * frame, "tracker.processing": frame,
