@@ -71,7 +71,9 @@ class Sheet:
         """Return the cells of the table."""
         one, two = (self.after(MINUTES, both) for both in (False, True))
         time = reached_after(self.errors, LATITUDE, GOAL)
-        growth = running(RandomErrors(self.errors.white, 0.0, self.errors.flicker), 0.0, 60.0 * MINUTES, 600.0)
+        growth = running(
+            RandomErrors(self.errors.white, 0.0, self.errors.flicker), 0.0, 60.0 * MINUTES, 600.0, LATITUDE
+        )
         alone = "lost" if self.errors.bias > NORTH else degrees(one, at_best=not self.bias)
         words = in_words(time)
         if time and not self.floor:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from gyrobench.units import EARTH_RATE
 from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instruments
 from systems.north_finder.after import RandomErrors
 
+Command = Callable[..., tuple[int, str, str]]
 ALL = sorted(Bench(standard_folder()).instruments())
 TABLES = [n for n in ALL if find_instrument(n).kind == "turntable"]
 SHEETS = [n for n in ALL if find_instrument(n).kind in ("fibre", "laser", "vibrating")]
@@ -32,6 +35,11 @@ date = "2020"
 
 [figures.noise_density]
 value = "0.01 deg/s/sqrt(Hz)"
+reading = "typical"
+"""
+FORCE = """
+[accelerometers.velocity_random_walk]
+value = "0.06 m/s/sqrt(h)"
 reading = "typical"
 """
 
@@ -156,6 +164,9 @@ def test_from_python() -> None:
         (MINE.replace('maker = "Me"\n', ""), "maker"),
         (MINE.replace('part = "gyro_mems"\n', ""), "part: missing"),
         (MINE.replace('"vibrating"', '"turntable"').replace("noise_density", "wobble"), "a turntable names none"),
+        (MINE + FORCE.replace("walk", "wander"), "accelerometers.velocity_random_wander: unknown"),
+        (MINE + FORCE.replace("m/s/sqrt(h)", "m/s"), r"accelerometers.velocity_random_walk.*does not convert"),
+        (MINE.replace("vibrating", "turntable").replace("noise_density", "wobble") + FORCE, "turntable has none"),
     ],
 )
 def test_refused(tmp_path: Path, text: str, said: str) -> None:
@@ -193,6 +204,50 @@ def test_a_unit_of_three_gyros_by_hand() -> None:
     assert largest == pytest.approx(0.5 * DEG / 3600.0, rel=1e-3)
     _, found = with_instruments("adis16488", {}, load_system("attitude_estimator"))
     assert found["imu.noise_z_gyro"] == pytest.approx(0.3 * DEG / 60.0) and found["imu.noise_z_bias"] > 0.0
+
+
+def test_the_accelerometers_of_a_unit_by_hand() -> None:
+    """mpu9250: 300 ug/sqrt(Hz) one-sided, 2 g, 0.5 % of it, 2 %, 1.5 mg/K, 0.026 %/K, 260 Hz; 60 mg, 3 % are limits.
+    STIM300: 0.06 m/s/sqrt(h), a least Allan deviation of 0.05 mg; HG1700: 0.065 ft/s/sqrt(h), 1 mg; HG9900: 25 ug.
+    """
+    g, system = 9.80665, load_system("drift_record")
+    _, found = with_instruments("mpu9250", {"accelerometers": "accelerometer_mems"}, system)
+    assert {n.partition(".")[0] for n in found} == {"accelerometers"}  # they stand in the place of the gyro
+    assert found["accelerometers.white"] == pytest.approx(300e-6 * g / math.sqrt(2.0))
+    assert found["accelerometers.range_max"] == pytest.approx(2.0 * g)
+    assert found["accelerometers.cubic"] == pytest.approx(0.005 / 0.4 / (2.0 * g) ** 2)
+    assert found["accelerometers.axes"][1] == [0.0, 1.0, 0.02] and found["accelerometers.bandwidth"] == 260.0
+    assert not {"accelerometers.turn_on", "accelerometers.scale"} & set(found)
+    assert found["accelerometers.x_flicker"] == found["accelerometers.x_walk"] == 0.0  # the sheet is the whole
+    _, unit = with_instruments("mpu9250", {}, load_system("imu_positions"))
+    assert unit["imu.acc_bias_T"] == pytest.approx([1.5e-3 * g] * 3)
+    assert unit["imu.acc_scale_T"] == pytest.approx([260e-6] * 3)
+    assert unit["imu.acc_scale"][2] == [0.02, 0.02, 0.0] and unit["imu.y_acc"] == found["accelerometers.white"]
+    _, unit = with_instruments("stim300", {}, load_system("imu_positions"))
+    assert unit["imu.z_acc"] == pytest.approx(0.06 / 60.0)
+    assert unit["imu.x_acc_bias"] == pytest.approx(0.05e-3 * g / 0.6174)
+    _, unit = with_instruments("hg1700", {}, load_system("imu_positions"))
+    assert unit["imu.x_acc"] == pytest.approx(0.065 * 0.3048 / 60.0)
+    assert unit["imu.acc_bias"][0] == pytest.approx(1e-3 * g)
+    _, unit = with_instruments("hg9900", {}, load_system("imu_positions"))  # no noise on the sheet: that of the part
+    assert "imu.x_acc" not in unit and np.array(unit["imu.acc_scale"]) == pytest.approx(1e-4 * np.eye(3))
+    # with accelerometers of their own in a unit both are set; a sheet without any says so
+    _, both = with_instruments("mpu9250", {"accelerometers": "accelerometer_mems"}, load_system("imu_positions"))
+    assert {n.partition(".")[0] for n in both} == {"accelerometers", "imu"}
+    with pytest.raises(UsageError, match="CRG20 states nothing of accelerometers"):
+        with_instruments("crg20", {"accelerometers": "accelerometer_mems"}, load_system("drift_record"))
+
+
+@pytest.mark.long
+def test_accelerometers_of_a_sheet_drift_as_it_says(command: Command, tmp_path: Path) -> None:
+    """STIM300, a minute: 0.06 m/s/sqrt(h) is in the interval, which is narrower than a fifth of it."""
+    out = ["--set", "duration=60s", "--set", "window=0.1s", "--seed", "3", "--out", str(tmp_path / "r")]
+    parts = ["--part", "accelerometers=accelerometer_mems", "--instrument", "stim300"]
+    code, _, err = command("run", "drift_record", *parts, *out)
+    assert code == 0, err
+    found = json.loads((tmp_path / "r" / "result.json").read_text())["coefficients"]
+    low, high = next(c for c in found if c["name"] == "N")["interval"]
+    assert low < 0.06 < high < low + 0.012
 
 
 def test_the_drift_of_a_platform() -> None:

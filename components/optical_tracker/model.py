@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, State, sampled
 from gyrobench.component.blocks.platform import left, moved_base
-from gyrobench.component.math import Number, Vector, atan2, cross, fabs, floor, index, vector
+from gyrobench.component.math import Number, Vector, atan2, cross, fabs, floor, index, sqrt, vector
 
 NONE = [0.0, 0.0, 0.0]
 PAIR = [0.0, 0.0]
@@ -28,9 +28,21 @@ class OpticalTracker(Component):
     and hold, T = exposure/2 + processing + period/2: poles those of Pade's [3/4] of exp(-s T), zeros such that all
     agrees up to s3.  Until the first image has arrived, the error is that of the equivalent.
 
+    Prediction over the delay, in each axis the Kalman filter of a steady state that takes the `order`-th derivative of
+    the error for a random walk, w = bandwidth, z the error that is there:
+
+        x' = v + l1 (z - x),  v' = a + l2 (z - x),  a' = l3 (z - x)        error = x + ahead v + ahead2 a / 2
+
+        order 1  l = (sqrt(2) w, w2, 0)        order 2  l = (2 w, 2 w2, w3)
+
+    From z to the error that is 1 + ahead s up to s, with order 2 + ahead2 s2/2 up to s2: of the delay's own row.
+    w = Lambda^(1/2) / period and Lambda^(1/3) / period with Kalata's tracking index Lambda, rms of the change of v
+    (order 2: of a) from image to image over the noise of an image, both times period (order 2: period2).
+
     Not modelled: size and contrast of the target, optics, rotation of the image during the exposure, a rolling shutter,
     noise that depends on the motion blur, loss of single images.
-    Source: equations of our own; delay of an imaging tracker in the loop: Masten 2008.
+    Source: equations of our own; delay of an imaging tracker in the loop: Masten 2008; filter: Kalata 1984,
+    Barshalom 2001 (section 6.5), here in its limit of small indices, images without end.
     """
 
     version = "1.0.0"
@@ -42,6 +54,9 @@ class OpticalTracker(Component):
     exposure = Parameter(0.004, "s", "time of exposure, whole communication steps", min=0.0)
     processing = Parameter(0.01, "s", "from the end of the exposure to the error, whole communication steps", min=0.0)
     pixel = Parameter(0.0, "rad", "resolution of the error; 0: none", min=0.0)
+    order = Parameter(0, int, "prediction: 0 none, 1 by a rate, 2 by an acceleration too", min=0, max=2)
+    ahead = Parameter(0.017, "s", "prediction: time over which", min=0.0)
+    bandwidth = Parameter(50.0, "rad/s", "prediction: of its filter", above=0.0)
     field = Parameter(0.02, "rad", "field of view, full angle in each axis", above=0.0, below=3.0)
     image_noise = Noise(1e-5, "rad", "noise of each image and axis, rms", per="step", samples=2)
 
@@ -61,6 +76,8 @@ class OpticalTracker(Component):
     e1 = State([1.0, 0.0, 0.0], "1", "x of the fixed frame, axes of the tracker")
     e2 = State([0.0, 1.0, 0.0], "1", "y of it")
     lag = State([[0.0] * 4, [0.0] * 4], "rad", "continuous equivalent of the frames")
+
+    filter = State([[0.0] * 3, [0.0] * 3], "rad", "prediction: error, its rate / bandwidth, acceleration / bandwidth2")
 
     row = Discrete([0.0] * 4, "1", "numerator of the equivalent, rising powers")
     T = Discrete(1.0, "s", "its delay")
@@ -132,6 +149,25 @@ class OpticalTracker(Component):
                 self.der.lag[k][j] = z[j + 1] / self.T
             back = 840.0 * z[0] + 480.0 * z[1] + 120.0 * z[2] + 16.0 * z[3]
             self.der.lag[k][3] = (x[k] - back) / self.T
+            self.predict(k)
+
+    def predict(self, k: Number) -> None:
+        """Set the derivatives of the filter of axis k; without prediction it stays 0, and leaves no pole at 0."""
+        w = self.bandwidth
+        z = vector(self.filter[index(k)])
+        new = self.arrived_error(k) - z[0]
+        self.der.filter[index(k)][0] = w * (z[1] + (sqrt(2.0) if self.order < 1.5 else 2.0) * new)
+        self.der.filter[index(k)][1] = w * (z[2] + (1.0 if self.order < 1.5 else 2.0) * new)
+        self.der.filter[index(k)][2] = w * (new if self.order > 1.5 else -z[2])
+        if self.order < 0.5:
+            for j in range(3):
+                self.der.filter[index(k)][j] = -w * z[j]
+
+    def arrived_error(self, k: Number) -> Number:
+        """Return the error of the image that arrived last; until the first, of the continuous equivalent."""
+        z = vector(self.lag[index(k)])
+        y = self.row[0] * z[0] + self.row[1] * z[1] + self.row[2] * z[2] + self.row[3] * z[3]
+        return self.held[index(k)] if self.arrived > 0.5 else 840.0 * y
 
     @sampled(every=1)
     def tick(self) -> None:
@@ -191,7 +227,8 @@ class OpticalTracker(Component):
         self.acceleration[1] = a[2]
         self.lost = self.out
         self.images = self.arrived
+        x = self.bandwidth * self.ahead
         for k in range(2):
-            z = vector(self.lag[k])
-            y = self.row[0] * z[0] + self.row[1] * z[1] + self.row[2] * z[2] + self.row[3] * z[3]
-            self.error[k] = self.held[k] if self.arrived > 0.5 else 840.0 * y
+            z = vector(self.filter[k])
+            ahead = z[0] + x * (z[1] + 0.5 * x * z[2])
+            self.error[k] = ahead if self.order > 0.5 else self.arrived_error(k)

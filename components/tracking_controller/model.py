@@ -15,7 +15,8 @@ class TrackingController(LeadLag):
     tracking loop is of type 1 (error rate / K), with integral > 0 of type 2 (error acceleration / (K integral)).  While
     v is limited and e pushes further, the integral waits (no wind-up); it does not for the slope.
 
-    Not modelled: prediction over the delay of the image, sampling of the controller (see stabilizer_lti).
+    Not modelled: prediction over the delay of the image (see optical_tracker), sampling of the controller (see
+    stabilizer_lti).
     Source: Masten 2008, Hilkert 2008 (structure); types and error coefficients: Franklin 2010, section 4.2.
     """
 

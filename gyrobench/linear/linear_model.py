@@ -22,7 +22,7 @@ without a linear model; a warning says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,16 +81,18 @@ def operating_point(
 
 
 class Linear:
-    """The linear system; see the module."""
+    """The linear system; see the module.  also: slots whose outputs come in from outside, as the exciter's do."""
 
-    def __init__(self, assembly: Assembly, parts: Mapping[str, Component], step: float) -> None:
+    def __init__(
+        self, assembly: Assembly, parts: Mapping[str, Component], step: float, also: Sequence[str] = ()
+    ) -> None:
         self.step = step
         system = assembly.system
         if late := [c.wire for c in assembly.connections if c.delayed]:
             if system.coupling:
                 raise LinearizationError("the parts are coupled in parallel")
             raise LinearizationError(f"a mapping file delays {', '.join(dict.fromkeys(late))}")
-        sources = [s for s, d in system.slots.items() if socket(d.socket).name == "Excitation"]
+        sources = [s for s, d in system.slots.items() if socket(d.socket).name == "Excitation" or s in also]
         varying = [c for c in assembly.connections if c.output.constant is None]
         self.connections = [c for c in varying if c.target not in sources]
         self.outside = list(

@@ -6,6 +6,7 @@ import asyncio
 import contextvars
 import functools
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,6 +25,7 @@ POINTS = 2000  # of a signal
 PANEL, GAP, TOP, BOTTOM = 170, 54, 30, 70  # px
 COLOURS = ("#1f77b4", "#d9730d", "#2a8c4a", "#b3333b", "#7a4fb0", "#8a6d3b", "#c2579a", "#4d5b68")
 TEXT, GRID = "#7b8791", "rgba(128, 140, 150, 0.3)"  # read on light and on dark ground
+REDRAW = 1.0  # s between two drawings of a run under way
 RECORDS = 3  # kept open
 OPENING = threading.Lock()  # a record that two tabs ask for is read once
 #: threads of their own: a page does not wait for one behind the pyramids of long records, which take seconds
@@ -118,12 +120,14 @@ class LiveChart:
     """Signals of a run while it is under way, from the file that its process writes."""
 
     def __init__(self, file: Path) -> None:
-        self.file, self.read = file, 0
+        self.file, self.read, self.drawn = file, 0, 0.0
         self.chart = ui.echart({"series": []}).classes("chart").props("role=img").props(spoken("Signals so far"))
         self.chart.set_visibility(False)
 
-    def look(self) -> None:
-        """Draw the signals where there are new ones."""
+    def look(self, last: bool = False) -> None:
+        """Draw the signals where there are new ones, at most once in ``REDRAW``; the last ones at once."""
+        if time.monotonic() < self.drawn + REDRAW and not last:
+            return
         try:
             changed = self.file.stat().st_mtime_ns
         except OSError:
@@ -131,7 +135,7 @@ class LiveChart:
         options = _live(self.file, changed, say.code) if changed != self.read else None
         if options is None:
             return
-        self.read = changed
+        self.read, self.drawn = changed, time.monotonic()
         self.chart.set_visibility(True)
         self.chart.style(height_of(len(options["series"])))
         self.chart.options.clear()

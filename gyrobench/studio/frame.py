@@ -22,6 +22,8 @@ from gyrobench.workflow.user_errors import user_message
 MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 NARROW = Path(__file__).with_name("narrow.js")
+SEEN = """document.addEventListener('visibilitychange', () => emitEvent('seen', !document.hidden));
+if (document.hidden) emitEvent('seen', false);"""
 NUMBER = "987654"  # stands for the number in the words of a count
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
@@ -109,6 +111,15 @@ def frame(studio: Studio, title: str) -> Iterator[None]:
             yield
         except Exception as error:
             show_problem(error)
+
+
+class PageSeen:
+    """``now``: does the browser show the page?  What nobody sees is neither sent nor drawn."""
+
+    def __init__(self) -> None:
+        self.now = True
+        ui.on("seen", lambda e: setattr(self, "now", bool(e.args)))
+        ui.run_javascript(SEEN)
 
 
 def show_problem(error: BaseException) -> None:

@@ -106,7 +106,13 @@ class StudioGate:
             await _answer(send, 403, "The studio is read-only.")
             return
         limited = _limited(receive, UPLOAD if upload else SMALL)
-        begun = False
+        begun = gone = False
+
+        async def heard() -> Message:
+            nonlocal gone
+            message = await limited()
+            gone = gone or message["type"] == "http.disconnect"
+            return message
 
         async def guarded(message: Message) -> None:
             nonlocal begun
@@ -120,7 +126,10 @@ class StudioGate:
         try:
             if (length := _length(scope)) is None or length > (UPLOAD if upload else SMALL):
                 raise _TooLargeError
-            await self.app(scope, limited, guarded)
+            await self.app(scope, heard, guarded)
+        except RuntimeError:  # a page that was left before its answer: the framework complains of none
+            if not gone:
+                raise
         except _TooLargeError:
             if not begun:
                 await _answer(send, 413, "The request is too large.")

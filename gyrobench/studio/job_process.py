@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from gyrobench.record.signal_view import LiveSignals
 
 REQUEST, STATE, STARTED, LIVE = "job.json", "state.json", "started", "live.json"
-LIVE_SIGNALS = 4
+LIVE_SIGNALS, LIVE_ROWS = 4, 1000
 PRINTED, LONG = 400, 500  # lines of a command that are kept, characters of one
 NICE = 5  # lower than the studio, whose pages answer while runs have all cores
 WAIT = 5.0  # s for the lock, which the studio takes for a moment when it looks
@@ -94,7 +94,7 @@ class _Writer:
         from gyrobench.record.signal_view import LiveSignals
         from gyrobench.workflow.progress_words import format_status
 
-        live = LiveSignals()
+        live = LiveSignals(LIVE_ROWS)
 
         def show(status: Any) -> None:
             self.report.label, self.report.fraction = label, float(status.fraction)

@@ -12,6 +12,7 @@ from nicegui import ui
 from gyrobench.arrays import Array
 from gyrobench.frames import pole
 from gyrobench.record.record import Record
+from gyrobench.studio.frame import PageSeen
 from gyrobench.studio.words import say, spoken
 from gyrobench.system.moving_bodies import MovingBody, attitudes
 
@@ -41,6 +42,30 @@ TURN = """(() => {
     if (waiting && left > 0) setTimeout(() => turn(left - 1), 50);
   };
   turn(200);
+})()"""
+
+
+#: the front end draws 20 frames a second whatever there is to see: those that show the same, or nothing, are left out
+CALM = """(() => {
+  const calm = left => {
+    const place = getElement(%d), draws = [place?.renderer, place?.text_renderer, place?.text3d_renderer];
+    if (!draws.every(Boolean)) { if (left > 0) setTimeout(() => calm(left - 1), 50); return; }
+    let last = '', changed = 0;
+    place.framesDrawn = 0;
+    const draw = draws.map(d => d.render.bind(d));
+    draws[0].render = (scene, camera) => {
+      if (!place.$el.offsetParent) return;
+      camera.updateMatrixWorld();
+      const now = [place.$el.clientWidth, ...camera.matrixWorld.elements, ...camera.projectionMatrix.elements];
+      scene.traverse(o => now.push(...o.position.toArray(), ...o.quaternion.toArray(), ...o.scale.toArray()));
+      if (last !== (last = now.join())) changed = performance.now();
+      if (performance.now() > changed + 1000) return;  // colours and texts come a little later
+      draw.forEach(d => d(scene, camera));
+      place.framesDrawn += 1;
+    };
+    draws[1].render = draws[2].render = () => {};
+  };
+  calm(200);
 })()"""
 
 
@@ -80,6 +105,8 @@ class MovingPicture:
         ui.label(say(LEGEND)).classes("soft")
         self.slider.on_value_change(lambda e: self.show(int(e.value)))
         self.timer = ui.timer(TICK, self._step, active=False)
+        self.seen = PageSeen()
+        ui.run_javascript(CALM % self.scene.id)
         self.show(0)
 
     def attitudes(self, row: int) -> Mapping[str, Array]:
@@ -98,6 +125,8 @@ class MovingPicture:
         self.button.props(f"icon={'pause' if self.timer.active else 'play_arrow'}")
 
     def _step(self) -> None:
+        if not self.seen.now:
+            return
         last = len(self.time) - 1
         following = self.row + max(1, last // FRAMES)
         self.slider.set_value(0 if self.row >= last else min(last, following))

@@ -6,7 +6,7 @@ import asyncio
 from html import escape
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from nicegui import ui
 
@@ -14,11 +14,11 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
-from gyrobench.studio.frame import CopyLines, Studio, address, counted, frame, inside, search_field, told
+from gyrobench.studio.frame import CopyLines, PageSeen, Studio, address, counted, frame, inside, search_field, told
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
-from gyrobench.studio.request import CommandRequest, comparison_command, comparison_python, first_shown
+from gyrobench.studio.request import CommandRequest, JobRequest, comparison_command, comparison_python, first_shown
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
@@ -48,6 +48,14 @@ def _is_suite(name: str) -> bool:
         return False
 
 
+def _title(request: JobRequest | CommandRequest) -> str:
+    """Return the title of what runs: that of its system, where it is a run of one."""
+    try:
+        return say(load_test(request.system).title, request.system) or request.system
+    except Exception:  # a command, or a system that is not there any more
+        return request.system
+
+
 def _place(studio: Studio, folder: str) -> str:
     """Return the place of a run below reports/out, "" for one elsewhere."""
     path, out = Path(folder).resolve(), studio.bench.out.resolve()
@@ -60,7 +68,7 @@ def _add_job_page(studio: Studio) -> None:
         with frame(studio, "Run"):
             job = studio.jobs.find(key)
             command = isinstance(job.request, CommandRequest)
-            ui.html(f"<h1>{escape(job.request.system)}</h1>", sanitize=False)
+            ui.html(f"<h1>{escape(_title(job.request))}</h1>", sanitize=False)
             with ui.element("div").classes("bar"):
                 state = ui.label().classes("tag").props("role=status").mark("state")
                 words = ui.label().classes("soft")
@@ -73,12 +81,17 @@ def _add_job_page(studio: Studio) -> None:
                     "resume"
                 )
                 done = ui.link(say("Its pages" if command else "Report and signals"), "#").mark("result")
+                if isinstance(job.request, JobRequest) and not job.request.data:
+                    values = urlencode([("set", f"{n}={v}") for n, v in job.request.values.items()])
+                    ui.link(say("Change its values"), f"/system/{quote(job.request.system)}?{values}").mark("change")
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
-            gone = {"there": False}
+            gone, seen = {"there": False}, PageSeen()
 
             def show() -> None:
+                if not seen.now:
+                    return
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
                 message.set_text(
@@ -95,7 +108,7 @@ def _add_job_page(studio: Studio) -> None:
                 if now.state == "done" and place and not message.text and not gone["there"] and not command:
                     gone["there"] = True
                     ui.navigate.to(address("run", place))
-                chart.look()
+                chart.look(last=not now.active)
                 if not now.active:
                     timer.deactivate()
 
@@ -285,8 +298,11 @@ def _table(entries: list[RunEntry], chosen: dict[str, ui.checkbox]) -> None:
 def _watch(studio: Studio, place: ui.element) -> None:
     """Show the jobs that have not ended, as they are now."""
     rows: dict[str, tuple[ui.element, ui.label, ui.label]] = {}  # kept while the job is under way: its link is clicked
+    seen = PageSeen()
 
     def look() -> None:
+        if not seen.now:
+            return
         jobs = {j.key: j for j in studio.jobs.all() if j.active}
         for key in [*rows]:
             if key not in jobs:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -145,10 +146,17 @@ def serve(
         config = uvicorn.Config(
             gate, log_level="error", access_log=False, ws_max_size=MESSAGE, server_header=False, date_header=False,
             timeout_graceful_shutdown=2, lifespan="on", proxy_headers=False,
+            ws_per_message_deflate=remote is not None,  # within a machine it costs more than it saves
         )  # fmt: skip
         shown = host if is_loopback(host) and host != "localhost" else "127.0.0.1"
         opened(f"http://{f'[{shown}]' if ':' in shown else shown}:{number}/?{TOKEN}={gate.token}")
-        uvicorn.Server(config).run(sockets=[listener])
+        server = uvicorn.Server(config)
+        # what strangers ask for is no line of the terminal, nor what is cut off when the studio ends
+        logging.getLogger("nicegui").setLevel(logging.ERROR)
+        logging.getLogger("engineio.server").setLevel(logging.CRITICAL)
+        for name in ("uvicorn.error", "nicegui"):
+            logging.getLogger(name).addFilter(lambda _: not server.should_exit)
+        server.run(sockets=[listener])
 
 
 def _only_one(folder: Path) -> FolderLock:

@@ -25,7 +25,7 @@ from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten, parse
 from gyrobench.system.wire_text import parse_wires
-from gyrobench.units import format_quantity
+from gyrobench.units import convert, format_quantity
 from gyrobench.workflow.fitting_parts import fitting_parts, load_parts, part_of, settable
 from gyrobench.workflow.inputs import load_test
 
@@ -49,8 +49,21 @@ def _unit(unit: str | type) -> str:
     return {int: "whole number", bool: "true or false", str: "text"}.get(unit, "") if isinstance(unit, type) else unit
 
 
+#: units in which a value may be shown: the one in which it is shortest, the first of equals
+SMALL = 2e-3  # rad, below which an angle is shown in minutes or seconds of arc
+ALSO = {"rad": ("deg", "arcmin", "arcsec", "rad"), "rad/s": ("deg/h", "deg/s", "rad/s")}
+
+
 def _shown(value: Any, unit: str | type) -> str:
-    return str(value) if isinstance(unit, type) else format_quantity(value, unit)
+    """Return a value as a person writes it."""
+    if isinstance(unit, type):
+        return str(value).lower() if unit is bool else str(value)
+    if unit not in ALSO or not isinstance(value, int | float):
+        return format_quantity(value, unit)
+    small = 0.0 < abs(value) < SMALL
+    said = ((f"{convert(value, unit, u):.6g}", u) for u in ALSO[unit] if small or u not in ("arcmin", "arcsec"))
+    number, name = min(said, key=lambda pair: len(pair[0]))
+    return f"{number}°" if name == "deg" else f"{number} {name}"
 
 
 def _range(low: float | None, high: float | None, unit: str | type, strict: bool = False) -> str:
@@ -58,7 +71,7 @@ def _range(low: float | None, high: float | None, unit: str | type, strict: bool
     named = unit if isinstance(unit, str) else "1"
     more, less = (">", "<") if strict else ("≥", "≤")
     limits = [(more, low), (less, high)]
-    return ", ".join(f"{sign} {format_quantity(x, named)}" for sign, x in limits if x is not None)
+    return ", ".join(f"{sign} {_shown(x, named)}" for sign, x in limits if x is not None)
 
 
 class _Choice:
@@ -275,6 +288,8 @@ def add_system_page(studio: Studio) -> None:
 
     @ui.page("/system/{name}", response_timeout=60)
     async def system(name: str) -> None:
+        given = ui.context.client.request.query_params.getlist("set")
+
         def load() -> tuple[System | Suite, dict[str, list[str]]]:
             studio.bench.system_folder(name)  # refuses what is no name
             test = load_test(name)
@@ -301,12 +316,17 @@ def add_system_page(studio: Studio) -> None:
                             sanitize=False,
                         )
                     line = TimeLine(test) if isinstance(test, System) and test.slots else None
+                    begin = ui.element("div").classes("begin")
                     lines = CopyLines()
                     choice = _Choice(test, lines)
+                    values = {n: v for n, sign, v in (g.partition("=") for g in given) if sign}
+                    choice.request = replace(choice.request, values=values)
                     if line:
                         choice.changed.append(lambda: line.show(choice.request.values))
+                        line.show(values)
                     choice.show()
-                    _start(studio, choice)
+                    with begin:
+                        _start(studio, choice)
             with left:
                 _searched_options(choice)
                 if isinstance(test, System) and test.slots:

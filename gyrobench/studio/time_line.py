@@ -23,7 +23,7 @@ class TimeLine:
     def __init__(self, system: System) -> None:
         self.system = system
         self.bars = ui.html("", sanitize=False).classes("full")
-        with ui.expansion(say("Phases")).props("dense").classes("full"):
+        with ui.expansion(say("Phases")).props("dense").classes("full") as self.phases:
             self.table = ui.html("", sanitize=False).classes("scroll")
         self.show({})
 
@@ -34,6 +34,11 @@ class TimeLine:
             plan = self.system.with_values(own).plan()
             phases: list[Phase | LoopPhase] = [*plan.phases]
         except (GyrobenchError, ValueError, ArithmeticError):
+            return
+        self.phases.set_visibility(bool(phases))
+        if not phases:
+            said = say("Its parts decide while it runs what comes when: there is no plan to draw.")
+            self.bars.set_content(f'<p class="soft">{escape(said)}</p>')
             return
         times = [max(0.0, p.duration()) for p in phases]
         whole = sum(times) or 1.0

@@ -71,6 +71,12 @@ class Option:
         return number
 
 
+def lacking_methods(cls: type) -> list[str]:
+    """Return the methods that a class has not, though its base leaves them to it, as sentences."""
+    lacking = [n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)]
+    return [f"{cls.__name__} has no {n}(), which its family leaves to the test" for n in lacking]
+
+
 class Configurable:
     """Base of System and Suite: what ``systems/<name>/system.py`` declares of either, with one set of values."""
 
@@ -102,8 +108,7 @@ class Configurable:
 
     def unfinished(self) -> list[str]:
         """Return what the declaration still lacks, as sentences: methods that its family leaves to it."""
-        lacking = [n for n in dir(type(self)) if getattr(getattr(type(self), n), "__isabstractmethod__", False)]
-        return [f"{type(self).__name__} has no {n}(), which its family leaves to the test" for n in lacking]
+        return lacking_methods(type(self))
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with further values set."""

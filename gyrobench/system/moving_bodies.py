@@ -10,7 +10,10 @@ A line is a body: what it stands on ("ENU" where none of the bodies is named), t
 body as it is turned so far, passive and right-handed (CONV-GIMBALS): "x CHANNEL" by an angle of the record, or by a
 parameter of a part where no channel has this name; "base PARAMETER", a matrix whose rows are its axes on what it stands
 on; "faces SLOT", the mounts of the plan of this sequencer, phase by phase; "mounts SLOT",
-those of a stand that turns the whole table, in east, north, up.
+those of a stand that turns the whole table, in east, north, up; "outer SLOT" and "middle SLOT", the gimbals of a
+platform whose parameter ``mount`` says which is outside, 0: roll about y by theta[2], 1: pitch about x by theta[1].
+"z CHANNEL or windows": where the record lacks the channel, the angle that its windows begin and end with, which
+is that of a table that rests or turns evenly within a window; between two windows it is interpolated.
 
 Not modelled: what the record does not hold (wobble of an axis, bending), and where the bodies are.
 """
@@ -29,16 +32,20 @@ from gyrobench.record.record import Record
 from gyrobench.system.values import nest
 
 ROOT = "ENU"
-TURN = re.compile(r"(x|y|z|base|faces|mounts)\s+([\w.]+(?:\[\d+\])?)")
+TURN = re.compile(r"(x|y|z|base|faces|mounts|outer|middle)\s+([\w.]+(?:\[\d+\])?)(\s+or windows)?")
 
 
 @dataclass(frozen=True)
 class MovingBody:
-    """A body: its name, what it stands on, and its turns: (kind, name of a channel, a parameter or a slot)."""
+    """A body: its name, what it stands on, and its turns: (kind, name of a channel, a parameter or a slot).
+
+    windows: channels whose place the angles of the windows take.
+    """
 
     name: str
     on: str
     turns: tuple[tuple[str, str], ...]
+    windows: tuple[str, ...] = ()
 
 
 def parse_bodies(text: str) -> list[MovingBody]:
@@ -52,9 +59,12 @@ def parse_bodies(text: str) -> list[MovingBody]:
         turns = [TURN.fullmatch(w) for w in words]
         if not (name and colon) or name in {*known, ROOT} or not all(turns):
             raise ValueError(
-                f"bodies: '{line}': write NAME: [BODY,] x|y|z CHANNEL, base PARAMETER, faces or mounts SLOT"
+                f"bodies: '{line}': write NAME: [BODY,] x|y|z CHANNEL [or windows], base PARAMETER, faces, mounts, "
+                "outer or middle SLOT"
             )
-        found.append(MovingBody(name, on, tuple((m[1], m[2]) for m in turns if m)))
+        matched = [m for m in turns if m]
+        windows = tuple(m[2] for m in matched if m[3])
+        found.append(MovingBody(name, on, tuple((m[1], m[2]) for m in matched), windows))
     return found
 
 
@@ -67,7 +77,7 @@ def attitudes(bodies: list[MovingBody], record: Record, at: AnyArray) -> dict[st
     for body in bodies:
         if body.on not in found:
             continue
-        turns = [_turn(kind, name, record, at) for kind, name in body.turns]
+        turns = [_turn(kind, name, record, at, name in body.windows) for kind, name in body.turns]
         known = [t for t in turns if t is not None]
         if len(known) == len(turns):
             axes = found[body.on]
@@ -77,7 +87,7 @@ def attitudes(bodies: list[MovingBody], record: Record, at: AnyArray) -> dict[st
     return {name: axes for name, axes in found.items() if name != ROOT}
 
 
-def _turn(kind: str, name: str, record: Record, at: AnyArray) -> Array | None:
+def _turn(kind: str, name: str, record: Record, at: AnyArray, windows: bool) -> Array | None:
     """Return the passive rotations of a turn, an array that broadcasts to (rows, 3, 3); None where it is not known."""
     if kind == "faces":
         return _faces(name, record, at)
@@ -86,10 +96,30 @@ def _turn(kind: str, name: str, record: Record, at: AnyArray) -> Array | None:
     if kind == "base":
         base = record.run.parameters.get(name)
         return None if base is None else np.asarray(base, dtype=float).reshape(3, 3)
+    if kind in ("outer", "middle"):
+        mount = record.run.parameters.get(f"{name}.mount")
+        pitch = (mount == 1) == (kind == "outer")
+        kind, name = ("x", f"{name}.theta[1]") if pitch else ("y", f"{name}.theta[2]")
+        if mount is None:
+            return None
     if name in record.channels:
         return passive("xyz".index(kind), np.asarray(record.channels[name], dtype=float)[at])
+    if windows and (angles := _window_angles(record, at)) is not None:
+        return passive("xyz".index(kind), angles)
     value = _parameter(record.run.parameters, name)
     return None if value is None else passive("xyz".index(kind), np.asarray([value]))
+
+
+def _window_angles(record: Record, at: AnyArray) -> Array | None:
+    """Return the angle, rad, at rows of the channels, by those at begin and end of the windows; None without them."""
+    edges = ("t_start", "t_end", "angle_start", "angle_end")
+    if not set(edges) <= set(record.windows) or not len(record.windows["t_start"]):
+        return None
+    begin, end, first, last = (np.asarray(record.windows[e], dtype=float) for e in edges)
+    times, angles = np.stack([begin, end], axis=1).ravel(), np.stack([first, last], axis=1).ravel()
+    order = np.argsort(times, kind="stable")
+    rows = np.asarray(record.channels["time"], dtype=float)[at]
+    return np.asarray(np.interp(rows, times[order], angles[order]), dtype=float)
 
 
 def _parameter(parameters: Mapping[str, object], name: str) -> float | None:

@@ -35,7 +35,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
-from gyrobench.system.configurable import Configurable, InvalidConfigurationError, Option, load_configurable
+from gyrobench.reduction.setup.sources import Source, declared
+from gyrobench.system.configurable import (
+    Configurable,
+    InvalidConfigurationError,
+    Option,
+    lacking_methods,
+    load_configurable,
+)
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.plan import Plan
 from gyrobench.system.sockets import Socket
@@ -166,6 +173,18 @@ class System(Configurable):
                 f"{cls.__name__}.reduce: what a record says, without limits and verdict, is returned by "
                 "findings(record); reduce judges it, for every system alike"
             )
+        if isinstance(cls.reduction, type):
+            cls._take_sources(declared(cls.reduction).values())
+
+    @classmethod
+    def _take_sources(cls, sources: Iterable[Source]) -> None:
+        """Take the options of the sources of error that the reduction declares, and what simulates them."""
+        from gyrobench.system.families.option_groups import type_b
+
+        sources = list(sources)
+        cls.options = {**cls.options, **(type_b(*(s for s in sources if s.option)) | dict(cls.options))}
+        new = {s.parameter for s in sources} - {"", *cls.assumed}
+        cls.assumed = (*cls.assumed, *sorted(new))
 
     def __init__(self) -> None:
         super().__init__()
@@ -273,7 +292,15 @@ class System(Configurable):
         if not isinstance(reduction, str):
             return reduction
         module = self._beside("reduction", reduction)
-        return getattr(module, "Reduction", module)
+        found = getattr(module, "Reduction", module)
+        for name, source in declared(found).items():
+            if source.option and source.option not in self.options:
+                raise UsageError(
+                    f"{self.name}: {source.option} is no option of it, in which {name}() of {module.__name__} states "
+                    f"the source of error {source.id}. Write options |= type_b(SOURCE) in system.py, or let reduction "
+                    "be the class itself"
+                )
+        return found
 
     def _beside(self, declared: str, module: str) -> Any:
         """Return a module beside the system.py of the class that declares something."""
@@ -345,6 +372,7 @@ class System(Configurable):
             parts = ", ".join(f'{slot}="..."' for slot in empty)
             lacks.append(f"slot {', '.join(empty)}: no part; name it by with_parts({parts})")
         named = self.reduction if isinstance(self.reduction, str) else ""
+        lacks += [] if isinstance(self.reduction, str) else lacking_methods(self.reduction)
         if named and self.folder and not (self.folder / f"{named}.py").is_file():
             missing = f'reduction = "{named}": no file {named}.py in {self.folder}'
             lacks.append(f"{missing}; write a class Reduction with from_record(record) there")

@@ -74,18 +74,23 @@ class ProvenWish:
 
 @dataclass(frozen=True)
 class ExpectedJitter:
-    """Jitter to be measured: phase of the system's plan, lowest frequency (Hz), rms of the linear model (rad)."""
+    """Jitter to be measured: phase of the system's plan, lowest frequency (Hz), rms of the linear model (rad), channel
+    of the angle, and of what is 1 while the target is lost ("": there is none).
+    """
 
     ride: str
     lowest: float
     rms: float
+    angle: str
+    lost: str = ""
 
 
 @dataclass(frozen=True)
 class Proof:
     """Measures of a run at a point of the spread.  why_not: why nothing was, else "".
 
-    cut: part of the time in which noise alone has the voltage at its limit.
+    cut: part of the time in which noise alone has the voltage at its limit.  lost: part of the ride in which the target
+    was lost.
     """
 
     values: Mapping[str, float]
@@ -98,10 +103,11 @@ class Proof:
     load: float  # N.m
     why_not: str = ""
     cut: float = 0.0
+    lost: float = 0.0
 
     @property
     def holds(self) -> bool:
-        return not self.why_not and all(w.kept for w in self.wishes)
+        return not self.why_not and not self.lost and all(w.kept for w in self.wishes)
 
 
 def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
@@ -226,8 +232,11 @@ def _read(
         for w in wishes
         if w.name != JITTER
     ]
-    jitter = [_jitter(w, phases, ports, sight) for w in wishes if w.name == JITTER and sight]
-    return Proof(at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load, cut=cut)
+    jitter = [_jitter(w, phases, sight) for w in wishes if w.name == JITTER and sight]
+    lost_part = _lost(phases, sight) if sight else 0.0
+    return Proof(
+        at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load, cut=cut, lost=lost_part
+    )
 
 
 def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
@@ -242,13 +251,19 @@ def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:
     return float(np.mean(np.abs(at_rest[0]) >= (1.0 - 1e-9) * limit)) if at_rest else 0.0
 
 
-def _jitter(wish: Wish, phases: Sequence[Gate], ports: LoopPorts, sight: ExpectedJitter) -> ProvenWish:
+def _jitter(wish: Wish, phases: Sequence[Gate], sight: ExpectedJitter) -> ProvenWish:
     gate = next((g for g in phases if g.label == sight.ride), None)
-    found = spectra(float(gate.t[1] - gate.t[0]), gate[ports.angle], sight.lowest) if gate is not None else None
+    found = spectra(float(gate.t[1] - gate.t[0]), gate[sight.angle], sight.lowest) if gate is not None else None
     if found is None:
         return ProvenWish(wish, np.inf, 0.0, sight.rms)
     v = found.rms(sight.lowest)
     return ProvenWish(wish, v.value, v.k * v.u, sight.rms)
+
+
+def _lost(phases: Sequence[Gate], sight: ExpectedJitter) -> float:
+    """Return the part of the ride in which the target was lost."""
+    rides = [g[sight.lost] for g in phases if g.label == sight.ride and sight.lost in g.channels]
+    return float(np.mean(rides[0] > 0.5)) if rides else 0.0
 
 
 def _step(gate: Gate, angle: str) -> tuple[Array, Array]:

@@ -1,9 +1,10 @@
 """Jitter of a line of sight for any controller of a loop, from the linear model without it.
 
-    u = U d + Q y + n        y = G u        L = -G Q        line of sight = W d + R y
-    line of sight = (W + R G U / (1 + L)) d + R G / (1 + L) n
+    u = sum_i U_i d_i + Q y        y = G u        L = -G Q        line of sight = sum_i W_i d_i + R y
+    line of sight = sum_i (W_i + R G U_i / (1 + L)) d_i
 
-d the angle of the base about each axis, n the noise of the sensor in the loop's signal; other loops stay closed.
+d_i what moves it: angles of the base, direction of a target, noise of sensors (U = 1, W = 0 of the loop's own); other
+loops stay closed.
 
 Not modelled: dry friction that slips (the model takes it for an elastic contact), limits, what is of second order.
 """
@@ -16,18 +17,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.linear.linear_model import Linear, operating_point
 from gyrobench.record.frequency_response import Complex
 from gyrobench.record.run_document import LinearModel
-from gyrobench.reduction.loops.margins import excitation_response
+from gyrobench.reduction.loops.margins import excitation_responses
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.wiring import Assembly
 from gyrobench.tuning.loop_ports import LoopPorts
 from gyrobench.tuning.plant import without_controller
+
+FINER = 12  # intervals in one of the grid
 
 
 @dataclass(frozen=True)
@@ -41,62 +43,101 @@ class SightModel:
     ports: LoopPorts
     sources: LineOfSight
 
+    @property
+    def angle(self) -> str:
+        """Return the channel of the angle whose jitter it is."""
+        return self.sources.angles.get(self.ports.loop, self.ports.angle)
+
     def at(self, f: Array) -> SightWays:
         """Return the ways at frequencies, Hz; those below the lowest are left out."""
         use = f >= self.sources.lowest * (1.0 - 1e-9)
         g = f[use]
 
-        def way(kind: str, axis: int, to: str) -> Complex:
-            return np.asarray(excitation_response(self.model, kind, axis, to, g))
+        fine = finer(g)
 
-        moved = [(way("motion", k, self.ports.angle), way("motion", k, self.ports.inside)) for k in (1, 2, 3)]
-        angles = [density(g) / (2.0 * np.pi * g) ** 2 for density in self.sources.rates]
-        return SightWays(
-            use, g, tuple((w, u, s) for (w, u), s in zip(moved, angles, strict=True)),
-            way("test", self.ports.axis, self.ports.angle),
-            way("test", self.ports.axis, self.ports.inside), self.sources.noise[self.ports.loop](g),
-        )  # fmt: skip
+        def both(kind: str, axis: int) -> tuple[Complex, Complex]:
+            """Return the ways of an excitation to the line of sight and to the input of the controller."""
+            made = excitation_responses(self.model, kind, (axis,), (self.angle, self.ports.inside), g)[:, :, 0]
+            return np.interp(fine, g, made[:, 0]), np.interp(fine, g, made[:, 1])
+
+        moved = []
+        for source in self.sources.sources:
+            if source.loop == self.ports.loop:
+                w, u = 0.0j * fine, 0.0j * fine + 1.0
+            else:
+                w, u = both(source.kind, source.axis)
+            moved.append(MovedSight(source.name, w, u, source.density(fine)))
+        return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis))
+
+
+def finer(f: Array) -> Array:
+    """Return rising frequencies with FINER intervals in the place of each.
+
+    A loop may close with a resonance of its own, where no part has one: narrower than the grid, on which the parts'
+    responses are smooth.
+    """
+    k = np.arange(FINER * (f.size - 1) + 1)
+    at = np.interp(k / FINER, np.arange(f.size), f)
+    at[::FINER] = f
+    return np.asarray(at)
+
+
+@dataclass(frozen=True)
+class MovedSight:
+    """A source at frequencies: its way W to the line of sight and U to the input of the controller; its density."""
+
+    name: str
+    sight: Complex
+    seen: Complex
+    density: Array
 
 
 @dataclass(frozen=True)
 class SightWays:
-    """Ways to a line of sight at frequencies f, Hz: of the base (W, U, density of its angle); R, Q; density of n."""
+    """Ways to a line of sight at frequencies f, Hz: of its sources; R, Q of the controller's output.
 
-    use: NDArray[np.bool_]
+    at: frequencies at which a controller is given.
+    """
+
+    at: Array
     f: Array
-    base: tuple[tuple[Complex, Complex, Array], ...]
+    moved: tuple[MovedSight, ...]
     driven: Complex
     back: Complex
-    noise: Array
 
     def sources(self, G: Complex) -> dict[str, float]:
-        """Return source -> rms of the line of sight, rad; G: the controller over all frequencies."""
-        answer = self.driven * G[self.use] / (1.0 - G[self.use] * self.back)
-        density = {f"vibration about {axis}": np.abs(w + answer * u) ** 2 * s
-                   for axis, (w, u, s) in zip("xyz", self.base, strict=True)}  # fmt: skip
-        density["noise of the sensor"] = np.abs(answer) ** 2 * self.noise
-        return {name: math.sqrt(float(np.trapezoid(s, self.f))) for name, s in density.items()}
+        """Return source -> rms of the line of sight, rad; G: the controller at ``at``."""
+        held = np.interp(self.f, self.at, G)
+        answer = self.driven * held / (1.0 - held * self.back)
+        squares: dict[str, float] = {}
+        for m in self.moved:
+            made = float(np.trapezoid(np.abs(m.sight + answer * m.seen) ** 2 * m.density, self.f))
+            squares[m.name] = squares.get(m.name, 0.0) + made
+        return {name: math.sqrt(x) for name, x in squares.items()}
 
     def rms(self, G: Complex) -> float:
         """Return the jitter, rad rms."""
         return math.sqrt(sum(x * x for x in self.sources(G).values()))
 
     def voltage(self, G: Complex) -> float:
-        """Return what the controller gives to the motor for base and noise together, V rms."""
-        answer = G[self.use] / (1.0 - G[self.use] * self.back)
-        seen = sum((np.abs(u) ** 2 * s for _, u, s in self.base), self.noise)
-        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * seen, self.f)))
+        """Return what the controller gives for all sources together, V rms."""
+        held = np.interp(self.f, self.at, G)
+        answer = held / (1.0 - held * self.back)
+        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * self._seen(), self.f)))
+
+    def _seen(self) -> Array:
+        """Return the density of the controller's input without the controller."""
+        return np.asarray(sum((np.abs(m.seen) ** 2 * m.density for m in self.moved), np.zeros(self.f.size)))
 
     def floor(self) -> float:
         """Return the jitter, rad rms, below which no linear controller of this loop comes, causal or not.
 
-        The line of sight is (W + X U) d + X n, X = R G/(1 + L); at each frequency the best complex X alone makes
-        |W|2 S - |W conj(U) S|2 / (|U|2 S + S_n), axes of the base summed.
+        The line of sight is sum (W_i + X U_i) d_i, X = R G/(1 + L); at each frequency the best complex X alone makes
+        sum |W_i|2 S_i - |sum W_i conj(U_i) S_i|2 / sum |U_i|2 S_i.
         """
-        kept = sum((np.abs(w) ** 2 * s for w, _, s in self.base), np.zeros(self.f.size))
-        shared = sum((w * np.conj(u) * s for w, u, s in self.base), np.zeros(self.f.size, complex))
-        seen = sum((np.abs(u) ** 2 * s for _, u, s in self.base), self.noise)
-        least = kept - np.abs(shared) ** 2 / np.maximum(seen, 1e-300)
+        kept = sum((np.abs(m.sight) ** 2 * m.density for m in self.moved), np.zeros(self.f.size))
+        shared = sum((m.sight * np.conj(m.seen) * m.density for m in self.moved), np.zeros(self.f.size, complex))
+        least = kept - np.abs(shared) ** 2 / np.maximum(self._seen(), 1e-300)
         return math.sqrt(max(0.0, float(np.trapezoid(least, self.f))))
 
 
@@ -107,12 +148,8 @@ def sight_models(
     """Return the model at each point of the spread.  Raises LinearizationError and ComponentError."""
     found = []
     for values in points:
-        linear = Linear(assembly, operating_point(assembly, {**parameters, **values}, part_of), step)
-        found.append(
-            SightModel(
-                without_controller(linear, ports.slot, {("v", "test"): -1.0, ("e", "u"): 1.0}).discrete(),
-                ports,
-                sources,
-            )
-        )
+        parts = operating_point(assembly, {**parameters, **values}, part_of)
+        linear = Linear(assembly, parts, step, sources.moved_by)
+        opened = without_controller(linear, ports.slot, {("v", "test"): -1.0, ("e", "u"): 1.0})
+        found.append(SightModel(opened.discrete(), ports, sources))
     return found

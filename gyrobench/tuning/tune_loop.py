@@ -26,7 +26,7 @@ from gyrobench.system.values import flatten
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.plant import HeldController, Plant, plants
-from gyrobench.tuning.proof import ExpectedJitter, Proof, proof_of
+from gyrobench.tuning.proof import ExpectedJitter, Proof, known_limit, proof_of
 from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
@@ -86,7 +86,7 @@ def tune(
             if w.f >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
                                  f"{HIGHEST / now.step:g} Hz")  # fmt: skip
-        sources = _line_of_sight(now, nominal, wishes)
+        sources = _line_of_sight(now, nominal, wishes, ports)
         wishes = [replace(w, f=sources.lowest) if w.name == JITTER and sources else w for w in wishes]
         models = _Loop(session, now, nominal, ranges, ports, sources)
         problem = models.problem(shape, wishes)
@@ -124,7 +124,8 @@ def tune(
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
             jitter = ways[k].rms(responses) if ways else 0.0
-            sight = ExpectedJitter(sources.ride, sources.lowest, jitter) if sources else None
+            angle = problem.sights[0].angle if sources else ""
+            sight = ExpectedJitter(sources.ride, sources.lowest, jitter, angle, sources.lost) if sources else None
             try:
                 proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
             except RunError as error:
@@ -136,7 +137,7 @@ def tune(
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
         best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
-        notes=(*implied, *about(quiet_one), *_slips(sources), *_driven(ways, responses, nominal, ports.slot),
+        notes=(*implied, *about(quiet_one), *_slips(sources), *_driven(ways, responses, nominal, ports),
                *_notes(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
@@ -170,7 +171,7 @@ class _Loop:
         """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
         if self.sources is None:
             return []
-        slipping = {**self.nominal, **self.sources.slipping}
+        slipping = {**self.nominal, **self.sources.riding, **self.sources.slipping}
         return sight_models(self.assembly, slipping, self.part_of, self.step, at, self.ports, self.sources)
 
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
@@ -213,13 +214,20 @@ def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:
     return ports
 
 
-def _line_of_sight(system: System, nominal: Mapping[str, Any], wishes: Sequence[Wish]) -> LineOfSight | None:
+def _line_of_sight(
+    system: System, nominal: Mapping[str, Any], wishes: Sequence[Wish], ports: LoopPorts
+) -> LineOfSight | None:
     """Return what makes the line of sight of a system jitter, where that is wanted.  Raises UsageError."""
     if not any(w.name == JITTER for w in wishes):
         return None
     stated = getattr(system, "line_of_sight", None)
     if stated is None:
         raise UsageError(f"--want jitter: {system.name} does not state what moves a line of sight")
+    if ports.kind == "command" and not any(w.name == "bandwidth" or w.f for w in wishes if w.name != JITTER):
+        raise UsageError(
+            f"--want jitter: it is least with a loop {ports.loop} that does nothing, and its target is lost then; want "
+            'what the loop is for, too, --want "bandwidth>1Hz" or --want "S at 0.1Hz<-40dB"'
+        )
     found: LineOfSight = stated(nominal)
     return found
 
@@ -234,15 +242,15 @@ def _slips(sources: LineOfSight | None) -> list[str]:
     ]
 
 
-def _driven(ways: Sequence[SightWays], G: Complex, nominal: Mapping[str, Any], slot: str) -> list[str]:
-    """Return that base and noise alone take the motor to its limit, where they do."""
-    limit = min(float(np.min(nominal.get(f"{s}.v_max", np.inf))) for s in (slot, "platform"))
+def _driven(ways: Sequence[SightWays], G: Complex, nominal: Mapping[str, Any], ports: LoopPorts) -> list[str]:
+    """Return that what moves the line of sight alone takes the controller's output to its limit, where it does."""
+    limit = known_limit(nominal, ports)
     volts = max((w.voltage(G) for w in ways), default=0.0)
     if PEAK * volts < limit:
         return []
     return [
-        f"base and noise take {volts:.2g} V rms by the linear model, and the motor's limit is {limit:.3g} V: their "
-        "peaks are cut, and the jitter is more than the linear model says"
+        f"base, target and noise take {volts:.2g} V rms by the linear model, and the limit of {ports.slot} is "
+        f"{limit:.3g} V: their peaks are cut, and the jitter is more than the linear model says"
     ]
 
 
@@ -389,4 +397,9 @@ def _notes(proofs: Sequence[Proof]) -> list[str]:
             break
     if any(p.limits for p in proofs):
         notes.append("a part was at its limit in the test sines: what was measured there is not linear")
+    if lost := max((p.lost for p in proofs), default=0.0):
+        notes.append(
+            f"the target was lost in {100.0 * lost:.2g} % of the ride: the loop was open then, and the jitter is none "
+            "of a tracker that sees; want more bandwidth, or widen the field"
+        )
     return notes

@@ -49,8 +49,8 @@ def purposes_of(test: System | Suite) -> tuple[str, ...]:
     if isinstance(test, Suite):
         return (GYRO,)
     found = []
-    loop = bool(test.loops) or test.closed_loop or isinstance(test.plan(), LoopPlan)
-    if test.windows is not None and not loop:
+    loop = bool(test.loops) or isinstance(test.plan(), LoopPlan)
+    if (test.windows is not None and not loop) or (test.measured_data is not None and not test.loops):
         found.append(GYRO)
     if test.measured_data is not None:
         found.append(DATA)

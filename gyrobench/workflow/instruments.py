@@ -12,14 +12,19 @@
     reading = "typical"                    # typical, one_sigma, maximum, minimum, or limit: plus or minus, of all units
     note = "rms in 1 Hz, one-sided"
 
+    [accelerometers.noise_density]         # of a unit: the same of its accelerometers
+    value = "300 ug/sqrt(Hz)"
+    reading = "typical"
+
 What becomes of the figures is written in :mod:`gyrobench.workflow.sheet_values`.  A gyro goes into the slot gyro, or
-three of them into a unit; a turntable changes no part: it sets what the system's table has, and what is believed of it.
+three of them into a unit, the accelerometers into the slot accelerometers or the unit; a turntable changes no part: it
+sets what the system's table has, and what is believed of it.
 [GYRO-SHEET, TABLE-PRESETS]
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,6 +43,7 @@ from gyrobench.workflow.sheet_values import FIGURES, SETTINGS, SIGNED
 TABLE_SLOTS = ("table", "outer", "inner")
 TAKERS = "drift_record, rate_table_test, gyro_bandwidth, turn_on_repeatability, vibration_rectification, north_finder"
 UNITS = "imu_positions (with a chamber: over temperature), coning_test, sculling_test, attitude_estimator"
+FORCES = "accelerometers"  # kind of the sheet of those of a unit, and their slot
 TABLE_SOCKETS = ("Table", "ServoTable", "TwoAxisTable")
 
 
@@ -63,6 +69,15 @@ class Instrument(BaseModel):
     source: str = Field(min_length=1)
     date: str = Field(min_length=4)
     figures: dict[str, Figure] = Field(min_length=1)
+    accelerometers: dict[str, Figure] = Field(default_factory=dict)
+
+    @property
+    def of_accelerometers(self) -> Instrument | None:
+        """Return the sheet of the accelerometers of this unit, of no part; None where it states none."""
+        if not self.accelerometers:
+            return None
+        changes = {"kind": FORCES, "part": "", "figures": self.accelerometers, "accelerometers": {}}
+        return self.model_copy(update=changes)
 
     @property
     def label(self) -> str:
@@ -105,35 +120,46 @@ def read_instrument(file: Path) -> Instrument:
     try:
         sheet = Instrument.model_validate(data)
     except ValidationError as error:
-        found = faults_of(error, lambda place: Figure if place[0] == "figures" and len(place) > 2 else Instrument)
+        tables = ("figures", FORCES)
+        found = faults_of(error, lambda place: Figure if place[0] in tables and len(place) > 2 else Instrument)
         raise UsageError("\n".join([f"{file}: not a data sheet:", *(f"  - {p}" for p in found)])) from None
-    known = FIGURES[sheet.kind]
-    problems = [f"figures.{n}: unknown; {suggest_names(n, known)}" for n in sheet.figures if n not in known]
+    problems = _faults("figures", sheet.figures, FIGURES[sheet.kind])
+    problems += _faults(FORCES, sheet.accelerometers, FIGURES[FORCES])
+    if sheet.accelerometers and sheet.kind in ("floated", "turntable"):
+        problems.append(f"{FORCES}: a sheet of kind {sheet.kind} has none")
     if (sheet.kind == "turntable") == bool(sheet.part):
         problems.append(
             "part: a turntable names none, its figures go to the table of the system"
             if sheet.part
             else "part: missing; the part that takes the figures"
         )
-    for name, figure in sheet.figures.items():
-        if name in known:
-            try:
-                value = float(parse_number(f"figures.{name}", figure.value, known[name]))
-                if not value > 0.0 and name not in SIGNED:
-                    problems.append(f"figures.{name} = {figure.value}: a size is expected, above 0")
-            except (InvalidValueError, TypeError, ValueError) as error:
-                problems.append(str(error))
     if problems:
         raise UsageError("\n".join([f"{file}: not a data sheet:", *(f"  - {p}" for p in problems)]))
     return sheet
 
 
+def _faults(table: str, figures: Mapping[str, Figure], known: Mapping[str, str]) -> list[str]:
+    """Return what is wrong with the figures of a table of a sheet; known: figure -> unit."""
+    problems = [f"{table}.{n}: unknown; {suggest_names(n, known)}" for n in figures if n not in known]
+    for name, figure in figures.items():
+        if name in known:
+            try:
+                value = float(parse_number(f"{table}.{name}", figure.value, known[name]))
+                if not value > 0.0 and name not in SIGNED:
+                    problems.append(f"{table}.{name} = {figure.value}: a size is expected, above 0")
+            except (InvalidValueError, TypeError, ValueError) as error:
+                problems.append(str(error))
+    return problems
+
+
 def parameters(sheet: Instrument) -> dict[str, Any]:
-    """Return the parameters of the part of a gyro's sheet, SI, those that it has.
+    """Return the parameters of the part of a gyro's or accelerometers' sheet, SI, those that it has.
 
     Raises UsageError for a part that takes no data sheets.
     """
     part = load_part(sheet.part, Bench.find().folder)
+    if sheet.kind == FORCES:
+        return sheet_values.accelerometers(sheet, part.declarations)
     found = sheet_values.floated(sheet) if sheet.kind == "floated" else sheet_values.rate_gyro(sheet, part)
     if sheet.kind == "floated" and not found.keys() <= part.declarations.keys():
         raise UsageError(f"{sheet.title}: the part {sheet.part} takes no data sheets of a floated gyro")
@@ -176,9 +202,13 @@ def unit_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dic
     if part in bench.parts():
         declared = load_part(part, bench.folder).declarations
         found |= {f"imu.{n}": v for n, v in sheet_values.unit(sheet, declared).items()}
+        if forces := sheet.of_accelerometers:
+            found |= {f"imu.{n}": v for n, v in sheet_values.unit_forces(forces, declared).items()}
     found |= {n: v for n, v in sheet_values.drifts(sheet).items() if n in test.options}
     if sheet.kind == "floated":
         raise UsageError(f"the data sheet {sheet.title} is of a floated gyro: {test.name} has no slot for one")
+    if not found and FORCES in parts:
+        raise UsageError(f"the data sheet {sheet.title} states nothing of accelerometers")
     if not found:
         raise UsageError(
             f"the data sheet {sheet.title} is of one gyro: {test.name} has no slot for it. Its tests are {TAKERS}; as "
@@ -187,6 +217,16 @@ def unit_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dic
     if (own := test.options.get("bandwidth")) and own.sets and (bandwidth := sheet.si("bandwidth")):
         found["bandwidth"] = bandwidth
     return found
+
+
+def force_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dict[str, Any]:
+    """Return what the accelerometers of a unit's sheet set in the slot accelerometers; {} where nothing takes them."""
+    bench, forces = Bench.find(), sheet.of_accelerometers
+    part = parts.get(FORCES, test.slots[FORCES].part if FORCES in test.slots else "")
+    if forces is None or part not in bench.parts():
+        return {}
+    found = sheet_values.accelerometers(forces, load_part(part, bench.folder).declarations)
+    return {f"{FORCES}.{n}": v for n, v in found.items()}
 
 
 def with_instruments(
@@ -212,9 +252,14 @@ def with_instruments(
                 raise UsageError(f"--instrument {name}: a turntable is for one test, not for a suite")
             found |= table_settings(sheet, test, parts)
             continue
-        if isinstance(test, System) and "gyro" not in test.slots:
-            found |= unit_settings(sheet, test, parts)
-            continue
+        if isinstance(test, System):
+            if FORCES in parts and FORCES in test.on_request and FORCES not in test.slots:
+                test.request(FORCES)  # they may stand in the place of the gyro
+            found |= (forces := force_settings(sheet, test, parts))
+            if "gyro" not in test.slots:
+                if "imu" in test.slots or not forces:
+                    found |= unit_settings(sheet, test, parts)
+                continue
         if parts.setdefault("gyro", sheet.part) != sheet.part:
             raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
         found |= settings(sheet)

@@ -34,6 +34,23 @@ RATE_GYRO: dict[str, str] = {
     "cross_axis": "1",
     "g_sensitivity": "rad.s/m",
 }
+#: figure of the accelerometers of a unit -> unit
+ACCELEROMETERS: dict[str, str] = {
+    "range": "m/s2",
+    "resolution": "m/s2",
+    "bandwidth": "Hz",
+    "output_rate": "Hz",
+    "noise_density": "m/s2/sqrt(Hz)",
+    "velocity_random_walk": "m/s/sqrt(s)",
+    "bias_instability": "m/s2",
+    "bias": "m/s2",
+    "bias_temperature": "m/s2/K",
+    "scale_error": "1",
+    "scale_temperature": "1/K",
+    "nonlinearity": "1",
+    "misalignment": "rad",
+    "cross_axis": "1",
+}
 #: figure of a floated gyro -> its unit and parameter
 COEFFICIENTS = tuple(f"D_{n}" for n in ("F", "I", "O", "S", "II", "OO", "SS", "IO", "OS", "IS"))
 FLOATED: dict[str, tuple[str, str]] = {
@@ -79,6 +96,7 @@ TURNTABLE: dict[str, tuple[str, str, str]] = {
 #: kind -> figure -> unit
 FIGURES: dict[str, dict[str, str]] = {
     **dict.fromkeys(("fibre", "laser", "vibrating"), RATE_GYRO),
+    "accelerometers": ACCELEROMETERS,
     "floated": {n: unit for n, (unit, _) in FLOATED.items()},
     "turntable": {n: unit for n, (unit, _, _) in TURNTABLE.items()},
 }
@@ -104,10 +122,12 @@ DIRECT = {
 
 
 def density(sheet: Instrument) -> float | None:
-    """Return N of a rate gyro, the two-sided density of the white noise; None where the sheet has none."""
-    if sheet.kind not in ("fibre", "laser", "vibrating"):
+    """Return N of a rate gyro or of accelerometers, the two-sided density of the white noise; None without one."""
+    known = FIGURES[sheet.kind]
+    if "noise_density" not in known:
         return None
-    walk, noise = sheet.si("angle_random_walk"), sheet.si("noise_density")
+    walk = sheet.si("velocity_random_walk" if "velocity_random_walk" in known else "angle_random_walk")
+    noise = sheet.si("noise_density")
     return walk if walk is not None else None if noise is None else noise / math.sqrt(2.0)
 
 
@@ -143,6 +163,27 @@ def rate_gyro(sheet: Instrument, part: type) -> dict[str, Any]:
     return found
 
 
+def accelerometers(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a part that is three such accelerometers, SI; {} for one that takes no data sheets.
+
+    As :func:`rate_gyro`; sizes of errors are set positive, on all axes, and the sheet is the whole of the drift.
+    """
+    if not {"white", "x_flicker", "range_max"} <= declarations.keys():
+        return {}
+    found: dict[str, Any] = {} if (noise := density(sheet)) is None else {"white": noise}
+    for axis in "xyz":
+        found |= {f"{axis}_flicker": (sheet.si("bias_instability") or 0.0) / FLOOR, f"{axis}_walk": 0.0}
+    for name, parameter in DIRECT.items():
+        declared = declarations.get(parameter)
+        if declared is not None and (value := sheet.si(name)) is not None:
+            found[parameter] = [value] * 3 if declared.shape else value
+    if (nonlinearity := sheet.si("nonlinearity")) is not None and (full := sheet.si("range")) is not None:
+        found["cubic"] = nonlinearity / 0.4 / full**2
+    if lean := sheet.si("misalignment") or sheet.si("cross_axis"):
+        found["axes"] = [[1.0, lean, 0.0], [0.0, 1.0, lean], [lean, 0.0, 1.0]]
+    return found
+
+
 def wander(sheet: Instrument) -> float:
     """Return the rms of a Gauss-Markov bias whose largest Allan deviation is the bias instability, 0 without one."""
     return (sheet.si("bias_instability") or 0.0) / MARKOV_FLOOR
@@ -159,7 +200,7 @@ def believed_bias(sheet: Instrument) -> float:
 
 
 def unit(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of a unit of three such gyros, SI, those that it declares; its accelerometers stay.
+    """Return the parameters of a unit of three such gyros, SI, those that it declares; see :func:`unit_forces`.
 
     The sheet is the whole of the errors of the gyros: what it does not state is 0.  Sizes of errors are set positive,
     on all axes.  A bias instability is a Gauss-Markov bias; a bias joins it where a unit has no steady one.
@@ -176,6 +217,23 @@ def unit(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
     for axis in "xyz":
         found |= {f"{axis}_gyro_bias": wander(sheet), f"noise_{axis}_bias": math.hypot(bias, wander(sheet))}
         found |= dict.fromkeys((f"{axis}_gyro", f"noise_{axis}_gyro"), density(sheet) or 0.0)
+    return {n: v for n, v in found.items() if n in declarations}
+
+
+def unit_forces(sheet: Instrument, declarations: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the same of the accelerometers of a unit; their white noise stays where their sheet has none."""
+    scale, lean = sheet.si("scale_error") or 0.0, sheet.si("misalignment") or sheet.si("cross_axis") or 0.0
+    bias, noise = sheet.si("bias") or 0.0, density(sheet)
+    found: dict[str, Any] = {
+        "acc_bias": [bias] * 3,
+        "acc_scale": [[scale if i == j else lean for j in range(3)] for i in range(3)],
+        "acc_bias_T": [sheet.si("bias_temperature") or 0.0] * 3,
+        "acc_scale_T": [sheet.si("scale_temperature") or 0.0] * 3,
+    }
+    for axis in "xyz":
+        found |= {f"{axis}_acc_bias": wander(sheet), f"noise_{axis}_acc_bias": math.hypot(bias, wander(sheet))}
+        if noise is not None:
+            found |= dict.fromkeys((f"{axis}_acc", f"noise_{axis}_acc"), noise)
     return {n: v for n, v in found.items() if n in declarations}
 
 

@@ -36,7 +36,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     Setup,
-    Source,
     Table,
     told,
     window_problems,
@@ -44,6 +43,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCSEC
 
 from . import chain, geometry
+from .sources import FIRST
 
 COLUMNS = ("mean", "mean_2", "mean_3", "mean_4")
 MEANING = {
@@ -56,20 +56,16 @@ MEANING = {
 NAMES = [(i, k) for i in geometry.SENSORS for k in geometry.TERMS]  # of the coefficients, in their order
 BIASED = ("K_F", "K_IO", "K_II")  # by the first harmonic of the head
 POSITION = math.radians(0.1)  # largest departure of an angle from its position
-FIRST = Source("head.first_harmonic.{kind}", "first harmonic of the head, {kind}", "rad", "u_D1", "as measured")
 VOLTAGES = "relative, of all voltages"
 
 
 @dataclass(frozen=True, kw_only=True)
 class FourSetup(Setup):
-    """gravity: m/s2.  D1: first harmonic of the head, cosine and sine, rad; None: unknown.  u_D1: of both."""
+    """gravity: m/s2.  D1: first harmonic of the head, cosine and sine, rad; None: unknown."""
 
     gravity: float
     points: int = 24
     D1: tuple[float, float] | None = None
-    u_D1: float = 0.0
-    u_voltage: float = 0.0
-    u_gravity: float = 0.0
 
     @property
     def gamma(self) -> float:
@@ -189,7 +185,7 @@ class Reduction(DriftReduction[FourSetup]):
             for m, (k, kind) in enumerate(geometry.orders(s.points))
         ]
         known = zip(("cos", "sin"), s.D1 or (), strict=False)
-        rows = [[1, kind, v / ARCSEC, s.u_D1 / ARCSEC] for kind, v in known] + rows
+        rows = [[1, kind, v / ARCSEC, FIRST.size(s) / ARCSEC] for kind, v in known] + rows
         caption = "Positions minus their nominal angles; the first harmonic is that of the autocollimator"
         head = ["harmonic", "of", "amplitude / ″", "u / ″"]
         return Table("head.harmonics", "Angle errors of the head by harmonics", caption, head, rows)

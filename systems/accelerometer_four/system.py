@@ -10,13 +10,13 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.system.connectors import Socket, inp, out
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import TableTest, on_table, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
-from . import geometry
+from . import geometry, sources
 from .head import first_harmonic
 from .measured import MEASURED
 
@@ -65,14 +65,13 @@ class AccelerometerFour(TableTest):
         "dwell": Option(10.0, "s", "time averaged in each position"),
         "D1c": Option("3.094arcsec", "rad", "first harmonic of the head as an autocollimator measured it, cosine"),
         "D1s": Option("-0.392arcsec", "rad", "the same, sine"),
-        "u_D1": Option("0.1arcsec", "rad", "standard uncertainty of D1c and D1s", 0.0),
+        **type_b(sources),
         "d1_unknown": Option(False, bool, "no such measurement: K_F, K_IO and K_II are biased by K_I D1"),
         "head_error": Option("11arcsec", "rad", "half range of the head's random errors (simulated)", 0.0, 1e-3),
         "head_seed": Option(1, int, "which random errors (simulated)", 0),
         "head_D1c": Option("3.094arcsec", "rad", "true first harmonic of the head, cosine (simulated)", -1e-3, 1e-3),
         "head_D1s": Option("-0.392arcsec", "rad", "the same, sine", -1e-3, 1e-3),
-        "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
-        "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
+        **type_b("voltage", "gravity"),
     }
     noises = (*(f"accelerometer_{i}.white" for i in geometry.SENSORS), "table.repeat")
     assumed = ("table.base",)

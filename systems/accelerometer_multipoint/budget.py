@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -21,29 +20,20 @@ from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
-from gyrobench.reduction.setup import sources
-from gyrobench.reduction.setup.sources import Effect, Source
+from gyrobench.reduction.setup.sources import Effect
 from gyrobench.units import ARCSEC
 
-from . import closed
+from . import closed, sources
 from .geometry import specific_force
 from .model import MultipointSetup, Polynomial, Visits
 
 STEP = 1e-4
 LEVEL_SLOPE = 1e-3  # of the largest: a position where the data do not change with the angle shows no error of it
-SCALE = Source("accelerometer.scale", "scale λ", "1", "u_scale", "relative")
-ZERO = replace(sources.CURRENT_OFFSET, name="zero of the current meter")
-RESOLUTION = replace(sources.CURRENT_RESOLUTION, name="resolution of the current meter")
 STATIONS = "station"  # kind of the candidate
 UNSTATED = (
     "errors of the head's positions are the same wherever a position comes back (the other mount, another turn); they "
     "are not in u, and this plan does not show their size. State u_angle, take more positions or declare type_b = none."
 )
-PLACES = Source(
-    "head.positions", "positions of the head", "rad", "u_angle", "independent, the same in each turn and mount"
-)
-AXIS = Source("head.axis", "axis of the head above the horizon", "rad", "u_axis")
-TURNED = Source("accelerometer.mount.{k}", "accelerometer turned about its {axis} axis", "rad", "u_mount")
 
 
 def places(v: Visits, slopes: Array) -> list[Candidate]:
@@ -83,16 +73,16 @@ def effects(
         return np.array([found.error(-slope * f(n * v.angle)) for f in (np.sin, np.cos)])
 
     return [
-        SCALE.effect(s, found.error(v.y)),
-        ZERO.effect(s, offset),
-        RESOLUTION.effect(s.quantum / math.sqrt(12.0), offset),
+        sources.SCALE.effect(s, found.error(v.y)),
+        sources.ZERO.effect(s, offset),
+        sources.RESOLUTION.effect(s.quantum / math.sqrt(12.0), offset),
         sources.GRAVITY.effect(s, found.error(dX=stretched)),
-        PLACES.effect(s, alone, parts=tuple(f"{x:g}°" for x in stations.tolist()), needed=needed),
+        sources.PLACES.effect(s, alone, parts=tuple(f"{x:g}°" for x in stations.tolist()), needed=needed),
         sources.ANGLE_ONCE.effect(s, misread(1), note=of_head),
         sources.ANGLE_TWICE.effect(s, misread(2), note=of_head),
-        AXIS.effect(s, found.error(axis)),
+        sources.AXIS.effect(s, found.error(axis)),
         *(
-            TURNED.of(k=str(n), axis=name).effect(s, found.error(row))
+            sources.TURNED.of(k=str(n), axis=name).effect(s, found.error(row))
             for n, (name, row) in enumerate(zip(("input", "output", "pendulum"), turned, strict=True), 1)
         ),
     ]

@@ -36,14 +36,6 @@ class MultipointSetup(setups.Setup):
     quantum: float = 0.0
     nuisances: bool = True
     places_stated: bool = True
-    u_scale: float = 0.0
-    u_current: float = 0.0
-    u_gravity: float = 0.0
-    u_angle: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
 
     @property
     def gamma(self) -> float:

@@ -52,6 +52,7 @@ from . import budget, closed
 from .geometry import zero_angle
 from .model import MultipointSetup, Polynomial, Visits, visits
 from .refusals import four_positions, position_problems, record_problems, setup_problems, zero_problems
+from .sources import PLACES
 
 UG = 1e-6
 KS = ("k0", "k1", "k2", "k3", "k4", "k5")
@@ -128,7 +129,7 @@ class Reduction(DriftReduction[MultipointSetup]):
         # four positions see combinations that differ a little from mount to mount: equal weights, as the formulas
         noise = "white" if self.four else "estimated"
         X = self._columns(v)
-        back = budget.places(v, X[:, len(self.model.terms) :].sum(axis=1)) if s.nuisances and not s.u_angle else []
+        back = budget.places(v, X[:, len(self.model.terms) :].sum(axis=1)) if s.nuisances and not PLACES.size(s) else []
         unit = ("λi/g₀", "µg", UG)
         return Regression(steps, X, v.y, v.t_start, v.t_end, groups, *unit, noise, candidates=back, ideal=ROUNDING)
 
@@ -279,7 +280,7 @@ class Reduction(DriftReduction[MultipointSetup]):
                 "tan 2θ₀; 8 positions or more tell them apart."
             )
             return [Reason("positions.four", text)]
-        if self.setup.u_angle > 0.0:
+        if PLACES.size(self.setup) > 0.0:
             text = "Errors of the head with sin θ look like k4 and k5, those with cos θ like k0 and k2: see the budget."
             return [Reason("head.aliased", text)]
         return []

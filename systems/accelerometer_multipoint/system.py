@@ -17,7 +17,7 @@ from gyrobench.system.system import Option, Slot
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, nearest_turn, parse_visits
 
-from . import geometry
+from . import geometry, sources
 from .measured import MEASURED
 
 TURN = 2.0 * math.pi
@@ -60,19 +60,8 @@ class AccelerometerMultipoint(TableTest):
             "scale": Option(
                 0.0, "m/s2/A", "scale λ for the reduction; 0: the parameter scale of the accelerometer", 0.0
             ),
-            "u_scale": Option(0.0, "1", "relative standard uncertainty of λ", 0.0),
-            "u_current": Option(0.0, "A", "standard uncertainty of the zero of the current meter", 0.0),
-            "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
-            "u_angle": Option(
-                0.0, "rad", "standard uncertainty of a position of the head that comes back each turn", 0.0
-            ),
         }
-        | type_b(
-            "angle1",
-            "angle2",
-            axis="standard uncertainty of the axis of the head against the horizon",
-            mount="standard uncertainty of the accelerometer about each of its axes in the mount",
-        )
+        | type_b(sources)
     )
     noises = (
         "accelerometer.turn_on", "accelerometer.markov", "accelerometer.white", "accelerometer.meter", "table.repeat",

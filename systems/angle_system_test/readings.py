@@ -60,7 +60,6 @@ class AngleSystemSetup(Setup):
     turned: frozenset[int]
     head: float
     reversal: bool = False
-    u_rate: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:

@@ -17,7 +17,6 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.reduction.estimation.findings import NORMAL_RESIDUALS
-from gyrobench.reduction.setup.sources import RELATIVE
 from gyrobench.reduction.toolkit import (
     Account,
     Coefficient,
@@ -30,7 +29,6 @@ from gyrobench.reduction.toolkit import (
     Reason,
     Regression,
     RunDocument,
-    Source,
     Table,
     told,
     window_problems,
@@ -39,6 +37,7 @@ from gyrobench.units import ARCSEC
 
 from . import harmonics
 from .readings import CLOCKS, OTHER, RATES, SHOWN, AngleSystemSetup, assemble
+from .sources import TABLE_RATE
 
 ERU = frames.EARTH_RATE
 COLUMNS = (
@@ -47,7 +46,6 @@ COLUMNS = (
 )
 NOTHING = (0.0, 0.0)  # cosine and sine of an order that a reader does not have
 LISTED = 8  # slips that are listed by angle
-TABLE_RATE = Source("table.rate", "rate of the table", RELATIVE, "u_rate", "relative")
 
 
 class Reduction(DriftReduction[AngleSystemSetup]):

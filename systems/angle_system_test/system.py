@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gyrobench import frames
+from gyrobench.system.families.option_groups import type_b
 from gyrobench.system.families.table_test import TABLE, TableTest, on_table, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import LIMIT, Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
-from . import harmonics
+from . import harmonics, sources
 from .measured import MEASURED
 
 FACE = "table"
@@ -79,7 +80,7 @@ class AngleSystemTest(TableTest):
         "gate": Option(1.0, "s", "gate of the rate readout", sets="gate.gate"),
         "noise": Option("0.02arcsec", "rad", "standard deviation of a reading before it is counted", 0.0, sets=NOISE),
         "reference_zero": Option("70.7deg", "rad", "angle at which the reference is mounted", sets="reference.head"),
-        "u_rate": Option(0.0, "1", "relative standard uncertainty of the table's rate", 0.0),
+        **type_b(sources),
         "quantum": Option(0.0, "rad", "angle of a count of the reader, of measured data; 0: of the part", 0.0),
         "reference_quantum": Option(0.0, "rad", "of the reference, of measured data; 0: that of the reader", 0.0),
     }

@@ -39,7 +39,6 @@ from gyrobench.reduction.toolkit import (
     Record,
     Regression,
     Setup,
-    Source,
     Table,
     told,
     window_problems,
@@ -48,10 +47,10 @@ from gyrobench.units import DEG, DPH
 
 from . import mistakes
 from .closed import AXES, Chain, cone_rate
+from .sources import TWIST
 
 COLUMNS = ("t_start", "t_end", *(f"drift_{a}" for a in AXES))
 LEAST = 2  # readings at rest, and at each cone
-TWIST = Source("table.twist", "steady turn of the table about the axis of the cone", "rad/s", "u_twist")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +62,6 @@ class ConingSetup(Setup):
     axis: str
     chain: Chain
     nuisances: bool = True
-    u_time: float = 0.0
-    u_mount: float = 0.0
-    u_twist: float = 0.0
 
 
 def hertz(f: float) -> str:

@@ -23,6 +23,7 @@ from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, Windows
 
+from . import sources
 from .closed import Chain
 from .measured import MEASURED
 
@@ -96,7 +97,7 @@ class ConingTest(StrapdownMotion):
         | NUISANCES
         | CORRECTIONS
         | type_b("time", mount="standard uncertainty of the case about each of its axes on the plate")
-        | {"u_twist": Option(0.0, "rad/s", "std. unc. of a steady turn of the table about the axis of the cone", 0.0)}
+        | type_b(sources)
     )
     noises = tuple(f"imu.{a}_{n}" for a in AXES for n in ("gyro", "gyro_bias"))
     measured_data = MEASURED

@@ -65,15 +65,8 @@ class EightPositionSetup(SiteSetup):
 
     terms: int = 6
     sigma: bool = True
-    u_attitude: float = 0.0
-    u_mount: float = 0.0
-    u_latitude: float = 0.0
-    u_current: float = 0.0
-    u_nonlinearity: float = 0.0
     quantum: Mapping[str, float] = field(default_factory=dict)
     pulses: Mapping[str, Pulses | None] = field(default_factory=dict)  # of pulse-width rebalances, by channel
-    u_pulse: float = 0.0
-    u_switching: float = 0.0
 
 
 def directions(position: NDArray[np.int_], latitude: float, turned: Mapping[int, Array] | None = None) -> Array:

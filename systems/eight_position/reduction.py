@@ -162,7 +162,7 @@ class CurrentChannel(DriftReduction[EightPositionSetup]):
                 f"I_{c}{a} = I_{c}{b} within the noise: no scale factor k_{c} (relative uncertainty {u / abs(k):.2g}); "
                 "longer readings or a lower latitude are needed"
             )
-        return super().finished(found, self.effects(found))
+        return super().finished(found, self.all_effects(found))
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         """Return the result with Allan deviation and spectrum within the positions, from the single readings less their

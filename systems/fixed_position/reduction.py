@@ -62,10 +62,6 @@ class FixedPositionSetup(SiteSetup):
     k: float
     rate: bool = False
     attitude: Array = field(default_factory=lambda: np.eye(3))
-    u_attitude: float = 0.0
-    u_latitude: float = 0.0
-    u_scale_factor: float = 0.0
-    u_current: float = 0.0
     quantum: float = 0.0
     supplies: Supplies = field(default_factory=Supplies)
 

@@ -16,8 +16,9 @@ from gyrobench.reduction.loops.sight_budget import EXCITED, LOS, MoreSources, Ri
 from gyrobench.reduction.loops.sight_reduction import AXES, SightReduction
 from gyrobench.reduction.loops.tracking_measures import MISS, RATE, TrackingMeasures
 
+from .sources import TARGET, image_density, image_noises, prediction
+
 PAIR = (0, 1)
-TARGET = "motion of the target"
 
 
 class Reduction(TrackingMeasures, SightReduction):
@@ -94,8 +95,6 @@ class Reduction(TrackingMeasures, SightReduction):
         """Return the densities by noise and resolution of the images, held from frame to frame."""
         p = self.run.parameters
         period, noise, pixel = (float(p.get(f"tracker.{n}", 0.0)) for n in ("period", "image_noise", "pixel"))
-        shape = np.sum(np.abs(sight) ** 2, axis=2).T * 2.0 * period * np.sinc(f * period) ** 2
-        found = {"noise of the images": shape * noise**2}
-        if noise > 0.3 * pixel > 0.0:  # the remainders are uniform, and independent of each other
-            found["resolution of the images"] = shape * pixel**2 / 12.0
+        shape = np.sum(np.abs(sight) ** 2, axis=2).T * np.abs(prediction(p, f)) ** 2
+        found = {name: shape * image_density(period, s)(f) for name, s in image_noises(noise, pixel).items()}
         return {name: y for name, y in found.items() if np.any(y)}

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.loops.jitter import spectra
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.sight_test import AXES, SightTest
+from gyrobench.system.line_of_sight import Density, LineOfSight, SightSource
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
+from .sources import TARGET, image_density, image_noises, prediction, target_rates
+
 TARGETS = ("rest", "constant", "sine", "circle", "flyby")
 TYPES = (1, 2)
+PREDICTED = ("none", "rate", "acceleration")
 CORNER = 6.0  # crossover of a tracking loop over the corner of its integral
 TONES = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.6, 2.2, 3.0, 4.0)  # of the crossover
 IMAGE_TEST = 4e-4  # V (rad), of the test sines of the tracking loops
 TIMES = ("period", "exposure", "processing")
 ODD = 1e-3  # of a time: less than that it is changed without a word
 SAMPLES = 10.0  # images in a period of the crossover, or more
+TARGET_STEP = 2e-3  # s, of its path for the density of its rates
 SLOWER = 0.25  # of the rate loop's crossover: that of the tracking loop
 
 
@@ -91,6 +101,8 @@ class GimbalTracking(SightTest):
         "processing": Option(10e-3, "s", "time from the end of the exposure to the error", 0.0, 5.0),
         "pixel": Option(2e-5, "rad", "resolution of the error; 0: none", 0.0, sets="tracker.pixel"),
         "image_noise": Option(2e-5, "rad", "noise of each image and axis, rms", 0.0),
+        "prediction": Option("none", str, f"of the error over the delay of its image: {', '.join(PREDICTED)}"),
+        "index": Option(0.3, "1", "prediction: Kalata's tracking index, motion in an image over noise", 1e-6, 100.0),
         "field": Option(0.02, "rad", "field of view, full angle", 1e-5, 2.9, sets="tracker.field"),
         "target": Option("constant", str, f"motion of the target in the ride: {', '.join(TARGETS)}"),
         "target_pitch": Option(1e-3, "rad/s", "target: constant rate about x, up"),
@@ -143,18 +155,63 @@ class GimbalTracking(SightTest):
         found = super().design(parts)
         found |= {f"tracker.{n}": t for n, t in self.times().items()} | self.moves()
         found["tracker.image_noise?"] = self["image_noise"]
+        found |= self.ahead()
         found["target.first?"] = found["vibration.first?"]
         for k, axis in enumerate(AXES):
             wc = 2.0 * math.pi * self["track"]
             corner = wc / CORNER if self["type"] == 2 else 0.0
-            found[f"track_{axis}.K?"] = wc / abs((1.0 + corner / (1j * wc)) * self.closed(k, parts, 1j * wc))
+            ahead = complex(prediction(self.ahead(), self["track"]))
+            found[f"track_{axis}.K?"] = wc / abs((1.0 + corner / (1j * wc)) * self.closed(k, parts, 1j * wc) * ahead)
             found[f"track_{axis}.integral?"] = corner
         return found
+
+    def ahead(self) -> dict[str, float]:
+        """Return the parameters of the prediction: over the delay, with the filter of the tracking index."""
+        order = PREDICTED.index(self["prediction"]) if self["prediction"] in PREDICTED else 0
+        times = self.times()
+        delay = 0.5 * times["exposure"] + times["processing"] + 0.5 * times["period"]
+        bandwidth = self["index"] ** (1.0 / (order + 1)) / times["period"]
+        return {"tracker.order": order, "tracker.ahead": delay, "tracker.bandwidth": bandwidth}
 
     def closed(self, k: int, parts: PartValues, s: complex) -> complex:
         """Return the closed rate loop of an axis, rate over commanded rate."""
         L = self.shape(k, parts, s) / abs(self.shape(k, parts, 2j * math.pi * self["crossover"]))
         return L / (1.0 + L)
+
+    def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
+        """Return what makes the tracking error jitter: base, target, gyro, images."""
+        of_gimbal = super().line_of_sight(parameters)
+        p = {n: float(parameters.get(f"tracker.{n}", 0.0)) for n in ("period", "image_noise", "pixel")}
+
+        def images(sigma: float) -> Density:
+            held = image_density(p["period"], sigma)
+            return lambda f: held(f) * np.abs(prediction(parameters, f)) ** 2
+
+        more = [
+            SightSource(name, "command", k, images(sigma), f"track {axis}")
+            for axis, (_, k) in AXES.items()
+            for name, sigma in image_noises(p["image_noise"], p["pixel"]).items()
+        ]
+        ride = self.ride()
+        t = np.arange(0.0, ride.settle + ride.dwell, TARGET_STEP)
+        rates = target_rates(parameters, t)
+        inside = t >= ride.settle
+        # u = (-b, 1, a): a turn about x is its third element, one about z its first
+        for element, rate in zip((3, 1), rates, strict=True):
+            more.append(SightSource(TARGET, "direction", element, self.moved(rate[inside])))
+        turned = np.array([self["pitch"], self["yaw"]])[:, None] + np.cumsum(rates, axis=1) * TARGET_STEP
+        about = np.sqrt(np.mean(turned[:, inside] ** 2, axis=1)) * np.sign(turned[:, inside].mean(axis=1))
+        angles = {loop: f"tracker.miss[{AXES[loop.split()[-1]][0]}]" for loop in self.loops}
+        return replace(
+            of_gimbal, sources=[*of_gimbal.sources, *more], angles=angles, moved_by=("target",), lost="tracker.lost",
+            riding={"platform.theta_0": about.tolist()},
+        )  # fmt: skip
+
+    def moved(self, rate: Array) -> Density:
+        """Return the density of a direction, rad2/Hz, from its rate in the ride: rad/s, every TARGET_STEP."""
+        made = spectra(TARGET_STEP, rate, self["jitter_from"])
+        assert made is not None  # a ride is as long as its jitter takes
+        return lambda f: np.interp(f, made.f, made.mean, right=0.0) / (2.0 * np.pi * f) ** 2
 
     def moves(self) -> dict[str, Any]:
         """Return the parameters of the moving target."""
@@ -177,7 +234,7 @@ class GimbalTracking(SightTest):
         return {f"track {axis}": self["track"] for axis in AXES}
 
     def check(self) -> list[str]:
-        problems = [*super().check(), *self.no_choice(target=TARGETS)]
+        problems = [*super().check(), *self.no_choice(target=TARGETS, prediction=PREDICTED)]
         period = 1.0 / self["frames"]
         if self["exposure"] > period * (1.0 + 1e-9):
             problems.append(f"exposure = {self['exposure']:g} s: longer than {period:g} s from image to image")

@@ -7,15 +7,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
+from gyrobench.reduction.diagnosis.scale_mistakes import AMPLITUDES, factor_sentence
 from gyrobench.result import Reason
 
-from .response import Figures, GyroResponse, fitted, logarithm
+from .response import Figures, GyroResponse, curves, fitted, logarithm
 
 FAR = 0.1  # error of the gain at low frequency from which on something else than the gyro is meant
 STEEP = 0.2  # of a slope of 1 or -1, and of a right angle, rad
 SCATTER = 0.01  # least robust scatter of the residuals, over u, which an outlier widens where it is not stated
 OFF = 6.0  # u: a point further from the curve
+ROUGH = 0.01  # rms of the residuals, ln gain and rad: more than a gyro leaves
 LEAD = 0.2  # rad, at the end of the pass band: more than any gyro, or a late reading of the table, makes
 BETTER = 0.1  # of chi2 that is left when two rows are exchanged back
 
@@ -43,7 +44,7 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
         yield Reason("response.sense", text.replace("-", "−"), blocked, severity="doubt")
         return
     if abs(found.value[0] - 1.0) > FAR:
-        yield Reason("response.factor", factor_sentence(float(found.value[0])), blocked, severity="doubt")
+        yield Reason("response.factor", factor_sentence(float(found.value[0]), AMPLITUDES), blocked, severity="doubt")
     late = r.phase[r.gain > r.gain[0] - 0.5 * math.log(2.0)]
     if late[-1] > LEAD:
         text = (
@@ -51,7 +52,23 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
             "opposite sign? A lag is negative."
         )
         yield Reason("response.lead", text, blocked, severity="doubt")
+    if _in_radians(r, found):
+        text = (
+            "Gain and phase belong to one response where the phases are 57.3 times as large. Are they in rad and were "
+            "given as °?"
+        )
+        yield Reason("response.radians", text, blocked, severity="doubt")
+        return
     yield from _rows(r, found)
+
+
+def _in_radians(r: GyroResponse, found: Figures) -> bool:
+    """Return whether gain and phase are of one curve, as they are not as given, where the phases are larger by 57.3."""
+    left = np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)
+    if float(np.sqrt(np.mean(left * left))) < ROUGH:
+        return False
+    again = curves(GyroResponse(r.f, r.gain, np.degrees(r.phase), r.u))
+    return any(c.chi2 < BETTER * found.curve.chi2 for c in again)
 
 
 def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:

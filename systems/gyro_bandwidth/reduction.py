@@ -12,16 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
-from gyrobench.reduction.loops.loop_toolkit import Account, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import (
-    COSINE,
-    READING_GAIN,
-    READING_LAG,
-    Sensitivity,
-    predicted_shifts,
-)
-from gyrobench.reduction.setup.sources import TIME_BASE, Source
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
+from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.units import DEG
 
 from .mistakes import mistakes
@@ -40,7 +35,6 @@ FIGURES = (
 PLAIN = 1e-9  # Hz; finer than any figure
 STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
 NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
-MISFIT = 1e-4  # p of chi2 below which the curve does not fit
 
 
 class Reduction(MeasureReduction):
@@ -151,6 +145,17 @@ class Reduction(MeasureReduction):
             out.append(Sensitivity(source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
         return out
 
+    def _neighbours_alike(self) -> bool:
+        """Return whether the residuals of neighbours, without which u of the points is not known, are alike."""
+        r, c = self.response, self.figures.curve
+
+        def of(p: Array) -> Array:
+            out: Array = logarithm(p, r.f) / r.u
+            return out
+
+        size = np.array([1.0, 1.0 / c.highest, *np.ones(c.poles)])
+        return alike(of, c.p, size, np.vstack([r.gain, r.phase]) / r.u - of(c.p)) < LEAST
+
     def _doubts(self) -> None:
         found, points, c = self.found, self.points, self.figures.curve
         if points.saturated:
@@ -166,7 +171,13 @@ class Reduction(MeasureReduction):
                 f"The curve does not fit the points: χ² = {c.chi2:.3g} of {c.dof} degrees of freedom. u of the figures "
                 "is widened by its root. The gyro has a response of another shape, or points are wrong."
             )
-            found.warn("response.misfit", text)
+            found.doubt("response.misfit", text)
+        elif not points.known and self._neighbours_alike():
+            text = (
+                "Neighbouring points lie on one side of the curve more often than noise explains, and their scatter is "
+                "no measure of their uncertainty. The gyro has a response of another shape, or points are wrong."
+            )
+            found.doubt("response.misfit", text)
         peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
         if peak > 0.5 * math.log(2.0):
             top = float(self.response.f[int(np.argmax(self.response.gain))])

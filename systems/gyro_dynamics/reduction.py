@@ -13,10 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCMIN,
     Account,
+    Array,
     MeasureReduction,
     Point,
     ReductionError,
@@ -24,23 +26,16 @@ from gyrobench.reduction.loops.loop_toolkit import (
     told,
     trace,
 )
-from gyrobench.reduction.loops.response_errors import (
-    COSINE,
-    READING_GAIN,
-    READING_LAG,
-    Sensitivity,
-    predicted_shifts,
-)
-from gyrobench.reduction.setup.sources import STATED, TIME_BASE, Source
+from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 
 from .mistakes import mistakes
 from .model import AngleResponse, DynamicFigures, figures, response, values_near
 from .points import points_of
+from .sources import PICKOFF, SPIN
 from .steps import StepFigures, figures_of
 from .truth import true_values
 
-PICKOFF = Source("pickoff.scale", "pickoff gain", "1", "u_pickoff", STATED)
-SPIN = Source("gyro.spin", "spin angular momentum", "1", "u_spin", STATED)
 #: name, meaning, unit, SI per unit, in the order of model.read_off
 FIGURES = (
     ("g", "angle of the float over that of the case at low frequency, H/C", "1", 1.0),
@@ -249,6 +244,18 @@ class Reduction(MeasureReduction):
             text = "Sines and steps give different time constants. A reading with a filter of its own does this."
             self.found.warn("dynamics.steps", text)
 
+    def _neighbours_alike(self) -> bool:
+        """Return whether the residuals of neighbours, without which u of the points is not known, are alike."""
+        assert self.response is not None and self.figures is not None
+        r, p = self.response, self.figures.fit.p
+        top = 2.0 * math.pi * float(r.f[-1])
+
+        def of(p: Array) -> Array:
+            ratio = np.log(response(p, r.f, r.output) / r.value) / r.u
+            return np.vstack([ratio.real, ratio.imag])
+
+        return alike(of, p, np.array([1.0, 1.0, top**-2, top**-3])[: p.size], of(p)) < LEAST
+
     def _doubts(self) -> None:
         found, points = self.found, self.points
         if points.saturated:
@@ -264,4 +271,10 @@ class Reduction(MeasureReduction):
                 f"The curve does not fit the points: χ² = {fit.chi2:.3g} of {fit.dof} degrees of freedom. u of the "
                 "figures is widened by its root. The gyro has dynamics of another kind, or points are wrong."
             )
-            found.warn("response.misfit", text)
+            found.doubt("response.misfit", text)
+        elif fit and not points.known and self._neighbours_alike():
+            text = (
+                "Neighbouring points lie on one side of the curve more often than noise explains, and their scatter is "
+                "no measure of their uncertainty. The gyro has dynamics of another kind, or points are wrong."
+            )
+            found.doubt("response.misfit", text)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import ON_TABLE, SDF_NOISES
 from gyrobench.system.families.vibrating_table import (
     FREQUENCIES,
@@ -25,6 +25,7 @@ from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
+from . import sources
 from .measured import MEASURED
 
 #: gyro axes I, O, S (rows) in table axes: O = z_T along the table axis, which points to the pole
@@ -70,10 +71,7 @@ class GyroDynamics(System):
             ),
         }
         | STATED
-        | {
-            "u_pickoff": Option(0.0, "1", "relative standard uncertainty of the pickoff gain", 0.0),
-            "u_spin": Option(0.0, "1", "relative standard uncertainty of the angular momentum", 0.0),
-        }
+        | type_b(sources)
         | MOUNT
     )
     assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")

@@ -107,11 +107,13 @@ class GyroMagneticCompass(LoopTest):
     noises = ("gyro.white", "sensor.white")
     step = 0.1
     channels = (
-        "exciter.phase", "exciter.gate", "exciter.test[1]", "exciter.command[1]", "motion.angle[3]", "gyro.psi",
-        "sensor.psi", "slaving.error", "slaving.rate", "slaving.cut",
+        "exciter.phase", "exciter.gate", "exciter.test[1]", "exciter.command[1]",
+        *(f"motion.angle[{k}]" for k in (1, 2, 3)), "gyro.psi", "sensor.psi", "slaving.error", "slaving.rate",
+        "slaving.cut",
     )  # fmt: skip
     shown = ("motion.angle", "gyro.psi sensor.psi", "slaving.error", "slaving.rate", "slaving.cut")
     channel_period = 0.1
+    bodies = "vehicle: z motion.angle[3], x motion.angle[1], y motion.angle[2]"
 
     def field(self) -> Field | None:
         """Return the field of the day and the site; None without a date.  Raises FieldError."""

@@ -17,32 +17,15 @@ from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.sources import Source
 
 from .geometry import AXES, EXACT, Motion, SetUp
+from .sources import AXIS_AZIMUTH, AXIS_LEVEL, MOUNT, ZERO
 
 SMALL = 1e-5  # rad, step of the perturbations (they are linear to 1e-10)
-AXIS_LEVEL = Source("outer.axis.level", "outer axis out of level, about north", "rad", "u_axis")
-AXIS_AZIMUTH = Source("outer.axis.azimuth", "outer axis off east, about the vertical", "rad", "u_axis")
-ZERO = Source("{axis}.angle.zero", "zero of the {axis} angle", "rad", "u_zero", "table stands further than it reads")
-MOUNT = Source("mount.{k}", "case turned about its {axis} axis", "rad", "u_mount")
-GYRO_SCALE = Source(
-    "gyro.scale.unseen", "scale factors and misalignments not shown by the plan", sources.RELATIVE, "u_gyro_scale"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImuSetup(SiteSetup):
     """A table with two axes at a site; see gyrobench.reduction.setup.setups."""
 
-    u_axis: float = 0.0
-    u_zero: float = 0.0
-    u_square: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_wobble: float = 0.0
-    u_mount: float = 0.0
-    u_latitude: float = 0.0
-    u_time: float = 0.0
-    u_gravity: float = 0.0
-    u_gyro_scale: float = 0.0
     #: orders of bias and scale factor over the temperature, K of its hysteresis, temperature of the coefficients; none:
     #: nothing follows the temperature but by the nuisance model
     thermal: tuple[int, int, float, float] | None = None

@@ -43,11 +43,12 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 from . import geometry, mistakes, tables
-from .budget import GYRO_SCALE, ImuSetup, Kinematics
+from .budget import ImuSetup, Kinematics
 from .channels import BY_NAME, CHANNELS, UG, overview
 from .compensation import truth_of
 from .hand import UNKNOWN, HandReduction
 from .log import UP_DOWN
+from .sources import GYRO_SCALE
 from .thermal import Thermal, quantity
 from .updown import UpDownReduction
 

@@ -16,7 +16,7 @@ from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import Visit, parse_visits
 
-from . import geometry, instruments, norms, plans
+from . import geometry, instruments, norms, plans, sources
 from .channels import CHANNELS
 from .hand import UNKNOWN
 from .measured import MEASURED
@@ -115,13 +115,7 @@ class ImuPositions(TableTest):
             axis="standard uncertainty of the outer axis against level, and against east",
             mount="standard uncertainty of the case about each of its axes on the plate",
         )
-        | {
-            "u_zero": Option(0.0, "rad", "standard uncertainty of the zero of each angle, plate level", 0.0),
-            "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
-            "u_gyro_scale": Option(
-                0.0, "1", "std. unc. of scale factors and misalignments of the gyros that the plan does not show", 0.0
-            ),
-        }
+        | type_b(sources.ZERO, "gravity", sources.GYRO_SCALE)
     )  # fmt: skip
     noises = tuple(f"imu.{a}_{n}" for a in "xyz" for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     assumed = ("table.base", "imu.mount")

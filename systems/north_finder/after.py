@@ -6,6 +6,7 @@
     level            s_tilt = s_f/g,   s_f2 as s_w2 of one position, of the accelerometer
     free running     s2(t) = s2(0) + t2 s_r2(T, t)            s_r: rate of the time t against that of the alignment T
     s_r2(T, t) = N2 (1/T + 1/t) + (B2/pi) F(T, t) + K2 (T + t)/3,   F(T, T) = 4 ln 2
+    d' = -W x d + e:  across W the errors e of the axes turn into each other, along it they do not
 
 b: rms of the bias at switch-on, N, B, K: white noise, flicker, random walk; a Gauss-Markov part by its correlation.
 Not modelled: errors of scale factor and axes, temperature, motion of the base, more than two positions.
@@ -33,6 +34,7 @@ GOALS = (1.0, 0.1)  # deg
 LONGEST = 86400.0  # s, looked at
 #: the slowest relaxation of a part's flicker stands for those beyond it, too: half a ratio of 4, and a third of one
 BEYOND = 2.0 * 4.0 ** (1.0 / 3.0)
+CELLS = 200  # of a time, over which readings are taken as even
 EULER = 0.5772156649015329
 WHITE = ("white_y", "white", "electronics", "quantum", "white_x")
 OWN = ("optical", "lock_in")  # noise that a part computes of its physics: its density is not a parameter
@@ -97,6 +99,28 @@ class RandomErrors:
             + self.markov**2 * markov
         )
 
+    def turned(self, T: float, t: float, turn: float) -> float:
+        """Return the variance of an angle that grows for t after T of alignment, across the axis about which all axes
+        turn at the rate turn (rad/s); with errors of this size on each.  turn = 0: t2 times :meth:`change`.
+
+        By weights of readings that sum to zero, -1/2 sum w_i w_j* D(s_i - s_j), D the structure function; a cell's own
+        mean of ln and of the lag in closed form.
+        """
+        cells = np.array([T, t]) / CELLS
+        middle = np.arange(CELLS) + 0.5
+        s = np.concatenate([cells[0] * middle - T, cells[1] * middle])
+        grown = np.exp(1j * turn * s[CELLS:]) * cells[1]
+        w = np.concatenate([np.full(CELLS, -grown.sum() / CELLS), grown])
+        own = np.repeat(cells, CELLS)
+        lag = np.abs(s[:, None] - s[None, :])
+        far = ~np.eye(s.size, dtype=bool)
+        log = np.log(lag, out=np.diag(np.log(own) - 1.5), where=far)
+        mean = np.where(far, lag, np.diag(own / 3.0))
+        D = 2.0 * self.flicker**2 / math.pi * log + self.walk**2 * mean
+        D -= 2.0 * self.markov**2 * np.expm1(-mean / self.markov_tau)
+        white = self.white**2 * (t + abs(complex(grown.sum())) ** 2 / T)
+        return float(white - 0.5 * np.real(w @ D @ np.conj(w)))
+
     def reversed(self, T: float) -> float:
         """Return the variance of half the difference of two positions half a turn apart, T/2 each."""
         return self.change(0.5 * T, 0.5 * T) / 4.0
@@ -122,12 +146,17 @@ def reached_after(rate: RandomErrors, latitude: float, goal: float, *, two: bool
     return float(good[0]) if good else None
 
 
-def running(rate: RandomErrors, start: float, T: float, t: float) -> float:
-    """Return the standard deviation of an angle t seconds after an alignment of T seconds that left start, rad.
+def running(rate: RandomErrors, start: float, T: float, t: float, latitude: float | None = None) -> float:
+    """Return the standard deviation of a heading t seconds after an alignment of T seconds that left start, rad.
 
-    The rate of the alignment is taken for the bias, so that what changes since counts.
+    The rate of the alignment is taken for the bias, so that what changes since counts.  latitude: the Earth's rate
+    turns the errors of the three axes, of one size, into each other; None: an axis by itself, 5 % more in six hours.
     """
-    return math.hypot(start, t * math.sqrt(rate.change(T, t)))
+    growth = t * t * rate.change(T, t)
+    if latitude is not None:  # the vertical has cos of it across the Earth's rate
+        across = rate.turned(T, t, units.EARTH_RATE) / rate.turned(T, t, 0.0)
+        growth *= 1.0 - math.cos(latitude) ** 2 * (1.0 - across)
+    return math.hypot(start, math.sqrt(growth))
 
 
 def lost(method: str, u_bias: float, latitude: float) -> list[str]:

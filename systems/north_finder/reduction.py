@@ -45,7 +45,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
-    Source,
     Table,
     told,
     window_problems,
@@ -54,16 +53,12 @@ from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import after, plans
 from .model import LocalEarth, at_null, attitude, of_windows
+from .sources import FORCE_BIAS, FORCE_NOISE, GYRO_BIAS, TILT, ZERO
 
 NEAR = 0.2  # largest departure of the horizontal rate from that of the latitude
 LEVEL = 1e-3  # of the test of that departure
 MANY = 3.0  # standard deviations of the horizontal rate, at least
 MOST = 3.0  # standard uncertainties by which a heading and the rough one may differ
-ZERO = Source("head.zero", "zero of the head against the reference", "rad", "u_angle")
-TILT = Source("head.tilt.{axis}", "tilt of the head about {axis}", "rad", "u_level", "right-handed")
-GYRO_BIAS = Source("gyro.bias.{axis}", "bias of the gyro along {axis}", "rad/s", "u_bias")
-FORCE_NOISE = Source("accelerometers.noise.{axis}", "noise of the accelerometers along {axis}", "m/s2")
-FORCE_BIAS = Source("accelerometers.bias.{axis}", "bias of the accelerometer along {axis}", "m/s2", "u_accelerometer")
 DRIFTS = (
     "linear drift of the bias, at the end",
     "quadratic drift of the bias, at the end",
@@ -97,11 +92,6 @@ class NorthFinderSetup(SiteSetup):
     time: float = 0.0
     settle: float = 0.0
     drift_order: int = 0
-    u_latitude: float = 0.0
-    u_angle: float = 0.0
-    u_level: float = 0.0
-    u_accelerometer: float = 0.0
-    u_bias: float = 0.0
     unbiased: bool = False
     instruments: Mapping[str, Any] | None = None
 
@@ -134,7 +124,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
-        problems += after.lost(s.method, s.u_bias, s.latitude)
+        problems += after.lost(s.method, GYRO_BIAS.size(s), s.latitude)
         problems += window_problems(self.windows)
         if s.method == "null" and not problems:
             near = at_null(self.windows)
@@ -212,7 +202,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         s, x = self.setup, float(self.unknowns(found)[0]) / self.north
         psi = math.remainder(psi - self.model.zero, 2.0 * math.pi)
         half = 0.0 if found.ideal else float(found.reported.half_width[0]) / self.north
-        b = (s.u_level * s.earth.up / self.north, s.u_latitude * math.tan(s.latitude))
+        b = (TILT.size(s) * s.earth.up / self.north, LATITUDE.size(s) * math.tan(s.latitude))
         U = math.sqrt(half**2 + NORMAL**2 * sum(v * v for v in b))
         if abs(x) > 1.0 + max(MOST * U, NEAR):
             raise ReductionError(
@@ -279,7 +269,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             ],
             tables=[
                 self._integrity(psi, A), *after.methods_table(s.density, s.time, s.settle, s.latitude, psi),
-                *after.table(s.instruments or {}, s.latitude, s.gravity, s.u_bias),
+                *after.table(s.instruments or {}, s.latitude, s.gravity, GYRO_BIAS.size(s)),
             ],
         )  # fmt: skip
 
@@ -297,7 +287,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         if s.finder and s.finder["status"] != 1.0:
             words = STATUS.get(s.finder["status"], "is not there")
             reasons.append(_doubt("finder.status", f"The finder says that the heading {words}."))
-        if s.method == "strapdown" and not s.u_bias and not s.unbiased:
+        if s.method == "strapdown" and not GYRO_BIAS.size(s) and not s.unbiased:
             turned = math.degrees(0.1 * DPH / self.north)
             text = (
                 f"One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to {turned:.2g}°. "

@@ -20,7 +20,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import Option, Slot, Windows
 
-from . import after, plans
+from . import after, plans, sources
 from .after import OWN, WHITE, RandomErrors
 from .measured import MEASURED
 
@@ -104,13 +104,7 @@ class NorthFinding(TableTest):
         }
         | SITE
         | NUISANCES
-        | type_b("latitude")
-        | {
-            "u_angle": Option(0.0, "rad", "standard uncertainty of the zero of the head against the reference", 0.0),
-            "u_level": Option(0.0, "rad", "std. unc. of the level of the head about each axis, not read", 0.0),
-            "u_accelerometer": Option(0.0, "m/s2", "standard uncertainty of the bias of an accelerometer", 0.0),
-            "u_bias": Option(0.0, "rad/s", "std. unc. of the bias of a gyro (strapdown, one position)", 0.0),
-        }
+        | type_b("latitude", sources)
     )  # fmt: skip
     noises = (
         "gyro.turn_on_x", "gyro.turn_on_y", "gyro.markov_x", "gyro.markov_y", "gyro.white_x", "gyro.white_y",

@@ -29,7 +29,7 @@ from gyrobench import drift, frames
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import attitude_effects
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, Source
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -53,11 +53,10 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCSEC, DPH
 
 from . import refusals
+from .sources import ANGLE, GAIN
 
 LEAST = 9  # readings
 SMALL = 1e-5  # rad
-ANGLE = Source("angle.span", "angle between first and last reading", "rad", "u_angle")
-GAIN = Source("float.gain", "float gain H/C", "1", "u_float_gain", "Earth rate along the spin axis times b")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,12 +70,6 @@ class OpenLoopSetup(SiteSetup):
     float_gain: float = 1.0
     wait: float | None = None
     reach: float | None = None
-    u_attitude: float = 0.0
-    u_latitude: float = 0.0
-    u_angle: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_float_gain: float = 0.0
 
     def earth(self, axis: int = 0) -> float:
         """Return the Earth rate along I (0), O (1) or S (2) at table angle 0, rad/s."""

@@ -16,7 +16,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
-from . import refusals
+from . import refusals, sources
 from .measured import MEASURED
 
 ACCELERATION, RATE = 1e-3, 0.01  # rad/s2, rad/s: a gentle hand; the float sees the rate in steps, off by some a h^2
@@ -53,11 +53,7 @@ class OpenLoopDrift(OpenLoopTest):
         }
         | NUISANCES
         | CORRECTIONS
-        | type_b("attitude", "latitude", "angle1", "angle2")
-        | {
-            "u_angle": Option(0.0, "rad", "standard uncertainty of the angle from the first to the last reading", 0.0),
-            "u_float_gain": Option(0.0, "1", "standard uncertainty of H/C", 0.0),
-        }
+        | type_b("attitude", "latitude", "angle1", "angle2", sources)
     )
     measured_data = MEASURED
     channels = ("gyro.u", "gyro.drift", "table.angle")

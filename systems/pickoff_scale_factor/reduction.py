@@ -52,7 +52,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     Setup,
-    Source,
     told,
     truth_of,
     window_problems,
@@ -62,17 +61,12 @@ from gyrobench.units import ARCSEC, DPH
 
 from .levels import Levels
 from .refusals import drift_problems, record_problems
+from .sources import DRIFT, GAIN, SCALE
 
 ARCMIN = units.factor("arcmin")
 SMALL = 1e-5  # rad, step of the sensitivities to the angle readings
 NEGLIGIBLE = 0.3  # of what white noise leaves in the mean drift of a test
 TOLD_APART = 0.9  # largest correlation of angle and time at which the drift is estimated
-GAIN = Source("float.gain", "gain H/C", "1", "u_gain", "relative")
-SCALE = Source("angle.scale", "angle scale of the table", "1", "u_angle", "relative")
-DRIFT = Source(
-    "drift.bound", "drift during the test", "rad/s",
-    note="not told from the slope by angles gone over once; bound taken as two standard uncertainties",
-)  # fmt: skip
 SHORT = (
     "It is the mean of this test alone, with the random drift of these seconds in it; open_loop_drift, fixed_position "
     "or a servo test tell the drift of the gyro."
@@ -81,21 +75,14 @@ SHORT = (
 
 @dataclass(frozen=True)
 class PickoffSetup(Setup):
-    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).  u_gain,
-    u_angle, u_voltage: relative.  channel: of a two-degree-of-freedom gyro, x or y; its gain is 1.
+    """gain: H/C.  drift: largest to be expected, rad/s.  truth: S (V/rad), K_sg (V/rad), drift (rad/s).
+    channel: of a two-degree-of-freedom gyro, x or y; its gain is 1.
     """
 
     gain: float
     drift: float
     channel: str = ""
     earth_rate: float = frames.EARTH_RATE
-    u_gain: float = 0.0
-    u_angle: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_voltage: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
 
 
 def float_angle(angle: Array, gain: float, channel: str = "") -> Array:

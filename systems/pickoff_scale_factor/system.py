@@ -16,6 +16,7 @@ from gyrobench.system.families.table_test import FACE, OpenLoopTest
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option
 
+from . import sources
 from .measured import MEASURED
 from .refusals import drift_problems, points_problems, range_problems
 
@@ -50,11 +51,10 @@ class PickoffScaleFactor(ChannelTest, OpenLoopTest):
             "gain": Option(
                 0.0, "1", "angle of the float per angle of the case, H/C; 0: from the gyro's parameters", 0.0
             ),
-            "u_gain": Option(0.0, "1", "relative standard uncertainty of that gain", 0.0),
-            "u_angle": Option(0.0, "1", "relative standard uncertainty of the angle scale of the table", 0.0),
-            "u_voltage": Option(0.0, "1", "relative standard uncertainty of the voltmeter", 0.0),
         }
         | type_b(
+            sources,
+            "voltage",
             "angle1",
             "angle2",
             axis="standard uncertainty of the right angle between table axis and pole",

@@ -118,6 +118,11 @@ class PlatformAlignment(System):
     shown = ("platform.theta", "controller.tilt", "controller.heading", "controller.sigma", "controller.mode",
              "controller.status controller.ready")  # fmt: skip
     channel_period = 1.0
+    bodies = """
+        roll gimbal: y platform.theta[2]
+        pitch gimbal: roll gimbal, x platform.theta[1]
+        inner element: pitch gimbal, z platform.theta[3]
+    """
 
     def set(self, name: str, value: Any) -> None:
         """Set an option; a moving base puts its ground into the slot site, and its tilt into the record."""

@@ -102,6 +102,13 @@ class PlatformFollowing(TwoGyroTest):
         "platform.saturated",
     )
 
+    bodies = """
+        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        outer gimbal: base, outer platform
+        middle gimbal: outer gimbal, middle platform
+        inner element: middle gimbal, z platform.theta[3]
+    """
+
     def phases(self) -> list[LoopPhase]:
         return [LoopPhase("follow", "hold", settle=max(10.0, 2 * self.wait), dwell=self["time"])]
 

@@ -44,13 +44,22 @@ class PlatformFourGimbalSystem(TwoGyroTest):
     }
     channels = (
         *three("platform.attitude"), "platform.theta_4", *three("platform.theta"), "exciter.phase", "exciter.gate",
-        *three("exciter.torque", "exciter.test", "motion.omega", "platform.theta_dot"), "platform.theta_4_dot",
+        *three("exciter.torque", "exciter.test", "motion.omega", "motion.angle", "platform.theta_dot"),
+        "platform.theta_4_dot",
         "platform.lock", "pitch.e", "roll.e", "azimuth.e",
     )  # fmt: skip
     shown = (
         "platform.attitude", "platform.theta platform.theta_4", "platform.theta_dot platform.theta_4_dot",
         "motion.omega", "pitch.e roll.e azimuth.e", "platform.lock gyro_a.saturated gyro_b.saturated",
     )  # fmt: skip
+
+    bodies = """
+        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        fourth gimbal: base, y platform.theta_4
+        pitch gimbal: fourth gimbal, x platform.theta[1]
+        inner roll gimbal: pitch gimbal, y platform.theta[2]
+        inner element: inner roll gimbal, z platform.theta[3]
+    """
 
     def flown(self) -> Any:
         return FLIGHTS.get(self["flight"], FLIGHTS["crossing"])

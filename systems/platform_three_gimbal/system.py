@@ -62,13 +62,20 @@ class PlatformThreeGimbal(TwoGyroTest):
     channels = (
         *three("platform.attitude", "platform.theta"), "exciter.phase", "exciter.gate",
         *three("exciter.torque", "exciter.test"), "exciter.command[3]",
-        *three("motion.omega", "platform.theta_dot"), "platform.lock", "pitch.e", "roll.e", "azimuth.e",
+        *three("motion.omega", "motion.angle", "platform.theta_dot"), "platform.lock", "pitch.e", "roll.e", "azimuth.e",
         "gyro_a.u_y", "gyro_b.u_x", "gyro_a.drift_x", "gyro_a.drift_y", "gyro_b.drift_x", "gyro_b.drift_y",
     )  # fmt: skip
     shown = (
         "platform.attitude", "platform.theta", "platform.theta_dot", "motion.omega", "pitch.e roll.e azimuth.e",
         "platform.lock gyro_a.saturated gyro_b.saturated",
     )  # fmt: skip
+
+    bodies = """
+        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        outer gimbal: base, outer platform
+        middle gimbal: outer gimbal, middle platform
+        inner element: middle gimbal, z platform.theta[3]
+    """
 
     def legs(self) -> list[Leg]:
         """Return the flight and the way back; whole steps, so that the angles are exact."""

@@ -41,7 +41,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
-    Source,
     Table,
     attitude_of,
     number,
@@ -51,12 +50,13 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import ARCSEC, DPH
 
+from .sources import PICKOFF
+
 COLUMNS = ("t_start", "t_end", "mean_x", "mean_y", "u_x", "u_y")
 OTHER = {"x": "y", "y": "x"}
 LEAST = 9  # readings
 SHARE = 0.1  # of the accuracy that the springs may take
 SMALL = 1e-5  # rad
-PICKOFF = Source("pickoff.gain", "gain of the pickoffs", "1", "u_pickoff", "relative, of both alike")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,10 +71,6 @@ class PositionSetup(SiteSetup):
     accuracy: float
     K_p: Mapping[str, float] = field(default_factory=dict)
     K_i: Mapping[str, float] = field(default_factory=dict)
-    u_attitude: float = 0.0
-    u_scale_factor: float = 0.0
-    u_current: float = 0.0
-    u_pickoff: float = 0.0
 
     @property
     def earth(self) -> Array:

@@ -16,6 +16,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 
+from . import sources
 from .measured import MEASURED
 
 FACE = "service attitude"
@@ -96,8 +97,7 @@ class PositionSensitivity(TwoChannelTest):
         | {f"K_sg_{a}": Option(0.0, "V/rad", f"gain of the {a} pickoff; 0: that of the gyro", 0.0) for a in "xy"}
         | NUISANCES
         | CORRECTIONS
-        | {"u_pickoff": Option(0.0, "1", "relative standard uncertainty of the pickoff gains", 0.0)}
-        | type_b("attitude", "scale_factor", "current")
+        | type_b(sources, "attitude", "scale_factor", "current")
     )
     measured_data = MEASURED
     windows = Windows(

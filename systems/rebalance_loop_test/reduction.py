@@ -49,7 +49,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
-    Source,
     Table,
     number,
     told,
@@ -59,12 +58,12 @@ from gyrobench.system.families.table_test import FACE, ON_TABLE
 from gyrobench.units import ARCSEC, DPH
 
 from .measured import REST, TURNING
+from .sources import DRIFT_RATE
 from .truth import true_values
 
 MA, UA = 1e-3, 1e-6  # A
 NO_QUANTUM = 1e-10  # A, below this readings are not quantized but rounded
 LEVEL = np.eye(3)  # table axes in (E, N, U)
-DRIFT_RATE = Source("gyro.drift_rate", "drift rate of the gyro", "rad/s", "u_drift")
 NO_STD = (
     "The record has no standard deviation of the samples (column std): |x|, x² and x³ are taken at the mean of each "
     "reading. Where the current of the samples changes its sign within a reading, I_0 is off by up to 0.8 κ_± times "
@@ -94,15 +93,6 @@ class RebalanceLoopSetup(SiteSetup):
     limit: float = 0.0
     has_small: bool = False
     pulses: Pulses | None = None
-    u_drift: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
-    u_wobble: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_scale_factor: float = 0.0
-    u_current: float = 0.0
-    u_time: float = 0.0
 
     @property
     def full(self) -> float:

@@ -16,6 +16,7 @@ from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, Windows
 from gyrobench.units import DPH
 
+from . import sources
 from .measured import MEASURED
 
 FLOAT = "float"  # the sampler of the float angle
@@ -52,8 +53,8 @@ class RebalanceLoopTest(RebalanceTest):
         | TORQUER
         | NUISANCES
         | CORRECTIONS
-        | {"u_drift": Option(0.0, "rad/s", "standard uncertainty of the drift rate of the gyro", 0.0)}
         | type_b(
+            sources,
             "mount",
             "wobble",
             "angle1",

@@ -37,7 +37,6 @@ from gyrobench.reduction.toolkit import (
     Record,
     Regression,
     Setup,
-    Source,
     Table,
     told,
     window_problems,
@@ -47,14 +46,11 @@ from gyrobench.units import DEG
 
 from . import mistakes
 from .closed import ScullingMotion, UnitErrors, VelocityChain, reading
+from .sources import ANGLE, PHASE, VIBRATION
 
 COLUMNS = ("t_start", "t_end", "frequency", "angle", "vibration", "acceleration")
 LEAST = 2  # readings at rest, and in each motion
 UG = 1e-6 * G0
-ANGLE = Source("table.angle_gain", "amplitude of the angle", "1", "u_angle", "relative, positive where it is larger")
-VIBRATION = Source("table.force_gain", "amplitude of the vibration", "1", "u_vibration",
-                   "relative, positive where it is larger")  # fmt: skip
-PHASE = Source("table.phase_error", "phase of the vibration against the angle", "rad", "u_phase")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,10 +59,6 @@ class ScullingSetup(Setup):
 
     chain: VelocityChain
     nuisances: bool = True
-    u_time: float = 0.0
-    u_angle: float = 0.0
-    u_vibration: float = 0.0
-    u_phase: float = 0.0
 
 
 @dataclass(frozen=True)

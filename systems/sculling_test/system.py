@@ -23,6 +23,7 @@ from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, Windows
 
+from . import sources
 from .measured import MEASURED
 
 FORCES = "specific force that the accelerometers x, y, z read"
@@ -107,12 +108,7 @@ class ScullingTest(StrapdownMotion):
         | GONE_THROUGH
         | NUISANCES
         | CORRECTIONS
-        | type_b("time")
-        | {
-            "u_angle": Option(0.0, "1", "relative standard uncertainty of the amplitude of the angle", 0.0),
-            "u_vibration": Option(0.0, "1", "relative standard uncertainty of that of the vibration", 0.0),
-            "u_phase": Option(0.0, "rad", "standard uncertainty of the phase between both", 0.0),
-        }
+        | type_b("time", sources)
     )  # fmt: skip
     noises = tuple(f"imu.{a}_{n}" for a in AXES for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     measured_data = MEASURED

@@ -67,8 +67,6 @@ class TwoAxisServoSetup(HeldSetup):
     gains: Mapping[str, float] = field(default_factory=dict)
     levelled: bool = False
     torquers: Mapping[str, float] = field(default_factory=dict)
-    u_square: float = 0.0
-    u_current: float = 0.0
 
     def names(self, channel: str) -> tuple[str, ...]:
         """Return the coefficients of a channel."""

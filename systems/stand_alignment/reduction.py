@@ -21,9 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gyrobench.component.set_up import SINES
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.sources import LATITUDE, RELATIVE, Source
 from gyrobench.reduction.toolkit import (
     Account,
     Coefficient,
@@ -42,6 +40,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCSEC, DEG, EARTH_RATE
 
 from . import polaris
+from .sources import CIRCLE, CLOCK, HEADING, LATITUDE, LEANING, LEVEL, NORMAL, PLACE
 
 STAR, MIRROR, AXIS, HEAD = 1, 2, 3, 4
 NAMES = {STAR: "star", MIRROR: "mirror", AXIS: "axis", HEAD: "head"}
@@ -56,15 +55,6 @@ FITTED = {
 }
 LARGE = 120.0 * ARCSEC  # of the theodolite's errors, whose square is 0.07 arcsec
 ZERO = "circle zero"  # what is fitted of it counts from a first value
-CLOCK = Source("clock", "clock", "s", "u_time", "positive where it is fast")
-PLACE = Source("star.place", "place of the star", "rad", "u_star", "each way", ("declination", "hour angle"))
-HEADING = Source("head.heading", "heading of the north finder", "rad", "u_heading", "positive where it is too large")
-LEVEL = Source(
-    "level.scale", "scale of the plate level", RELATIVE, "u_level", "relative, positive where it reads too much"
-)
-CIRCLE = Source("circle.once", "circle, once a turn", "rad", "u_circle", "reads too much", SINES)
-NORMAL = Source("mirror.normal", "mirror against the axis", "rad", "u_mirror", "in azimuth, to the east")
-LEANING = Source("inclinometer", "inclinometer", "rad", "u_inclinometer", "what turning it round does not show")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +67,6 @@ class AlignmentSetup(Setup):
     ut1_utc: float = 0.0
     air: tuple[float, float] = (101325.0, 283.15)
     heading: float = 0.0
-    u_heading: float = 0.0
-    u_time: float = 0.0
-    u_latitude: float = 0.0
-    u_star: float = 0.0
-    u_level: float = 0.0
-    u_circle: float = 0.0
-    u_mirror: float = 0.0
-    u_inclinometer: float = 0.0
 
 
 class Reduction(DriftReduction[AlignmentSetup]):

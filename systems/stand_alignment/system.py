@@ -10,14 +10,14 @@ import numpy as np
 
 from gyrobench.result import Result
 from gyrobench.system.connectors import Socket, inp, out
-from gyrobench.system.families.option_groups import CORRECTIONS
+from gyrobench.system.families.option_groups import CORRECTIONS, type_b
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.units import DEG
 
-from . import polaris
+from . import polaris, sources
 from .measured import MEASURED
 
 STAR, MIRROR, AXIS, HEAD = 1.0, 2.0, 3.0, 4.0
@@ -87,16 +87,7 @@ class StandAlignment(System):
         "sets": Option(6, int, "sets of mirror, star, star, mirror and both inclinometer readings", 2, 16),
         "settle": Option("60s", "s", "time to turn and to point", 1.0),
         "dwell": Option("20s", "s", "time of a sight", 1.0),
-    } | CORRECTIONS | {
-        "u_time": Option(0.0, "s", "standard uncertainty of the clock", 0.0),
-        "u_latitude": Option(0.0, "rad", "standard uncertainty of the latitude, deflection of the vertical in it", 0.0),
-        "u_star": Option(0.0, "rad", "standard uncertainty of the place of Polaris, each way", 0.0),
-        "u_heading": Option(0.0, "rad", "standard uncertainty of the heading of the north finder's mirror", 0.0),
-        "u_level": Option(0.0, "1", "relative standard uncertainty of the scale of the plate level", 0.0),
-        "u_circle": Option(0.0, "rad", "error of the circle once a turn, std. unc. of its amplitude", 0.0),
-        "u_mirror": Option(0.0, "rad", "std. unc. of the mirror's normal against the axis, in azimuth", 0.0),
-        "u_inclinometer": Option(0.0, "rad", "std. unc. of the inclinometer that turning does not show", 0.0),
-    }  # fmt: skip
+    } | CORRECTIONS | type_b(sources)  # fmt: skip
     takes: ClassVar[Mapping[str, Any]] = {"north_finder": heading_of}
     measured_data = MEASURED
     noises = ("theodolite.pointing", "theodolite.bubble")

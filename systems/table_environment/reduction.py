@@ -78,10 +78,6 @@ class EnvironmentSetup(SiteSetup):
     k: float
     options: Mapping[str, Any]
     seed: int
-    u_mount: float = 0.0
-    u_scale_factor: float = 0.0
-    u_current: float = 0.0
-    u_scales: float = 0.0
 
 
 class Reduction(DriftReduction[EnvironmentSetup]):

@@ -25,17 +25,15 @@ from scipy.interpolate import CubicSpline
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.setup.setups import SiteSetup
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, RELATIVE, TORQUER_SCALE, TURNED, Effect, Source
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, TORQUER_SCALE, TURNED, Effect
 
-RECORDED = Source(
-    "recorded.{cause}.scale", "scale of the {words}", RELATIVE, "u_scales", "relative, what is recorded"
-)  # fmt: skip
+from .sources import RECORDED
 
 
 def effects(
     found: Findings, windows: Mapping[str, Array], s: SiteSetup, k: float, causes: Sequence[str]
 ) -> list[Effect]:
-    """Return all sources; s: with u_mount (rad), u_scale_factor (1), u_current (A), u_scales (1).
+    """Return all sources.
 
     k: torquer scale factor, rad/s/A.  causes: names of the recorded columns, in the order of the columns of the fit,
     which follow its constant.

@@ -15,7 +15,7 @@ from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.units import ARCSEC, G0
 
-from . import budgets, isolation
+from . import budgets, isolation, sources
 from .budgets import ERU
 
 ATTITUDE = "E U"  # input axis east, output axis up, spin axis south
@@ -97,9 +97,8 @@ class TableEnvironment(RebalanceTest):
         | TORQUER
         | NUISANCES
         | CORRECTIONS
-        | type_b("mount", "scale_factor", "current")
+        | type_b("mount", "scale_factor", "current", sources)
         | {
-            "u_scales": Option(0.0, "1", "relative standard uncertainty of the scale of each recorded cause", 0.0),
             "u_tilt": Option("0.6arcsec", "rad", "surroundings of the later tests: tilt", 0.0),
             "u_rate": Option("2e-5arcsec/s", "rad/s", "rate of tilting", 0.0),
             "u_temperature": Option("10mK", "K", "mean temperature", 0.0),

@@ -30,18 +30,17 @@ from gyrobench.result import BudgetLine, Reason, Response, Table
 
 from .axis_as_data import SampledLoopError, margins_table
 from .closed_form import SampledLoop
+from .sources import COUNTS, CYCLE, NOISE, ONCE, TWICE
 
 PPM = 1e-6
 SHOWN = 1500  # intervals of a drawn line
 RAMP = 0.6  # s of a change of rate that is drawn
-COUNTS = Source("reader.counts", "quantization of the counts", "rad")
-NOISE = Source("reader.noise", "noise of a reading beyond its rounding", "rad", "u_reading")
 BEYOND = 1e-3  # p of a scatter that rounding does not explain
 #: errors of the readings by cycles a turn, u of their amplitudes; the last: twice in a cycle of the scale
 SCALE = (
-    (1.0, Source("reader.once", "readings, once a turn", "rad", "u_angle1")),
-    (2.0, Source("reader.twice", "readings, twice a turn", "rad", "u_angle2")),
-    (None, Source("reader.cycle", "readings, within a cycle of the scale", "rad", "u_cycle")),
+    (1.0, ONCE),
+    (2.0, TWICE),
+    (None, CYCLE),
 )
 READOUTS = (
     "Relative errors of the rate by counts over the whole phase, by the last gate and by the last interval of the "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import FACE, ON_TABLE, sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -14,6 +14,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.units import ARCSEC
 
+from . import sources
 from .axis_as_data import SampledLoopError, plant_of
 from .closed_form import SampledLoop
 from .measured import MEASURED
@@ -78,10 +79,7 @@ class TableRateTest(System):
         "feedforward": Option(1.0, "1", "share of the inertia that is fed forward; 0: none", 0.0, 2.0),
         "settle": Option(2.0, "s", "wait after each change of rate", 0.0),
         "windows": Option(10, int, "windows at each rate", 2, 1000),
-        "u_angle1": Option(0.3 * ARCSEC, "rad", "error of the readings once a turn, std. unc. of its amplitude", 0.0),
-        "u_angle2": Option(0.15 * ARCSEC, "rad", "error of the readings twice a turn, std. unc. of its amplitude", 0.0),
-        "u_cycle": Option(0.1 * ARCSEC, "rad", "error twice in a cycle of the scale, std. unc. of its amplitude", 0.0),
-        "u_reading": Option(0.0, "rad", "noise of a reading beyond its rounding, standard uncertainty", 0.0),
+        **type_b(sources),
         "plant": Option("", str, "angle per torque of the real axis: 'num | den | delay' or a table of its response"),
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }

@@ -127,7 +127,9 @@ class TableSupervision(System):
         "supervisor.tripped",
         "supervisor.mode",
         "faults.pressure",
+        "table.angle",
     )
+    bodies = "table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle"
     shown = ("table.rate", "monitor.alarm supervisor.tripped", "monitor.outside", "faults.pressure")
     channel_period = 0.05
     step = 5e-4

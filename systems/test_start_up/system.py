@@ -157,6 +157,10 @@ class TestStartUp(System):
         "program.state", "program.reason", "heater.temperature", "stand.wheel_speed", "stand.wheel_current",
         "stand.u_out", "program.i", "table.angle",
     )  # fmt: skip
+    bodies = """
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        instrument: table
+    """
     shown = (
         "program.state", "heater.temperature", "stand.wheel_speed", "stand.wheel_current", "stand.u_out", "program.i",
         "table.angle",

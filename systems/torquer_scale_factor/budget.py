@@ -32,12 +32,9 @@ from gyrobench.reduction.setup.sources import (
     INPUT_TO_SPIN,
     TIME_BASE,
     Effect,
-    Source,
 )
 
-AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")
-RANGES = Source("torquer.range_step", "step of K_n between the angle ranges", "rad/s/A")
-ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
+from .sources import AMMETER, ZERO
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +45,6 @@ class TorquerSetup(Setup):
 
     channel: str = ""
     earth_rate: float = frames.EARTH_RATE
-    u_current: float = 0.0
-    u_zero: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
-    u_time: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:

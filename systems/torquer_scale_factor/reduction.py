@@ -34,6 +34,7 @@ from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, chan
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
+    Account,
     Array,
     Coefficient,
     DriftTestResult,
@@ -48,10 +49,11 @@ from gyrobench.result import BudgetLine, Series, Test
 from gyrobench.system.families.servo_channel import OTHER, own_name
 
 from . import marks, row_checks
-from .budget import AMMETER, RANGES, TorquerSetup
+from .budget import TorquerSetup
 from .estimates import DPH, KU, UNIT, of_table, of_windows
 from .precession import Precession, precession
 from .row_checks import MA
+from .sources import AMMETER, RANGES
 
 RANDOM = "random drift, angle readings and current, with the linearity error"
 COMPUTED = "Both senses have equal rates in every row: computed, not measured; the drift is then no finding."
@@ -128,7 +130,7 @@ class Reduction:
         s, number = self.setup, self.e.numbers[j]
         value, u_a, dof = number[0] * size, number[1] * size, number[2]
         half_a = float(special.stdtrit(min(dof, 1e9), 0.975)) * u_a
-        b = [abs(value) * s.u_current, abs(value) * s.u_time] if unit == UNIT else []
+        b = [abs(value) * AMMETER.size(s), abs(value) * TIME_BASE.size(s)] if unit == UNIT else []
         b = [*b, self.e.of_step[j] * size]
         if self.e.reported:
             b = (np.vstack([np.zeros((1, 6)), *self.by_source])[:, j] * size).tolist()
@@ -151,7 +153,7 @@ class Reduction:
         seen = p is not None and p < 0.05
         text = "the scale factor depends on the current" if seen else "no curvature beyond the scatter"
         noise = "Noise of K_n is proportional to 1/angle range (constant error of the angle marks)."
-        return DriftTestResult(
+        account = Account(
             method="Servo-table rates with both senses of each current over the same angle range [TEST-TORQUER]",
             sources=["TEST-TORQUER, SF-APP1, LIN-TABLE; Hu 1981, eq. A3-1..A3-6, corrected by E48, E49"],
             equation="K_n = (dot(theta)_+ + dot(theta)_-) / (2 abs(i_n)), quad K = 1/N sum K_n",
@@ -164,16 +166,23 @@ class Reduction:
                 if self.fit is None
                 else "Noise, white, Gauss-Markov and of the angle readings, estimated from all windows together.",
             ],
+        )
+        numbers: dict[str, Any] = {
+            "series": [self._series()],
+            "correlation": regression.correlation(covariance).tolist(),
+            "condition": regression.examine(curve, ("K_1", "K_3")).condition,
+            "rank": 2,
+            "dof": float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
+            "noise": self._noise(),
+            "tests": [Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
+            "residual_std": e.scatter / KU,
+            "residual_unit": UNIT,
+        }
+        return DriftTestResult(
+            **account.statements(),
+            **numbers,
+            **self.setup.stated(),
             coefficients=coefficients,
-            series=[self._series()],
-            correlation=regression.correlation(covariance).tolist(),
-            condition=regression.examine(curve, ("K_1", "K_3")).condition,
-            rank=2,
-            dof=float(n - 2 if self.fit is None else self.fit.est.mixture.dof),
-            noise=self._noise(),
-            tests=[Test("cubic", "cubic term", F, p, "curvature of the torquer", text)],
-            residual_std=e.scatter / KU,
-            residual_unit=UNIT,
             budget=self._budget(),
             type_b=changes_by_source(e.reported, self.sources, self.by_source) if e.reported else [],
             tables=self._tables(),
@@ -184,9 +193,7 @@ class Reduction:
                 f"Largest departure from it, at {i[e.worst_at] / MA:g} mA: {{linearity}}.",
                 "Drift along the axis {drift}.",
             ),
-            instrument=self.setup.instrument,
             simulated=self.setup.truth is not None,
-            site=self.setup.shown,
         )
 
     def _torquer(self) -> list[str]:

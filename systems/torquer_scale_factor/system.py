@@ -15,6 +15,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import OnRequest, Option, Slot
 
+from . import sources
 from .measured import MEASURED
 
 CAPTURE = "capture, no current"
@@ -59,10 +60,9 @@ class TorquerScaleFactor(ChannelTest, TableTest):
             "k": Option("17.2deg/h/mA", "rad/s/A", "scale factor expected, for the times of the plan", 0.0),
             "slew": Option(0.1, "A/s", "rate at which the current is changed", 0.0, sets="source.slew"),
             "windows": Option(20, int, "readings of the angle over each range", 5, 500),
-            "u_current": Option(0.0, "1", "relative standard uncertainty of the ammeter", 0.0),
-            "u_zero": Option(0.0, "A", "standard uncertainty of the zero of the ammeter", 0.0),
         }
         | type_b(
+            sources,
             "angle1",
             "angle2",
             "time",

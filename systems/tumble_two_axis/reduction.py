@@ -56,10 +56,6 @@ class TwoAxisSetup(OneLoopSetup):
     n: int = 1
     harmonic: bool = False
     path: bool = True
-    u_square: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_wobble: float = 0.0
 
 
 class Reduction(RestTest[TwoAxisSetup]):

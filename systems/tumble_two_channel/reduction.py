@@ -61,8 +61,6 @@ class TwoChannelSetup(TurningSetup):
     model: str = "nine"
     quantum: Mapping[str, float] = field(default_factory=dict)
     pulses: Mapping[str, Pulses | None] = field(default_factory=dict)
-    u_pulse: float = 0.0
-    u_switching: float = 0.0
 
 
 class TumbleChannel(TurningTest[TwoChannelSetup]):

@@ -1,10 +1,11 @@
 """Warm-ups that a record allows: sizes and time constants by chance, an exponential that is hardly seen among them.
 
-    p(tau, A, s | y) ~ exp(-|y - sum A m(tau)|2/2 sigma2) p(A_q | s)        A_q by chance of rms s, ln s and ln tau even
+    p(tau, A | y) ~ exp(-|y - sum A m(tau)|2/2 sigma2) p(A_q)        A_q by chance of the size found, ln tau even
 
-Where one exponential was found, a second of the size s may be there, from what the record can hardly see to that of the
-first: intervals of a fit without it are too narrow, and whether it is there is not known to the fit.  Sizes go out of
-the posterior in closed form; ln tau and ln s are drawn by differential evolution (Braak 2006).
+Where one exponential was found, a second of its size may be there: intervals of a fit without it are too narrow, and
+whether it is there is not known to the fit.  A size that is itself by chance, small ones as likely as large ones,
+favours a record of one: of two exponentials taken for one it held sizes and times in 0.87 to 0.90.  Sizes go out of
+the posterior in closed form; ln tau is drawn by differential evolution (Braak 2006).
 """
 
 from __future__ import annotations
@@ -22,30 +23,26 @@ WALKERS, ROUNDS, KEPT = 100, 100, 25
 
 
 class Posterior:
-    """of: kinds of the exponentials, the first of kind 0; doubtful: the last of them may be of any size in smaller."""
+    """of: kinds of the exponentials, the first of kind 0; doubtful: rms of the size of the last of them by chance."""
 
-    def __init__(self, curves: Curves, of: Sequence[int], variance: float, smaller: tuple[float, float] | None) -> None:
+    def __init__(self, curves: Curves, of: Sequence[int], variance: float, doubtful: float | None) -> None:
         self.curves, self.of, self.variance = curves, list(of), variance
-        self.q, self.smaller = len(self.of), smaller
-        doubt = smaller is not None
-        self.low = np.full(self.q + doubt, curves.low)
-        self.high = np.full(self.q + doubt, curves.high)
-        if smaller is not None:
-            self.low[self.q - 1] = curves.first  # faster ones are over before the record sees them
-            self.low[-1], self.high[-1] = np.log(smaller)
+        self.q, self.doubtful = len(self.of), doubtful
+        self.low, self.high = np.full(self.q, curves.low), np.full(self.q, curves.high)
+        if doubtful is not None:
+            self.low[-1] = curves.first  # faster ones are over before the record sees them
 
     def of_sizes(self, at: Array) -> tuple[Array, Array, Array]:
-        """Return ln of the density (w,) at (w, d) but for a constant; mean (w, q) and precision (w, q, q) of sizes."""
-        A = self.curves.at(at[:, : self.q], self.of)
+        """Return ln of the density (w,) at (w, q) but for a constant; mean (w, q) and precision (w, q, q) of sizes."""
+        A = self.curves.at(at, self.of)
         P = np.swapaxes(A, 1, 2) @ A / self.variance
         b = np.einsum("wdq,d->wq", A, self.curves.y) / self.variance
         size = np.sqrt(np.maximum(np.einsum("wqq->wq", P), 1e-300))
-        known = self.q - (self.smaller is not None)
+        known = self.q - (self.doubtful is not None)
         R = P / (size[:, :, None] * size[:, None, :]) + 1e-10 * np.eye(self.q)
         flat = 0.5 * np.linalg.slogdet(R[:, :known, :known])[1] + np.sum(np.log(size[:, :known]), axis=1)
-        if self.smaller is not None:
-            R[:, -1, -1] += np.exp(-2.0 * at[:, -1]) / size[:, -1] ** 2
-            flat -= at[:, -1]
+        if self.doubtful is not None:
+            R[:, -1, -1] += 1.0 / (self.doubtful * size[:, -1]) ** 2
         mean = np.linalg.solve(R, (b / size)[..., None])[..., 0]
         log = (
             0.5 * np.sum(mean * b / size, axis=1) - 0.5 * np.linalg.slogdet(R)[1] - np.sum(np.log(size), axis=1) + flat
@@ -81,7 +78,7 @@ class Posterior:
         _, mean, P = self.of_sizes(at)
         L = np.linalg.cholesky(P)
         z = rng.normal(size=(*mean.shape, 1))
-        size, log_tau = mean + np.linalg.solve(np.swapaxes(L, 1, 2), z)[..., 0], at[:, : self.q]
+        size, log_tau = mean + np.linalg.solve(np.swapaxes(L, 1, 2), z)[..., 0], at
         c = self.curves
         level = c.level + math.sqrt(self.variance * c.level_variance) * rng.normal(size=len(at))
         for j, k in enumerate(self.of):

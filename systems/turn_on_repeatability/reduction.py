@@ -14,7 +14,7 @@ Not modelled: a warm-up that differs from turn-on to turn-on, biases that depend
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +50,7 @@ from .warming import Kind, Warming, fitted, means
 
 CONDITION = 1e6  # exponentials that are hardly two were left out by then
 FEW = 4  # readings of a turn-on from which on a warm-up is looked for
-COMPARABLE = 0.5  # size of the smaller of two exponentials over that of the larger
+MEANT = "time constant of the warm-up: after it 1/e is left"
 SECONDS = "s"
 ENDLESS = "longer than the record tells"
 HIDDEN = "Intervals of the warm-up allow for a second exponential that the record does not exclude."
@@ -160,7 +160,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
             wanted.append(
                 Quantity.of(name, f"bias at the turn-on, less that when warm{word}", "deg/h", truth.get(name))
             )
-            wanted.append(Quantity(tau, f"time constant of the warm-up{word}", SECONDS, 1.0, truth.get(tau)))
+            meaning = f"time constant of the warm-up{word}" if word else MEANT
+            wanted.append(Quantity(tau, meaning, SECONDS, 1.0, truth.get(tau)))
         if e:
             wanted.append(Quantity.of("E", "scale factor at the turn-on, less that when warm", "ppm", truth.get("E")))
             wanted.append(Quantity("τ_E", "time constant of the scale factor", SECONDS, 1.0, truth.get("τ_E")))
@@ -216,17 +217,15 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
     def _time(self, truth: float | None) -> Coefficient | None:
         """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""
-        q, longest = self.tau.size, 20.0 * float(np.max(self.since))
+        q, longest = self.tau.size, self._longest()
         meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
         if not q:
             return None
-        value, e, (size, tau, _) = self.found.value, self.tau_E.size, self.drawn
+        value = self.found.value
         own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
             self.setup.limit, longest
         )
-        times = np.sort([
-            Warming(size[k, e:], tau[k, e:]).time_until(self.setup.limit, longest) for k in range(0, len(size), 4)
-        ])  # fmt: skip
+        times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t)))
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
         if self.endless or not math.isfinite(own):
             return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
@@ -234,6 +233,14 @@ class Reduction(DriftReduction[TurnOnSetup]):
         low, high = min(low, own), max(high, own)
         u = (high - low) / (2.0 * NORMAL)
         return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
+
+    def _longest(self) -> float:
+        return 20.0 * float(np.max(self.since))
+
+    def _of_each(self, figure: Callable[[Warming, float], float]) -> Array:
+        """Return a figure of every fourth of the warm-ups of the bias that the record allows."""
+        e, (size, tau, _) = self.tau_E.size, self.drawn
+        return np.array([figure(Warming(size[k, e:], tau[k, e:]), self._longest()) for k in range(0, len(size), 4)])
 
     def _draws(self) -> tuple[Array, Array, Array]:
         """Return sizes (m, e + q) and time constants of warm-ups that the record allows, those of the scale factor
@@ -253,12 +260,11 @@ class Reduction(DriftReduction[TurnOnSetup]):
         amplitude, u_tau = white[n : n + q + e], white[n + q + e : n + 2 * (q + e)]
         ratio = np.concatenate([reported[0::2] / amplitude, reported[1::2] / value[1::2] / u_tau])
         factor = max(1.0, float(np.max(ratio)))
-        smaller = None
+        doubtful = None
         if q and self.setup.exponentials < 0:
-            largest = float(np.max(np.abs(value[0 : 2 * q : 2])))
-            smaller = (min(factor * float(np.min(amplitude[:q])), 0.5 * largest), largest)
-        of = [1] * e + [0] * (2 if smaller else q)
-        posterior = Posterior(self.choice.curves, of, factor**2 * variance, smaller)
+            doubtful = float(np.max(np.abs(value[0 : 2 * q : 2])))
+        of = [1] * e + [0] * (2 if doubtful else q)
+        posterior = Posterior(self.choice.curves, of, factor**2 * variance, doubtful)
         start, order = np.log(np.concatenate([self.tau_E, self.tau])), np.r_[q : q + e, :q]
         drawn, log_tau, level = posterior.drawn(start, np.minimum(factor * u_tau[order], 0.5))
         return drawn, np.exp(log_tau), level
@@ -285,18 +291,15 @@ class Reduction(DriftReduction[TurnOnSetup]):
             order = np.argsort(tau if q > 1 else -np.abs(size), axis=1)
             size, tau = (np.take_along_axis(x, order, axis=1) for x in (size, tau))
         unit = next(x.scale for x in self.found.quantities if x.name == c.name)
-        tail = 0.025
         if name == "b":
             sample = level
         elif name == "τ":
             sample = tau[:, k]
             if q == 1 and size.shape[1] == 2 and number != "E":
-                least = np.min(np.abs(size), axis=1) / np.max(np.abs(size), axis=1)
-                if np.quantile(least, 0.95) > COMPARABLE:  # which is the larger is not known: either
-                    sample, tail = tau.ravel(), 0.5 * tail
+                sample = self._of_each(Warming.time_constant)
         else:
             sample = size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
-        low, high = (float(v) / unit for v in np.quantile(sample, (tail, 1.0 - tail)))
+        low, high = (float(v) / unit for v in np.quantile(sample, (0.025, 0.975)))
         own = c.interval
         if name == "τ":  # it was fitted in logarithms; type B below
             factor = math.exp(min(c.k * (c.u_a or c.u) / c.estimate, 20.0))

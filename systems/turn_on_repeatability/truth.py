@@ -24,7 +24,7 @@ def true_values(run: RunDocument) -> dict[str, float] | None:
     order = there[np.argsort(tau[there])]
     found: dict[str, float] = {}
     if order.size:  # what is one exponential to the record may be two
-        found |= {"A": float(size.sum()), "τ": float(tau[np.argmax(np.abs(size))])}
+        found |= {"A": float(size.sum()), "τ": Warming(size[order], tau[order]).time_constant(1e9)}
     if order.size == 2:
         for k, j in enumerate(order.tolist(), 1):
             found |= {f"A_{k}": float(size[j]), f"τ_{k}": float(tau[j])}

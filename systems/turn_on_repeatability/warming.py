@@ -53,6 +53,10 @@ class Warming:
 
         return float(optimize.brentq(at, t[k], t[k + 1]))
 
+    def time_constant(self, longest: float) -> float:
+        """Return the time after which 1/e of the beginning is left, for good: tau of one exponential, s."""
+        return self.time_until(abs(float(np.sum(self.size))) / math.e, longest)
+
 
 def means(since: Array, length: Array, tau: Array) -> Array:
     """Return (n, q) means of exp(-t/tau) over readings of this length about the times since."""

@@ -59,13 +59,18 @@ class VerticalGyroBench(LoopTest):
     noises = ("gyro.white", "gyro.white_y")
     step = 1e-2
     channels = (
-        "exciter.phase", "exciter.gate", "motion.angle[1]", "motion.angle[2]", "gyro.pitch", "gyro.roll",
-        "gyro.e_x", "gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
+        "exciter.phase", "exciter.gate", "motion.angle[1]", "motion.angle[2]", "motion.angle[3]", "gyro.pitch",
+        "gyro.roll", "gyro.e_x", "gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
     )  # fmt: skip
     shown = (
         "motion.angle", "gyro.pitch gyro.roll", "gyro.e_x gyro.e_y", "gyro.inner", "gyro.ring_angle", "erection.cut",
     )  # fmt: skip
     channel_period = 0.1
+
+    bodies = """
+        vehicle: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        as the gyro shows it: z motion.angle[3], x gyro.pitch, y gyro.roll
+    """
 
     def phases(self) -> list[LoopPhase]:
         """Return the phases asked for; before each manoeuvre (not the erection) the vehicle rests for as long."""

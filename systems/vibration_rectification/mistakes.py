@@ -9,7 +9,7 @@ import numpy as np
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
-from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
+from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
 from gyrobench.result import Coefficient, Reason
 
 FAR = 1e5  # ppm, scale factor error from which on something else than the accelerometer is meant
@@ -33,4 +33,6 @@ def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:
     """Yield why a scale factor error beyond 10 % is that of no accelerometer."""
     for c in found:
         if c.name == "S" and abs(c.estimate) > FAR:
-            yield Reason("force.factor", factor_sentence(1.0 + c.estimate * 1e-6), ("pass", "fail"), severity="doubt")
+            yield Reason(
+                "force.factor", factor_sentence(1.0 + c.estimate * 1e-6, FORCES), ("pass", "fail"), severity="doubt"
+            )

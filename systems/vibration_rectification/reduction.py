@@ -40,18 +40,17 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
-    Source,
     told,
     window_problems,
 )
 from gyrobench.units import DPH
 
 from . import mistakes
+from .sources import CONTROL
 
 GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
 LEAST = 3  # levels, rest included
-CONTROL = Source("table.control.gain", "control accelerometer", "1", "u_gain", "relative, positive where it reads more")
 UG = 1e-6 * G0
 
 
@@ -60,9 +59,6 @@ class VibrationSetup(SiteSetup):
     """axis: of the case, along the vibration."""
 
     axis: str
-    u_gain: float = 0.0
-    u_gravity: float = 0.0
-    u_latitude: float = 0.0
 
 
 class VibrationChannel(DriftReduction[VibrationSetup]):

@@ -20,6 +20,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.values import InvalidValueError
 from gyrobench.units import DPH
 
+from . import sources
 from .measured import MEASURED
 
 AXES = "xyz"
@@ -111,11 +112,7 @@ class VibrationRectification(System):
         }
         | NUISANCES
         | CORRECTIONS
-        | type_b("latitude")
-        | {
-            "u_gain": Option(0.0, "1", "relative standard uncertainty of the control accelerometer", 0.0),
-            "u_gravity": Option(0.0, "m/s2", "standard uncertainty of gravity", 0.0),
-        }
+        | type_b("latitude", sources, "gravity")
     )  # fmt: skip
     noises = ("table.control", *RATE_NOISES, "gyro.pickoff",
               *(f"accelerometers.{n}" for n in ("turn_on", "white", *(f"{a}_{m}" for a in AXES

@@ -56,7 +56,7 @@ def main() -> None:
                 errors[method].append(found.est.beta[:5] - TRUE[0])
                 spread[method].append(found.residual_std)
             if n < given.reports:
-                c = reduce(windows(U), FourSetup(gravity=G0, D1=measured, u_D1=KNOWN)).coefficients[:20]
+                c = reduce(windows(U), FourSetup(gravity=G0, D1=measured, sizes={"u_D1": KNOWN})).coefficients[:20]
                 held.append([x.interval[0] <= t <= x.interval[1] for x, t in zip(c, TRUE.ravel(), strict=True)])
         for method, e in errors.items():
             rms = 1e6 * np.sqrt(np.mean(np.array(e) ** 2, axis=0))

@@ -3,7 +3,8 @@
     python tests/benchmarks/data_sheets.py [--write] [NAME ...]
 
 Each sheet becomes a part; `drift_record` (an hour, 0.1 s), `rate_table_test`, `gyro_bandwidth` and
-`vibration_rectification` measure it, `imu_positions` with a chamber a unit of three of it; noise off where the figure
+`vibration_rectification` measure it, `imu_positions` with a chamber a unit of three of it; of its accelerometers
+`drift_record` and the unit; noise off where the figure
 is none of noise, so that a difference is one of the way from the sheet to the part and of the test.  --write: the table
 of docs/data_sheets.md anew; some minutes for all.
 """
@@ -15,8 +16,8 @@ import logging
 import math
 import re
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +27,20 @@ from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import Instrument, find_instrument, parameters, settings, with_instruments
+from gyrobench.workflow.instruments import (
+    FORCES,
+    Instrument,
+    find_instrument,
+    parameters,
+    settings,
+    with_instruments,
+)
 from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
 
 PAGE = standard_folder() / "docs" / "data_sheets.md"
 DEG = math.pi / 180.0
 ARCSEC = DPH = DEG / 3600.0
+UG = 1e-6 * G0
 NEAR = 0.05
 KINDS = ("fibre", "laser", "vibrating")
 ROOM = 0.8  # of the range, up to which the table turns
@@ -39,6 +48,10 @@ NOT_TESTED = {
     "output_rate": "sets nothing: a sample each communication step",
     "range": "the part clips there; readings beyond it are refused",
     "resolution": "steps of the word are averaged out by the noise",
+}
+NOT_OF_FORCES = {
+    "bandwidth": "no test shakes accelerometers; sculling_test takes it as its option",
+    "nonlinearity": "no test goes beyond 1 g, a small part of the range",
 }
 
 
@@ -62,31 +75,61 @@ class Row:
         return f"| {self.sheet} | {self.figure} | {self.printed} | {self.test} | {found} | {self.why} |"
 
 
+def slot_of(sheet: Instrument) -> str:
+    return FORCES if sheet.kind == FORCES else "gyro"
+
+
 class Tests:
     """Sessions of the tests by part, kept open."""
 
     def __init__(self) -> None:
         self.open: dict[tuple[str, str], Session] = {}
+        self.units: dict[str, dict[str, Any]] = {}
 
     def result(self, test: str, sheet: Instrument, options: dict[str, Any], more: dict[str, Any], quiet: bool) -> Any:
         """Return what a test finds; quiet: without noise."""
         key = (test, sheet.part)
         if key not in self.open:
-            self.open[key] = Session(test, {"gyro": sheet.part})
+            self.open[key] = Session(test, {slot_of(sheet): sheet.part})
         declared = load_part(sheet.part).declarations
         off = {n: 0.0 for n in RATE_NOISES if quiet and n.removeprefix("gyro.") in declared}
-        record = self.open[key].run({**options, **settings(sheet), **off, **more}, seed=3)
-        return load_system(test).with_values(options).reduce(record)
+        record = self.open[key].run({**options, **settings(sheet, slot_of(sheet)), **off, **more}, seed=3)
+        reading = {"reading": "force"} if sheet.kind == FORCES else {}
+        return load_system(test).with_values({**options, **reading}).reduce(record)
+
+    def unit(self, name: str) -> dict[str, Any]:
+        """Return the coefficients of a unit of a sheet at positions over temperature, without noise; once."""
+        if name not in self.units:
+            test = load_system("imu_positions")
+            test.request("chamber")
+            _, values = with_instruments(name, {}, test)
+            key = ("imu_positions", "")
+            if key not in self.open:
+                self.open[key] = Session("imu_positions", {"chamber": "thermal_chamber"})
+            options = {"nuisances": "none"}
+            record = self.open[key].run({**options, **values, **dict.fromkeys(test.noises, 0.0)}, seed=3)
+            self.units[name] = coefficients(test.with_values(options).reduce(record))
+        return self.units[name]
 
 
 def coefficients(result: Any) -> dict[str, Any]:
     return {c.name: c for c in result.coefficients}
 
 
+Test = Callable[[Tests, str, Instrument], Iterator[Row]]
+
+
 def noise(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
     """Yield random walk and bias instability, of an hour."""
-    asked = [n for n in ("angle_random_walk", "noise_density", "bias_instability") if sheet.si(n) is not None]
+    walk_name, unit_N, unit_B = ("angle_random_walk", DEG / 60.0, DPH)
+    if sheet.kind == FORCES:
+        walk_name, unit_N, unit_B = ("velocity_random_walk", 1.0 / 60.0, UG)
+    asked = [n for n in (walk_name, "noise_density", "bias_instability") if sheet.si(n) is not None]
     if not asked:
+        return
+    if sheet.density is None:
+        for figure in asked:
+            yield Row(name, figure, sheet.figures[figure].value, "", None, "the sheet states no white noise beside it")
         return
     found = coefficients(
         tests.result("drift_record", sheet, {"duration": 3600.0, "window": 0.1, "settle": 1.0}, {}, False)
@@ -95,10 +138,10 @@ def noise(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
         value = sheet.si(figure)
         assert value is not None
         if figure == "bias_instability":
-            c, expected = found["B"], value / FLOOR / DPH
+            c, expected = found["B"], value / FLOOR / unit_B
         else:
             walk = value / (math.sqrt(2.0) if figure == "noise_density" else 1.0)
-            c, expected = found["N"], walk / (DEG / 60.0)
+            c, expected = found["N"], walk / unit_N
         low, high = c.interval
         inside = low <= expected <= high
         ratio = None if c.no_value else c.estimate / expected
@@ -108,7 +151,7 @@ def noise(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
         elif abs(ratio - 1.0) > NEAR:
             spread = f"95 % {low / expected:.2f} to {high / expected:.2f} of it in an hour"
             why = spread if inside else f"{spread}: does not contain it"
-        if figure == "noise_density" and "angle_random_walk" in asked:
+        if figure == "noise_density" and walk_name in asked:
             why = "the random walk of the same sheet goes before it"
         yield Row(name, figure, sheet.figures[figure].value, "drift_record", ratio, why)
 
@@ -178,22 +221,20 @@ def sensitivity(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
     yield Row(name, "g_sensitivity", printed, "vibration_rectification", c.estimate * DPH / G0 / value)
 
 
+#: figure -> coefficient of a unit of three, SI of its unit
+OF_UNIT = {"misalignment": ("Sg_xy", ARCSEC), "cross_axis": ("Sg_xy", ARCSEC),
+           "bias_temperature": ("bgT_x", DPH), "scale_temperature": ("SgT_x", 1e-6)}  # fmt: skip
+OF_FORCES = {"misalignment": ("Sa_xy", ARCSEC), "cross_axis": ("Sa_xy", ARCSEC), "bias": ("ba_x", UG),
+             "scale_error": ("Sa_xx", 1e-6), "bias_temperature": ("baT_x", UG),
+             "scale_temperature": ("SaT_x", 1e-6)}  # fmt: skip
+
+
 def unit(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
-    """Yield misalignment and temperature coefficients, of a unit of three such gyros on a table with a chamber."""
-    asked = {"misalignment": ("Sg_xy", ARCSEC), "cross_axis": ("Sg_xy", ARCSEC),
-             "bias_temperature": ("bgT_x", DPH), "scale_temperature": ("SgT_x", 1e-6)}  # fmt: skip
-    there = {n: of for n, of in asked.items() if sheet.si(n) is not None}
+    """Yield what a unit of three such instruments on a table with a chamber shows."""
+    there = {n: of for n, of in (OF_FORCES if sheet.kind == FORCES else OF_UNIT).items() if sheet.si(n) is not None}
     if not there:
         return
-    test = load_system("imu_positions")
-    test.request("chamber")
-    _, values = with_instruments(name, {}, test)
-    key = ("imu_positions", "")
-    if key not in tests.open:
-        tests.open[key] = Session("imu_positions", {"chamber": "thermal_chamber"})
-    options = {"nuisances": "none"}
-    record = tests.open[key].run({**options, **values, **dict.fromkeys(test.noises, 0.0)}, seed=3)
-    found = coefficients(test.with_values(options).reduce(record))
+    found = tests.unit(name)
     for figure, (c, size) in there.items():
         ratio = found[c].estimate * size / (sheet.si(figure) or math.nan)
         yield Row(name, figure, sheet.figures[figure].value, "imu_positions", ratio)
@@ -202,12 +243,22 @@ def unit(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
 def rows(tests: Tests, name: str) -> list[Row]:
     """Return a row for each figure of a sheet, in the order of FIGURES."""
     sheet = find_instrument(name)
-    found = {r.figure: r for test in (noise, rates, bandwidth, sensitivity, unit) for r in test(tests, name, sheet)}
+    forces = sheet.of_accelerometers
+    own = _rows(tests, name, sheet, (noise, rates, bandwidth, sensitivity, unit), NOT_TESTED)
+    if forces is None:
+        return own
+    forces = forces.model_copy(update={"part": "accelerometer_mems"})
+    more = _rows(tests, name, forces, (noise, unit), NOT_TESTED | NOT_OF_FORCES)
+    return own + [replace(r, figure=f"accelerometers: {r.figure}") for r in more]
+
+
+def _rows(tests: Tests, name: str, sheet: Instrument, used: Sequence[Test], untested: dict[str, str]) -> list[Row]:
+    found = {r.figure: r for test in used for r in test(tests, name, sheet)}
     for figure, printed in sheet.figures.items():
         if figure in found:
             continue
         limit = printed.reading == "limit" and figure not in SETTINGS
-        why = "a limit says nothing of one unit" if limit else NOT_TESTED.get(figure, "no test")
+        why = "a limit says nothing of one unit" if limit else untested.get(figure, "no test")
         found[figure] = Row(name, figure, printed.value, "", None, why)
     return [found[n] for n in FIGURES[sheet.kind] if n in found]
 

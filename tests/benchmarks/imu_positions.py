@@ -115,7 +115,7 @@ def of_set_up(rng: Rng, stated: bool = True) -> tuple[Any, dict[str, float]]:
 
     windows = world.windows(plan(FACES + EDGES), unit, noise)
     sizes = {"u_axis": size, "u_square": size, "u_mount": size, "u_gravity": 3e-4} if stated else {}
-    said = budget.ImuSetup(latitude=latitude, gravity=gravity, earth_rate=EARTH, **sizes)
+    said = budget.ImuSetup(latitude=latitude, gravity=gravity, earth_rate=EARTH, sizes=sizes)
     return reduction.reduce(windows, said), unit.coefficients()
 
 

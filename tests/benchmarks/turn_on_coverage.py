@@ -5,7 +5,7 @@
 y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + white noise, over 1 to 2 days of 3 to 5 turn-ons of 300 s in
 readings of 5 s; no part, no simulation.  one, two: exponentials of 1 to 5 deg/h, tau of 10 to 40 s and four times that;
 hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses.  Where one
-is found of two, A stands for their sum and tau for that of the larger one.
+is found of two, A stands for their sum and tau for the time after which 1/e of it is left.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ def written(rng: np.random.Generator, kind: str) -> tuple[dict[str, Array], dict
     windows = {"t_start": start, "t_end": start + READING, "turn_on": turn + 1, "day": turn // of_day + 1,
                "since": since, "mean": DPH * y}  # fmt: skip
     there = np.flatnonzero(size)
-    truth = {"A": size.sum() * DPH, "τ": taus[np.argmax(np.abs(size))], "σ_on": on * DPH, "σ_day": between * DPH,
-             "t_w": Warming(size[there], taus[there]).time_until(LIMIT, 1e9)}  # fmt: skip
+    warm = Warming(size[there], taus[there])
+    truth = {"A": size.sum() * DPH, "τ": warm.time_constant(1e9), "σ_on": on * DPH, "σ_day": between * DPH,
+             "t_w": warm.time_until(LIMIT, 1e9)}  # fmt: skip
     truth["b"] = bias.mean() * DPH
     if there.size == 2:
         truth |= {"A_1": size[0] * DPH, "A_2": size[1] * DPH, "τ_1": taus[0], "τ_2": taus[1]}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 from wired import BENCH
 
@@ -168,3 +169,60 @@ def test_controller_keeps_its_rate_and_acceleration() -> None:
         assert part.saturated == 1.0
     assert np.diff(values[:20]) == pytest.approx(2e-3, abs=1e-12)
     assert values[-1] == pytest.approx(0.05) and part.sum == 0.0
+
+
+def ahead_of(order: int, w: float, T: float, s: Any) -> Any:
+    """Return x + T v + T2 a/2 of the filter with gains l, by its matrices: (c + T e + ..)(s - A + l c)^-1 l."""
+    n = order + 1
+    gains = np.array([[math.sqrt(2.0) * w, w * w], [2 * w, 2 * w * w, w**3]][order - 1])
+    A = np.diag(np.ones(n - 1), 1)
+    A[:, 0] -= gains
+    row = np.array([1.0, T, T * T / 2.0])[:n]
+    return np.array([row @ np.linalg.solve(x * np.eye(n) - A, gains) for x in s])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_prediction_over_the_delay(order: int) -> None:
+    """Delay, averages and filter in a row, up to f T = 0.13; up to s (order 2: s2) the delay's own row is undone."""
+    w, T = 60.0, 0.017
+    part = Tracker(image_noise=0.0, order=order, ahead=T, bandwidth=w)
+    part.initialize()
+    A, B, C, D = jacobians(part, ["direction[1]"], ["error[2]"])
+    f = np.array([0.05, 0.3, 1.0, 3.0, 8.0])
+    s = 2j * np.pi * f
+    got = np.array([-(C @ np.linalg.solve(x * np.eye(len(A)) - A, B) + D)[0, 0] for x in s])
+    images = np.exp(-T * s) * np.sinc(0.01 * f) * np.sinc(0.004 * f)
+    assert got == pytest.approx(images * ahead_of(order, w, T, s), rel=1e-3)
+    assert abs(got[0] - 1.0) < 3.0 * (abs(s[0]) / w) ** (order + 1) + 1e-6  # and the averages
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_filter_of_the_prediction_is_that_of_the_tracking_index(order: int) -> None:
+    """Discrete Kalman gains of an index of 1e-4 by the Riccati equation, Kalata's model (the derivative of `order` + 1
+    is white, constant in an image): alpha = l1 period, beta = l2 period2 within some roots of the index, 2 and 8 %.
+    """
+    index, period = 1e-4, 0.01
+    n = order + 1
+    F = np.array([[1.0, period, period**2 / 2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])[:n, :n]
+    G = np.array([[period**2 / 2], [period], [1.0]])[:n]
+    H = np.eye(1, n)
+    Q = G @ G.T * (index / period**2) ** 2  # rms over the noise of an image, 1
+    M = solve_discrete_are(F.T, H.T, Q, np.eye(1))
+    found = (M @ H.T / (H @ M @ H.T + 1.0)).ravel()
+    w = index ** (1.0 / n) / period
+    gains = [[math.sqrt(2.0) * w, w * w], [2 * w, 2 * w * w, w**3]][order - 1]
+    assert found == pytest.approx(np.array(gains) * period, rel={1: 0.02, 2: 0.08}[order])
+
+
+def test_a_predicted_error_follows_a_constant_rate() -> None:
+    """Yaw 0.02 t, from rest: after 8/w the filter gives the true error, but for what the hold makes, half a frame."""
+    part = Tracker(image_noise=0.0, order=1, ahead=0.017, bandwidth=60.0)
+    part.initialize()
+    errors = []
+    for k in range(300):
+        a = 0.02 * (k + 1) * H
+        part.direction = [-math.sin(a), math.cos(a), 0.0]
+        part.do_step(k * H, H)
+        errors.append(part.error[1] - part.miss[1])
+    assert np.mean(errors[-100:]) == pytest.approx(0.0, abs=0.02 * 0.3e-3)
+    assert np.max(np.abs(errors[-100:])) < 0.02 * 5e-3

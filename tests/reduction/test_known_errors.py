@@ -18,8 +18,8 @@ from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.run_metadata import Remount
+from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.sources import Effect, Source
-from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = units.factor("deg/h")
 N = 120
@@ -29,10 +29,12 @@ X = np.column_stack([np.ones(N), np.cos(ANGLE)])
 HALVES = np.array([np.arange(N) < 60, np.arange(N) >= 60]).astype(float)  # one constant of each mount
 
 
-def test_a_set_up_without_the_field_of_a_source_says_so() -> None:
+def test_the_size_of_a_source_is_what_its_option_states() -> None:
+    """Of any set-up, without a field of its own; a mapping of options and a number do as well."""
     source = Source("mount.flip", "flip of the mount", "rad", "u_flip")
-    with pytest.raises(ReductionError, match="takes its uncertainty from u_flip, and the set-up Remount has no"):
-        source.effect(Remount())
+    for stated in (Setup(sizes={"u_flip": 2e-5, "u_other": 1.0}), {"u_flip": 2e-5}, 2e-5):
+        assert source.effect(stated).size == 2e-5
+    assert source.effect(Setup()).size == 0.0
 
 
 def line(y: Any) -> Findings:

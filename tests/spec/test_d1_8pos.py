@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from stated import with_sizes
 
 from gyrobench import drift, frames
 from gyrobench.reduction.estimation import noise, repeatability
@@ -76,7 +77,7 @@ def rows(I_x: dict[int, float], I_y: dict[int, float], cycles: int = 2, readings
 
 
 def setup(phi: float = math.radians(45.75), **changes: Any) -> Any:
-    return R.EightPositionSetup(**{"latitude": phi, "gravity": 9.80665, **changes})
+    return R.EightPositionSetup(**with_sizes({"latitude": phi, "gravity": 9.80665, **changes}))
 
 
 def named(result: Any) -> dict[str, Any]:

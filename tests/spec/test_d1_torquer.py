@@ -105,10 +105,12 @@ def test_intervals_cover() -> None:
 
 
 def test_ammeter() -> None:
-    plain, with_b = (named(R.reduce(made(noise=1e-5), R.TorquerSetup(u_current=u)))["K"] for u in (0.0, 1e-4))
+    plain, with_b = (
+        named(R.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": u})))["K"] for u in (0.0, 1e-4)
+    )
     assert with_b.u == pytest.approx(math.hypot(plain.u, 17.0e-4), rel=1e-3)
     limits = {"K": (16.9, 17.1), "linearity": (-1e-6, 1e-6)}
-    r = conclude(R.reduce(made(noise=1e-5), R.TorquerSetup(u_current=1e-4)), None, limits)
+    r = conclude(R.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": 1e-4})), None, limits)
     assert named(r)["K"].verdict == "pass" and r.verdict in ("fail", "inconclusive")
 
 

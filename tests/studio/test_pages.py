@@ -132,9 +132,24 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.get_by_role("button", name="Run").click()
     page.wait_for_url("**/job/**")
     address = page.url
+    page.get_by_role("heading", name="Fixed-position test").wait_for()
+    page.get_by_role("link", name="Change its values").click()  # the form as it was filled in
+    page.wait_for_function("document.querySelector('.code').textContent.includes('20000000s')")
+    assert page.get_by_label("dwell", exact=True).input_value() == "20000000s"
     page.goto(base_of(studio) + "/")  # the page of the run is closed
     page.goto(address)
     page.wait_for_function("parseFloat(document.querySelector('[role=progressbar]').ariaValueNow) > 0")
+    left = "document.querySelector('[role=status]').nextElementSibling.textContent"
+    seen = "h => { Object.defineProperty(document, 'hidden', {value: h, configurable: true}); " + (
+        "document.dispatchEvent(new Event('visibilitychange')); }"
+    )
+    page.evaluate(seen, True)  # another tab is in front of it: nothing is sent to it
+    page.wait_for_timeout(800)
+    before = page.evaluate(left)
+    page.wait_for_timeout(1500)
+    assert "steps/s" in before and page.evaluate(left) == before
+    page.evaluate(seen, False)
+    page.wait_for_function(f"said => {left} !== said", arg=before)
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("button", name="Resume").click()
     page.wait_for_function("document.querySelector('[role=status]').textContent === 'running'")
@@ -224,6 +239,14 @@ def test_what_is_drawn_stands_as_the_record_says(
         rows.add(row)
         expected = {body: axes[0] for body, axes in attitudes(bodies, record, np.array([row])).items()}
         assert drawn_as(page, expected) < 1e-9, (name, row)
+    if name == next(iter(MOVING)):  # what stands still is drawn for a second, and then no more
+        frames = "getElement(document.querySelector('.scene').id.slice(1)).framesDrawn"
+        page.wait_for_timeout(2500)
+        before = page.evaluate(frames)
+        page.wait_for_timeout(500)
+        assert page.evaluate(frames) == before > 0
+        page.locator(".time [tabindex='0']").press("ArrowRight")
+        page.wait_for_function(f"before => {frames} > before", arg=before)
 
 
 def drawn_as(page: Any, expected: dict[str, Any], limit: float = 20.0) -> float:

@@ -5,4 +5,15 @@ these weights.  Stated at FAINT of its size it moves none: the lines, over FAINT
 which nothing is stated.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
 FAINT = 1e-9
+
+
+def with_sizes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a setup; those named as options, u_NAME, are its sizes."""
+    sizes = {n: v for n, v in values.items() if n.startswith("u_")}
+    return {**{n: v for n, v in values.items() if n not in sizes}, "sizes": {**values.get("sizes", {}), **sizes}}

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import random
 import re
 import socket
 import string
+import threading
 import time
+import uuid
 from dataclasses import dataclass
+from urllib.parse import urlencode
 
 WALL = 60.0  # s, for one answer
 NAMES = ("fixed_position", "tumble_single_axis", "floated_gyro", "run1")
@@ -87,6 +91,61 @@ class Door:
         raw = (head + body).encode("utf-8", "surrogatepass")
         cut = rng.random() < 0.03
         return (raw[: rng.randint(1, len(raw) - 1)] if cut else raw), not cut
+
+
+class SocketTab:
+    """A tab without a browser: a page is fetched, its socket opened, every message taken and confirmed; none is drawn.
+
+    messages: that have come.
+    """
+
+    CONFIRM = 3.0  # s between two confirmations, as the front end does it
+
+    def __init__(self, door: Door, path: str) -> None:
+        from websockets.sync.client import connect
+
+        self.path, self.messages, self.following = path, 0, 0
+        page = door.get(path)[2].decode()
+        found = re.search(r"client_id\W+([0-9a-f-]{36})", page)
+        assert found, page[:200]
+        self.client = found[1]
+        query = {
+            "EIO": 4, "transport": "websocket", "client_id": self.client, "implicit_handshake": "true",
+            "tab_id": uuid.uuid4(), "document_id": uuid.uuid4(), "next_message_id": 0,
+        }  # fmt: skip
+        host = f"127.0.0.1:{door.port}"
+        self.link = connect(
+            f"ws://{host}/_nicegui_ws/socket.io/?{urlencode(query)}", max_size=None,
+            additional_headers={"cookie": door.cookie, "origin": f"http://{host}"},
+        )  # fmt: skip
+        self.link.send("40")
+        self.thread = threading.Thread(target=self._listen, daemon=True)
+        self.thread.start()
+
+    def _listen(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        confirmed, last = 0, time.monotonic()
+        try:
+            while True:
+                text = str(self.link.recv())
+                if text == "2":  # is somebody there?
+                    self.link.send("3")
+                elif text.startswith("42"):
+                    self.messages += 1
+                    number = re.findall(r'"_id":(\d+)', text)
+                    self.following = max(self.following, int(number[-1]) + 1 if number else 0)
+                if self.following > confirmed and time.monotonic() > last + self.CONFIRM:
+                    confirmed, last = self.following, time.monotonic()
+                    word = ["ack", {"client_id": self.client, "next_message_id": confirmed}]
+                    self.link.send(f"42{json.dumps(word)}")
+        except ConnectionClosed:
+            return
+
+    def close(self) -> None:
+        """Close the tab."""
+        self.link.close()
+        self.thread.join(5.0)
 
 
 def wrong(answer: bytes) -> str:

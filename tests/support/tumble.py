@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from stated import with_sizes
 
 from gyrobench import drift, frames
 from gyrobench.system.system import load_system
@@ -41,7 +42,7 @@ def setup(latitude: float = 45.75, **changes: Any) -> Any:
         "nuisances": False,
         "labels": PHASES, "modes": {p: "rate" if n.startswith("mount") else "dwell" for p, n in PHASES.items()},
     }  # fmt: skip
-    return reduction.TumbleSetup(**{**values, **changes})
+    return reduction.TumbleSetup(**with_sizes({**values, **changes}))
 
 
 def in_face(local: np.ndarray, s: Any, phase: int, angle: np.ndarray) -> np.ndarray:

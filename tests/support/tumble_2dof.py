@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from stated import with_sizes
 
 from gyrobench import drift, frames
 from gyrobench.system.system import load_system
@@ -34,7 +35,7 @@ def setup(latitude: float = 45.75, model: str = "nine", **changes: Any) -> Any:
         "latitude": phi, "gravity": 9.8, "k": K, "model": model, "faces": {p: faces[n] for p, n in phases.items()},
         "labels": phases, "modes": {p: "rate" if n.startswith("mount") else "dwell" for p, n in phases.items()},
     }  # fmt: skip
-    return reduction.TwoChannelSetup(**{**values, **changes})
+    return reduction.TwoChannelSetup(**with_sizes({**values, **changes}))
 
 
 def in_face(local: np.ndarray, s: Any, phase: int, angle: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from stated import with_sizes
 
 from gyrobench import drift, frames
 from gyrobench.system.system import load_system
@@ -35,7 +36,7 @@ def attitude(phi: float, outer: float, inner: float) -> np.ndarray:
 
 def setup(latitude: float = 45.75, **changes: Any) -> Any:
     values: dict[str, Any] = {"latitude": math.radians(latitude), "gravity": 9.8, "k": K}
-    return reduction.TwoAxisSetup(**{**values, **changes})
+    return reduction.TwoAxisSetup(**with_sizes({**values, **changes}))
 
 
 def record(

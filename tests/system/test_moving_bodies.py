@@ -10,10 +10,13 @@ import pytest
 import gyrobench as gb
 from gyrobench import frames
 from gyrobench.arrays import Array
+from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.system.moving_bodies import attitudes, parse_bodies, passive
+from gyrobench.system.system import System
+from gyrobench.workflow.inputs import load_test
 
 SHORT: dict[str, dict[str, Any]] = {
     "tumble_single_axis": {"rate": "30deg/s", "dwell": "2s", "settle": "0.5s", "windows": 12, "latitude": "20deg"},
@@ -115,6 +118,71 @@ def test_the_inner_element_feels_the_force_of_its_base() -> None:
     assert np.abs(f_inner - turned).max() < 1e-6 * g  # the force is that of the step before
 
 
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("platform_four_gimbal", {"load": 0.0}), ("platform_three_gimbal", {"mount": 0, "roll": "40deg", "yaw": "20deg"})],
+)
+@pytest.mark.long
+def test_the_platform_stays_where_its_rates_leave_it(
+    name: str, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through base and all gimbals, in the order of ``mount``: its turns from the start are the integral of its rates.
+
+    They are small, e < 7e-3 rad: R - 1 is -[e x] but for e^2 / 2 < 3e-5.
+    """
+    test = gb.load(name, values)
+    monkeypatch.setattr(type(test.system), "stop", 31.0 if "four" in name else 22.0)
+    record = test.run(check_step=False).record
+    found = attitudes(parse_bodies(test.system.bodies), record, np.arange(len(record.channels["time"])))
+    assert np.ptp(found["base"], axis=0).max() > 0.5, "the base turns"
+    turn = found["inner element"] @ found["inner element"][0].T
+    small = np.stack([turn[:, 1, 2], turn[:, 2, 0], turn[:, 0, 1]], axis=1)
+    attitude = vector(record, "platform.attitude")
+    assert np.abs(attitude).max() < 7e-3
+    assert np.abs(small - (attitude - attitude[0])).max() < 3e-5
+
+
+@pytest.mark.long
+def test_windows_say_where_a_table_stands_whose_angle_is_not_recorded() -> None:
+    """Within windows the same as by the angle itself, at rest and at even rates; and f = C (0, 0, g)."""
+    record = run("rate_table_test", {}, "table.angle", *(f"table.f[{k}]" for k in (1, 2, 3)))
+    bodies = parse_bodies(gb.load("rate_table_test").system.bodies)
+    time, w = record.channels["time"], record.windows
+    inside = ((time[:, None] > w["t_start"]) & (time[:, None] < w["t_end"])).any(axis=1)
+    assert inside.sum() > 1000 and np.ptp(record.channels.pop("table.angle")) > 10.0
+    axes = attitudes(bodies, record, np.arange(len(time)))["instrument"]
+    f = vector(record, "table.f")
+    assert np.abs(f - np.linalg.norm(f[0]) * axes[:, :, 2])[inside].max() < 1e-9 * np.linalg.norm(f[0])
+    again = run("rate_table_test", {}, "table.angle")
+    true = attitudes(bodies, again, np.arange(len(time)))["table"]
+    assert np.abs(attitudes(bodies, record, np.arange(len(time)))["table"] - true)[inside].max() < 1e-9
+
+
+#: systems without a moving picture -> why
+STILL = {
+    "coning_test": "turns by fractions of a degree many times a second, its angle is not recorded",
+    "drift_compensation": "one axis that moves by seconds of arc",
+    "estimator_bench": "nothing turns",
+    "gyro_bandwidth": "the rate of the table is recorded, not its angle",
+    "gyro_dynamics": "the rate of the table is recorded, not its angle",
+    "gyrocompass": "roll of the ship and tilt of the compass are recorded in part",
+    "platform_single_axis": "one axis that moves by seconds of arc",
+    "sculling_test": "turns by fractions of a degree many times a second, its angle is not recorded",
+    "stabilizer_floated_2dof": "one axis that moves by seconds of arc",
+    "stabilizer_power_2dof": "one axis that moves by seconds of arc",
+    "stabilizer_power_two_axis": "two axes that move by seconds of arc",
+    "stabilizer_sdf": "one axis that moves by seconds of arc",
+    "stand_alignment": "readings of a theodolite at marks, nothing moves between them",
+    "vibration_rectification": "the table shakes along a line",
+}
+
+
+def test_every_other_system_has_a_picture() -> None:
+    every = {name: load_test(name) for name in Bench.find().systems()}
+    systems = {name: test for name, test in every.items() if isinstance(test, System)}
+    assert {name for name, test in systems.items() if not parse_bodies(test.bodies)} == set(STILL)
+
+
 def test_rotations_are_passive_and_right_handed() -> None:
     """A turn by +90 degrees about z brings x to where y was: east in the new axes is -y."""
     assert np.allclose(passive(2, np.array([np.pi / 2]))[0] @ [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])
@@ -132,6 +200,6 @@ def test_what_the_record_lacks_is_left_out() -> None:
     found = attitudes(bodies, record, np.arange(2))
     assert list(found) == ["one", "four"]
     assert np.allclose(found["one"][1], passive(2, np.array([0.5]))[0] @ passive(0, np.array([0.2]))[0])
-    for text in ("one", "one: w a.q", "ENU: x a.q", "one: x a.q\none: x a.q", "one: two, x a.q"):
+    for text in ("one", "one: w a.q", "one: x a.q or else", "ENU: x a.q", "one: x a.q\none: x a.q", "one: two, x a.q"):
         with pytest.raises(ValueError, match="bodies: "):
             parse_bodies(text)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from accelerometers_four import ALPHA, ARCSEC, TRUE, N, head, voltages, windows
+from stated import with_sizes
 
 from gyrobench.engine.session import Session
 from gyrobench.frames import G0
@@ -27,7 +28,7 @@ D1 = (1.5e-5, -1.9e-6)
 
 
 def setup(**values: object) -> FourSetup:
-    return FourSetup(**{"gravity": G0, "D1": D1, **values})  # type: ignore[arg-type]
+    return FourSetup(**with_sizes({"gravity": G0, "D1": D1, **values}))  # type: ignore[arg-type]
 
 
 def reduced(U: np.ndarray, **values: object) -> np.ndarray:

@@ -234,3 +234,56 @@ def test_a_good_record_names_none(tmp_path: Path) -> None:
 )
 def test_refused(values: dict[str, Any], said: str) -> None:
     assert said in " ".join(load_system(NAME).with_values(values).check())
+
+
+# ------------------------------------------------------------------------------------------------ what u does not show
+def low_pass(change: str, noise: float = 1e-3) -> np.ndarray:
+    """Rows without u of 1/(1 + s/(2 pi 40 Hz)) with something that no curve of poles makes, or nothing."""
+    rng = np.random.default_rng(9)
+    f = np.geomspace(1.0, 200.0, 25)
+    h = np.exp(noise * (rng.normal(size=25) + 1j * rng.normal(size=25))) / (1.0 + 1j * f / 40.0)
+    gain, phase = np.abs(h), np.degrees(np.angle(h))
+    if change == "half the points 2 % up":
+        gain[12:] *= 1.02
+    elif change == "phases in rad":
+        phase = np.radians(phase)
+    elif change == "rms":
+        gain *= math.sqrt(0.5)
+    elif change == "per minute":
+        gain /= 60.0
+    return np.column_stack([f, np.full(25, 10.0), 10.0 * gain, phase])
+
+
+def test_scatter_that_is_none(tmp_path: Path) -> None:
+    """Without u the scatter about the curve takes its place: K was then 10 u off and no word was said."""
+    withheld = {r.id for r in measured(tmp_path, low_pass("half the points 2 % up")).reasons if r.severity == "doubt"}
+    assert withheld == {"response.misfit"}
+    assert not measured(tmp_path, low_pass("")).reasons
+
+
+def test_phases_in_radians_are_named(tmp_path: Path) -> None:
+    assert "response.radians" in {r.id for r in measured(tmp_path, low_pass("phases in rad")).reasons}
+
+
+@pytest.mark.parametrize(("change", "said"), [("rms", "rms value"), ("per minute", "per minute")])
+def test_the_nearest_factor_is_named(tmp_path: Path, change: str, said: str) -> None:
+    """1/60 lies within 10 % of pi/180, which was named."""
+    (reason,) = [r for r in measured(tmp_path, low_pass(change)).reasons if r.id == "response.factor"]
+    assert said in reason.text
+
+
+def test_neighbours_by_chance() -> None:
+    """Of 400 records of white noise about a straight line in ln f, p is below 0.05 in some 20."""
+    misfit = importlib.import_module("gyrobench.reduction.loops.curve_misfit")
+    rng, x = np.random.default_rng(2), np.linspace(-1.0, 1.0, 20)
+    X = np.column_stack([np.ones(20), x])
+    of = lambda p: np.vstack([X @ p[:2], X @ p[2:]])  # noqa: E731
+    count = 0
+    for _ in range(400):
+        y = rng.standard_normal((2, 20))
+        p = np.concatenate([np.linalg.lstsq(X, row, rcond=None)[0] for row in y])
+        count += misfit.alike(of, p, np.ones(4), y - of(p)) < 0.05
+    assert 8 <= count <= 34  # 20 and 3.3 standard deviations
+    bent = np.vstack([3.0 * x**2 + 0.3 * rng.standard_normal(20), 0.3 * rng.standard_normal(20)])
+    p = np.concatenate([np.linalg.lstsq(X, row, rcond=None)[0] for row in bent])
+    assert misfit.alike(of, p, np.ones(4), bent - of(p)) < 1e-3

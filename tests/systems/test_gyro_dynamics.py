@@ -170,6 +170,16 @@ def test_a_file_of_sines(tmp_path: Path) -> None:
     assert abs(c["tau"].estimate - 1.04) < 3.5 * c["tau"].u and "f_3dB" not in c
 
 
+def test_scatter_that_is_none(tmp_path: Path) -> None:
+    """Without u the scatter takes its place: a filter of the pickoff, 1 ms, moves tau by many u; no word was said."""
+    rows = sines()
+    low_pass = 1.0 / (1.0 + 2j * np.pi * rows[:, 0] * 1e-3)
+    rows[:, 2] *= np.abs(low_pass) ** 2
+    rows[:, 3] += 2.0 * np.degrees(np.angle(low_pass))
+    assert "response.misfit" in {r.id for r in measured(tmp_path, SINES, rows).reasons if r.severity == "doubt"}
+    assert not measured(tmp_path, SINES, sines()).reasons
+
+
 def test_a_file_of_steps(tmp_path: Path) -> None:
     """Four turns to and fro, samples every 0.2 ms, noise of 0.2 mV of 2.4."""
     rng = np.random.default_rng(6)

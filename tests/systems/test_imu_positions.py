@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from imu_world import EDGES, FACES, Unit, World, plan
 from scipy.spatial.transform import Rotation
+from stated import with_sizes
 
 import gyrobench as gb
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -31,7 +32,7 @@ GYRO, ACC = 3e-6, 5e-4  # noise densities, rad/s/sqrt(Hz), m/s2/sqrt(Hz)
 
 def setup(world: World, **more: Any) -> Any:
     site = {"latitude": world.latitude, "gravity": world.gravity, "earth_rate": 7.2921159e-5}
-    return budget.ImuSetup(**{**site, "nuisances": False, **more})
+    return budget.ImuSetup(**with_sizes({**site, "nuisances": False, **more}))
 
 
 def white(rng: np.random.Generator) -> Any:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from imu_world import FACES, Heat, Unit, World, plan
+from stated import with_sizes
 
 import gyrobench as gb
 from gyrobench.commands.arguments import read_settings
@@ -64,7 +65,7 @@ def heated(seed: int, cycles: int = 6, noise: Any = None) -> tuple[Any, dict[str
 
 def setup(**more: Any) -> Any:
     site = {"latitude": 0.7, "gravity": 9.805, "earth_rate": 7.2921159e-5, "nuisances": False}
-    return budget.ImuSetup(**{**site, "thermal": (3, 2, 10.0, 0.0), **more})
+    return budget.ImuSetup(**with_sizes({**site, "thermal": (3, 2, 10.0, 0.0), **more}))
 
 
 @pytest.mark.long

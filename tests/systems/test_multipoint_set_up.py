@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from multipoint import G0, KS, NAME, estimates, load, module, polynomial, quiet, windows
+from stated import with_sizes
 
 from gyrobench import frames
 from gyrobench.design.plan_runs import mistakes_unshown
@@ -140,7 +141,7 @@ def made(rng: np.random.Generator, points: int, size: float, **setup: Any) -> tu
     zeros = {m: float(rng.uniform(-1e-3, 1e-3)) for m in "ab"}
     off = (rng.normal(size=points) * size * ARCSEC).tolist()
     R = module("reduction")
-    own = R.MultipointSetup(gravity=gamma * G0, scale=9806.65, mounts={1: "a", 2: "b"}, **setup)
+    own = R.MultipointSetup(gravity=gamma * G0, scale=9806.65, mounts={1: "a", 2: "b"}, **with_sizes(setup))
     return R.reduce(windows(k, zeros, gamma, points, sigma=5e-7, rng=rng, off=off), own), {
         **k, **{f"θ₀ {m}": z for m, z in zeros.items()}
     }  # fmt: skip

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from stated import with_sizes
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
@@ -316,7 +317,9 @@ def windows(
 
 
 def heading_of(method: str, w: dict[str, np.ndarray], latitude: float, **u: float) -> DriftTestResult:
-    setup = NorthFinderSetup(method=method, latitude=latitude, gravity=9.80665, rough=1.0, nuisances=False, **u)
+    setup = NorthFinderSetup(
+        method=method, latitude=latitude, gravity=9.80665, rough=1.0, nuisances=False, **with_sizes(u)
+    )
     return reduce(w, setup)
 
 

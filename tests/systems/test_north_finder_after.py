@@ -54,6 +54,23 @@ def test_walk_and_markov_by_simulation() -> None:
         assert one[name].change(100.0, 100.0) == pytest.approx((half - whole).var(), rel=0.12)
 
 
+def test_the_earth_rate_turns_the_errors_of_the_axes_into_each_other() -> None:
+    """Across the Earth's rate W, after 6 h, Wt = 1.575: a random walk from nothing (T -> 0) makes
+    int_0^t 2 (1 - cos W v)/W2 dv = 2 (t - sin(W t)/W)/W2 for t3/3 along it; white noise t + T (2 sin(W t/2)/(W T))2.
+    """
+    W, t, T = units.EARTH_RATE, 6.0 * 3600.0, 300.0
+    walk = RandomErrors(0.0, walk=1.0)
+    assert walk.turned(1.0, t, W) == pytest.approx(2.0 * (t - math.sin(W * t) / W) / W**2, rel=1e-3)
+    white = RandomErrors(1.0)
+    assert white.turned(T, t, W) == pytest.approx(t + (2.0 * math.sin(0.5 * W * t) / W) ** 2 / T, rel=1e-4)
+    for each in (RandomErrors(0.0, flicker=1.0), walk, RandomErrors(0.0, markov=1.0, markov_tau=50.0), white):
+        assert each.turned(T, 600.0, 0.0) == pytest.approx(600.0**2 * each.change(T, 600.0), rel=2e-3)
+    # of a bias that has changed by then the vertical at 45 deg has sinc2(W t/2) = 0.815 by half: 0.908 of variance
+    kept = running(white, 0.0, 1e-3, t, 45.0 * DEG) / running(white, 0.0, 1e-3, t)
+    assert kept**2 == pytest.approx(0.5 * (1.0 + (math.sin(0.5 * W * t) / (0.5 * W * t)) ** 2), rel=1e-4)
+    assert 1.0 > running(walk, 0.0, T, 600.0, 45.0 * DEG) / running(walk, 0.0, T, 600.0) > 0.9995
+
+
 def test_by_hand() -> None:
     """At 45°: 0.01 °/h of bias, 0.012 °/√h, 300 s; two positions N/(A √T); 1 mg of level; ten minutes alone."""
     latitude, T, north = 45.0 * DEG, 300.0, units.EARTH_RATE * math.cos(45.0 * DEG)
@@ -92,7 +109,7 @@ def test_a_bias_beyond_the_earth_rate_gives_no_heading_in_one_position() -> None
     for sheet, u, lost in (("mpu6050", 20.0 * 3600.0 / math.sqrt(3.0), True), ("ln200", 1.0, False)):
         _, values = with_instruments(sheet, {}, load_system("north_finder"))
         assert values["u_bias"] == pytest.approx(u * DPH)
-        setup = NorthFinderSetup(latitude=45.0 * DEG, gravity=9.8, method="strapdown", u_bias=values["u_bias"])
+        setup = NorthFinderSetup(latitude=45.0 * DEG, gravity=9.8, method="strapdown", sizes=values)
         assert any("take the method strapdown two" in p for p in Reduction({}, setup).problems()) == lost
 
 

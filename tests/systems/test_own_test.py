@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gyrobench.bench import Bench, standard_folder
+from gyrobench.bench import Bench, UsageError, standard_folder
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import Result
@@ -41,7 +41,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_it_is_short() -> None:
-    assert len(EXAMPLE.read_text("utf-8").splitlines()) <= 45
+    assert len(EXAMPLE.read_text("utf-8").splitlines()) <= 40
 
 
 @pytest.mark.long
@@ -111,7 +111,7 @@ def test_the_reduction_has_set_up_effects_corrections_and_a_verdict(bench: Path,
     """
     system = load_system(NAME, bench)
     with Session(system) as session:
-        record = session.run({"u_scale_factor": 1e-4, "u_axis": "5arcsec"}, seed=4)
+        record = session.run({"u_scale_factor": 1e-4, "u_level": "5arcsec"}, seed=4)
     limits = {"D_I": (-1.0, -0.8), "D_F": (0.0, 0.1), "D_S": (-0.70001, -0.69999)}
     plain = system.reduce(record, limits)
     assert [plain[n].verdict for n in limits] == ["pass", "fail", "inconclusive"] and plain.verdict == "fail"
@@ -125,6 +125,51 @@ def test_the_reduction_has_set_up_effects_corrections_and_a_verdict(bench: Path,
     shift = corrected["D_F"].estimate - plain["D_F"].estimate
     assert shift == pytest.approx(-10.0 * arcsec * line.sensitivity, rel=0.1)
     assert any(row[0] == "fixture off level, about east" for t in corrected.tables for row in t.rows)
+
+
+def test_a_source_is_declared_in_one_place(bench: Path) -> None:
+    """In the file of the test alone: its option, its line of the budget, the shift that is predicted of the
+    part's value that simulates it, which two runs of one seed show, and the correction that takes it out again.
+    """
+    system, arcsec = load_system(NAME, bench), math.pi / 648000.0
+    option = system.options["u_level"]
+    assert option.unit == "rad" and option.default == 0.0 and option.doc.startswith("fixture off level, about east")
+    values = {"dwell": "100s", "u_level": "5arcsec"}
+    with Session(system) as session:
+        level, tilted = (session.run({**values, **more}, seed=2) for more in ({}, {"table.tilt[1]": "100arcsec"}))
+    assert [e.parameter for e in tilted.run.setup_errors] == ["table.tilt[1]"]
+    plain, off = system.reduce(level), system.reduce(tilted)
+    line = next(x for x in off.budget if (x.id, x.coefficient) == ("fixture.level", "D_F"))
+    assert line.size == pytest.approx(5.0 * arcsec) and abs(line.contribution) > 1e-4
+    (table,) = [t for t in off.tables if t.id == "budget.predicted"]
+    shift = {row[0]: row[1] for row in table.rows}
+    assert abs(shift["D_F"]) > 1e-3
+    for name in ("D_F", "D_II", "D_SS"):
+        assert off[name].estimate - plain[name].estimate == pytest.approx(shift[name], rel=0.02, abs=1e-6)
+    options = {**tilted.run.options, "corrections": "fixture.level = 100(1) arcsec"}
+    corrected = system.reduce(Record(tilted.windows, {}, tilted.run.replace(options=options)))
+    assert corrected["D_F"].estimate == pytest.approx(plain["D_F"].estimate, abs=0.05 * abs(shift["D_F"]))
+
+
+def test_a_source_without_its_option_is_named(bench: Path) -> None:
+    """A reduction in a module of its own is loaded late: its options stand in system.py."""
+    text = EXAMPLE.read_text("utf-8")
+    folder = bench / "systems" / NAME
+    (folder / "sums.py").write_text(text.split("class SixPosition(")[0] + "\n\nReduction = SixPositionReduction\n")
+    late = text.replace("reduction = SixPositionReduction", 'reduction = "sums"')
+    (folder / "system.py").write_text(late, encoding="utf-8")
+    with pytest.raises(
+        UsageError, match=r"u_level is no option of it, in which level\(\) .* fixture.level. Write options"
+    ):
+        load_system(NAME, bench).reduction_object()
+
+
+def test_what_the_skeleton_leaves_to_a_reduction_is_asked_for_before_a_run(bench: Path) -> None:
+    file = bench / "systems" / NAME / "system.py"
+    bare = EXAMPLE.read_text("utf-8").replace("(RestTest)", "(DriftReduction)").replace("import Source", "import *")
+    file.write_text(bare, encoding="utf-8")
+    with pytest.raises(InvalidConfigurationError, match=r"SixPositionReduction has no account\(\), which its family"):
+        load_system(NAME, bench)
 
 
 def test_the_declared_reduction_of_every_system_is_one() -> None:

@@ -101,7 +101,7 @@ def test_the_largest_of_many_departures_is_no_bend() -> None:
 
 
 def test_effects() -> None:
-    r = R.reduce(made(), R.PickoffSetup(2.0, 2.0 * DPH, u_gain=1e-3, u_angle=2e-3, u_voltage=3e-3))
+    r = R.reduce(made(), R.PickoffSetup(2.0, 2.0 * DPH, sizes={"u_gain": 1e-3, "u_angle": 2e-3, "u_voltage": 3e-3}))
     lines = {(b.source, b.coefficient): b.contribution for b in r.budget}
     S, K = named(r)["S"].estimate, named(r)["K_sg"].estimate
     assert ("gain H/C", "S") not in lines and lines["gain H/C", "K_sg"] == pytest.approx(1e-3 * K)

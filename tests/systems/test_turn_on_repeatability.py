@@ -77,6 +77,38 @@ def test_time_until_it_is_warm() -> None:
     assert 10.0 * math.exp(-t / 20.0) - 3.0 * math.exp(-t / 200.0) == pytest.approx(-0.5)
 
 
+def test_a_time_constant_of_two_exponentials_is_the_time_to_one_over_e() -> None:
+    """2 exp(-t/20) + 2 exp(-t/80) = 4/e: x^4 + x = 2/e = 0.73576 with x = exp(-t/80): 0.60329^4 + 0.60329 = 0.13247 +
+    0.60329, t = -80 ln 0.60329 = 40.43 s.
+    """
+    assert Warming(np.array([3.0]), np.array([40.0])).time_constant(1e4) == pytest.approx(40.0)
+    assert Warming(np.array([2.0, 2.0]), np.array([20.0, 80.0])).time_constant(1e4) == pytest.approx(40.43, abs=0.01)
+
+
+def test_two_exponentials_of_like_size_taken_for_one() -> None:
+    """2 exp(-t/20) + 2 exp(-t/80), noise of 0.4 deg/h, three turn-ons: most fits find one.  Its time constant is the
+    time after which 1/e is left, 40.5 s, and its interval is that of this time, not of all time constants there are
+    (7 to 500 s); A = 4.  Of six, 0.95 of each is missed twice or more with a probability of 0.03.
+    """
+    rng = np.random.default_rng(12)
+    turn, since = np.repeat(np.arange(3), 60), np.tile(2.5 + 5.0 * np.arange(60), 3)
+    curve = means(since, np.full(since.size, 5.0), np.array([20.0, 80.0])) @ [2.0, 2.0]
+    start = since - 2.5 + 400.0 * turn
+    both = Warming(np.array([2.0, 2.0]), np.array([20.0, 80.0]))
+    truth = {"A": 4.0 * DPH, "A_1": 2.0 * DPH, "A_2": 2.0 * DPH, "τ": both.time_constant(1e4)}
+    held = []
+    for _ in range(6):
+        y = (curve + rng.normal(0.0, 0.3, 3)[turn] + rng.normal(0.0, 0.4, since.size)) * DPH
+        windows = {"t_start": start, "t_end": start + 5.0, "turn_on": turn + 1, "since": since, "mean": y}
+        result = Reduction.reduce(windows, TurnOnSetup(limit=0.3 * DPH, truth=truth))
+        found = {c.name: c for c in result.coefficients if c.truth is not None}
+        if "τ" in found:
+            low, high = found["τ"].interval
+            assert high < 4.0 * found["τ"].estimate
+            held += [low <= truth["τ"] <= high, found["A"].interval[0] <= 4.0 <= found["A"].interval[1]]
+    assert len(held) >= 8 and sum(held) >= len(held) - 1
+
+
 def test_time_constants_are_found() -> None:
     """Two, of readings that are as long as the fast one: the mean over a reading counts; none of noise alone."""
     rng = np.random.default_rng(2)
@@ -100,10 +132,13 @@ def test_a_second_exponential_that_is_hardly_seen() -> None:
     since = np.tile(2.5 + 5.0 * np.arange(each), turns)
     turn = np.repeat(np.arange(turns), each)
     start = since - 2.5 + 400.0 * turn
-    truth = {"A": 2.7 * DPH, "A_1": 2.0 * DPH, "A_2": 0.7 * DPH, "τ": 20.0, "τ_1": 20.0, "τ_2": 80.0}
+    truth = {"A": 2.7 * DPH, "A_1": 2.0 * DPH, "A_2": 0.7 * DPH, "τ_1": 20.0, "τ_2": 80.0}
     # at 78.86 s: 2 exp(-3.943) + 0.7 exp(-0.9857) = 0.0388 + 0.2612 = 0.3
     truth["t_w"] = Warming(np.array([2.0, 0.7]), np.array([20.0, 80.0])).time_until(0.3, 1e4)
     assert truth["t_w"] == pytest.approx(78.86, abs=0.01)
+    # at 27.78 s: 2 exp(-1.389) + 0.7 exp(-0.3473) = 0.4986 + 0.4946 = 2.7/e
+    truth["τ"] = Warming(np.array([2.0, 0.7]), np.array([20.0, 80.0])).time_constant(1e4)
+    assert truth["τ"] == pytest.approx(27.78, abs=0.01)
     for _ in range(10):
         curve = means(since, np.full(since.size, 5.0), np.array([20.0, 80.0])) @ [2.0, 0.7]
         y = (curve + rng.normal(0.0, 0.3, turns)[turn] + rng.normal(0.0, 0.2, since.size)) * DPH
@@ -191,7 +226,7 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     for name, value in {"A": 2.0, "τ": 60.0, "t_w": 60.0 * math.log(10.0), "b_T": 0.1, "σ_on": 0.3}.items():
         low, high = found[name]["interval"]
         assert low < value < high, name
-    assert found["τ"]["u"] < 2.0 and found["t_w"]["u"] < 5.0  # a second one of some percent is not excluded
+    assert found["τ"]["u"] < 2.0 and found["t_w"]["u"] < 7.0  # a second one of some percent is not excluded
 
 
 def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:

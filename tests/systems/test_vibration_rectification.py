@@ -155,7 +155,8 @@ def test_gyro_or_accelerometer_alone_and_one_way() -> None:
 
 def test_mistakes_are_named() -> None:
     swapped = [[*row[:2], -row[2], *row[3:]] for row in rows()]
-    assert any(r.id == "force.factor" for r in reduced(swapped).reasons)
+    (reason,) = [r for r in reduced(swapped).reasons if r.id == "force.factor"]
+    assert "accelerometer" in reason.text and "up and down" in reason.text  # it was called a gyro
     assert any("levels are needed" in p for p in problems([row for row in rows() if row[3] < 1.5]))
     assert any("up: 1" in p for p in problems([[*row[:2], 2.0, *row[3:]] for row in rows()]))
 

@@ -14,7 +14,7 @@ from gyrobench.tuning import synthesis
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies
 from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.reasons import _bode
-from gyrobench.tuning.sight_jitter import SightWays
+from gyrobench.tuning.sight_jitter import MovedSight, SightWays
 from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.synthesis import (
     StateSpace,
@@ -236,7 +236,8 @@ def test_no_controller_is_below_the_floor() -> None:
     f = np.geomspace(1.0, 100.0, 300)
     S, n = 1e-6 / f**2, np.full(f.size, 1e-9)
     one = np.ones(f.size, complex)
-    ways = SightWays(np.ones(f.size, bool), f, ((one, one, S), *[(0 * one, 0 * one, 0 * S)] * 2), one, -one, n)
+    moved = MovedSight("base", one, one, S), MovedSight("noise", 0 * one, one, n)
+    ways = SightWays(f, f, moved, one, -one)
     by_hand = math.sqrt(np.trapezoid(S * n / (S + n), f))
     assert ways.floor() == pytest.approx(by_hand, rel=1e-9)
     for _ in range(200):
@@ -249,8 +250,8 @@ def test_the_voltage_of_noise_and_base() -> None:
     """No way back: the controller's gain times the root of the integral of all densities, 3 sqrt(2e-4 x 99)."""
     f = np.linspace(1.0, 100.0, 500)
     one = np.ones(f.size, complex)
-    none = (0 * one, 0 * one, 0 * f)
-    ways = SightWays(np.ones(f.size, bool), f, ((one, one, 1e-4 + 0 * f), none, none), one, 0 * one, 1e-4 + 0 * f)
+    moved = MovedSight("base", one, one, 1e-4 + 0 * f), MovedSight("noise", 0 * one, one, 1e-4 + 0 * f)
+    ways = SightWays(f, f, moved, one, 0 * one)
     assert ways.voltage(one + one + one) == pytest.approx(3.0 * math.sqrt(2e-4 * 99.0), rel=1e-9)
 
 

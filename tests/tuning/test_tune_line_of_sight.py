@@ -7,30 +7,30 @@ import math
 import numpy as np
 import pytest
 
-from gyrobench.bench import Bench
+from gyrobench.bench import Bench, UsageError
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.plant import HeldController, plants
-from gyrobench.tuning.sight_jitter import sight_models
+from gyrobench.tuning.sight_jitter import FINER, MovedSight, SightWays, finer, sight_models
 from gyrobench.tuning.structures import rounded
 from gyrobench.tuning.tune_loop import tune
 
 F = np.geomspace(0.05, 1000.0, 3000)
 
 
-def gimbal(**values: object):
+def gimbal(of: str = "gimbal_stabilization", **values: object):
     """Return the gimbal with options set."""
-    system = load_system("gimbal_stabilization")
+    system = load_system(of)
     for name, x in values.items():
         system.set(name, x)
     return system
 
 
-def models(axis: str, **values: object):
+def models(axis: str, of: str = "gimbal_stabilization", **values: object):
     """Return the plant, the sight model, the system's own controller over F and its parameters."""
-    system = gimbal(**values)
+    system = gimbal(of, **values)
     ports = loops_of(system)[axis]
     with Session(system, bench=Bench.find().folder, child=True) as session:
         now, _, document = session.prepare()
@@ -40,10 +40,15 @@ def models(axis: str, **values: object):
         def part_of(slot: str):
             return load_part(session.names[slot])
 
-        free, slipping = ({**q, **more} for more in (sources.free, sources.slipping))
+        free, slipping = {**q, **sources.free}, {**q, **sources.riding, **sources.slipping}
         plant = plants(session.assembly, free, part_of, now.step, [{}], ports)[0]
         sight = sight_models(session.assembly, slipping, part_of, now.step, [{}], ports, sources)[0]
-    G = HeldController(rounded(np.array(q[f"{axis}.num"]), np.array(q[f"{axis}.den"]), {}), now.step)
+    if f"{axis}.num" in q:
+        num, den = np.array(q[f"{axis}.num"]), np.array(q[f"{axis}.den"])
+    else:  # the design of a tracking loop has an integral alone
+        num = q[f"{ports.slot}.K"] * np.array([q[f"{ports.slot}.integral"], 1.0])
+        den = np.array([0.0, 1.0])
+    G = HeldController(rounded(num, den, {}), now.step)
     return plant, sight, G.response(np.exp(2j * np.pi * F * now.step)), q
 
 
@@ -61,8 +66,9 @@ def test_the_model_without_controller_makes_the_loop(axis: str) -> None:
     plant, sight, G, _ = models(axis, pitch=0.5)
     ways = sight.at(F)
     L = plant.response(F) * G
-    assert -G[ways.use] * ways.back == pytest.approx(L[ways.use], rel=1e-6)
-    assert ways.f[0] >= 1.0
+    use = F >= 1.0
+    assert -G[use] * ways.back[::FINER] == pytest.approx(L[use], rel=1e-6)
+    assert ways.f[0] == F[use][0]
 
 
 @pytest.mark.long
@@ -80,7 +86,7 @@ def test_jitter_by_hand() -> None:
     use = F >= 1.0
     by_hand = math.sqrt(np.trapezoid(density[use], F[use]))
     assert sight.at(F).rms(G) == pytest.approx(by_hand, rel=0.02)
-    assert set(sight.at(F).sources(G)) == {f"vibration about {a}" for a in "xyz"} | {"noise of the sensor"}
+    assert set(sight.at(F).sources(G)) == {f"vibration about {a}" for a in "xyz"} | {"noise of the gyro"}
 
 
 @pytest.mark.long
@@ -123,3 +129,71 @@ def test_a_controller_of_less_order_takes_the_design_away() -> None:
     """The design of the system has a notch: its coefficients beyond those of a pi controller become 0."""
     found = tune(gimbal(), ["phase margin=40deg", "S at 1Hz<-20dB"], structure="pi", loop="yaw")
     assert len(found.settings["yaw.num"]) == 4 and found.settings["yaw.num"][2:] == [0.0, 0.0]
+
+
+TRACKED = {"bending": 0.0, "psd": "none", "target": "sine", "frequency": 3.0, "jitter_from": 1.0, "ride": 36.0}
+
+
+@pytest.mark.long
+def test_jitter_of_a_tracking_error_by_hand() -> None:
+    """A sine of 0.5 mrad about yaw at 3 Hz, noise of gyro and images; continuous, the step of 0.2 ms: 2 %.
+
+    With T_r the closed rate loop, H = exp(-17 ms s) sinc sinc of the images and L = C T_r H / s:  error = target S,
+    S = 1/(1 + L);  images C T_r/s S;  gyro F T_r/s S, F its low pass.  Both loops, each without its own
+    controller, make the same of it.
+    """
+    made = {}
+    for loop in ("yaw", "track yaw"):
+        _, sight, G, q = models(loop, "gimbal_tracking", amplitude=5e-4, **TRACKED)
+        made[loop] = sight.at(F).sources(G)
+    assert made["yaw"] == pytest.approx(made["track yaw"], rel=1e-4)
+    s = 2j * np.pi * F
+    low_pass = 1.0 / (1.0 + math.sqrt(2.0) * s / (200 * np.pi) + (s / (200 * np.pi)) ** 2)
+    num, den = (np.polynomial.polynomial.polyval(s, np.array(q[f"yaw.{n}"])) for n in ("num", "den"))
+    torque = num / den * 0.4 / (0.08 * s + 0.01)  # rate for a rate signal: k_t/R = 0.4 N.m/V, 0.08 kg.m2
+    T_r = torque / (1.0 + torque * low_pass)
+    images = np.exp(-0.017 * s) * np.sinc(0.01 * F) * np.sinc(0.004 * F)
+    C = q["track_yaw.K"] * (1.0 + q["track_yaw.integral"] / s)
+    S = 1.0 / (1.0 + C * T_r * images / s)
+    use = F >= 1.0
+
+    def rms(way: np.ndarray, density: np.ndarray | float) -> float:
+        return math.sqrt(np.trapezoid((np.abs(way) ** 2 * density)[use], F[use]))
+
+    got = made["yaw"]
+    assert got["motion of the target"] == pytest.approx(5e-4 / math.sqrt(2.0) * abs(np.interp(3.0, F, S)), rel=0.02)
+    assert got["noise of the gyro"] == pytest.approx(rms(low_pass * T_r / s * S, math.radians(0.005) ** 2), rel=0.02)
+    held = 2.0 * 0.01 * 4e-10 * np.sinc(0.01 * F) ** 2
+    assert got["noise of the images"] == pytest.approx(rms(C * T_r / s * S, held), rel=0.02)
+    assert got["resolution of the images"] == pytest.approx(got["noise of the images"] / math.sqrt(12.0), rel=1e-6)
+
+
+def test_a_resonance_between_the_frequencies_of_the_grid() -> None:
+    """P = (w/s)2 (1 + 2 z s/w) closes with a damping of 0.005, as narrow as half an interval of the grid."""
+    f0, z = 37.1, 0.005
+    f = np.geomspace(1.0, 1000.0, 400)
+    fine = finer(f)
+    s = 2j * np.pi * fine
+    w = 2.0 * np.pi * f0
+    plant = (w / s) ** 2 * (1.0 + 2.0 * z * s / w)
+    moved = (MovedSight("noise", 0.0 * s, 1.0 + 0.0 * s, np.ones(fine.size)),)
+    ways = SightWays(f, fine, moved, plant, -plant)
+    x = np.linspace(1.0, 1000.0, 4_000_001) / f0
+    exact = np.trapezoid((1.0 + (2 * z * x) ** 2) / ((1.0 - x**2) ** 2 + (2 * z * x) ** 2), x * f0)
+    assert ways.sources(np.ones(f.size, complex))["noise"] ** 2 == pytest.approx(exact, rel=0.02)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("loop", ["pitch", "track yaw"])
+def test_jitter_of_a_tracking_gimbal_is_had_and_measured(loop: str) -> None:
+    wishes = ["phase margin=40deg", "jitter=60urad", *(["bandwidth>0.6Hz"] if loop != "pitch" else [])]
+    plain = gimbal("gimbal_tracking", jitter_from=2.0, ride=20.0, target_yaw=2e-3)
+    found = tune(plain, wishes, structure="pi", loop=loop)
+    jitter = next(w for w in found.proofs[0].wishes if w.wish.name == "jitter")
+    assert found.proven, str(found)
+    assert jitter.value == pytest.approx(jitter.expected, abs=jitter.U + 0.1 * jitter.expected)
+
+
+def test_jitter_alone_is_no_wish_for_a_tracking_loop() -> None:
+    with pytest.raises(UsageError, match="it is least with a loop track yaw that does nothing"):
+        tune(gimbal("gimbal_tracking"), ["phase margin=40deg", "jitter=60urad"], loop="track yaw")

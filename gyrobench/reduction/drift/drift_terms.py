@@ -25,11 +25,12 @@ from gyrobench.reduction.setup.sources import (
     CURRENT_OFFSET_OF,
     CURRENT_RESOLUTION,
     CURRENT_RESOLUTION_OF,
+    IN_ATTITUDE,
+    PULSES,
     TORQUER_NONLINEARITY,
     TORQUER_NONLINEARITY_OF,
     TORQUER_SCALE,
     TORQUER_SCALE_OF,
-    TURNED,
     Effect,
     Source,
 )
@@ -51,8 +52,6 @@ class OneLoopSetup(RebalanceSetup):
     quantum: float = 0.0
     pulses: Pulses | None = None
     supplies: Supplies = field(default_factory=Supplies)
-    u_pulse: float = 0.0
-    u_switching: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
@@ -120,13 +119,13 @@ def equation(left: str, names: Iterable[str]) -> str:
 def attitude_effects(s: Any, found: Findings, note: str = "") -> list[Effect]:
     """Return what a gyro turned about its output and spin axes does to drift rates in one attitude: the Earth's rate.
 
-    s: a setup with attitude (rows I, O, S in E, N, U), latitude, earth_rate and u_attitude.
+    s: a setup with attitude (rows I, O, S in E, N, U), latitude and earth_rate.
     """
     earth, turned = frames.earth_rate_local(s.latitude, s.earth_rate), []
     for axis, name in ((1, "output"), (2, "spin")):
         R = frames.rotation(np.eye(3)[axis], SMALL).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ earth) / SMALL
-        turned.append(replace(TURNED[name], option="u_attitude", note=note).effect(s, found.error(-rate)))
+        turned.append(IN_ATTITUDE[name].effect(s, found.error(-rate), note=note))
     return turned
 
 
@@ -142,7 +141,7 @@ def torquer_sources(axis: str = "", full: str = "") -> list[Source]:
 
 def elsewhere(axis: str) -> list[str]:
     """Return names and ids of the sources of one of two torquers, which the other channel lacks."""
-    own = [*torquer_sources(axis), *(pulse_sources.of_loop(s, axis) for s in pulse_sources.SOURCES)]
+    own = [*torquer_sources(axis), *(pulse_sources.of_loop(s, axis) for s in PULSES)]
     return [word for s in own for word in (s.name, s.id)]
 
 

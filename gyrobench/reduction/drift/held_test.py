@@ -51,14 +51,6 @@ class HeldSetup(SiteSetup):
     k_locked: float = 0.0
     k: float = 0.0
     supplies: Supplies = field(default_factory=Supplies)
-    u_scale_factor: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
-    u_wobble: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
-    u_unbalance: float = 0.0
-    u_time: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:

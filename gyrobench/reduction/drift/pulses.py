@@ -23,17 +23,16 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.setup.sources import Effect, Source
-
-ASYMMETRY = Source(
-    "pulse.asymmetry", "asymmetry of the pulse currents", "A", "u_pulse", "positive less negative current"
+from gyrobench.reduction.setup.sources import (
+    PULSE_ASYMMETRY,
+    PULSE_CURVED,
+    PULSE_GROWING,
+    PULSE_LATE,
+    PULSE_MEAN,
+    PULSE_RESOLUTION,
+    Effect,
+    Source,
 )
-MEAN = Source("pulse.mean", "mean of the pulse currents", "A", note="part of the torquer scale factor")
-LATE = Source("pulse.late", "switching time of the pulses", "s", "u_switching", "edges too late")
-GROWING = Source("pulse.growing", "switching time, proportional to the current", "s", "u_switching", "at full current")
-CURVED = Source("pulse.curved", "switching time, by the square of the current", "s", "u_switching", "at full current")
-RESOLUTION = Source("pulse.resolution", "resolution of the counts", "1")
-SOURCES = (ASYMMETRY, MEAN, LATE, GROWING, CURVED, RESOLUTION)
 
 
 def of_loop(source: Source, loop: str = "") -> Source:
@@ -90,12 +89,12 @@ class Pulses:
         square = d**2 + (read.std / self.current) ** 2  # the noise of d is rectified
         note = "two clocks, independent from window to window"
         return [
-            of_loop(ASYMMETRY, loop).effect(sizes, 0.5 * k * one, simulated=(self.d_plus - self.d_minus,)),
-            of_loop(MEAN, loop).effect(0.0, k * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
-            of_loop(LATE, loop).effect(sizes, edge * one, simulated=(self.late[0],)),
-            of_loop(GROWING, loop).effect(sizes, edge * d, simulated=(self.late[1],)),
-            of_loop(CURVED, loop).effect(sizes, edge * square, simulated=(self.late[2],)),
-            of_loop(RESOLUTION, loop).effect(12.0**-0.5, values=self._counts(fit, k, read), note=note),
+            of_loop(PULSE_ASYMMETRY, loop).effect(sizes, 0.5 * k * one, simulated=(self.d_plus - self.d_minus,)),
+            of_loop(PULSE_MEAN, loop).effect(0.0, k * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
+            of_loop(PULSE_LATE, loop).effect(sizes, edge * one, simulated=(self.late[0],)),
+            of_loop(PULSE_GROWING, loop).effect(sizes, edge * d, simulated=(self.late[1],)),
+            of_loop(PULSE_CURVED, loop).effect(sizes, edge * square, simulated=(self.late[2],)),
+            of_loop(PULSE_RESOLUTION, loop).effect(12.0**-0.5, values=self._counts(fit, k, read), note=note),
         ]
 
     def _counts(self, fit: Findings, k: float, read: CurrentWindows) -> Array:
@@ -114,8 +113,8 @@ class PulsesOnDemand(Pulses):
         asymmetric, late = 0.5 * k * longer * np.abs(d), k * self.current * self.f_q * d
         values, note = self._counts(fit, k, read), "a pulse at either end, independent from window to window"
         return [
-            of_loop(ASYMMETRY, loop).effect(sizes, asymmetric, simulated=(self.d_plus - self.d_minus,)),
-            of_loop(MEAN, loop).effect(0.0, k * longer * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
-            of_loop(GROWING, loop).effect(sizes, late, note="length of a pulse", simulated=(self.late[1],)),
-            of_loop(RESOLUTION, loop).effect(6.0**-0.5, values=values, note=note),
+            of_loop(PULSE_ASYMMETRY, loop).effect(sizes, asymmetric, simulated=(self.d_plus - self.d_minus,)),
+            of_loop(PULSE_MEAN, loop).effect(0.0, k * longer * d, simulated=((self.d_plus + self.d_minus) / 2.0,)),
+            of_loop(PULSE_GROWING, loop).effect(sizes, late, note="length of a pulse", simulated=(self.late[1],)),
+            of_loop(PULSE_RESOLUTION, loop).effect(6.0**-0.5, values=values, note=note),
         ]

@@ -2,7 +2,7 @@
 
     class Reduction(RestTest[RestSetup]):
         names = ("D_F", "D_I", ...)
-        def account(self, found): ...
+        method = "Least squares over six positions"
 
     y = omega_IA - k i = sum of the terms ``names`` in (X, Y, Z) = -f/g0 + noise    [GYRO-STATIC-9; Hu 1981, eq. 2-36]
 
@@ -30,6 +30,7 @@ from gyrobench.reduction.drift.pulses import CurrentWindows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.drift_test import DriftReduction
 from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.setup.run_metadata import Location
@@ -60,6 +61,13 @@ class RestTest(DriftReduction[S]):
 
     handling = staticmethod(handling_candidates.positions)
     names: Sequence[str] = drift.terms(9)
+    method: str = "Currents at rest, by least squares under an estimated noise model"
+
+    @classmethod
+    def setup_of(cls, run: RunDocument) -> S:
+        """Return the setup of a plan whose faces name the attitudes, of a test that has no setup of its own."""
+        setup: Any = RestSetup.of_plan(run)
+        return setup  # type: ignore[no-any-return]
 
     @property
     def attitudes(self) -> Array:
@@ -144,6 +152,11 @@ class RestTest(DriftReduction[S]):
             *drift_terms.torquer_effects(s, found, s.k, self.read, s.quantum, s.pulses),
             *s.supplies.effects(found, readings, -axes @ frames.U * s.gamma, (t0 + t1) / 2.0),
         ]
+
+    def account(self, found: Findings) -> Account:
+        """Return what a test says of itself that says no more than its method."""
+        conventions = self.setup.sign_conventions(self.setup.k)
+        return Account(method=self.method, sources=[], equation=self.equation, conventions=conventions)
 
     @property
     def equation(self) -> str:

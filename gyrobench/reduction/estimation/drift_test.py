@@ -4,6 +4,8 @@
         def problems(self): ...                # what makes setup or record impossible
         def regression(self): ...              # data, design matrix, quantities, what they are drawn against
         def effects(self, found): ...          # sources of error of the set-up, with what they do to the data
+        @Source(...)                           # one of its own: what an error of one unit does to the data
+        def level(self, found): ...
         def account(self, found): ...          # method, equation, conventions, tables of its own
 
         setup_of = ...                         # run.json -> setup
@@ -17,6 +19,7 @@ handling errors in a measured record, and the reasons that withhold a verdict.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -30,7 +33,7 @@ from gyrobench.reduction.estimation.fit_result import Account, fit_result
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.sources import Effect
+from gyrobench.reduction.setup.sources import Effect, declared
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftTestResult
 
@@ -52,13 +55,15 @@ class DriftReduction(Generic[S]):
     # ------------------------------------------------------------------------------ what a test states
     @classmethod
     def setup_of(cls, run: RunDocument) -> S:
-        """Return the setup that a run.json describes."""
-        raise NotImplementedError
+        """Return the setup that a run.json describes: a :class:`Setup`, of a test that has none of its own."""
+        setup: Any = Setup.of(run)
+        return setup  # type: ignore[no-any-return]
 
     def problems(self) -> list[str]:
         """Return what makes setup or record impossible, as sentences."""
         return []
 
+    @abstractmethod
     def regression(self) -> Regression:
         """Return the data with their linear model.  May raise ReductionError."""
         raise NotImplementedError
@@ -72,12 +77,13 @@ class DriftReduction(Generic[S]):
         return found
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the sources of error of the set-up, with what they do to the data."""
+        """Return the sources of error of the set-up, with what they do to the data, beside the declared ones."""
         return []
 
     def test(self, found: Findings) -> None:
         """Add F tests of what the model leaves out (:meth:`Findings.f_test`)."""
 
+    @abstractmethod
     def account(self, found: Findings) -> Account:
         """Return what the test says of itself, beside its figures."""
         raise NotImplementedError
@@ -96,6 +102,11 @@ class DriftReduction(Generic[S]):
         return [*told(coefficients, *sentences), found.noise_sentence(), *found.nuisance_sentences()]
 
     # ------------------------------------------------------------------------------ what follows
+    def all_effects(self, found: Findings) -> list[Effect]:
+        """Return the declared sources, each with the error of the data of its method, then :meth:`effects`."""
+        own = [source.effect(self.setup, getattr(self, n)(found)) for n, source in declared(type(self)).items()]
+        return [*own, *self.effects(found)]
+
     @classmethod
     def reduce(cls, windows: Mapping[str, Array], setup: S) -> DriftTestResult:
         """Return what the windows of a record say.  Raises ReductionError with everything that is wrong."""
@@ -112,9 +123,9 @@ class DriftReduction(Generic[S]):
         """Return what the data say, without the checks of :meth:`problems`."""
         setup = self.setup
         found = self.fitted()
-        found = with_set_up(self.derived(found), self.effects, setup.corrections, self.elsewhere, setup.remount)
+        found = with_set_up(self.derived(found), self.all_effects, setup.corrections, self.elsewhere, setup.remount)
         self.test(found)
-        effects = [*self.effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
+        effects = [*self.all_effects(found), *(remounts(found, setup.remount) if setup.remount else [])]
         return self.finished(found, effects)
 
     def finished(self, found: Findings, effects: Sequence[Effect]) -> DriftTestResult:

@@ -62,6 +62,12 @@ class Account:
     title: str = ""  # where it is not that of the system
     random: str = "random drift and reading noise"
 
+    def statements(self) -> dict[str, Any]:
+        """Return the fields of a result that are the test's own words and figures."""
+        lists = {n: list(getattr(self, n)) for n in ("sources", "conventions", "harmonics")}
+        words = {n: getattr(self, n) for n in ("title", "method", "equation")}
+        return {**words, **lists, "repeatability": dict(self.repeatability)}
+
 
 #: of a measured record: readings in steps larger than their noise can lie on the model to the last digit
 NO_RESIDUALS = Reason(
@@ -97,28 +103,11 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
     simulated = setup.truth is not None or any(q.truth is not None for q in fit.quantities)
     robust = outliers.robust(fit) if setup.robust and asked.whole() else []
     return DriftTestResult(
-        title=account.title,
-        method=account.method,
-        sources=list(account.sources),
-        equation=account.equation,
-        conventions=list(account.conventions),
+        **account.statements(),
+        **_numbers(fit),
         coefficients=coefficients,
-        series=fit.series(),
-        correlation=regression.correlation(fit.reported.covariance).tolist(),
-        condition=fit.est.design.condition,
-        rank=fit.est.design.rank,
-        dof=float(fit.dof),
-        noise=fit.noise(),
-        tests=list(fit.tests),
-        residual_std=fit.residual_std,
-        residual_unit=fit.y_unit,
-        acf=fit.acf(),
-        allan=fit.allan(),
-        psd=fit.psd(),
-        harmonics=list(account.harmonics),
         budget=budget_lines(fit, effects, account.random),
         type_b=changes_by_source(fit, effects, by_source),
-        repeatability=dict(account.repeatability),
         tables=[
             *correction_table(fit),
             *simulated_table(fit, effects, setup.errors),
@@ -142,12 +131,29 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
             *_ill_conditioned(fit),
             *account.reasons,
         ],
-        ideal=fit.ideal,
         decision_rule=f"{DECISION_RULE} {SLOW_RULE}",
-        site=setup.shown,
-        instrument=setup.instrument,
         simulated=simulated,
+        **setup.stated(),
     )
+
+
+def _numbers(fit: Findings) -> dict[str, Any]:
+    """Return fields of a result: what the fit says of the data as a whole, and of its residuals."""
+    return {
+        "series": fit.series(),
+        "correlation": regression.correlation(fit.reported.covariance).tolist(),
+        "condition": fit.est.design.condition,
+        "rank": fit.est.design.rank,
+        "dof": float(fit.dof),
+        "noise": fit.noise(),
+        "tests": list(fit.tests),
+        "residual_std": fit.residual_std,
+        "residual_unit": fit.y_unit,
+        "acf": fit.acf(),
+        "allan": fit.allan(),
+        "psd": fit.psd(),
+        "ideal": fit.ideal,
+    }
 
 
 def with_values(result: DriftTestResult, more: Sequence[Coefficient]) -> DriftTestResult:

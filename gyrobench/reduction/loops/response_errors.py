@@ -25,9 +25,6 @@ from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Table
 
-READING_GAIN = Source("table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large")
-READING_LAG = Source("table.reading.lag", "lag of the reading of the table rate", "s", "u_lag", "reading late")
-COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
 ROUNDING = 1e-6  # least relative uncertainty of a point
 LINES = 12  # numbers from which neighbour_noise estimates
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth

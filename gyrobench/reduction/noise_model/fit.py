@@ -23,9 +23,9 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
-from gyrobench.reduction.noise_model.noise_model import Minimum, NoiseModel, Process, Scale
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
-from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
+from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, filtered, joined, spectrum, split
+from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
 from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
@@ -34,11 +34,11 @@ from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
-ABSENT = 0.025  # probability of its absence below which a term is determined
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models with flicker, or of those without, from which on N holds for them too
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
+FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 STEPS = 5
 TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
 DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no model of the record
@@ -95,6 +95,7 @@ def fit_noise(
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
+        filtered=_filtered(clouds),
     )
 
 
@@ -185,12 +186,13 @@ class _Judge:
         terms, p = found.whole
         self.own, self.clean = (with_spectrum(d, terms, p, treated.spread) for d in (scaled.own, scaled.clean))
         self.removed = scaled.removed
+        self.below = treated.below / self.own.tau  # is in the samples and not in the model
         peaks = found.resonances
         self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
 
     def both(self, variance: Array) -> tuple[DeviationAgreement, DeviationAgreement]:
         """Return the agreements of an Allan variance (k,) of the broadband terms, with a ramp if there is one."""
-        whole = variance + self.peaks
+        whole = np.maximum(variance + self.peaks + self.below, 0.0)
         return (compare(self.own, np.sqrt(whole + self.removed), self.samples),
                 compare(self.clean, np.sqrt(whole[: self.clean.tau.size]), self.samples))  # fmt: skip
 
@@ -200,8 +202,7 @@ class _Judge:
         return 1.0 if all(a.holds_at_octaves for a in both) else min(min(a.share, a.octaves) for a in both)
 
     def choose(self, clouds: Sequence[Cloud]) -> Fitted:
-        """Return the model to be reported: of greatest evidence, terms paid for, among those that agree with the
-        record.
+        """Return the model to be reported: of greatest evidence, terms paid for, of those that agree with the record.
 
         Where no maximum agrees the draws are tried, the most probable ones first; where none does, the closest one.
         """
@@ -214,6 +215,8 @@ class _Judge:
         near = [f for f in ranked if worth(f) > worth(ranked[0]) - posterior.WINDOW][:TRIED_MODELS]
         tried = [(self.share(allan(f.model, f.p, tau, self.means)), f) for f in near]
         agree = [f for share, f in tried if share == 1.0]
+        if _filtered(clouds) < 1.0 - ABSENT:  # one that is not determined is not reported
+            agree = [f for f in agree if not filtered(f.model)] or agree
         if agree:
             return _middle([f for f in agree if worth(f) > worth(agree[0]) - SIMPLER], clouds)
         for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
@@ -227,6 +230,11 @@ class _Judge:
                         return tried[-1][1]
         best = max(tried, key=lambda t: t[0])
         return best[1] if best[0] > tried[0][0] + 0.05 else tried[0][1]
+
+
+def _filtered(clouds: Sequence[Cloud]) -> float:
+    """Return the probability that the white noise has passed a filter."""
+    return sum(float(c.weight.sum()) for c in clouds if filtered(c.model))
 
 
 def _middle(models: Sequence[Fitted], clouds: Sequence[Cloud]) -> Fitted:
@@ -264,6 +272,10 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
         return Estimate(0.0, 0.0, max([high, *(math.exp(0.5 * e) for e in ends)]), False)
     value = math.exp(0.5 * float(own[0]))
+    beside = figure(at.model, found.beside_weak_bands(at)[None]) if name in FAST else None
+    if beside is not None:
+        ratio = math.exp(0.5 * float(beside[0] - own[0]))
+        low, high = low * min(ratio, 1.0), high * max(ratio, 1.0)
     return Estimate(value, *about(value, low, high), True)
 
 
@@ -322,19 +334,6 @@ def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Proce
     return Process(times(estimates[0], scale.size), times(estimates[1], scale.tau0), present)
 
 
-def _resampled(clouds: Sequence[Cloud], count: int) -> list[tuple[Model, Array]]:
-    """Return some draws (M, q) of each model, as many as its weight, by systematic resampling."""
-    out, passed = [], 0.0
-    for c in clouds:
-        edges = passed + np.cumsum(c.weight)
-        wanted = (np.arange(count) + 0.5) / count
-        inside = wanted[(wanted > passed) & (wanted <= edges[-1])]
-        passed = float(edges[-1])
-        if inside.size:
-            out.append((c.model, c.p[np.minimum(np.searchsorted(edges, inside), c.p.shape[0] - 1)]))
-    return out
-
-
 def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
     """Return the ramp per sample: its normal distribution for given parameters, over the draws.
 
@@ -348,7 +347,7 @@ def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
     walks = [replace(c, weight=c.weight / total) for c in walks] if total > 0.0 else []
     ends, value = [], 0.0
     for some in (walks, clouds):
-        rows = [(model, *found.data.ramp_of(model, p)) for model, p in _resampled(some, SAMPLE)]
+        rows = [(model, *found.data.ramp_of(model, p)) for model, p in resampled(some, SAMPLE)]
         if rows:
             mean, sd = (np.concatenate([row[i] for row in rows]) for i in (1, 2))
             v, w = (mean[:, None] + sd[:, None] * z).ravel(), np.tile(share, mean.size)
@@ -361,7 +360,7 @@ def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, 
     """Return the least deviation of the model without resonances, up to a quarter of the record."""
     m = np.unique(np.rint(np.geomspace(1.0, max(samples / 4.0, 2.0), AVERAGES)))
     slow = 0.5 * (ramp.value * m) ** 2 if ramp.determined else 0.0
-    rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in _resampled(clouds, SAMPLE)]
+    rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in resampled(clouds, SAMPLE)]
     curves = np.concatenate(rows)
     place = np.argmin(curves, axis=1)
     own = np.sqrt(allan(at.model, at.p[None], m, scale.means)[0] + slow)

@@ -39,6 +39,8 @@ ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
 SMOOTH = 0.03  # of the frequency
 WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
+BELOW = 0.5  # of the power of the wild samples: the most that is wild below the limit; where it is more, the tails are
+# continuous and the noise's own.  Of wild samples of normal sizes, 3.4 times the noise or more, it is less
 FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
 NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
 SEED = 90125
@@ -50,7 +52,9 @@ class Completed:
 
     wild: indices.  missing: samples that were not there.  white (n,): the stretch with an even spectrum, of unit
     variance, NaN where a sample is missing or wild.  noise (n,): a draw of what the completed samples may differ by.
-    stays: whether the spectrum of the completion came to an end.
+    stays: whether the spectrum of the completion came to an end.  below: variance of white noise by which the samples
+    of ``x`` exceed the noise that ``extra`` leaves, as wild ones below the limit are among them; negative where the
+    limit has taken tails of the noise for wild.
     """
 
     x: Array
@@ -60,6 +64,7 @@ class Completed:
     white: Array
     noise: Array | None
     stays: bool = True
+    below: float = 0.0
 
     @property
     def drawn(self) -> Array:
@@ -266,11 +271,20 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     excess = 0.0
     if wild.any():  # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
+        if excess > BELOW * float(np.sum((x[wild] - y[wild]) ** 2)) / x.size:
+            excess = 0.0
         excess = min(excess, WHITE * float(P.S.min()))  # no more than is there
     white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
     return Completed(
-        y, lost - excess if noise is not None else None, np.flatnonzero(wild), int(missing.sum()), white, noise, stays
+        y,
+        lost - excess if noise is not None else None,
+        np.flatnonzero(wild),
+        int(missing.sum()),
+        white,
+        noise,
+        stays,
+        excess,
     )
 
 

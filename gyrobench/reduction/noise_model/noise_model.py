@@ -16,6 +16,8 @@ from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
+ABSENT = 0.025  # probability of its absence below which a term is determined
+
 
 @dataclass(frozen=True)
 class Process:
@@ -72,6 +74,7 @@ class NoiseModel:
     coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
+    filtered: probability that the white noise has passed a filter.
     """
 
     scale: Scale
@@ -83,6 +86,7 @@ class NoiseModel:
     agreements: tuple[DeviationAgreement, DeviationAgreement]
     with_wild: dict[str, float]
     models: int
+    filtered: float
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -140,7 +144,9 @@ class NoiseModel:
         return out
 
     def filter_words(self) -> str:
-        """Return what the sensor's filter is, in words; "" where the record shows none."""
+        """Return what the sensor's filter is, in words; "" where the record does not show that there is one."""
+        if self.filtered < 1.0 - ABSENT:
+            return ""
         found = next(((t, q) for t, q in split(*self.shape) if t.name == "white" and t.filter != "none"), None)
         if found is None:
             return ""

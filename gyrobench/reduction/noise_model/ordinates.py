@@ -314,6 +314,11 @@ def parameters(model: Model) -> int:
     return sum(term.size for term in model)
 
 
+def filtered(model: Model) -> bool:
+    """Return whether the white noise of a model has passed a filter."""
+    return any(term.filter != "none" for term in model)
+
+
 def spectrum(model: Model, p: Array, grid: Grid) -> Array:
     """Return S (..., b) of a model."""
     return np.asarray(np.sum([term.spectrum(q, grid) for term, q in split(model, p)], axis=0))

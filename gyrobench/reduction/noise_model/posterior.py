@@ -102,6 +102,19 @@ def weighted(clouds: Sequence[Cloud], figure: Callable[[Model, Array], Array | N
     return np.concatenate(values), np.concatenate(weights)
 
 
+def resampled(clouds: Sequence[Cloud], count: int) -> list[tuple[Model, Array]]:
+    """Return some draws (M, q) of each model, as many as its weight, by systematic resampling."""
+    out, passed = [], 0.0
+    for c in clouds:
+        edges = passed + np.cumsum(c.weight)
+        wanted = (np.arange(count) + 0.5) / count
+        inside = wanted[(wanted > passed) & (wanted <= edges[-1])]
+        passed = float(edges[-1])
+        if inside.size:
+            out.append((c.model, c.p[np.minimum(np.searchsorted(edges, inside), c.p.shape[0] - 1)]))
+    return out
+
+
 def quantile(values: Array, weights: Array, share: float) -> float:
     """Return the weighted quantile of values (M,); of models that all lack weight, each draw counts the same."""
     if not weights.sum() > 0.0:
@@ -122,4 +135,4 @@ def size_of(term: str) -> Callable[[Model, Array], Array | None]:
     return figure
 
 
-__all__ = ["Cloud", "draw", "quantile", "size_of", "volume", "weighted"]
+__all__ = ["Cloud", "draw", "quantile", "resampled", "size_of", "volume", "weighted"]

@@ -32,6 +32,7 @@ STARTS: dict[str, list[list[float]]] = {
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
+WEAK = 2  # bands that may be, though nothing shows them
 
 
 @dataclass(frozen=True)
@@ -226,9 +227,9 @@ class ModelSearch:
         return at
 
     # ------------------------------------------------------------------ resonances
-    def peak(self, at: Fitted, vain: Sequence[Array] = ()) -> Array | None:
+    def peak(self, at: Fitted, vain: Sequence[Array] = (), clear: float = CLEAR) -> Array | None:
         """Return the start (3,) of a resonance where the powers stand out of the fit most, None where none is clear;
-        vain: where one was sought already.
+        vain: where one was sought already; clear: probability of so large an excess anywhere.
         """
         data = self.data
         order = np.argsort(data.grid.omega[: data.b])
@@ -239,7 +240,7 @@ class ModelSearch:
             mine = np.abs(omega - math.exp(start[2])) < 2.0 * math.exp(-start[1])
             ratio[mine] = count[mine]
         total, number = (np.concatenate([[0.0], np.cumsum(v)]) for v in (ratio, count))
-        best, found = math.log(CLEAR / (len(WIDTHS) * order.size)), None
+        best, found = math.log(clear / (len(WIDTHS) * order.size)), None
         for width in WIDTHS:
             m, x = number[width:] - number[:-width], total[width:] - total[:-width]
             z = np.where(x > m, (np.cbrt(x / m) - 1.0 + 2.0 / (9.0 * m)) / np.sqrt(2.0 / (9.0 * m)), 0.0)
@@ -311,6 +312,22 @@ class ModelSearch:
         at = self.best
         self.seen = {}
         self.fit(at.model, at.p)
+
+    def beside_weak_bands(self, at: Fitted) -> Array:
+        """Return the parameters (q,) of a model beside the bands that may be where the powers stand out most, though
+        not clearly.
+        """
+        found, bands = at, list(self.resonances)
+        for _ in range(WEAK):
+            start = self.peak(found, clear=math.inf)
+            if start is None:
+                break
+            more = max((self._with(found, NoiseTerm(name), start) for name in PEAKS), key=lambda f: f.evidence)
+            bands.append((more.model[-1], more.p[-3:]))
+            self.data.hold(bands)
+            found = replace(more, model=more.model[:-1], p=more.p[:-3])
+        self.data.hold(self.resonances)
+        return found.p
 
     def _with(self, at: Fitted, term: NoiseTerm, start: Array) -> Fitted:
         return maximize(self.data, self.prior, (*at.model, term), np.concatenate([at.p, start]))

@@ -90,6 +90,11 @@ class Treated:
         return sum(s.done.missing for s in self.stretches)
 
     @property
+    def below(self) -> float:
+        """Return the variance of wild samples below the limit, which are in the samples and not in the noise."""
+        return float(np.average([s.done.below for s in self.stretches], weights=[s.own.size for s in self.stretches]))
+
+    @property
     def settled(self) -> bool:
         """Return whether what was completed came to an end, and is the lesser part, in all stretches."""
         return all(s.done.stays and mostly_known(s.done.x, s.done.extra) for s in self.stretches)

@@ -88,9 +88,9 @@ def truth_of(run: RunDocument, names: Iterable[str], slot: str = "gyro") -> dict
     return {n: float(run.parameters[f"{slot}.{n}"]) for n in names if f"{slot}.{n}" in run.parameters} or None
 
 
-def sizes(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
-    """Return the options that are sizes of uncertainties, SI; 0 where not given."""
-    return {n: float(options.get(n, 0.0)) for n in names}
+def sizes(options: Mapping[str, Any]) -> dict[str, float]:
+    """Return the options that are sizes of uncertainties of type B, u_NAME, SI."""
+    return {n: float(v) for n, v in options.items() if n.startswith("u_") and isinstance(v, int | float)}
 
 
 def remount_of(run: RunDocument) -> Remount:

@@ -32,7 +32,8 @@ class Setup:
     """truth: simulated values, SI (of coefficients rad/s per g0^n).  errors: of a simulated set-up, by source.
     corrections: measured errors of the set-up (estimation.effects).  robust: a robust fit is shown beside.
 
-    u_* of all setups: standard uncertainties of type B, SI, the options of the same names.
+    sizes: standard uncertainties of type B, SI, by option, "u_axis"; a source takes its own (:meth:`Source.size`).
+    parameters: of the parts of a simulated run, SI, for sources that name one.
     """
 
     truth: Mapping[str, float] | None = None
@@ -42,6 +43,8 @@ class Setup:
     robust: bool = False
     site: Mapping[str, Any] = field(default_factory=dict)  # as printed
     remount: Remount | None = None  # drift from mount to mount; None: the test has no mounts
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
@@ -49,13 +52,19 @@ class Setup:
         shared: dict[str, Any] = {"instrument": run.instrument, "corrections": run.options.get("corrections", "")}
         shared["errors"] = simulated_errors(run)
         shared["robust"] = bool(run.options.get("robust", False))
-        sources = sizes(run.options, [f.name for f in fields(cls) if f.name.startswith("u_")])
-        return cls(**{**shared, **sources, **own})
+        shared["sizes"] = sizes(run.options)
+        shared["parameters"] = {} if run.measured else run.parameters
+        shared |= {f.name: shared["sizes"].get(f.name, 0.0) for f in fields(cls) if f.name.startswith("u_")}
+        return cls(**{**shared, **own})
 
     @property
     def shown(self) -> dict[str, Any]:
         """Return the site as a report prints it."""
         return dict(self.site)
+
+    def stated(self) -> dict[str, Any]:
+        """Return the fields of a result that say where, and of which instrument."""
+        return {"site": self.shown, "instrument": self.instrument}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,17 +104,12 @@ class RebalanceSetup(SiteSetup):
     """A gyro in torque rebalance under gravity of one size.
 
     fold: squares that cannot be told apart may be there and are folded into others.  polarity: "project" k i = omega_IA
-    - omega_d, or "book" k i = omega_d - omega_IA.  u_nonlinearity: relative, at the largest current of the record.
+    - omega_d, or "book" k i = omega_d - omega_IA.
     """
 
     fold: bool = False
     polarity: str = "project"
     remount: Remount | None = field(default_factory=Remount)
-    u_axis: float = 0.0
-    u_mount: float = 0.0
-    u_scale_factor: float = 0.0
-    u_nonlinearity: float = 0.0
-    u_current: float = 0.0
 
     @classmethod
     def of(cls, run: RunDocument, **own: Any) -> Self:
@@ -148,9 +152,6 @@ class TurningSetup(RebalanceSetup):
     labels: Mapping[int, str] = field(default_factory=dict)
     modes: Mapping[int, str] | None = None
     tilt: bool | None = None
-    u_wobble: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
 
     def __post_init__(self) -> None:
         if np.size(self.base) == 0 and not frames.latitude_problems(self.latitude):

@@ -1,20 +1,24 @@
 """Sources of error of the set-up: each is declared once, with all that the bench knows of it.
 
-    TORQUER_SCALE.effect(setup, fit.error(-k * current))        # in a test: what an error of one unit does to its data
+    class Reduction(RestTest):                                  # a source of one test, in one place
+        @Source("fixture.level", "fixture off level, about east", "rad", "u_level", parameter="table.tilt[1]")
+        def level(self, found): return -self.believed(found, leaning)      # error of the data for one unit
+
+    TORQUER_SCALE.effect(setup, fit.error(-k * current))        # of several tests: declared below, used in effects()
 
 A source has an id; a name and a unit for the reader; the sign (note) of an error of one unit; the option that states
-its standard uncertainty; and the handling errors that are its large form (gyrobench.reduction.diagnosis).  A part that
-simulates it names its id (gyrobench.component.set_up).  From these follow, for every test that names the source: the
-lines of the budget, the correction of a measured error, the weights of the fit, and the predicted shift of a simulated
-error.  docs/guides/errors_of_the_set_up.md explains them to a metrologist.
-
-A system has sources of its own by declaring them in its folder, in the same way.
+its standard uncertainty, with its meaning; the parameter of a part that simulates it, or a part that names its id
+(gyrobench.component.set_up); and the handling errors that are its large form (gyrobench.reduction.diagnosis).  From
+these follow, for every test that names the source: the option, the lines of the budget, the correction of a measured
+error, the weights of the fit, and the predicted shift of a simulated error.
+docs/guides/errors_of_the_set_up.md explains them to a metrologist.
 
 The way of a statement ``--set u_axis=60arcsec``:
 
-1. ``type_b("axis")`` (system.families.option_groups) makes the option; ``Setup.of`` (setups) takes its value, SI, into
-   the field of the same name, which the setup of the test must have.
-2. ``effects`` of the test pairs it with what one unit does to the data: :meth:`Source.effect`.
+1. The option is that of the source: of one that a reduction declares by itself (System.options); of a shared one, or of
+   a reduction in a module of its own, by ``type_b("axis")`` or ``type_b(SOURCE)`` (system.families.option_groups).
+   ``Setup.of`` (setups) takes all of them, SI, into ``sizes``.
+2. The source is paired with what one unit does to the data: :meth:`Source.effect`.
 3. ``with_set_up`` (estimation.effects) puts size times error into the covariance of the data, but for a source that is
    relative to the reading, and takes corrections out of the data.
 4. ``fit_result`` (estimation): gain of the fit times error (:meth:`Effect.changes`) times size joins u and interval;
@@ -23,20 +27,20 @@ The way of a statement ``--set u_axis=60arcsec``:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from gyrobench.component.set_up import SINES
-from gyrobench.reduction.setup.window_checks import ReductionError
 
 if TYPE_CHECKING:
     from gyrobench.arrays import Array
     from gyrobench.component.set_up import Errors
     from gyrobench.reduction.estimation.findings import Findings
 
+Sensitivity = TypeVar("Sensitivity", bound=Callable[..., Any])
 PHASES = ("phase 0°", "phase 90°")  # of a wobble
 #: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
 #: of the data, which a covariance would take for information about it
@@ -48,9 +52,10 @@ STATED = "positive where the stated one is too large"
 class Source:
     """A source of error of the set-up.
 
-    id, name, note: may hold fields in braces, of several sources that are alike (:meth:`of`).  option: whose value, SI,
-    is the standard uncertainty; "" where the test states it.  parts: of several independent errors of one size.  large:
-    handling errors (diagnosis.handling_candidates) that are its large form.
+    id, name, note, doc: may hold fields in braces, of several sources that are alike (:meth:`of`).  option: whose
+    value, SI, is the standard uncertainty; "" where the test states it.  parts: of several independent errors of one
+    size.  large: handling errors (diagnosis.handling_candidates) that are its large form.  doc, default: of the option.
+    parameter: "slot.name" or "slot.name[k]" whose value is the error, of a part that does not name the id itself.
     """
 
     id: str
@@ -60,31 +65,57 @@ class Source:
     note: str = ""
     parts: tuple[str, ...] = ()
     large: tuple[str, ...] = ()
+    doc: str = ""
+    default: float | str = 0.0
+    parameter: str = ""
 
     def of(self, **named: str) -> Source:
         """Return one of several sources that are alike: its fields filled in."""
-        return replace(self, **{n: getattr(self, n).format(**named) for n in ("id", "name", "note")})
+        return replace(self, **{n: getattr(self, n).format(**named) for n in ("id", "name", "note", "doc")})
+
+    def __call__(self, sensitivity: Sensitivity) -> Sensitivity:
+        """Declare a method (self, found) of a reduction as what an error of one unit does to the data of its test."""
+        sensitivity.source = self  # type: ignore[attr-defined]
+        return sensitivity
+
+    @property
+    def meaning(self) -> str:
+        """What the option states."""
+        return self.doc or f"{self.name}, standard uncertainty"
 
     def effect(self, sizes: Any, error: Array | None = None, **more: Any) -> Effect:
         """Return the source with what it does to the data of a test; see gyrobench.reduction.estimation.effects.
 
         sizes: the setup of the test, a mapping of its options, or the standard uncertainty itself, SI.
         """
+        if self.parameter:
+            more = {"simulated": self._simulated(getattr(sizes, "parameters", {})), **more}
         return Effect(self, self.size(sizes), error, **{"note": self.note, "parts": self.parts, **more})
 
     def size(self, sizes: Any) -> float:
         """Return the standard uncertainty that is stated, SI; 0 where none is."""
         if isinstance(sizes, (int, float)):
             return float(sizes)
-        if isinstance(sizes, Mapping):
-            return float(sizes.get(self.option, 0.0))
-        if not hasattr(sizes, self.option):
-            kind = type(sizes).__name__
-            raise ReductionError(
-                f"the source of error {self.id} takes its uncertainty from {self.option}, and the set-up {kind} has no "
-                f"such field: write `{self.option}: float = 0.0` in {kind}"
-            )
-        return float(getattr(sizes, self.option))
+        stated: Mapping[str, float] = sizes if isinstance(sizes, Mapping) else sizes.sizes
+        return float(stated.get(self.option, 0.0))
+
+    def _simulated(self, parameters: Mapping[str, Any]) -> tuple[float, ...]:
+        """Return the error that :attr:`parameter` has in a simulated run, SI; () where it has none."""
+        name, _, index = self.parameter.partition("[")
+        if name not in parameters:
+            return ()
+        value = parameters[name]
+        return (float(np.ravel(value)[int(index.rstrip("]")) - 1]),) if index else tuple(np.ravel(value).tolist())
+
+
+def declared(reduction: Any) -> dict[str, Source]:
+    """Return the sources that a class declares by itself or inherits: name of the method -> source, in their order."""
+    found: dict[str, Source] = {}
+    for klass in reversed(getattr(reduction, "__mro__", ())):
+        for name, value in vars(klass).items():
+            if isinstance(source := getattr(value, "source", None), Source):
+                found[name] = source
+    return found
 
 
 @dataclass(frozen=True)
@@ -154,7 +185,10 @@ class Effect:
 
 
 # ------------------------------------------------------------------------------------------------ the table
-AXIS_POLE_EAST = Source("table.axis.pole.east", "table axis off the pole, about east", "rad", "u_axis")
+AXIS_POLE_EAST = Source(
+    "table.axis.pole.east", "table axis off the pole, about east", "rad", "u_axis",
+    doc="standard uncertainty of the table axis against the pole",
+)  # fmt: skip
 AXIS_POLE_NORMAL = Source("table.axis.pole.normal", "table axis off the pole, about p × east", "rad", "u_axis")
 AXIS_VERTICAL_EAST = Source("table.axis.vertical.east", "table axis off the vertical, about east", "rad", "u_axis")
 AXIS_VERTICAL_NORTH = Source("table.axis.vertical.north", "table axis off the vertical, about north", "rad", "u_axis")
@@ -163,47 +197,82 @@ AXIS_SERVO = Source("table.axis.servo.{axis}", "table axis about {axis}", "rad",
 ATTITUDE_SERVO = Source("table.attitude", "attitude about the table axis", "rad", "u_axis")
 OUTER_POLE_EAST = Source("outer.axis.pole.east", "outer axis off the pole, about east", "rad", "u_axis")
 OUTER_POLE_NORMAL = Source("outer.axis.pole.normal", "outer axis off the pole, about p × east", "rad", "u_axis")
-SQUARE = Source("table.square", "table axes out of the right angle", "rad", "u_square")
+SQUARE = Source(
+    "table.square", "table axes out of the right angle", "rad", "u_square",
+    doc="standard uncertainty of the right angle between the table axes",
+)  # fmt: skip
 INNER_SQUARE = Source("inner.axis.square", "right angle of the table axes", "rad", "u_square")
-WOBBLE = Source("table.wobble", "wobble of the table axis, twice a turn", "rad", "u_wobble", parts=PHASES)
+WOBBLE = Source(
+    "table.wobble", "wobble of the table axis, twice a turn", "rad", "u_wobble", parts=PHASES,
+    doc="wobble of a table axis twice a turn, std. unc. of its amplitude",
+)  # fmt: skip
 WOBBLE_OF = Source(
     "{axis}.wobble", "wobble of the {axis} axis, twice a turn", "rad", "u_wobble", "unknown phase", PHASES
 )
 ROTATION = ("rotation", "angle_unit")
-ANGLE_ONCE = Source("angle.once", "angle error, once a turn", "rad", "u_angle1", "encoder", SINES, ROTATION)
-ANGLE_TWICE = Source("angle.twice", "angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
+ANGLE_ONCE = Source(
+    "angle.once", "angle error, once a turn", "rad", "u_angle1", "encoder", SINES, ROTATION,
+    "error of the angle readings once a turn, std. unc. of its amplitude",
+)  # fmt: skip
+ANGLE_TWICE = Source(
+    "angle.twice", "angle error, twice a turn", "rad", "u_angle2", "encoder", SINES,
+    doc="error of the angle readings twice a turn, std. unc. of its amplitude",
+)  # fmt: skip
 ANGLE_ONCE_OF = Source("{axis}.angle.once", "{axis} angle error, once a turn", "rad", "u_angle1", "encoder", SINES)
 ANGLE_TWICE_OF = Source("{axis}.angle.twice", "{axis} angle error, twice a turn", "rad", "u_angle2", "encoder", SINES)
 ANGLE_OF = {"once": ANGLE_ONCE_OF, "twice": ANGLE_TWICE_OF}
 UNBALANCE = Source(
     "servo.unbalance", "unbalance over stiffness", "rad", "u_unbalance", "angle at 1 g across the axis",
-    ("mass along z", "mass along y"),
+    ("mass along z", "mass along y"), doc="angle by unbalance of the table at 1 g over the stiffness, std. unc.",
 )  # fmt: skip
-TIME_BASE = Source("time_base", "time base", RELATIVE, "u_time", "relative", large=("time_unit",))
+TIME_BASE = Source(
+    "time_base", "time base", RELATIVE, "u_time", "relative", large=("time_unit",),
+    doc="relative standard uncertainty of the time base",
+)  # fmt: skip
 
 # ------------------------------------------------------------------------------------------------ the instrument on it
-INPUT_TO_OUTPUT = Source("mount.3", "input axis towards output axis", "rad", "u_mount")
+INPUT_TO_OUTPUT = Source(
+    "mount.3", "input axis towards output axis", "rad", "u_mount",
+    doc="standard uncertainty of the gyro axes against the fixture",
+)  # fmt: skip
 INPUT_TO_SPIN = Source("mount.input_to_spin", "input axis towards spin axis", "rad", "u_mount")
 TURNED = {
     axis: Source(f"mount.{k}", f"gyro turned about its {axis} axis", "rad", "u_mount")
     for axes in (("input", "output", "spin"), ("x", "y", "z"))
     for k, axis in enumerate(axes, 1)
 }
-REMOUNT = Source("mount.scatter", "drift from mount to mount", "rad/s", "u_remount", "of each mount by itself")
-LATITUDE = Source("latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",))
-GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity")
+#: the same of a gyro that stands in one attitude
+IN_ATTITUDE = {
+    axis: replace(source, option="u_attitude", doc="standard uncertainty of the attitude about each gyro axis")
+    for axis, source in TURNED.items()
+}
+REMOUNT = Source(
+    "mount.scatter", "drift from mount to mount", "rad/s", "u_remount", "of each mount by itself",
+    doc="std. unc. of the drift from mount to mount, where the plan does not show it",
+)  # fmt: skip
+LATITUDE = Source(
+    "latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",),
+    doc="standard uncertainty of the latitude",
+)  # fmt: skip
+GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity", doc="standard uncertainty of gravity")
 
 # ------------------------------------------------------------------------------------------------ its supplies
 #: departure of each at the start of the record; its drift over the record is a source beside it: :func:`drifting`
+_SUPPLIES = {
+    "frequency": ("frequency of the wheel supply", RELATIVE, "u_wheel_frequency", "relative std. unc. of the wheel's "
+                  "frequency, and of its change over the record"),
+    "voltage": ("voltage of the wheel supply", RELATIVE, "u_wheel_voltage", "relative std. unc. of the wheel's "
+                "voltage, and of its change over the record"),
+    "phase": ("phases of the wheel supply", "rad", "u_wheel_phase", "std. unc. of the phases of the wheel's supply, "
+              "and of its change over the record"),
+    "pickoff": ("excitation of the pickoff", RELATIVE, "u_pickoff_excitation", "relative std. unc. of the pickoff's "
+                "excitation, and of its change over the record"),
+    "torquer": ("excitation of torquer or suspension", RELATIVE, "u_torquer_excitation", "the same of the excitation "
+                "of torquer or suspension"),
+}  # fmt: skip
 SUPPLIES = {
-    name: Source(f"supply.{name}", title, unit, option, "departure from the nominal value, at the start")
-    for name, title, unit, option in (
-        ("frequency", "frequency of the wheel supply", RELATIVE, "u_wheel_frequency"),
-        ("voltage", "voltage of the wheel supply", RELATIVE, "u_wheel_voltage"),
-        ("phase", "phases of the wheel supply", "rad", "u_wheel_phase"),
-        ("pickoff", "excitation of the pickoff", RELATIVE, "u_pickoff_excitation"),
-        ("torquer", "excitation of torquer or suspension", RELATIVE, "u_torquer_excitation"),
-    )
+    name: Source(f"supply.{name}", title, unit, option, "departure from the nominal value, at the start", doc=doc)
+    for name, (title, unit, option, doc) in _SUPPLIES.items()
 }
 
 
@@ -216,13 +285,17 @@ def drifting(source: Source) -> Source:
 # ------------------------------------------------------------------------------------------------ current and readings
 TORQUER_SCALE = Source(
     "torquer.scale_factor", "torquer scale factor", RELATIVE, "u_scale_factor", f"relative, {STATED}",
-    large=("current_unit",),
+    large=("current_unit",), doc="relative standard uncertainty of the torquer scale factor",
 )  # fmt: skip
 TORQUER_NONLINEARITY = Source(
     "torquer.nonlinearity", "torquer nonlinearity", RELATIVE, "u_nonlinearity",
     "relative departure from proportionality at {full}",
+    doc="relative torquer nonlinearity at the largest current, standard unc.",
 )  # fmt: skip
-CURRENT_OFFSET = Source("current.offset", "offset of the current reading", "A", "u_current", large=("current_sign",))
+CURRENT_OFFSET = Source(
+    "current.offset", "offset of the current reading", "A", "u_current", large=("current_sign",),
+    doc="standard uncertainty of the zero of the current meter",
+)  # fmt: skip
 CURRENT_RESOLUTION = Source("current.resolution", "resolution of the current reading", "A", note="as if never dithered")
 #: of a gyro with two channels: the torquer about an axis, and the meter of its current
 TORQUER_SCALE_OF = replace(
@@ -235,4 +308,50 @@ CURRENT_OFFSET_OF = replace(CURRENT_OFFSET, id="current.{axis}.offset", name="ze
 CURRENT_RESOLUTION_OF = replace(
     CURRENT_RESOLUTION, id="current.{axis}.resolution", name="resolution of the {axis} current meter"
 )
-VOLTMETER = Source("voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative")
+VOLTMETER = Source(
+    "voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative",
+    doc="relative standard uncertainty of the voltmeter",
+)  # fmt: skip
+
+#: reading of the rate of a vibrating table; input axis of a gyro on it
+READING_GAIN = Source(
+    "table.reading.gain", "gain of the reading of the table rate", "1", "u_gain", "reading too large",
+    doc="relative standard uncertainty of the reading of the table rate",
+)  # fmt: skip
+READING_LAG = Source(
+    "table.reading.lag", "lag of the reading of the table rate", "s", "u_lag", "reading late",
+    doc="standard uncertainty of the time by which that reading is late",
+)  # fmt: skip
+COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
+
+# ------------------------------------------------------------------------------------------------ pulses of a rebalance
+PULSE_ASYMMETRY = Source(
+    "pulse.asymmetry", "asymmetry of the pulse currents", "A", "u_pulse", "positive less negative current",
+    doc="standard uncertainty of the positive less the negative current of a pulse rebalance",
+)  # fmt: skip
+PULSE_MEAN = Source("pulse.mean", "mean of the pulse currents", "A", note="part of the torquer scale factor")
+PULSE_LATE = Source(
+    "pulse.late", "switching time of the pulses", "s", "u_switching", "edges too late",
+    doc="standard uncertainty of the switching time of a pulse rebalance",
+)  # fmt: skip
+PULSE_GROWING = Source(
+    "pulse.growing", "switching time, proportional to the current", "s", "u_switching", "at full current"
+)
+PULSE_CURVED = Source(
+    "pulse.curved", "switching time, by the square of the current", "s", "u_switching", "at full current"
+)
+PULSE_RESOLUTION = Source("pulse.resolution", "resolution of the counts", "1")
+PULSES = (PULSE_ASYMMETRY, PULSE_MEAN, PULSE_LATE, PULSE_GROWING, PULSE_CURVED, PULSE_RESOLUTION)
+
+
+def stating(names: Mapping[str, Any]) -> dict[str, Source]:
+    """Return those of a module's names that say what an option states, or tables of them: option -> source."""
+    found: dict[str, Source] = {}
+    for value in names.values():
+        for s in value.values() if isinstance(value, dict) else (value,):
+            if isinstance(s, Source) and s.doc:
+                found.setdefault(s.option, s)
+    return found
+
+
+SHARED = stating(dict(vars()))

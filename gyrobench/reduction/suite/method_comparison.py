@@ -246,10 +246,14 @@ def _quantity(c: MeasurandComparison) -> SuiteQuantity:
     q, a = c.quantity, c.found
     weights = a.weights.tolist() if a is not None else [None] * len(c.values)
     values = [
-        SuiteValue(v.label, v.estimate, v.u, v.U, v.u_a, v.u_b, v.u_shared, v.dof if math.isfinite(v.dof) else None, w,
-                   v.truth, _how(v.reported, q.name))
+        SuiteValue(
+            **{n: getattr(v, n) for n in ("label", "estimate", "u", "U", "u_a", "u_b", "u_shared", "truth")},
+            dof=v.dof if math.isfinite(v.dof) else None,
+            weight=w,
+            how=_how(v.reported, q.name),
+        )
         for v, w in zip(c.values, weights, strict=True)
-    ]  # fmt: skip
+    ]
     found: dict[str, Any] = dict.fromkeys(("mean", "Q", "dof", "birge", "p", "largest_E_n"))
     if a is not None:
         found = {"mean": WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1, "birge": a.birge, "p": a.p,
@@ -270,14 +274,16 @@ def _how(reported: str, name: str) -> str:
 def _member(label: str, m: Member) -> SuiteMember:
     r = m.result
     return SuiteMember(
-        label=label, system=r.system, title=r.title, method=r.method, verdict=r.verdict, summary=list(r.summary),
-        warnings=list(r.warnings), site=dict(r.site), instrument=r.instrument, residual_std=r.residual_std,
-        unit=r.residual_unit, condition=r.condition, rank=r.rank, windows=sum(len(s.y) for s in r.series),
+        **{n: getattr(r, n) for n in ("system", "title", "method", "verdict", "summary", "warnings", "site")},
+        **{n: getattr(r, n) for n in ("instrument", "residual_std", "condition", "rank")},
+        label=label,
+        unit=r.residual_unit,
+        windows=sum(len(s.y) for s in r.series),
         estimates=[
             ReportedEstimate(c.name, c.unit, c.estimate, c.u, c.k, c.interval, c.truth, c.z) for c in r.coefficients
         ],
         test=m.test.as_dict(),
-    )  # fmt: skip
+    )
 
 
 def _consistency(compared: Sequence[MeasurandComparison]) -> dict[str, Any]:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import ModuleType
 
+from gyrobench.reduction.setup.sources import SHARED, Source, stating
 from gyrobench.system.configurable import Option
 from gyrobench.units import DEG
 
@@ -45,39 +48,20 @@ SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 
 ATTITUDE = {
     "attitude": Option("E U", str, "I and O (and S) axes: E, N, U, P, Q or minus these, or a matrix of rows"),
 }
-#: name without u_ -> unit and meaning
-_TYPE_B = {
-    "attitude": ("rad", "standard uncertainty of the attitude about each gyro axis"),
-    "axis": ("rad", "standard uncertainty of the table axis against the pole"),
-    "square": ("rad", "standard uncertainty of the right angle between the table axes"),
-    "mount": ("rad", "standard uncertainty of the gyro axes against the fixture"),
-    "remount": ("rad/s", "std. unc. of the drift from mount to mount, where the plan does not show it"),
-    "wobble": ("rad", "wobble of a table axis twice a turn, std. unc. of its amplitude"),
-    "angle1": ("rad", "error of the angle readings once a turn, std. unc. of its amplitude"),
-    "angle2": ("rad", "error of the angle readings twice a turn, std. unc. of its amplitude"),
-    "unbalance": ("rad", "angle by unbalance of the table at 1 g over the stiffness, std. unc."),
-    "latitude": ("rad", "standard uncertainty of the latitude"),
-    "scale_factor": ("1", "relative standard uncertainty of the torquer scale factor"),
-    "nonlinearity": ("1", "relative torquer nonlinearity at the largest current, standard unc."),
-    "current": ("A", "standard uncertainty of the zero of the current meter"),
-    "pulse": ("A", "standard uncertainty of the positive less the negative current of a pulse rebalance"),
-    "switching": ("s", "standard uncertainty of the switching time of a pulse rebalance"),
-    "time": ("1", "relative standard uncertainty of the time base"),
-    "wheel_frequency": ("1", "relative std. unc. of the wheel's frequency, and of its change over the record"),
-    "wheel_voltage": ("1", "relative std. unc. of the wheel's voltage, and of its change over the record"),
-    "wheel_phase": ("rad", "std. unc. of the phases of the wheel's supply, and of its change over the record"),
-    "pickoff_excitation": ("1", "relative std. unc. of the pickoff's excitation, and of its change over the record"),
-    "torquer_excitation": ("1", "the same of the excitation of torquer or suspension"),
-}
 
 
-def type_b(*names: str, **meanings: str) -> dict[str, Option]:
-    """Return the options u_NAME, sizes of uncertainties of type B (0 unless set), of the sources of these names.
+def type_b(*sources: str | Source | ModuleType, **meanings: str) -> dict[str, Option]:
+    """Return the options u_NAME of sources: sizes of uncertainties of type B, SI, 0 unless a source says otherwise.
 
-    meanings: names whose meaning in this test is another one: ``axis="of each mount, about each of its axes"``.
+    sources: declared ones, the name of the option of a shared one without u_ (reduction.setup.sources), or a module of
+    sources.  meanings: names whose meaning in this test is another one: ``axis="of each mount, about each axis"``.
     """
-    known = {**{n: _TYPE_B[n][1] for n in names}, **meanings}
-    return {f"u_{n}": Option(0.0, _TYPE_B[n][0], text, 0.0) for n, text in known.items()}
+    known: list[Source] = []
+    for s in sources:
+        one = SHARED[f"u_{s}"] if isinstance(s, str) else s
+        known += stating(vars(one)).values() if isinstance(one, ModuleType) else [one]
+    known += [replace(SHARED[f"u_{n}"], doc=text) for n, text in meanings.items()]
+    return {s.option: Option(s.default, s.unit.replace("²", "2"), s.meaning, 0.0) for s in known}
 
 
 #: electrical supplies of the gyro  [GYRO-SUPPLY]

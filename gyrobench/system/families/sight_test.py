@@ -9,6 +9,7 @@ class Mine(SightTest):
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +21,7 @@ from gyrobench.reduction.loops.jitter import shortest
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.base_spectra import SPECTRA
 from gyrobench.system.families.loop_test import LoopTest
+from gyrobench.system.line_of_sight import Density, LineOfSight, SightSource
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -152,6 +154,49 @@ class SightTest(LoopTest):
     def inner(self) -> str:
         """Return the name of the inner joint."""
         return "pitch" if self["form"] == FORMS[0] else "yaw"
+
+    def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
+        """Return what makes the line of sight jitter, for a jitter that is wanted of a loop."""
+        spectrum, scale = self.spectrum(), float(parameters.get("vibration.scale", 1.0)) ** 2
+
+        def angle(axis: int) -> Density:
+            return lambda f: scale * spectrum.density("rate", axis, f) / (2.0 * np.pi * f) ** 2 if spectrum else 0.0 * f
+
+        white = 2.0 * float(parameters.get("gyro.white", 0.0)) ** 2
+        band, K = float(parameters.get("gyro.bandwidth", np.inf)), float(parameters.get("decoupler.K", 1.0))
+
+        def noise(axis: str) -> Density:
+            gain = K if axis == self.inner else K / math.cos(self[self.inner])
+            return lambda f: white * gain**2 / (1.0 + (f / band) ** 4)
+
+        free, slipping = self.slips(parameters, spectrum, math.sqrt(scale)) if spectrum else ({}, {})
+        base = [SightSource(f"vibration about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
+        gyro = [SightSource("noise of the gyro", "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
+        return LineOfSight(self["jitter_from"], [*base, *gyro], free=free, slipping=slipping)
+
+    def slips(
+        self, parameters: Mapping[str, Any], spectrum: VibrationSpectrum, scale: float
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the gimbal without dry friction, and with viscous friction for it; {}, {} where the joints stick.
+
+        A line of sight at rest leaves the base's rate to the joints, v rms.  Friction M that slips makes torques of M
+        rms, as viscous friction M / v does; they slip where the angle exceeds presliding.
+        """
+        most = np.maximum(parameters["platform.friction"], parameters["platform.stiction"])
+        f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
+        density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale**2
+        squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
+        k_in, k_out = (0, 2) if self.inner == "pitch" else (2, 0)
+        c, s = (fun(self["yaw" if self.inner == "pitch" else "pitch"]) ** 2 for fun in (math.cos, math.sin))
+        rate, angle = (np.sqrt([
+            c * x[k_in] + s * x[1], x[k_out] + math.tan(self[self.inner]) ** 2 * (c * x[1] + s * x[k_in])
+        ]) for x in squares)  # fmt: skip
+        rate, angle = (x if self.inner == "pitch" else x[::-1] for x in (rate, angle))  # pitch, yaw
+        if not np.any(most) or not np.all(angle > float(parameters["platform.presliding"])):
+            return {}, {}
+        free = {"platform.friction": [0.0, 0.0], "platform.stiction": [0.0, 0.0]}
+        viscous = np.asarray(parameters["platform.viscous"]) + np.asarray(parameters["platform.friction"]) / rate
+        return free, {**free, "platform.viscous": viscous.tolist()}
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         form = FORMS.index(self["form"])

@@ -101,7 +101,7 @@ class TableTest(System):
     done = "sequencer.done"
     channel_period = 10.0
     bodies = """
-        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle
+        table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle or windows
         instrument: table, faces sequencer
     """
 

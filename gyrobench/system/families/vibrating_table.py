@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from gyrobench.reduction.setup.sources import READING_GAIN, READING_LAG
 from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families.option_groups import type_b
 from gyrobench.system.system import Option
 
 TABLE = Socket(
@@ -35,15 +37,8 @@ TIMES = {
     "dwell": Option(1.0, "s", "time measured at each frequency, at least", 1e-3),
     "settle": Option(0.5, "s", "time in which the vibration sets in", 1e-3),
 }
-STATED = {
-    "u_gain": Option(0.0, "1", "relative standard uncertainty of the reading of the table rate", 0.0),
-    "u_lag": Option(0.0, "s", "standard uncertainty of the time by which that reading is late", 0.0),
-    "u_time": Option(0.0, "1", "relative standard uncertainty of the time base", 0.0),
-}
-MOUNT = {
-    "u_mount": Option(0.0, "rad", "standard uncertainty of the input axis against the table axis, about each axis "
-                      "across it", 0.0),
-}  # fmt: skip
+STATED = type_b(READING_GAIN, READING_LAG, "time")
+MOUNT = type_b(mount="standard uncertainty of the input axis against the table axis, about each axis across it")
 
 
 def frequency_problems(lowest: float, highest: float, step: float) -> list[str]:

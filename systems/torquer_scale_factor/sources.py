@@ -1,0 +1,13 @@
+"""Sources of error of the current that are this test's own."""
+
+from __future__ import annotations
+
+from gyrobench.reduction.setup.sources import Source
+
+AMMETER = Source(
+    "ammeter.scale", "ammeter", "1", "u_current", "relative", doc="relative standard uncertainty of the ammeter"
+)
+ZERO = Source(
+    "ammeter.zero", "zero of the ammeter", "A", "u_zero", doc="standard uncertainty of the zero of the ammeter"
+)
+RANGES = Source("torquer.range_step", "step of K_n between the angle ranges", "rad/s/A")
