@@ -270,7 +270,7 @@ class Gyro2dof(Component):
         if self.wanders > 0.0:
             x = x + self.flicker_x_value + self.walk_x_value + self.quantization_x_rate + self.ramp_x * self.t
             y = y + self.flicker_y_value + self.walk_y_value + self.quantization_y_rate + self.ramp_y * self.t
-        return vector([x, y]) / self.speed()
+        return vector([x / self.speed(), y / self.speed()])
 
     def precession(self, drift: Vector) -> Vector:
         """Return the rates of the rotor under drift, torquers (each acts about the other axis) and springs."""
