@@ -3,7 +3,7 @@ from __future__ import annotations
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
 from gyrobench.component.blocks.gyro import DEG_H, PER_G, ChannelDrift, GaussMarkov, torquer_rate
 from gyrobench.component.blocks.random_drift import Flicker, Quantization, RateRandomWalk
-from gyrobench.component.math import Vector, clip, cos, fabs, pi, sin, vector
+from gyrobench.component.math import Number, Vector, clip, cos, fabs, pi, sin, vector
 from gyrobench.component.set_up import GYRO_MOUNT, turned
 
 
@@ -51,6 +51,13 @@ class Gyro2dof(Component):
     `temperature`): mean temperature above that of the coefficients, B, dB: magnetic field and its differences over the
     gyro along x, y, z                                                                              [ENV-DISTURBANCE]
 
+    Supplies off their nominal values: wheel frequency f, voltage v, phases p (rad), excitation of pickoffs e and of
+    torquers a.  H -> H (1 + f), while torques stay, so that all these rates are divided by (1 + f); k_c -> k_c (1 + k_E
+    a), K_sg_c -> K_sg_c (1 + e), and in the coefficients of a channel, j its own axis,              [GYRO-SUPPLY]
+
+        Dc_0 + Dc_pickoff ((1 + e)2 - 1) + Dc_torquer ((1 + a)2 - 1)
+        Dc_j + Dc_voltage v + Dc_phase p,   Dc_z + Dc_voltage_z v + Dc_phase_z p
+
     Nutation, with J_x, J_y > 0 (0 and 0: none, the rotor precesses without lag).  p, q: inertial rates of rotor axis:
 
         J_x p' = -H q - C_x (p - omega_x) + T_x + M_x,     T_x = +H (omega_dy + k_x i_x (1 + ...))
@@ -78,7 +85,7 @@ class Gyro2dof(Component):
     the power gyro GSP ch. 5, section 5.1.1, eq. 5-7, 5-8.
     """
 
-    version = "1.6.0"
+    version = "1.7.0"
     nonlinear = "full"
     integrator = "midpoint"
 
@@ -97,6 +104,7 @@ class Gyro2dof(Component):
     k3_y = Parameter(0.0, "1/A2", "nonlinearity of the torquer about y, relative, odd in the rate")
     k_T_x = Parameter(0.0, "1/K", "scale factor of the torquer about x per kelvin of mean temperature, relative")
     k_T_y = Parameter(0.0, "1/K", "scale factor of the torquer about y per kelvin of mean temperature, relative")
+    k_E = Parameter(0.0, "1", "share of the excitation in the torquers' constants; 0: permanent magnets, 1: microsyns")
     simulates = (turned("mount", GYRO_MOUNT),)
     mount = Rotation("rows: gyro axes x, y, z in case axes")
 
@@ -175,6 +183,11 @@ class Gyro2dof(Component):
     temperature = Input(0.0, "K", "mean temperature above that of the coefficients")
     B = Input([0.0, 0.0, 0.0], "T", "magnetic field, case axes")
     dB = Input([0.0, 0.0, 0.0], "T", "differences of the magnetic field over the gyro, case axes")
+    wheel_frequency = Input(0.0, "1", "frequency of the wheel supply, relative departure")
+    wheel_voltage = Input(0.0, "1", "voltage of the wheel supply, relative departure")
+    wheel_phase = Input(0.0, "rad", "asymmetry of the phases of the wheel supply")
+    pickoff_excitation = Input(0.0, "1", "excitation current of the pickoffs, relative departure")
+    torquer_excitation = Input(0.0, "1", "excitation of the torquers, relative departure")
 
     u_x = Output("V", "x pickoff: case against rotor about x")
     u_y = Output("V", "y pickoff: case against rotor about y")
@@ -191,6 +204,7 @@ class Gyro2dof(Component):
     q = State(0.0, "rad/s", "inertial rate of the rotor axis about y (with nutation)")
 
     per_h = Discrete(0.0, "1/(N.m.s)", "1 / H")
+    supplied = Discrete(0.0, "rad/s", "0 where the supplies add no drift")
 
     def start(self) -> None:
         n = self.terms_x
@@ -223,11 +237,16 @@ class Gyro2dof(Component):
         self.refuse(self.full and springs, "K_q and K_phi are of small angles: they must be 0 with full = 1")
         self.refuse(self.stop >= 0.5 * pi, "stop = {stop} rad: the inner gimbal must stop before pi/2 (gimbal lock)")
         self.per_h = 1.0 / self.H
+        self.supplied = self.Dx.sensitivity() + self.Dy.sensitivity()
         self.wanders = 0.0
         if self.flicker_x > 0.0 or self.walk_x > 0.0 or self.quantization_x > 0.0 or self.ramp_x != 0.0:
             self.wanders = 1.0
         if self.flicker_y > 0.0 or self.walk_y > 0.0 or self.quantization_y > 0.0 or self.ramp_y != 0.0:
             self.wanders = 1.0
+
+    def speed(self) -> Number:
+        """Return the speed of the wheel over its nominal one."""
+        return 1.0 + self.wheel_frequency
 
     def drift_rates(self) -> Vector:
         g = PER_G * (self.mount @ self.f)
@@ -241,26 +260,33 @@ class Gyro2dof(Component):
             difference = self.mount @ self.dB
             x = x + self.Dx.surroundings(self.temperature, field, difference)
             y = y + self.Dy.surroundings(self.temperature, field, difference)
+        if self.supplied > 0.0:
+            wheel = vector([self.wheel_voltage, self.wheel_phase])
+            excitation = vector([self.pickoff_excitation, self.torquer_excitation])
+            x = x + self.Dx.supplies(g[0], g[2], wheel, excitation)
+            y = y + self.Dy.supplies(g[1], g[2], wheel, excitation)
         x = x + self.noise.turn_on_x + self.markov_x_value + self.noise.white_x
         y = y + self.noise.turn_on_y + self.markov_y_value + self.noise.white_y
         if self.wanders > 0.0:
             x = x + self.flicker_x_value + self.walk_x_value + self.quantization_x_rate + self.ramp_x * self.t
             y = y + self.flicker_y_value + self.walk_y_value + self.quantization_y_rate + self.ramp_y * self.t
-        return vector([x, y])
+        return vector([x / self.speed(), y / self.speed()])
 
     def precession(self, drift: Vector) -> Vector:
         """Return the rates of the rotor under drift, torquers (each acts about the other axis) and springs."""
         T = self.temperature
-        about_x = drift[0] + torquer_rate(self.k_y * (1.0 + self.k_T_y * T), self.k2_y, self.k3_y, self.i_y)
-        about_y = drift[1] + torquer_rate(self.k_x * (1.0 + self.k_T_x * T), self.k2_x, self.k3_x, self.i_x)
+        excited = (1.0 + self.k_E * self.torquer_excitation) / self.speed()
+        about_x = drift[0] + excited * torquer_rate(self.k_y * (1.0 + self.k_T_y * T), self.k2_y, self.k3_y, self.i_y)
+        about_y = drift[1] + excited * torquer_rate(self.k_x * (1.0 + self.k_T_x * T), self.k2_x, self.k3_x, self.i_x)
         if self.K_q != 0.0 or self.K_phi > 0.0:
-            about_x = about_x + self.K_q * self.psi_y - self.K_phi * self.psi_x
-            about_y = about_y - self.K_q * self.psi_x - self.K_phi * self.psi_y
+            about_x = about_x + (self.K_q * self.psi_y - self.K_phi * self.psi_x) / self.speed()
+            about_y = about_y - (self.K_q * self.psi_x + self.K_phi * self.psi_y) / self.speed()
         return vector([about_x, about_y])
 
     def flow(self) -> None:
         w = self.mount @ (self.omega + (self.t - self.step_end) * self.alpha_b)  # omega is that of the step's end
         rate = self.precession(self.drift_rates())
+        momentum = self.H * self.speed()
         rate_x = rate[0]
         rate_y = rate[1]
         self.der.p = 0.0
@@ -269,21 +295,21 @@ class Gyro2dof(Component):
             c = cos(self.psi_y)
             w_y = w[1] * cos(self.psi_x) + w[2] * sin(self.psi_x)
             w_z = w[2] * cos(self.psi_x) - w[1] * sin(self.psi_x)
-            outer = self.H * (rate_y - self.q * c) - self.C_x * (self.p - w[0])
-            inner = self.H * (self.p * c - w_z * sin(self.psi_y) - rate_x) - self.C_y * (self.q - w_y)
+            outer = momentum * (rate_y - self.q * c) - self.C_x * (self.p - w[0])
+            inner = momentum * (self.p * c - w_z * sin(self.psi_y) - rate_x) - self.C_y * (self.q - w_y)
             self.der.p = (outer + self.M_x) / self.J_x
             self.der.q = (inner + self.M_y) / self.J_y
             self.der.psi_x = self.p - w[0]
             self.der.psi_y = self.q - w_y
         else:
             if self.J_x > 0.0:
-                self.der.p = (self.H * (rate_y - self.q) - self.C_x * (self.p - w[0]) + self.M_x) / self.J_x
-                self.der.q = (self.H * (self.p - rate_x) - self.C_y * (self.q - w[1]) + self.M_y) / self.J_y
+                self.der.p = (momentum * (rate_y - self.q) - self.C_x * (self.p - w[0]) + self.M_x) / self.J_x
+                self.der.q = (momentum * (self.p - rate_x) - self.C_y * (self.q - w[1]) + self.M_y) / self.J_y
                 rate_x = self.p
                 rate_y = self.q
             else:
-                rate_x = rate_x - self.per_h * self.M_y
-                rate_y = rate_y + self.per_h * self.M_x
+                rate_x = rate_x - self.per_h * self.M_y / self.speed()
+                rate_y = rate_y + self.per_h * self.M_x / self.speed()
             self.der.psi_x = rate_x - w[0] + w[2] * self.psi_y
             self.der.psi_y = rate_y - w[1] - w[2] * self.psi_x
 
@@ -298,15 +324,16 @@ class Gyro2dof(Component):
         drift = self.drift_rates()
         self.drift_x = drift[0]
         self.drift_y = drift[1]
-        unlimited_x = -self.K_sg_x * (self.psi_x - self.null_x) + self.noise.pickoff_x
-        unlimited_y = -self.K_sg_y * (self.psi_y - self.null_y) + self.noise.pickoff_y
+        unlimited_x = -self.K_sg_x * (1.0 + self.pickoff_excitation) * (self.psi_x - self.null_x) + self.noise.pickoff_x
+        unlimited_y = -self.K_sg_y * (1.0 + self.pickoff_excitation) * (self.psi_y - self.null_y) + self.noise.pickoff_y
         self.u_x = clip(unlimited_x, -self.u_max, self.u_max)
         self.u_y = clip(unlimited_y, -self.u_max, self.u_max)
         self.saturated = 1.0 if self.u_x != unlimited_x or self.u_y != unlimited_y else 0.0
         self.alpha = self.psi_x
         self.beta = self.psi_y
         rate = self.precession(drift)
-        q = self.q if self.J_x > 0.0 else rate[1] + self.per_h * self.M_x
+        momentum = self.H * self.speed()
+        q = self.q if self.J_x > 0.0 else rate[1] + self.per_h * self.M_x / self.speed()
         c = 1.0
         s = self.psi_x
         tilt = self.psi_y
@@ -317,9 +344,9 @@ class Gyro2dof(Component):
             tilt = sin(self.psi_y)
             turn = c * w[1] + s * w[2]
         # axes of the outer gimbal: bearing x, bearing y of the inner gimbal, constraint about z
-        m_x = -self.H * rate[1]
-        m_y = self.H * rate[0]
-        m_z = self.H * q * tilt
+        m_x = -momentum * rate[1]
+        m_y = momentum * rate[0]
+        m_z = momentum * q * tilt
         if self.J_x > 0.0:
             m_x = m_x + self.C_x * (self.p - w[0])
             m_y = m_y + self.C_y * (q - turn)

@@ -104,6 +104,7 @@ SOCKETS: dict[str, Socket] = {
                 inp("dT", "K", "temperature differences along x, y, z", 3, optional=True),
                 inp("v_float", "m/s", "velocity of the float against the case along x, y, z", 3, optional=True),
                 *EXPOSED,
+                *SUPPLIED,
                 out("u_x", "V", "x pickoff voltage: case against rotor about x"),
                 out("u_y", "V", "y pickoff voltage: case against rotor about y"),
                 out("drift_x", "rad/s", "drift rate about x, precession sign (diagnostic)", optional=True),

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 MORE = 1.3  # of the reading: more than with nothing taken back at all
 PART = 0.02  # of the reading: the other sign
+INSTRUMENTS = 0.05  # of the reading: more than scale factors and misalignments make
+CLEAR = 4.0  # standard uncertainties
+OFF = 0.1  # the same, of which nothing passes
 REST = 0.5  # m/s2 at rest: gravity is still there
 
 
@@ -35,6 +38,27 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
         yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
 
 
+def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:
+    """Yield that the acceleration is not that of the stated chain, by more than the instruments explain."""
+    y = np.asarray(windows["acceleration"], dtype=float)
+    rest = y[motions.number < 0]
+    for k, m in enumerate(motions.motions):
+        read, stated, here = reading(m, setup.chain.gravity), setup.chain.rise(m), y[motions.number == k]
+        u = float(np.hypot(np.std(rest, ddof=1) / np.sqrt(rest.size), np.std(here, ddof=1) / np.sqrt(here.size)))
+        found = float(here.mean() - rest.mean())
+        if abs(found - stated) > INSTRUMENTS * abs(read) + CLEAR * u:
+            text = (
+                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the stated "
+                f"filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle and vibration "
+                "(amplitudes) in the units that are given, and interval, filters, sculling, samples and size those of "
+                "the unit?"
+            )
+            far = abs(found - stated) > OFF * abs(read) + CLEAR * u
+            blocked, severity = (("pass",), "doubt") if far else ((), "warning")
+            yield Reason("sculling.stated", text.replace(" -", " −"), blocked, severity=severity)
+            return
+
+
 def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:
     """Yield why nothing may pass or fail: accelerations that no unit and no algorithm make of these motions."""
     blocked = ("pass", "fail")
@@ -46,7 +70,7 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
             f"At rest the computed acceleration is {rest.mean() / G0:.3g} g. Is gravity taken off, and the unit of the "
             "column the one that is given?"
         )
-        yield Reason("sculling.implausible", text.replace("-", "−"), blocked, severity="doubt")
+        yield Reason("sculling.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return
     for k, m in enumerate(motions.motions):
         read, stated = reading(m, setup.chain.gravity), setup.chain.rise(m)
@@ -65,5 +89,5 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
             )
         else:
             continue
-        yield Reason("sculling.implausible", text.replace("-", "−"), blocked, severity="doubt")
+        yield Reason("sculling.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return

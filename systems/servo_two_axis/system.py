@@ -10,7 +10,7 @@ from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, type
 from gyrobench.system.families.physical_form import PHYSICAL_FORM, physical_drift
 from gyrobench.system.families.rebalance_test import TWO_AXIS_NOISES
 from gyrobench.system.families.servo_test import SITE_AND_STAND, TRACKING
-from gyrobench.system.families.table_test import TableTest, surroundings
+from gyrobench.system.families.table_test import TableTest, supply, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Plan
 from gyrobench.system.system import OnRequest, Option, Slot, Windows
@@ -53,6 +53,7 @@ class ServoTwoAxis(TableTest):
     wires = setup.WIRES
     on_request: ClassVar[Mapping[str, OnRequest]] = {
         **surroundings("outer: angle_read", setup.FIELD),
+        **supply(),
         setup.METERS["x"]: OnRequest(
             {slot: Slot("Sampler", "sampler") for slot in setup.METERS.values()},
             setup.LEVELLED,

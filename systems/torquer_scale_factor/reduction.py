@@ -101,7 +101,8 @@ class Reduction:
         if wrong := row_checks.problems(rows):
             raise ReductionError(wrong)
         currents = np.asarray(rows["current"])
-        truth = truth_of(run.parameters, currents, str(run.options.get("channel", "")))
+        warm = float(np.mean(record.windows["temperature"])) if "temperature" in record.windows else 0.0
+        truth = truth_of(run.parameters, currents, str(run.options.get("channel", "")), warm)
         setup = TorquerSetup.of(run, earth_rate=site.earth_rate, truth=truth, site=site.shown())
         return cls(rows, setup, precession(record.windows, marks.senses(run.plan), currents, setup)).result()
 
@@ -279,16 +280,19 @@ class Reduction:
 reduce = Reduction.reduce
 
 
-def truth_of(parameters: Mapping[str, Any], currents: Array, channel: str = "") -> dict[str, float] | None:
-    """Return what a simulated torquer k i (1 + k2 i + k3 i2) makes of the reported values.
+def truth_of(
+    parameters: Mapping[str, Any], currents: Array, channel: str = "", warm: float = 0.0
+) -> dict[str, float] | None:
+    """Return what a simulated torquer k (1 + k_T warm) i (1 + k2 i + k3 i2) makes of the reported values.
 
-    k2 is even and goes into the half difference.  The drift has no one value: it changes with the range.
+    warm: mean temperature above that of the coefficients, K.  k2 is even and goes into the half difference.  The drift
+    has no one value: it changes with the range.
     """
-    own = [f"gyro.{own_name(channel, n)}" for n in ("k", "k3")]
+    own = [f"gyro.{own_name(channel, n)}" for n in ("k", "k3", "k_T")]
     if own[0] not in parameters:
         return None
-    k, k3, error = (float(parameters.get(n, 0.0)) for n in (*own, "source.error"))
-    k, full = k / (1.0 + error), float(currents.max()) / (1.0 + error)
+    k, k3, k_T, error = (float(parameters.get(n, 0.0)) for n in (*own, "source.error"))
+    k, full = k * (1.0 + k_T * warm) / (1.0 + error), float(currents.max()) / (1.0 + error)
     cubic = k3 * full**2
     truth = {
         "K_1": k / KU,

@@ -10,10 +10,10 @@ from gyrobench.arrays import Array
 from gyrobench.system.families.option_groups import CORRECTIONS, SITE, type_b
 from gyrobench.system.families.servo_channel import CHANNEL, ChannelTest, gyro_on_table
 from gyrobench.system.families.servo_test import GYRO_SERVO
-from gyrobench.system.families.table_test import FACE, SDF_NOISES, TableTest, on_table
+from gyrobench.system.families.table_test import FACE, SDF_NOISES, TableTest, on_table, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
-from gyrobench.system.system import Option, Slot
+from gyrobench.system.system import OnRequest, Option, Slot
 
 from . import sources
 from .measured import MEASURED
@@ -39,6 +39,7 @@ class TorquerScaleFactor(ChannelTest, TableTest):
         gyro=Slot("SdfGyro", "floated_gyro"),
     )  # fmt: skip
     axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
     # in servo mode the table has no target: the sequencer's target is the current
     wires = f"""
         {TableTest.wires}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.rate_reading import RATE_NOISES
-from gyrobench.system.families.table_test import FACE, ON_TABLE, TableTest, sampled
+from gyrobench.system.families.table_test import FACE, ON_TABLE, TableTest, sampled, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import LIMIT, Phase, Plan
-from gyrobench.system.system import Option, Slot, Windows
+from gyrobench.system.system import OnRequest, Option, Slot, Windows
 from gyrobench.units import DEG
 
 from .measured import MEASURED
@@ -61,6 +62,7 @@ class TurnOn(TableTest):
         {sampled("sampler")}
         {sampled("clock")}
     """
+    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings()
     options = (
         SITE
         | {

@@ -281,6 +281,9 @@ def test_names_and_terms_are_those_of_the_bench():
         declared = {n for n in Gyro2dof.declarations if n.startswith(f"D{c}_")}
         slow = {f"D{c}_{kind}{axis}" for axis in "xyz" for kind in "pTv"} | {f"D{c}_p0"}
         slow |= {f"D{c}_{n}" for n in ("T", "B", "dB", "exposed")}  # of the surroundings
+        slow |= {
+            f"D{c}_{n}" for n in ("pickoff", "torquer", "voltage", "voltage_z", "phase", "phase_z")
+        }  # of the supplies
         assert declared == set(bench_drift.NAMES_2DOF[c]) | slow
         part = started(**QUIET, f=[3.0, -4.0, 5.0])
         some = {n: getattr(part, n) for n in declared - slow}

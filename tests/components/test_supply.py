@@ -11,7 +11,8 @@ from wired import BENCH
 
 from gyrobench.packaging.loading import load_part
 
-Supply, Gyro, Compliant = (load_part(n, BENCH) for n in ("supply", "floated_gyro", "compliant_gyro"))
+Supply, Gyro = load_part("supply", BENCH), load_part("floated_gyro", BENCH)
+Compliant, TwoAxis = load_part("compliant_gyro", BENCH), load_part("gyro_2dof", BENCH)
 OUTPUTS = ("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")
 BLOCKS = ("frequency", "voltage", "asymmetry", "pickoff", "torquer")
 
@@ -121,3 +122,51 @@ def test_compliant_gyro_against_its_torques(seed: int) -> None:
     assert gyro.b == pytest.approx(b, rel=1e-8)
     assert gyro.u == pytest.approx(gyro.K_sg * (1 + e) * b, rel=1e-8)
     assert gyro.drift == pytest.approx(nominal / (1 + f), rel=1e-12)
+
+
+@pytest.mark.parametrize("nutation", [False, True])
+def test_two_degrees_of_freedom_against_their_torques(nutation: bool) -> None:
+    """The nominal torques T_x = H (omega_dy + k_x i_x), T_y = -H (omega_dx + k_y i_y) on a wheel of H (1 + f): without
+    nutation it precesses by T_y and T_x over H (1 + f); with it J p' = -H (1 + f) q + T_x, J q' = H (1 + f) p + T_y.
+    """
+    rng = np.random.default_rng(7)
+    f, v, p, e, a = rng.normal(size=5) * 0.02
+    w, g, i = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 6.0, (1e-3, -2e-3)
+    names = ("pickoff", "torquer", "voltage", "voltage_z", "phase", "phase_z")
+    given = {f"D{c}_{n}": x for c in "xy" for n, x in zip(names, rng.normal(size=6) * 3e-6, strict=True)}
+    J = 1e-4 if nutation else 0.0
+    silent = {f"{n}_{c}": 0.0 for n in ("white", "markov", "pickoff") for c in "xy"}
+    gyro = TwoAxis(**silent, **given, J_x=J, J_y=J, k_E=0.7, u_max=10.0)
+    gyro.initialize()
+    for name, x in zip(OUTPUTS, (f, v, p, e, a), strict=True):
+        setattr(gyro, name, x)
+    for j in range(3):
+        gyro.omega[j], gyro.f[j] = w[j], g[j]
+    gyro.i_x, gyro.i_y = i
+    h, steps = (1e-5, 500) if nutation else (1e-3, 20)
+    for n in range(steps):
+        gyro.do_step(n * h, h)
+    X, Y, Z = -g / 9.80665
+
+    def nominal(c: str, own: float) -> float:
+        D = {n: getattr(gyro, f"D{c}_{n}") for n in ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz", *names)}
+        drift = D["0"] + D["pickoff"] * ((1 + e) ** 2 - 1) + D["torquer"] * ((1 + a) ** 2 - 1)
+        drift += D["x"] * X + D["y"] * Y + D["z"] * Z + (D["voltage"] * v + D["phase"] * p) * own
+        drift += (D["voltage_z"] * v + D["phase_z"] * p) * Z + D["xx"] * X * X + D["yy"] * Y * Y + D["zz"] * Z * Z
+        return float(drift + D["xy"] * X * Y + D["yz"] * Y * Z + D["xz"] * X * Z)
+
+    H, drifts = gyro.H * (1 + f), (nominal("x", X), nominal("y", Y))
+    T_x = gyro.H * (drifts[1] + gyro.k_x * (1 + 0.7 * a) * i[0])
+    T_y = -gyro.H * (drifts[0] + gyro.k_y * (1 + 0.7 * a) * i[1])
+
+    def rhs(_: float, y: np.ndarray) -> list[float]:
+        psi_x, psi_y, rate_p, rate_q = y
+        turn = ((-H * rate_q + T_x) / J, (H * rate_p + T_y) / J) if nutation else (0.0, 0.0)
+        rates = (rate_p, rate_q) if nutation else (-T_y / H, T_x / H)
+        return [rates[0] - w[0] + w[2] * psi_y, rates[1] - w[1] - w[2] * psi_x, *turn]
+
+    psi = solve_ivp(rhs, (0.0, h * steps), [0.0] * 4, method="DOP853", rtol=1e-12, atol=1e-18).y[:2, -1]
+    near = 1e-4 if nutation else 1e-9  # the midpoint rule at 500 steps: (H h / J)^2/12 of the nutation, 3e-5
+    assert (gyro.psi_x, gyro.psi_y) == pytest.approx(tuple(psi), rel=near)
+    assert (gyro.drift_x, gyro.drift_y) == pytest.approx(tuple(x / (1 + f) for x in drifts), rel=1e-12)
+    assert gyro.u_x == pytest.approx(-gyro.K_sg_x * (1 + e) * gyro.psi_x, rel=1e-12)

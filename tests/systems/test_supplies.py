@@ -69,6 +69,38 @@ def test_shifts_are_those_predicted(sessions: dict[str, Session], name: str, val
         assert b.estimate - a.estimate == pytest.approx(row[-3], rel=0.02, abs=2e-6), a.name
 
 
+@pytest.mark.long
+def test_shifts_of_a_channel_of_two_degrees_of_freedom() -> None:
+    """The y channel holds the table: its own sensitivities, own axis for I, z for S, predict what the supplies do."""
+    names = {"pickoff": 0.5, "torquer": -0.2, "voltage": 2.0, "voltage_z": -1.0, "phase": 1.0, "phase_z": 3.0}
+    own = {f"gyro.Dy_{n}": x * DPH for n, x in names.items()} | {"gyro.k_E": 0.1}
+    system = load_system("servo_vertical_level")
+    system.set("channel", "y")
+    system.request("supply")
+    values = {**HELD, "attitudes": "x down; x up", **dict.fromkeys(system.noises, 0.0), **own, "nuisances": "none"}
+    with Session(system) as session:
+        records = [session.run({**values, **more}, seed=1) for more in ({}, OFF)]
+    options = {n: v for n, v in values.items() if "." not in n}
+    plain, off = (system.with_values(options).reduce(r) for r in records)
+    predicted = next(t for t in off.tables if t.id == "budget.predicted")
+    assert max(abs(row[-3]) for row in predicted.rows) > 1e-3
+    for a, b, row in zip(plain.coefficients, off.coefficients, predicted.rows, strict=True):
+        assert b.estimate - a.estimate == pytest.approx(row[-3], rel=0.02, abs=2e-6), a.name
+
+
+def test_excitation_in_a_test_of_two_channels() -> None:
+    """Dx_pickoff ((1 + e)^2 - 1) = 0.5 deg/h (1.01^2 - 1) = 0.01005 deg/h are in R_y = -Dx_0, none in R_x."""
+    system = load_system("eight_position")
+    system.request("supply")
+    values = {"dwell": 1.5, "settle": 1.5, "readings": 2, **dict.fromkeys(system.noises, 0.0)}
+    off = {"gyro.Dx_pickoff": 0.5 * DPH, "supply.pickoff_offset": 0.01}
+    with Session(system) as session:
+        records = [session.run({**values, **more}, seed=1) for more in ({}, off)]
+    plain, moved = (system.reduce(r) for r in records)
+    assert plain["R_y"].estimate - moved["R_y"].estimate == pytest.approx(0.01005, rel=1e-3)
+    assert moved["R_x"].estimate == pytest.approx(plain["R_x"].estimate, abs=1e-6)
+
+
 def test_budget_by_hand(sessions: dict[str, Session]) -> None:
     """Input axis north: omega_IA = W cos 50 deg; X = 0, and with the spin axis down Z = -f/g0 = +1 per g0 (E along O,
     S = N x E = -U).  Frequency: -W cos phi; pickoff: 2 D_pickoff; voltage: D_US gamma; phases: D_PS gamma.

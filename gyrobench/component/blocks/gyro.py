@@ -6,7 +6,7 @@ from gyrobench.component.blocks.random_drift import Flicker, Quantization, RateR
 from gyrobench.component.component import Component
 from gyrobench.component.composition import Block, sampled
 from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
-from gyrobench.component.math import Number, Vector, clip, exp, pi, sqrt, vector
+from gyrobench.component.math import Number, Vector, clip, exp, fabs, pi, sqrt, vector
 from gyrobench.component.rotation import Rotation
 from gyrobench.component.set_up import GYRO_MOUNT, turned
 
@@ -90,6 +90,40 @@ class Exposure(Block):
         return self.T * temperature + vector(self.B) @ field + vector(self.dB) @ difference
 
 
+class ChannelSupply(Block):
+    """Drift of one channel of a two-degree-of-freedom gyro that its supplies add.  [GYRO-SUPPLY]
+
+    D_0 + pickoff ((1 + e)2 - 1) + torquer ((1 + a)2 - 1)
+    D_own + voltage v + phase p,   D_z + voltage_z v + phase_z p      own: x of the x, y of the y channel
+    """
+
+    pickoff = Parameter(0.0, "rad/s", "part of the constant drift that the reaction torque of the pickoff makes")
+    torquer = Parameter(0.0, "rad/s", "part of the constant drift that the reaction torque of the torquer makes")
+    voltage = Parameter(0.0, "rad/s", "drift per g0 along the channel's axis and relative change of the wheel voltage")
+    voltage_z = Parameter(0.0, "rad/s", "drift per g0 along z and relative change of the wheel voltage")
+    phase = Parameter(0.0, "rad/s", "drift per g0 along the channel's axis and radian of asymmetry of the phases")
+    phase_z = Parameter(0.0, "rad/s", "drift per g0 along z and radian of asymmetry of the phases")
+
+    def sensitivity(self) -> Number:
+        """Return 0 where none of them is given."""
+        return (
+            fabs(self.pickoff)
+            + fabs(self.torquer)
+            + fabs(self.voltage)
+            + fabs(self.voltage_z)
+            + fabs(self.phase)
+            + fabs(self.phase_z)
+        )
+
+    def added(self, own: Number, z: Number, wheel: Vector, excitation: Vector) -> Number:
+        """Return it; own, z: g along these axes; wheel: (v, p); excitation: (e, a)."""
+        e = excitation[0]
+        a = excitation[1]
+        reaction = self.pickoff * e * (2.0 + e) + self.torquer * a * (2.0 + a)
+        along = (self.voltage * wheel[0] + self.phase * wheel[1]) * own
+        return reaction + along + (self.voltage_z * wheel[0] + self.phase_z * wheel[1]) * z
+
+
 class ChannelDrift(Block):
     """Static drift of one channel of a two-degree-of-freedom gyro, ten terms along x, y, z.  [GYRO-STATIC-2DOF]
 
@@ -99,8 +133,9 @@ class ChannelDrift(Block):
     [GYRO-COEFF-TIME-TEMP; Hu 1981, eq. 2-39..2-42]
     """
 
-    suffixes = {"fixed": "0", "exposure": ""}
+    suffixes = {"fixed": "0", "exposure": "", "supply": ""}
     exposure = Exposure()
+    supply = ChannelSupply()
     fixed = Parameter(0.0, "rad/s", "constant drift")
     x = Parameter(0.0, "rad/s", "per g0 along x")
     y = Parameter(0.0, "rad/s", "per g0 along y")
@@ -145,6 +180,14 @@ class ChannelDrift(Block):
     def surroundings(self, temperature: Number, field: Vector, difference: Vector) -> Number:
         """Return the drift rate that the surroundings add."""
         return self.exposure.added(temperature, field, difference)
+
+    def sensitivity(self) -> Number:
+        """Return 0 where the supplies add nothing."""
+        return self.supply.sensitivity()
+
+    def supplies(self, own: Number, z: Number, wheel: Vector, excitation: Vector) -> Number:
+        """Return the drift rate that the supplies add."""
+        return self.supply.added(own, z, wheel, excitation)
 
 
 class SdfGyro(Component):

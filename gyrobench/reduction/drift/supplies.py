@@ -30,6 +30,9 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 
 #: what a gyro has, and its unit: the parameters of the part
 TERMS = {n: "rad/s" for n in ("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS")} | {"k_E": "1"}
+#: the same of a channel of a two-degree-of-freedom gyro, whose axis stands for I and z for S
+CHANNEL = {"D_pickoff": "pickoff", "D_torquer": "torquer", "D_UI": "voltage", "D_US": "voltage_z", "D_PI": "phase",
+           "D_PS": "phase_z"}  # fmt: skip
 #: source -> the terms without one of which it does nothing
 NEEDED = {
     "voltage": ("D_UI", "D_US"),
@@ -55,7 +58,9 @@ class Supplies:
         where the size of a supply is stated and not what it does.
         """
         given = read_terms(str(run.options.get("supply_terms", "")))
-        known = given or {n: float(run.parameters.get(f"gyro.{n}", 0.0)) for n in TERMS}
+        channel = str(run.options.get("channel", ""))
+        own = {n: f"D{channel}_{CHANNEL[n]}" if channel and n in CHANNEL else n for n in TERMS}
+        known = given or {n: float(run.parameters.get(f"gyro.{name}", 0.0)) for n, name in own.items()}
         sizes = {s.option: float(run.options.get(s.option, 0.0)) for s in SUPPLIES.values()}
         for name, terms in NEEDED.items():
             size = SUPPLIES[name].option
