@@ -82,6 +82,18 @@ def test_list(gyrobench: Call) -> None:
     assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
 
 
+def test_list_is_narrowed_by_words(gyrobench: Call) -> None:
+    """Of every kind, in name, title or method, whatever the case; each word must be there."""
+    found = json.loads(gyrobench("list", "Floated", "gyro", "--json")[1])
+    assert "floated_gyro" in [r["name"] for r in found["parts"]]
+    assert "gyro_dynamics" in [r["name"] for r in found["systems"]]
+    assert not any(r["name"] == "site" for rows in found.values() for r in rows)
+    out = gyrobench("list", "TEST-TUMBLE1-SDF")[1]
+    assert out.startswith("systems\n  tumble_single_axis ") and "parts" not in out.split("\n")
+    code, _, err = gyrobench("list", "tumbel")
+    assert code == 2 and "nothing has 'tumbel' in its name, title or method; did you mean tumble_" in err
+
+
 # ------------------------------------------------------------------------------------------------ show
 @pytest.mark.long
 def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path) -> None:

@@ -21,7 +21,8 @@ from processes import unhurried
 
 import gyrobench as gb
 from gyrobench.commands.cli import main
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult, Reason
 from gyrobench.system.system import System

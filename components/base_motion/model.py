@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, sampled
+from gyrobench.component.blocks.recorded_path import parabola, quintic
 from gyrobench.component.math import Number, Vector, cos, floor, index, log, pi, sin, sqrt, vector
 
 DEG = pi / 180.0
@@ -124,15 +125,15 @@ class BaseMotion(Component):
                 if self.profile_t[k] <= self.t:
                     self.piece = k
 
-    def parabola(self, k: Number) -> Vector:
-        """Return slope and curvature (rows) of the parabolas through point k and its neighbours; 0 at both ends."""
+    def bend(self, k: Number, i: Number) -> Vector:
+        """Return slope and curvature of angle i at a point of the profile; 0 at both ends."""
         if k <= 0.0 or k >= self.points - 1.0:
-            return vector([vector(ZEROS), vector(ZEROS)])
+            return vector([0.0, 0.0])
         before = self.profile_t[index(k)] - self.profile_t[index(k - 1.0)]
         after = self.profile_t[index(k + 1.0)] - self.profile_t[index(k)]
-        s0 = (self.profile[index(k)] - self.profile[index(k - 1.0)]) / before
-        s1 = (self.profile[index(k + 1.0)] - self.profile[index(k)]) / after
-        return vector([(s0 * after + s1 * before) / (before + after), 2.0 * (s1 - s0) / (before + after)])
+        p0 = self.profile[index(k - 1.0)][index(i)]
+        p1 = self.profile[index(k)][index(i)]
+        return parabola(before, after, p0, p1, self.profile[index(k + 1.0)][index(i)])
 
     def wave(self, amplitude: Number, rate: Number, phase: Number) -> Vector:
         """Return a sine at the present instant and its two derivatives."""
@@ -173,20 +174,15 @@ class BaseMotion(Component):
             else:  # quintic between two points, of their slopes and curvatures
                 d = self.profile_t[index(self.piece + 1.0)] - self.profile_t[index(self.piece)]
                 x = (self.t - self.profile_t[index(self.piece)]) / d
-                first = self.parabola(self.piece)
-                second = self.parabola(self.piece + 1.0)
-                p0 = vector(self.profile[index(self.piece)])
-                p1 = first[0] * d
-                p2 = 0.5 * first[1] * d * d
-                rise = self.profile[index(self.piece + 1.0)] - p0 - p1 - p2
-                bend = second[0] * d - p1 - 2.0 * p2
-                kink = 0.5 * second[1] * d * d - p2
-                p3 = 10.0 * rise - 4.0 * bend + kink
-                p4 = -15.0 * rise + 7.0 * bend - 2.0 * kink
-                p5 = 6.0 * rise - 3.0 * bend + kink
-                q = q + self.scale * (p0 + x * (p1 + x * (p2 + x * (p3 + x * (p4 + x * p5)))))
-                v = v + self.scale * (p1 + x * (2.0 * p2 + x * (3.0 * p3 + x * (4.0 * p4 + x * 5.0 * p5)))) / d
-                a = a + self.scale * (2.0 * p2 + x * (6.0 * p3 + x * (12.0 * p4 + x * 20.0 * p5))) / (d * d)
+                for i in range(3):
+                    first = self.bend(self.piece, i)
+                    last = self.bend(self.piece + 1.0, i)
+                    p0 = self.profile[index(self.piece)][i]
+                    end = self.profile[index(self.piece + 1.0)][i]
+                    y = quintic(x, d, p0, end, first[0], first[1], last[0], last[1])
+                    q[i] = q[i] + self.scale * y[0]
+                    v[i] = v[i] + self.scale * y[1]
+                    a[i] = a[i] + self.scale * y[2]
         sp = sin(q[0])
         cp = cos(q[0])
         sr = sin(q[1])

@@ -26,17 +26,22 @@ from gyrobench.commands.options import (
 
 
 @app.command("list")
-def list_command(as_json: Json = False) -> None:
+def list_command(
+    words: Annotated[
+        list[str] | None, typer.Argument(metavar="WORD", help="Only what has all of these in name, title or method.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """List parts, systems, sockets, specifications and data sheets.
 
     A socket is the list of inputs and outputs, with units, that a part must have to stand in a slot of a system.
 
     \b
-    Example: gyrobench list
+    Example: gyrobench list tumble
     """
-    from gyrobench.workflow.catalog import list_contents
+    from gyrobench.workflow.catalog import list_contents, with_words
 
-    contents = list_contents(Bench.find())
+    contents = with_words(list_contents(Bench.find()), words or ())
     if as_json:
         echo(json.dumps(contents, indent=2, ensure_ascii=False))
         return

@@ -8,10 +8,11 @@ that nothing here can feed.
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gyrobench.bench import suggest_names
 from gyrobench.system.wiring import Assembly
 
 CLOSE = 1e-6  # of a step, by which a multiple may be off
@@ -35,6 +36,26 @@ def binary_problem(path: Path, description: Any) -> str:
     others = ", ".join(sorted({n[1] for n in libraries})) or "none"
     sources = "; it has its sources: fmpy compile" if any(n.startswith("sources/") for n in names) else ""
     return f"it has no binary for {folder}; there are {others}{sources}"
+
+
+def controller_problems(assembly: Assembly, names: Mapping[str, Any]) -> list[str]:
+    """Let controllers of the user's own keep their values; return inputs of theirs that nothing is connected to.
+
+    names: slot -> the part in it, as it is named.
+    """
+    from gyrobench.packaging.own_controller import is_controller
+
+    wired, found = {(c.target, c.input.element) for c in assembly.connections}, []
+    for slot in (s for s, name in names.items() if is_controller(name)):
+        assembly.keeps.add(slot)
+        binding = assembly.bindings[slot]
+        known = [c.name for c in binding.socket.connectors if c.causality == "input"]
+        unknown = [n for n in binding.inputs if n.split("[")[0] not in known and (slot, n) not in wired]
+        found += [
+            f"{slot}: {names[slot]} declares the input {n}, which nothing in this slot gives; {suggest_names(n, known)}"
+            for n in dict.fromkeys(n.split("[")[0] for n in unknown)
+        ]
+    return found
 
 
 def problems(assembly: Assembly, foreign: Iterable[str]) -> list[str]:

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrobench.bench import suggest_names
 from gyrobench.engine import preflight
 from gyrobench.engine.checkpoint import CheckpointManager, ResumeError
 from gyrobench.engine.execution import Ending, Job, execute
@@ -24,7 +23,7 @@ from gyrobench.engine.program import build_program
 from gyrobench.engine.reference_engine import RunState
 from gyrobench.engine.run_board import RunBoard
 from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressReport, Schedule
-from gyrobench.errors import GyrobenchError
+from gyrobench.engine.run_errors import ParameterRefusedError, RunError, RunInterrupted
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument, package_versions
@@ -37,27 +36,6 @@ from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
 
 TIMEOUT = 60.0  # s
-
-
-class RunError(GyrobenchError):
-    """A run that did not end as it should; ``record`` holds what was recorded until then (or None)."""
-
-    exit_code = 3
-
-    def __init__(self, message: str, record: Record | None = None) -> None:
-        self.record = record
-        kept = "" if record is None or record.folder is None else f"\nthe record until then is kept in {record.folder}"
-        super().__init__(message + kept)
-
-
-class RunInterrupted(RunError):
-    """The user stopped the run."""
-
-
-class ParameterRefusedError(RunError):
-    """A part refuses its parameters, before the first step."""
-
-    exit_code = 2
 
 
 ENGINES = ("native", "linked", "reference")
@@ -103,7 +81,8 @@ class Session:
         self.names = {s: str((parts or {}).get(s, self.system.slots[s].part)) for s in self.built}
         self.assembly: Assembly = assemble(self.system, paths, maps)
         self.notes += self.assembly.notes
-        self._check_controllers()
+        if found := preflight.controller_problems(self.assembly, self.names):
+            raise InvalidConfigurationError(self.system.name, found)
         self.program = build_program(self.assembly)
         self.gains = [(c.gain, c.offset) for c in self.assembly.connections]
         self.base = defaults(self.assembly)
@@ -129,24 +108,6 @@ class Session:
             if isinstance(error, FmuCallError):
                 raise RunError(str(error)) from None
             raise
-
-    def _check_controllers(self) -> None:
-        """Let controllers of the user's own keep their values; refuse inputs of theirs that nothing is connected to."""
-        from gyrobench.packaging.own_controller import is_controller
-
-        wired = {(c.target, c.input.element) for c in self.assembly.connections}
-        for slot in (s for s, name in self.names.items() if is_controller(name)):
-            self.assembly.keeps.add(slot)
-            binding = self.assembly.bindings[slot]
-            known = [c.name for c in binding.socket.connectors if c.causality == "input"]
-            unknown = [n for n in binding.inputs if n.split("[")[0] not in known and (slot, n) not in wired]
-            problems = [
-                f"{slot}: {self.names[slot]} declares the input {n}, which nothing in this slot gives; "
-                + suggest_names(n.split("[")[0], known)
-                for n in dict.fromkeys(n.split("[")[0] for n in unknown)
-            ]
-            if problems:
-                raise InvalidConfigurationError(self.system.name, problems)
 
     def _choose(self, engine: str | None) -> str:
         if engine == "reference":

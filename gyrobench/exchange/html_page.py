@@ -84,9 +84,10 @@ def _content(system: System, source: SystemSource, lesson: Mapping[str, Any] | N
         "step": system.step,
         "every": every,
         "rows": math.floor(end / system.step / every + 1e-6),
+        "planned": None if lesson else _planned(system, end),
         "done": next((i for i, o in enumerate(outputs) if o["name"] == system.done), -1),
         "parts": [[slot, name] for slot, (name, _) in source.parts.items()],
-        "parameters": [_parameter(e) for e in source.section("parameter")],
+        "parameters": [_parameter(e, system) for e in source.section("parameter")],
         "outputs": outputs,
         "charts": _charts(system, [o["name"] for o in outputs]),
         "fast": units.FAST,
@@ -99,7 +100,13 @@ def _named(e: Exposed) -> dict[str, Any]:
     return {"name": e.scalar.name, "unit": decl.unit, "shown": units.display(decl.unit), "doc": decl.doc}
 
 
-def _parameter(e: Exposed) -> dict[str, Any]:
+def _planned(system: System, end: float) -> float:
+    """Return s that a run takes by its plan, without the moves between phases; the end where there is no plan."""
+    planned = float(system.plan().duration()) if system.stop is None else end
+    return planned if 0.0 < planned < end else end
+
+
+def _parameter(e: Exposed, system: System) -> dict[str, Any]:
     """Return what a slider shows: values in the unit it is read in, ``factor`` to SI, a range around the start."""
     decl, si = e.scalar.decl, e.scalar.start
     read = READ.get(decl.unit, decl.unit)
@@ -111,6 +118,7 @@ def _parameter(e: Exposed) -> dict[str, Any]:
     high = min([high, *(b for b in (bounds[1], bounds[3]) if b is not None)])
     return {
         **_named(e),
+        **({"doc": system.options[e.scalar.name].doc} if e.scalar.name in system.options else {}),
         "shown": units.display(read),
         "reference": e.scalar.reference,
         "factor": factor,

@@ -178,7 +178,8 @@ def initial_inputs(
     They are what the outputs give after initialization, from a run of one step in a child process: tools that do not
     propagate initial outputs begin with them.  A system whose parts do not start has none, with a note.
     """
-    from gyrobench.engine.session import RunError, run
+    from gyrobench.engine.run_errors import RunError
+    from gyrobench.engine.session import run
 
     system = assembly.system.with_values({})
     outputs = tuple(dict.fromkeys(f"{c.source}.{c.output.element}" for c in varying(assembly)))

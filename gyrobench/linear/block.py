@@ -14,6 +14,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component
+from gyrobench.linear.multirate import MultirateStep, multirate_step
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import SampledStep, sampled_step, undelayed
 
@@ -81,6 +82,11 @@ def step_of(part: Component, inputs: list[str], outputs: list[str], step: float)
     return _step(_Point(part), tuple(inputs), tuple(outputs), step)
 
 
+def multirate_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> MultirateStep | None:
+    """Return, and raise, what :func:`gyrobench.linear.multirate.multirate_step` does."""
+    return _multirate(_Point(part), tuple(inputs), tuple(outputs), step)
+
+
 def undelayed_of(
     part: Component, inputs: list[str], outputs: list[str], step: float
 ) -> tuple[Array, Array, Array, Array] | None:
@@ -99,6 +105,11 @@ def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], ste
 @functools.lru_cache(maxsize=KEPT)
 def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> SampledStep | None:
     return sampled_step(point.part, [*inputs], [*outputs], step)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _multirate(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> MultirateStep | None:
+    return multirate_step(point.part, [*inputs], [*outputs], step)
 
 
 @functools.lru_cache(maxsize=KEPT)

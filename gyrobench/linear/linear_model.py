@@ -12,11 +12,12 @@ wires; excitations come in from outside.  Two models are made:
 Opened at an input, the loop is L = -(returned signal) / (injected signal), other loops closed.
 
 A sampled method that keeps something of an input has no continuous model; the discrete one takes the part's own step,
-where one step is like the next (gyrobench.linear.sampled_model).  One that carries it through the step only (the motion
-of a base between its values), or hands it on a step later, has both.
+where one step is like the next (gyrobench.linear.sampled_model), or like the one a sampling period later: a loop that
+is opened at its input is then that of its samples (gyrobench.linear.multirate).  One that carries it through the step
+only (the motion of a base between its values), or hands it on a step later, has both.
 
-Not modelled: limits.  Sampled methods whose steps differ (a moving average) and third-party FMUs leave the system
-without a linear model; a warning says so.
+Not modelled: limits.  Sampled methods whose steps differ otherwise (a moving average) and third-party FMUs leave the
+system without a linear model; a warning says so.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.block import LinearBlock, block_of, step_of, undelayed_of
+from gyrobench.linear.block import LinearBlock, block_of, multirate_of, step_of, undelayed_of
+from gyrobench.linear.multirate import MultirateStep
 from gyrobench.linear.sampled_model import SampledStep
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
@@ -105,13 +107,18 @@ class Linear:
             part.h = step / max(1, math.ceil(step / getattr(part, "step", step) - 1e-9))
         self.blocks = {s: self._block(s, parts[s]) for s in self.order}
         self.sampled: dict[str, SampledStep] = {}
+        self.multirate: dict[str, MultirateStep] = {}  # of them, those that sample every few steps
         for s in self.order:
+            at = parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step
             try:
-                model = step_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
+                slow = multirate_of(*at)
+                model = slow.baseband() if slow else step_of(*at)
             except ValueError as error:
                 raise LinearizationError(f"{s} works in samples, and {error}") from error
             if model is not None:
                 self.sampled[s] = model
+            if slow is not None:
+                self.multirate[s] = slow
         self.undelayed = {
             s: undelayed_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
             for s, model in self.sampled.items()
@@ -179,8 +186,26 @@ class Linear:
         return _model(a + b @ uk, b @ uw, cy[rows], dy[rows], self.outside, self.shown, self.states, 0.0)
 
     def discrete(self, break_at: str | None = None) -> LinearModel:
-        """Return the same for the communication step; states: those of the parts and the values of cut wires."""
-        names_of = {s: self.sampled[s].names if s in self.sampled else self.blocks[s].states for s in self.order}
+        """Return the same for the communication step; states: those of the parts and the values of cut wires.
+
+        A loop that is opened where a part takes samples every few steps: for the period of the samples, exact.
+        """
+        slow = self.multirate.get(break_at.partition(".")[0]) if break_at else None
+        if slow is None or slow.tick is None or any(m.every != slow.every for m in self.multirate.values()):
+            return self._step(break_at, self.sampled)
+        phases = []
+        for i in range(slow.every):
+            at = (slow.tick + i) % slow.every
+            phases.append(self._step(break_at, self.sampled | {s: m.steps[at] for s, m in self.multirate.items()}))
+        first = phases[0]
+        a, b = np.array(first.A), np.array(first.B)
+        for phase in phases[1:]:
+            a, b = np.array(phase.A) @ a, np.array(phase.A) @ b
+        return first.model_copy(update={"A": a.tolist(), "B": b.tolist(), "step": slow.every * self.step})
+
+    def _step(self, break_at: str | None, sampled: Mapping[str, SampledStep]) -> LinearModel:
+        """Return one communication step; sampled: slot -> the step of a part with sampled methods."""
+        names_of = {s: sampled[s].names if s in sampled else self.blocks[s].states for s in self.order}
         all_states = [f"{s}.{v}" for s in self.order for v in names_of[s]]
         nx, nc = len(all_states), len(self.cut)
         n_in = 1 if break_at is not None else len(self.outside)
@@ -203,7 +228,7 @@ class Linear:
             if u_at.start <= broken < u_at.stop:
                 returned = u[broken - u_at.start : broken - u_at.start + 1].copy()
                 u[broken - u_at.start] = injected[0]
-            model = self.sampled.get(slot)
+            model = sampled.get(slot)
             ad, bd = (model.a, model.b) if model else p.held(self.step)
             c, d = (model.c, model.d) if model else (p.c, p.d)
             x[x_at] = ad @ x[x_at] + bd @ u

@@ -5,7 +5,8 @@ x+ = A x + B u,  y = C x+ + D u with x = states and discrete values.  Exact but 
 A part that hands on values of earlier steps and keeps none (an amplifier that is asked once a step) only delays by the
 step, and has a continuous model, in which it does not: :func:`undelayed`.
 
-Not modelled: a part whose step is not the same one step later (a ring buffer, a sampling period of several steps).
+Not modelled: a part whose step is not the same one step later (a ring buffer; for a sampling period of several steps
+see gyrobench.linear.multirate).
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         return None
     if len(discrete) > MAX_DISCRETE:
         raise ValueError(f"keeps {len(discrete)} values in memory")
-    first = _differences(twin, inputs, outputs, step, discrete)
+    first = differences(twin, inputs, outputs, step, discrete)
     n = len(part.states)
     reached = _handed_on(first, n, reached)
     if not (np.any(first.a[:n, n:][:, reached]) or np.any(first.c[:, n:][:, reached])):
@@ -74,13 +75,13 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
         return first
     try:
         twin.do_step(0.0, step)
-        if first.is_like(_differences(twin, inputs, outputs, step, discrete), ALIKE / SETTLED):
+        if first.is_like(differences(twin, inputs, outputs, step, discrete), ALIKE / SETTLED):
             return first
         for k in range(1, SETTLED):
             twin.do_step(k * step, step)
-        last = _differences(twin, inputs, outputs, step, discrete)
+        last = differences(twin, inputs, outputs, step, discrete)
         twin.do_step(SETTLED * step, step)
-        after = _differences(twin, inputs, outputs, step, discrete)
+        after = differences(twin, inputs, outputs, step, discrete)
     except ComponentError as error:
         raise ValueError(str(error)) from error
     if not last.is_like(after, ALIKE):
@@ -106,7 +107,7 @@ def undelayed(
         twin.set_state(part.get_state())
         if sampled_step(part, inputs, outputs, 0.5 * step) is None:
             return None
-        whole, fine = (_differences(twin, inputs, outputs, h, discrete) for h in (step, FINE * step))
+        whole, fine = (differences(twin, inputs, outputs, h, discrete) for h in (step, FINE * step))
     except (ComponentError, ValueError):
         return None
     there = _handed_on(whole, n, _reached(part, inputs, discrete, step))
@@ -146,9 +147,10 @@ def _reached(part: Component, inputs: list[str], discrete: list[str], step: floa
     return np.asarray(values[0] != values[1])
 
 
-def _differences(
+def differences(
     part: Component, inputs: list[str], outputs: list[str], step: float, discrete: list[str]
 ) -> SampledStep:
+    """Return the linear step of a part at its present point; discrete: values that are kept."""
     names = [s.name for s in part.states] + discrete
     kept: Any = part.get_state()
 

@@ -14,7 +14,7 @@ from gyrobench.packaging.c_arrays import dimensions
 from gyrobench.packaging.dependencies import followed, written
 from gyrobench.packaging.own_controller.c_law import UNIT
 from gyrobench.packaging.source import PartCode, member
-from gyrobench.packaging.translate import Translation
+from gyrobench.packaging.translation import Translation
 from gyrobench.packaging.tuning import tuning
 
 HERE = Path(__file__).parent

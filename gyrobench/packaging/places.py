@@ -12,7 +12,7 @@ from gyrobench.packaging.c_arrays import CExpression, CVariable, Range, Shape, S
 from gyrobench.packaging.source import Code, SubsetError, dotted, local, member
 
 if TYPE_CHECKING:
-    from gyrobench.packaging.translate import Translation
+    from gyrobench.packaging.translation import Translation
 
 OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "d_add"),

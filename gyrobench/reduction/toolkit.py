@@ -7,11 +7,12 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.drift_test import DriftReduction
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.estimation.sentences import Sentence, plus_minus, told
 from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, Setup, SiteSetup, attitude_of

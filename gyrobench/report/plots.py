@@ -68,11 +68,11 @@ def is_curve(series: Series) -> bool:
 
 
 def by_axis(series: Sequence[Series]) -> list[list[Series]]:
-    """Return the series that can be drawn, together where they have the same axes, those with most points first."""
-    groups: dict[tuple[str, str, str], list[Series]] = {}
+    """Return the series that can be drawn, together those of a quantity over one axis, the most points first."""
+    groups: dict[tuple[str, str, str, str], list[Series]] = {}
     for s in series:
         if is_curve(s):
-            groups.setdefault((s.x_name, s.x_unit, s.y_unit), []).append(s)
+            groups.setdefault((s.x_name, s.x_unit, s.y_name, s.y_unit), []).append(s)
     return sorted(groups.values(), key=lambda alike: -sum(len(s.x) for s in alike))
 
 

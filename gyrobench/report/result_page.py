@@ -258,6 +258,6 @@ def _fits(series: Sequence[Series]) -> list[Any]:
                 "model; lower panel: residuals. A pattern in the residuals is evidence against the model."
             )
             alt = f"Points and fitted curve with residuals: {both}"
-            same = [s for s in curves if s.y_unit == pair[0].y_unit]
+            same = [s for s in curves if (s.y_name, s.y_unit) == (pair[0].y_name, pair[0].y_unit)]
             blocks += pictures(Picture(key, plots.fit(pair, key, alike, same), caption, alt))
     return blocks

@@ -1,10 +1,11 @@
-"""The pages of commands that a form asks for: tune a loop, find the shortest plan, sweep values, certify."""
+"""The pages of commands that a form asks for: tune or identify a loop, find a plan, sweep values, certify."""
 
 from __future__ import annotations
 
 import asyncio
 import functools
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -12,10 +13,12 @@ from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
+from nicegui.events import UploadEventArguments
 
 from gyrobench.bench import UsageError, display_path
 from gyrobench.report.laboratory import FILE, Laboratory, laboratory_of, read_laboratory, write_laboratory
-from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem, told
+from gyrobench.studio.data_page import FILES, keep
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, show_problem, told
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
 from gyrobench.studio.words import heading, say
@@ -23,7 +26,8 @@ from gyrobench.tuning.tune_loop import tunable
 from gyrobench.workflow.gallery import gallery
 from gyrobench.workflow.run_list import list_runs
 
-PAGES = ("tuning.html", "tuning.pdf", "site/index.html")  # that a command writes; certificates have names of their own
+OWN = ("tuning.html", "tuning.pdf", "identification.html", "identification.pdf")
+PAGES = (*OWN, "site/index.html")  # that a command writes; certificates have names of their own
 LISTED = 100  # runs to choose from
 STRUCTURES = ("lead-lag", "pi", "pi+lead-lag", "pi+lead", "lead", "lag", "lead-lag+notch", "pi+lead-lag+notch")
 
@@ -82,6 +86,19 @@ class CommandForm:
 
 
 SET = FormField("--set", "values", "Other values", "dict", "platform.J=0.7")
+PLACES = ("", "plant input", "reference", "plant output")
+IDENTIFY = CommandForm(
+    "Identify", "identify",
+    "Open loop, plant and margins of a real loop, with intervals, from its record: columns time, excitation, input (of "
+    "the plant) and output, each with its unit.",
+    (
+        FormField("--at", "at", "Where the excitation enters; empty: by the file", "choice", choices=PLACES),
+        FormField("--band", "band", "Frequencies to look at", "text", "0.5Hz..80Hz"),
+        FormField("--period", "period", "Period of the excitation; empty: found in the record", "text", "4s"),
+        FormField("--want", "want", "Margins that it must have", "list", "phase margin=40deg\ndisk margin=0.5"),
+        FormField("--fit", "fit", "Physical parameters to find, or known", "list", "J\nviscous\ndelay"),
+    ), under="identified",
+)  # fmt: skip
 TUNE = CommandForm(
     "Tune", "tune",
     "The controller of a stabilizer loop for wanted margins, in the worst case over a spread of the parts, proven in "
@@ -101,7 +118,7 @@ DESIGN = CommandForm(
         FormField("--want", "", "Standard uncertainties wanted", "dict", "D_I=0.001deg/h/g\nD_F=0.002deg/h"),
         FormField("--time", "time", "Or the best in this time", "text", "4h"),
         FormField("--count", "count", "Runs that count the prediction", "number", "0"),
-        SET,
+        replace(SET, example="latitude=45.75deg"),
     ),
 )  # fmt: skip
 SWEEP = CommandForm(
@@ -114,7 +131,7 @@ SWEEP = CommandForm(
         FormField("--seeds", "seeds", "Seeds at each point", "number", "1"),
         FormField("--runs", "runs", "Points that are drawn from distributions", "number", ""),
         FormField("--spec", "spec", "Acceptance specification", "choice"),
-        replace(SET, argument="set"),
+        replace(SET, argument="set", example="latitude=45.75deg"),
     ), fixed=("--site",), under="campaigns",
 )  # fmt: skip
 
@@ -166,24 +183,60 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
                     chosen = ui.select(systems, value=first, label=say("System"), with_input=True)
                     chosen.props("dense outlined").classes("full")
                     fields = {f.option: _field(f, studio) for f in form.fields}
-                with ui.element("div").classes("aside"):
-                    lines = CopyLines()
-                    go = ui.button(say("Start"), icon="play_arrow").mark("start")
-                    go.set_visibility(not studio.read_only)
+                asked = _asking(studio, form, fields, lambda: chosen.value or "")
+            chosen.on_value_change(asked)
 
-            def asked() -> CommandRequest:
-                if not chosen.value:
-                    raise UsageError("choose a system")
-                return form.request(studio, chosen.value, {o: f.value for o, f in fields.items()})
 
-            def show() -> None:
-                if chosen.value:
-                    lines.show(asked().command(), asked().python())
+def _asking(
+    studio: Studio, form: CommandForm, fields: dict[str, Any], subject: Callable[[], str]
+) -> Callable[[], None]:
+    """Add the lines to copy and the button that starts; return what shows them anew.
 
-            go.on_click(told(lambda: ui.navigate.to(f"/job/{studio.jobs.submit(asked())}")))
-            for f in (chosen, *fields.values()):
-                f.on_value_change(show)
-            show()
+    subject: the system or the file that the command is about, "" while none is chosen.
+    """
+    with ui.element("div").classes("aside"):
+        lines = CopyLines()
+        go = ui.button(say("Start"), icon="play_arrow").mark("start")
+        go.set_visibility(not studio.read_only)
+
+    def asked() -> CommandRequest:
+        if not subject():
+            raise UsageError("choose a system")
+        return form.request(studio, subject(), {o: f.value for o, f in fields.items()})
+
+    def show() -> None:
+        if subject():
+            lines.show(asked().command(), asked().python())
+
+    go.on_click(told(lambda: ui.navigate.to(f"/job/{studio.jobs.submit(asked())}")))
+    for field in fields.values():
+        field.on_value_change(show)
+    show()
+    return show
+
+
+def _add_identify_page(studio: Studio) -> None:
+    @ui.page("/identify", response_timeout=60)
+    def identify_page(file: str = "") -> None:
+        with frame(studio, IDENTIFY.name):
+            heading(IDENTIFY.name)
+            ui.label(say(IDENTIFY.text))
+            if studio.read_only:
+                raise UsageError("the studio is read-only: no file is taken")
+            there = inside(studio.bench.out / FILES, file) if file else None
+
+            async def taken(event: UploadEventArguments) -> None:
+                kept = keep(studio, event.file.name, await event.file.read())
+                ui.navigate.to(f"/identify?file={quote(kept.relative_to(studio.bench.out / FILES).as_posix())}")
+
+            dropped("Drop a file of your laboratory: text, or a log", taken, "File")
+            if there is None:
+                return
+            ui.label(there.name).classes("option")
+            with ui.element("div").classes("two"):
+                with ui.element("div").classes("form"):
+                    fields = {f.option: _field(f, studio) for f in IDENTIFY.fields}
+                _asking(studio, IDENTIFY, fields, lambda: display_path(there))
 
 
 # ---------------------------------------------------------------------------------------------- laboratory
@@ -304,7 +357,7 @@ def pages_of(folder: Path) -> list[str]:
 def served(out: Path, file: Path) -> bool:
     """Return whether a file below the folder of results is a page of a command, or belongs to a campaign's site."""
     parts = file.relative_to(out.resolve()).parts
-    named = file.name in ("tuning.html", "tuning.pdf") or file.match("certificates/*/certificate-*.*")
+    named = file.name in OWN or file.match("certificates/*/certificate-*.*")
     return named or (parts[0] == "campaigns" and len(parts) > 3 and parts[2] == "site")
 
 
@@ -312,6 +365,7 @@ def add_command_pages(studio: Studio) -> None:
     """Register the pages."""
     for form in (TUNE, DESIGN, SWEEP):
         _add_form(studio, form)
+    _add_identify_page(studio)
     _add_laboratory_page(studio)
 
     @ui.page("/pages/{place:path}", response_timeout=60)

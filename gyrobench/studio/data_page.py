@@ -261,6 +261,9 @@ def add_data_page(studio: Studio) -> None:
         tests = await asyncio.to_thread(tests_of_data, studio)
         with frame(studio, "Data"):
             heading("Measured data")
+            ui.label(
+                say("Choose the test and drop its record: columns are proposed, faults listed; then it is reduced.")
+            )
             if studio.read_only:
                 raise UsageError("the studio is read-only: no file is taken")
             chosen = ui.select(tests, value=test if test in tests else None, label=say("Test"), with_input=True)

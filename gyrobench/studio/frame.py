@@ -27,7 +27,7 @@ if (document.hidden) emitEvent('seen', false);"""
 NUMBER = "987654"  # stands for the number in the words of a count
 PAGES = (
     ("Systems", "/"), ("Data", "/data"), ("Runs", "/runs"), ("Design", "/design"), ("Tune", "/tune"),
-    ("Campaign", "/campaign"), ("Laboratory", "/laboratory"), ("Learn", "/learn"),
+    ("Identify", "/identify"), ("Campaign", "/campaign"), ("Laboratory", "/laboratory"), ("Learn", "/learn"),
 )  # fmt: skip
 DARK: dict[bool | None, tuple[bool | None, str]] = {  # mode -> the next one, and what the button says of it
     None: (True, "Colours: as the system"),

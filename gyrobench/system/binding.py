@@ -33,10 +33,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
-from gyrobench import reading, units
+from gyrobench import units
 from gyrobench.errors import GyrobenchError
 from gyrobench.system.connectors import QUANTITIES
 from gyrobench.system.fmu_variables import Variable, variables
@@ -106,22 +105,6 @@ class Binding:
     no_feedthrough: set[str] = field(default_factory=set)  # variables without it, by the mapping file
     delayed: set[str] = field(default_factory=set)  # elements whose wires carry the value of the previous step
     warnings: list[str] = field(default_factory=list)
-
-
-def load_mapping(file: Path | None) -> dict[str, Any]:
-    """Reads a mapping file; None gives the empty mapping.  Raises SocketMismatchError when it is not readable."""
-    if file is None:
-        return {}
-    return parse_mapping(reading.read_text(Path(file), _unreadable), str(file))
-
-
-def parse_mapping(text: str, file: str) -> dict[str, Any]:
-    """Return the mapping of a text.  Raises SocketMismatchError when it is not TOML."""
-    return reading.toml(text, file, _unreadable)
-
-
-def _unreadable(why: str) -> SocketMismatchError:
-    return SocketMismatchError("mapping file", [why])
 
 
 def _bound(element: str, v: Variable, gain: float, unit: str, offset: float = 0.0) -> Bound:

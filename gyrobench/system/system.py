@@ -35,7 +35,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
-from gyrobench.reduction.setup.sources import Source, declared
 from gyrobench.system.configurable import (
     Configurable,
     InvalidConfigurationError,
@@ -174,17 +173,9 @@ class System(Configurable):
                 "findings(record); reduce judges it, for every system alike"
             )
         if isinstance(cls.reduction, type):
-            cls._take_sources(declared(cls.reduction).values())
+            from gyrobench.system.declared_sources import take_sources
 
-    @classmethod
-    def _take_sources(cls, sources: Iterable[Source]) -> None:
-        """Take the options of the sources of error that the reduction declares, and what simulates them."""
-        from gyrobench.system.families.option_groups import type_b
-
-        sources = list(sources)
-        cls.options = {**cls.options, **(type_b(*(s for s in sources if s.option)) | dict(cls.options))}
-        new = {s.parameter for s in sources} - {"", *cls.assumed}
-        cls.assumed = (*cls.assumed, *sorted(new))
+            take_sources(cls, cls.reduction)
 
     def __init__(self) -> None:
         super().__init__()
@@ -291,15 +282,11 @@ class System(Configurable):
         reduction: Any = self.reduction
         if not isinstance(reduction, str):
             return reduction
+        from gyrobench.system.declared_sources import require_options
+
         module = self._beside("reduction", reduction)
         found = getattr(module, "Reduction", module)
-        for name, source in declared(found).items():
-            if source.option and source.option not in self.options:
-                raise UsageError(
-                    f"{self.name}: {source.option} is no option of it, in which {name}() of {module.__name__} states "
-                    f"the source of error {source.id}. Write options |= type_b(SOURCE) in system.py, or let reduction "
-                    "be the class itself"
-                )
+        require_options(self, found, module.__name__)
         return found
 
     def _beside(self, declared: str, module: str) -> Any:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import units
-from gyrobench.system.binding import Binding, Bound, fit, load_mapping
+from gyrobench.system.binding import Binding, Bound, fit
 from gyrobench.system.execution_order import AlgebraicLoopError, Cut, ExecutionOrder, Link, execution_order
 from gyrobench.system.fmu_variables import feedthrough, read_description
+from gyrobench.system.mapping_files import load_mapping
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.sockets import socket
 from gyrobench.system.system import System

@@ -91,6 +91,7 @@ def without_controller(linear: Linear, slot: str, gains: Mapping[tuple[str, str]
         slot, own.inputs, own.outputs, [], np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), d, [np.zeros((0, m))]
     )
     linear.sampled.pop(slot, None)
+    linear.multirate.pop(slot, None)
     linear.states = [f"{s}.{v}" for s in linear.order for v in linear.blocks[s].states]
     return linear
 

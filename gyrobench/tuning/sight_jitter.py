@@ -63,7 +63,7 @@ class SightModel:
         moved = []
         for source in self.sources.sources:
             if source.loop == self.ports.loop:
-                w, u = 0.0j * fine, 0.0j * fine + 1.0
+                w, u = np.zeros(fine.size, complex), np.ones(fine.size, complex)
             else:
                 w, u = both(source.kind, source.axis)
             moved.append(MovedSight(source.name, w, u, source.density(fine)))

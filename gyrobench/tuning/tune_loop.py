@@ -15,7 +15,8 @@ import numpy as np
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
 from gyrobench.component import Component, ComponentError
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part

@@ -6,11 +6,12 @@ import ast
 import contextlib
 import re
 import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gyrobench import reading
-from gyrobench.bench import ROOMS, Bench, BenchError, suggest_names
+from gyrobench.bench import ROOMS, Bench, BenchError, UsageError, suggest_names
 
 #: a class that derives from another: what its docstring is indented by, and the docstring
 CLASS = re.compile(r'^class \w+\([^)]*\w[^)]*\):[^\n]*\n\s*?([ \t]+)[rR]?"""\s*(.*?)"""', re.MULTILINE | re.DOTALL)
@@ -63,6 +64,28 @@ def list_contents(bench: Bench) -> dict[str, list[dict[str, Any]]]:
         "specifications": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.specifications().items()],
         "instruments": [{"name": n, "what": _title(f), "file": str(f)} for n, f in bench.instruments().items()],
     }
+
+
+def with_words(
+    contents: Mapping[str, Sequence[Mapping[str, Any]]], words: Sequence[str]
+) -> dict[str, list[Mapping[str, Any]]]:
+    """Return the entries that have every word in name, text or method, whatever its case.
+
+    Raises UsageError where none has.
+    """
+    wanted = [word.lower() for word in words]
+
+    def fits(row: Mapping[str, Any]) -> bool:
+        said = " ".join([row["name"], row["what"], *row.get("spec", ())]).lower()
+        return all(word in said for word in wanted)
+
+    found = {kind: [row for row in rows if fits(row)] for kind, rows in contents.items()}
+    if wanted and not any(found.values()):
+        names = [row["name"] for rows in contents.values() for row in rows]
+        raise UsageError(
+            f"nothing has '{' '.join(words)}' in its name, title or method; {suggest_names(words[0], names)}"
+        )
+    return found
 
 
 README = """# {name}

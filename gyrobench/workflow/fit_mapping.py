@@ -41,8 +41,9 @@ def _parameters(slot: str, description: Any) -> list[str]:
 
 def write_mapping(fmu: Path, slot: str, out: Path | None) -> tuple[str, list[str]]:
     """Return a first mapping file of the FMU, written to ``out`` where given, and what it still lacks."""
-    from gyrobench.system.binding import SocketMismatchError, fit, parse_mapping
+    from gyrobench.system.binding import SocketMismatchError, fit
     from gyrobench.system.fmu_variables import read_description
+    from gyrobench.system.mapping_files import parse_mapping
     from gyrobench.system.mapping_proposal import mapping_text
 
     check_fmu_files({slot: fmu})

@@ -104,7 +104,7 @@ def _run(
     checkpoints: CheckpointManager | None,
 ) -> Record:
     """Run and save the record, as far as it comes."""
-    from gyrobench.engine.session import RunError, RunInterrupted
+    from gyrobench.engine.run_errors import RunError, RunInterrupted
 
     feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
     try:
@@ -140,7 +140,7 @@ def _report(
     spec: Path | None = None,
 ) -> RunOutcome:
     """Reduce a record, with the effect of the step where it is wanted, and write its report."""
-    from gyrobench.engine.session import RunInterrupted
+    from gyrobench.engine.run_errors import RunInterrupted
 
     stopped: PostRunError | None = None
     step = request.step or system.step
@@ -205,7 +205,7 @@ def check_step(
     """
     import time
 
-    from gyrobench.engine.session import RunInterrupted
+    from gyrobench.engine.run_errors import RunInterrupted
     from gyrobench.reduction.estimation.step_effect import step_effects
 
     bindings = session.assembly.bindings

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 MORE = 1.3  # of the rate of the cone: more drift than no coning terms at all make
 ACROSS = 3.0  # times the drift along the axis of the cone: another axis, where it is a good part of the cone's rate
 PART = 0.02
+OFF = (
+    0.1  # of the rate of the cone, from what the stated filter, output rate and algorithm make: no gyro's scale factor
+)
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
@@ -46,9 +49,11 @@ def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
     rest = means[cones.number < 0]
     noise = 4.0 * float(np.max(np.std(rest, axis=0, ddof=1)))
     own = AXES.index(setup.axis)
+    off = ""
     for k, (f, theta) in enumerate(cones.cones):
         rate = cone_rate(f, theta)
         drift = means[cones.number == k].mean(axis=0) - rest.mean(axis=0)
+        stated = float(setup.chain.drift(f, theta, own)[own]) / rate
         if abs(drift[own]) > MORE * abs(rate) + noise:
             text = (
                 f"At {f:g} Hz the attitude drifts by {drift[own] / rate:.3g} of ω (1 − cos θ), more than without any "
@@ -56,8 +61,7 @@ def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
                 "in the units that are given?"
             )
         elif drift[own] / rate > PART and abs(drift[own]) > 2.0 * noise:
-            expected = float(setup.chain.drift(f, theta, own)[own]) / rate
-            if expected > -PART:
+            if stated > -PART:
                 continue
             text = (
                 f"At {f:g} Hz the attitude drifts with the cone, by {drift[own] / rate:.3g} of ω (1 − cos θ); coning "
@@ -71,7 +75,17 @@ def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
                 f"At {f:g} Hz the attitude drifts about {most}, not about {setup.axis}, the axis of the cone. Are the "
                 "columns of the axes exchanged, or is the axis another one?"
             )
+        elif abs(drift[own] - stated * rate) > OFF * abs(rate) + noise:
+            off = off or (
+                f"At {f:g} Hz the attitude drifts by {drift[own] / rate:.3g} of ω (1 − cos θ), the stated filter, "
+                f"output rate and algorithm make {stated:.3g}. Are frequency (Hz, not rad/s) and half-angle (not the "
+                "full angle) in the units that are given, and interval, bandwidth, coning and samples those of the "
+                "unit?"
+            )
+            continue
         else:
             continue
-        yield Reason("coning.implausible", text.replace("-", "−"), blocked, severity="doubt")
+        yield Reason("coning.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return
+    if off:
+        yield Reason("coning.implausible", off.replace(" -", " −"), blocked, severity="doubt")

@@ -212,7 +212,7 @@ def doubts(p: Prepared, run: RunDocument) -> dict[str, str]:
     noise = p.noise
     found = {"misfit": "" if noise.agrees else noise_tables.agreement_text(noise), "coarse": coarse_text(p.name, run),
              "explained": explained_text(p), "saturated": saturated_text(p, run), "frozen": frozen_text(p, run),
-             "level": noise_tables.levels_text(noise)}  # fmt: skip
+             "level": noise_tables.levels_text(noise), "rows": rows_text(p, run)}  # fmt: skip
     return {f"drift_record.{id}": text for id, text in found.items() if text}
 
 
@@ -233,7 +233,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
         )
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
-             "level": noise_tables.levels_text(noise)}  # fmt: skip
+             "level": noise_tables.levels_text(noise), "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():
         if text:
             say(id, text)
@@ -287,6 +287,26 @@ def frozen_text(p: Prepared, run: RunDocument) -> str:
         f"{length} samples from {number(when)} s on are the same value, which the noise does not make: the channel was "
         "frozen. They count as samples of the noise: the coefficients are too small. Leave them out by a column flag."
     )
+
+
+def rows_text(p: Prepared, run: RunDocument) -> str:
+    """Return that every second row of a file is not as the rows between; "" where they are alike."""
+    if not run.series or run.series["factor"] > 1:
+        return ""
+    found = p.rows
+    if found.noise_differs:
+        return (
+            f"The noise of every second row is {number(max(found.ratio, 1.0 / found.ratio))} times that of the rows "
+            "between: rows that were interpolated, or those of two instruments in one column. The coefficients are "
+            "those of the mixture; take one row of two."
+        )
+    if found.levels_differ:
+        return (
+            f"Every second row is {number(abs(found.level) / p.units.si)} {p.units.unit} off the rows between: rows of "
+            "two instruments in one column, a multiplexer, or a line at half the sampling rate. The coefficients are "
+            "those of the mixture; take one row of two."
+        )
+    return ""
 
 
 def of_rows(run: RunDocument) -> list[Reason]:

@@ -18,6 +18,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, 
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
+from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -60,6 +61,11 @@ class Prepared:
         wild in it is drawn from the noise around.
         """
         return self._longest[1]
+
+    @cached_property
+    def rows(self) -> RowPattern:
+        """How even and odd samples differ."""
+        return every_second_row(self.rate, self.clean)
 
     @cached_property
     def _longest(self) -> tuple[int, Array]:

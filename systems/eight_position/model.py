@@ -29,8 +29,9 @@ from gyrobench import frames, units
 from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.findings import Estimates, Findings
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Estimates
 from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.window_checks import ReductionError
 

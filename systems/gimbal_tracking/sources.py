@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.record.target_path import along
 from gyrobench.system.line_of_sight import Density
 
 TARGET = "motion of the target"
@@ -44,15 +45,24 @@ def target_rates(parameters: Mapping[str, Any], t: Array) -> Array:
     """
     p = {n.removeprefix("target."): v for n, v in parameters.items() if n.startswith("target.")}
     kind = round(float(p.get("kind", 0.0)))
+    if kind == 3:
+        n = int(p["points"])
+        angles, rates = along(np.asarray(p["path_t"], float)[:n], np.asarray(p["path"], float)[:n], t)
+        return _about(angles[:, 0], angles[:, 1], rates[:, 0], rates[:, 1])
     if kind == 1:
         w = 2.0 * np.pi * float(p["frequency"])
         (r1, r2), (a1, a2), lead = p["rate"], p["amplitude"], float(p["lead"])
         a = r1 * t + a1 * np.sin(w * t)
         b = r2 * t + a2 * (np.sin(w * t + lead) - np.sin(lead))
         da, db = r1 + w * a1 * np.cos(w * t), r2 + w * a2 * np.cos(w * t + lead)
-        return np.array([da * np.cos(b) + 0.5 * db * np.sin(2.0 * a) * np.sin(b), db * np.cos(a) ** 2])
+        return _about(a, b, da, db)
     if kind == 2:
         v = np.asarray(p["velocity"], float)
         place = np.array([0.0, float(p["distance"]), 0.0])[:, None] + v[:, None] * t
         return np.asarray(np.cross(place, v, axisa=0).T / np.sum(place**2, axis=0))[[0, 2]]
     return np.zeros((2, t.size))
+
+
+def _about(a: Array, b: Array, da: Array, db: Array) -> Array:
+    """Return the rates about x and z of turns a about x and b about z, which a target that turns with them has."""
+    return np.array([da * np.cos(b) + 0.5 * db * np.sin(2.0 * a) * np.sin(b), db * np.cos(a) ** 2])

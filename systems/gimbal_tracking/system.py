@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.record.target_path import TargetPath, read_path
 from gyrobench.reduction.loops.jitter import spectra
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.sight_test import AXES, SightTest
@@ -29,6 +31,7 @@ IMAGE_TEST = 4e-4  # V (rad), of the test sines of the tracking loops
 TIMES = ("period", "exposure", "processing")
 ODD = 1e-3  # of a time: less than that it is changed without a word
 SAMPLES = 10.0  # images in a period of the crossover, or more
+KEPT = 0.05  # of the wanted accuracy: a recorded path is off by it at most
 TARGET_STEP = 2e-3  # s, of its path for the density of its rates
 SLOWER = 0.25  # of the rate loop's crossover: that of the tracking loop
 
@@ -105,6 +108,7 @@ class GimbalTracking(SightTest):
         "index": Option(0.3, "1", "prediction: Kalata's tracking index, motion in an image over noise", 1e-6, 100.0),
         "field": Option(0.02, "rad", "field of view, full angle", 1e-5, 2.9, sets="tracker.field"),
         "target": Option("constant", str, f"motion of the target in the ride: {', '.join(TARGETS)}"),
+        "path": Option("", str, "CSV file with the recorded path of the target (time, azimuth, elevation)"),
         "target_pitch": Option(1e-3, "rad/s", "target: constant rate about x, up"),
         "target_yaw": Option(5e-3, "rad/s", "target: constant rate about z, to the left"),
         "amplitude": Option(0.02, "rad", "target: amplitude of sine and circle", 0.0, 1.0),
@@ -214,7 +218,9 @@ class GimbalTracking(SightTest):
         return lambda f: np.interp(f, made.f, made.mean, right=0.0) / (2.0 * np.pi * f) ** 2
 
     def moves(self) -> dict[str, Any]:
-        """Return the parameters of the moving target."""
+        """Return the parameters of the moving target.  Raises DataError and OSError, of a recorded path."""
+        if self["path"]:
+            return self.recorded().parameters()
         kind = str(self["target"])
         if kind == "flyby":
             across = min(1.0, self["passing"] / self["distance"])
@@ -228,6 +234,10 @@ class GimbalTracking(SightTest):
             "target.frequency?": self["frequency"],
             "target.lead?": 0.5 * math.pi if kind == "circle" else 0.0,
         }
+
+    def recorded(self) -> TargetPath:
+        """Return the recorded path of the target.  Raises DataError and OSError."""
+        return read_path(Path(self["path"]), KEPT * self["accuracy"])
 
     def crossovers(self) -> dict[str, float]:
         """Return those of the tracking loops; that of a rate loop is asked for with its tracking loop open."""
@@ -259,6 +269,18 @@ class GimbalTracking(SightTest):
                 found.append(
                     f"{name}: {1e3 * time:.5g} ms is no whole number of steps of {1e3 * self.step:g} ms; "
                     f"{1e3 * taken:.5g} ms is taken"
+                )
+        if self["path"]:
+            path, ride = self.recorded(), self.ride()
+            if path.rows > path.t.size:
+                found.append(
+                    f"path: {path.t.size} of {path.rows} rows are taken; between them it is off by "
+                    f"{1e6 * path.off:.2g} µrad at most"
+                )
+            if path.t[-1] < ride.settle + ride.dwell:
+                found.append(
+                    f"path: it ends after {path.t[-1]:.4g} s, and the ride takes {ride.settle + ride.dwell:.4g} s from "
+                    "its start: the target rests then; shorten the ride"
                 )
         if self["frames"] < SAMPLES * self["track"]:
             found.append(

@@ -6,7 +6,10 @@
 hg, half of up less down, is the vertical Earth rate where the gyro has no g-sensitivity.  Each position is averaged in
 pieces, from which the noise is estimated, of gyros with the errors of the readings of an angle.  [IMU-UPDOWN]
 
-Not modelled: the axis off the vertical but for the line u_mount of the budget, misalignments.
+An axis that leans by t reads g cos t: what the two level accelerometers read is tilt or bias, and 1 - cos t, even from
+0 to what it would be without bias, is in u of Sa.
+
+Not modelled: the axis off the vertical but for this and the line u_mount of the budget, misalignments.
 """
 
 from __future__ import annotations
@@ -49,6 +52,7 @@ UPRIGHT = 0.9  # of gravity along the axis that stands up or down
 TILT = Source(
     "axis.vertical", "axis off the vertical", "rad", "u_mount", "of each position, towards the level Earth rate"
 )
+LEAN = Source("axis.cosine", "axis off the vertical, by the level accelerometers", "1", "", "1 less the cosine")
 
 
 class UpDownChannel(DriftReduction[ImuSetup]):
@@ -89,11 +93,18 @@ class UpDownChannel(DriftReduction[ImuSetup]):
     def effects(self, found: Findings) -> list[Effect]:
         s, y = self.setup, found.data.y
         if not self.channel.gyro:
-            return [sources.GRAVITY.effect(s, -self.sign[self.sign != 0.0])]
+            sign = self.sign[self.sign != 0.0]
+            return [sources.GRAVITY.effect(s, -sign), LEAN.effect(self._lean() / math.sqrt(3.0), -s.gravity * sign)]
         level = s.earth_rate * math.cos(s.latitude)
         phase = np.asarray(self.windows["phase"])[self.sign != 0.0]
         each = np.array([np.where(phase == p, level, 0.0) for p in np.unique(phase)])
         return [TILT.effect(s, each.reshape(-1, y.size))]
+
+    def _lean(self) -> float:
+        """Return 1 less the cosine of the axis to the vertical, if what the other accelerometers read were no bias."""
+        level = [np.asarray(self.windows[f"mean_a{a}"], dtype=float) for a in AXES if a != self.channel.letter]
+        squares = np.sum(np.square(level), axis=0)[self.sign != 0.0]
+        return float(np.mean(squares)) / (2.0 * self.setup.gravity**2)
 
     def account(self, found: Findings) -> Account:
         i = self.channel.letter

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
-ZERO = Source(
-    "head.zero", "zero of the head against the reference", "rad", "u_angle",
-    doc="standard uncertainty of the zero of the head against the reference",
-)  # fmt: skip
+ZERO = Source("head.zero", "zero of the head against the reference", "rad", "u_angle")
 TILT = Source(
     "head.tilt.{axis}", "tilt of the head about {axis}", "rad", "u_level", "right-handed",
     doc="std. unc. of the level of the head about each axis, not read",

@@ -5,10 +5,7 @@ from __future__ import annotations
 from gyrobench.reduction.setup.sources import Source
 
 GAIN = Source("float.gain", "gain H/C", "1", "u_gain", "relative", doc="relative standard uncertainty of that gain")
-SCALE = Source(
-    "angle.scale", "angle scale of the table", "1", "u_angle", "relative",
-    doc="relative standard uncertainty of the angle scale of the table",
-)  # fmt: skip
+SCALE = Source("angle.scale", "angle scale of the table", "1", "u_angle", "relative")
 DRIFT = Source(
     "drift.bound", "drift during the test", "rad/s",
     note="not told from the slope by angles gone over once; bound taken as two standard uncertainties",

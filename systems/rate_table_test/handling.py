@@ -13,6 +13,7 @@ from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
 from gyrobench.result import Coefficient, Reason
 
+UNSIGNED = "are its readings of one sense given without their sign?"
 FAR = 0.1  # scale factor error from which on something else than the gyro is meant
 
 
@@ -44,9 +45,15 @@ def _reversed_steps(record: Record) -> Iterator[HandlingCandidate]:
         yield HandlingCandidate(words, changed(record, rate=np.where(wrong, -rate, rate)))
 
 
-def implausible(e: Coefficient) -> list[Reason]:
-    """Return why a scale factor error beyond 10 % is that of no gyro, with the mistake that makes such a factor."""
+def implausible(e: Coefficient, a: Coefficient) -> list[Reason]:
+    """Return why a scale factor error beyond 10 % is that of no gyro, with the mistake that makes such a factor.
+
+    a: its asymmetry, which takes abs(w) as it is, so that no residual shows readings without their sign.
+    """
     error = e.estimate * 1e-6
     if not math.isfinite(error) or abs(error) < FAR:
         return []
-    return [Reason("rate.factor", factor_sentence(1.0 + error), ("pass", "fail"), severity="doubt")]
+    text = factor_sentence(1.0 + error)
+    if abs(1.0 + error) < FAR and abs(a.estimate * 1e-6) > 1.0:
+        text = f"The gyro reads {1.0 + error:.2g} times the rate: {UNSIGNED}"
+    return [Reason("rate.factor", text, ("pass", "fail"), severity="doubt")]

@@ -26,7 +26,7 @@ from gyrobench import frames
 from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, LATITUDE, TIME_BASE
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -41,7 +41,6 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
-    Source,
     told,
     window_problems,
 )
@@ -52,7 +51,6 @@ from .steps import cycle_of, direction, levels
 
 PPM = 1e-6
 LEAST = 8  # readings of the sweep
-COSINE = Source("mount.cosine", "cosine of the input axis against the table axis", "1", "u_mount", "second order")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +59,6 @@ class RateTableSetup(SiteSetup):
 
     steps: int = 0
     cosine: float = 0.0
-    u_axis: float = 0.0
-    u_mount: float = 0.0
-    u_latitude: float = 0.0
-    u_time: float = 0.0
-    u_angle1: float = 0.0
-    u_angle2: float = 0.0
 
     @property
     def earth(self) -> float:
@@ -148,7 +140,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         s, large = self.setup, self.large
         table, dt = self.table[large], (self.t1 - self.t0)[large]
         across = s.earth_rate * math.cos(s.latitude)
-        lean = math.sqrt(2.0) * s.u_mount**2  # rms of (x2 + y2)/2
+        lean = math.sqrt(2.0) * COSINE.size(s) ** 2  # rms of (x2 + y2)/2
         encoder = []
         if "angle_start" in self.windows:
             a0, a1 = (np.asarray(self.windows[n])[large] for n in ("angle_start", "angle_end"))
@@ -199,7 +191,7 @@ class Reduction(DriftReduction[RateTableSetup]):
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth = (self.setup.truth or {}).get("threshold")
         added = self.small.coefficient(truth)
-        reasons = handling.implausible(result.coefficients[0])
+        reasons = handling.implausible(*result.coefficients[:2])
         return replace(
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],

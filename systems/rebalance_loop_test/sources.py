@@ -4,7 +4,4 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
-DRIFT_RATE = Source(
-    "gyro.drift_rate", "drift rate of the gyro", "rad/s", "u_drift",
-    doc="standard uncertainty of the drift rate of the gyro",
-)  # fmt: skip
+DRIFT_RATE = Source("gyro.drift_rate", "drift rate of the gyro", "rad/s", "u_drift")

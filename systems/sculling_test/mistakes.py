@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MORE = 1.3  # of the reading: more than with nothing taken back at all
 PART = 0.02  # of the reading: the other sign
+OFF = 0.1  # of what the accelerometer reads, from what the stated unit and user make: no instrument's scale factor
 REST = 0.5  # m/s2 at rest: gravity is still there
 
 
@@ -46,8 +47,9 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
             f"At rest the computed acceleration is {rest.mean() / G0:.3g} g. Is gravity taken off, and the unit of the "
             "column the one that is given?"
         )
-        yield Reason("sculling.implausible", text.replace("-", "−"), blocked, severity="doubt")
+        yield Reason("sculling.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return
+    off = ""
     for k, m in enumerate(motions.motions):
         read, stated = reading(m, setup.chain.gravity), setup.chain.rise(m)
         found = float(y[motions.number == k].mean() - rest.mean())
@@ -63,7 +65,17 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
                 f"filters and algorithm make {stated / read:.3g}. Is the vibration in antiphase (negative), or the "
                 "acceleration positive downwards?"
             )
+        elif abs(found - stated) > OFF * abs(read) + noise:
+            off = off or (
+                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the stated "
+                f"filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle and vibration "
+                "(amplitudes) in the units that are given, and interval, filters, sculling, samples and size those of "
+                "the unit?"
+            )
+            continue
         else:
             continue
-        yield Reason("sculling.implausible", text.replace("-", "−"), blocked, severity="doubt")
+        yield Reason("sculling.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return
+    if off:
+        yield Reason("sculling.implausible", off.replace(" -", " −"), blocked, severity="doubt")

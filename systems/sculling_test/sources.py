@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
-ANGLE = Source(
-    "table.angle_gain", "amplitude of the angle", "1", "u_angle", "relative, positive where it is larger",
-    doc="relative standard uncertainty of the amplitude of the angle",
-)  # fmt: skip
+ANGLE = Source("table.angle_gain", "amplitude of the angle", "1", "u_angle", "relative, positive where it is larger")
 VIBRATION = Source(
     "table.force_gain", "amplitude of the vibration", "1", "u_vibration", "relative, positive where it is larger",
     doc="relative standard uncertainty of that of the vibration",

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift
+from gyrobench.reduction.loops.loop_drift import Drift, drift
+from gyrobench.reduction.loops.loop_measures import Gate, Point
 from gyrobench.reduction.loops.loop_toolkit import DRIFTS, Account, LoopReduction, isolation, margins, told
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import isolation_near, stiffness

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.reduction.loops.loop_measures import Drift, Gate, drift
+from gyrobench.reduction.loops.loop_drift import Drift, drift
+from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_toolkit import DRIFTS, Account, LoopReduction, Table, isolation, margins, told
 from gyrobench.reduction.loops.platform_measures import peak_noise, stiffness
 from gyrobench.units import ARCSEC, DPH

@@ -8,7 +8,7 @@ from gyrobench.component.set_up import SINES
 from gyrobench.reduction.setup import sources as shared
 from gyrobench.reduction.setup.sources import RELATIVE, Source
 
-CLOCK = Source("clock", "clock", "s", "u_time", "positive where it is fast", doc="standard uncertainty of the clock")
+CLOCK = Source("clock", "clock", "s", "u_time", "positive where it is fast")
 LATITUDE = replace(shared.LATITUDE, doc="standard uncertainty of the latitude, deflection of the vertical in it")
 PLACE = Source(
     "star.place", "place of the star", "rad", "u_star", "each way", ("declination", "hour angle"),
@@ -19,9 +19,8 @@ HEADING = Source(
     doc="standard uncertainty of the heading of the north finder's mirror",
 )  # fmt: skip
 LEVEL = Source(
-    "level.scale", "scale of the plate level", RELATIVE, "u_level", "relative, positive where it reads too much",
-    doc="relative standard uncertainty of the scale of the plate level",
-)  # fmt: skip
+    "level.scale", "scale of the plate level", RELATIVE, "u_level", "relative, positive where it reads too much"
+)
 CIRCLE = Source(
     "circle.once", "circle, once a turn", "rad", "u_circle", "reads too much", SINES,
     doc="error of the circle once a turn, std. unc. of its amplitude",

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
-AMMETER = Source(
-    "ammeter.scale", "ammeter", "1", "u_current", "relative", doc="relative standard uncertainty of the ammeter"
-)
-ZERO = Source(
-    "ammeter.zero", "zero of the ammeter", "A", "u_zero", doc="standard uncertainty of the zero of the ammeter"
-)
+AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")
+ZERO = Source("ammeter.zero", "zero of the ammeter", "A", "u_zero")
 RANGES = Source("torquer.range_step", "step of K_n between the angle ranges", "rad/s/A")

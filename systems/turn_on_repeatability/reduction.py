@@ -62,7 +62,6 @@ class TurnOnSetup(Setup):
 
     limit: float
     exponentials: int = -1
-    u_time: float = 0.0
 
 
 class Reduction(DriftReduction[TurnOnSetup]):
@@ -95,9 +94,23 @@ class Reduction(DriftReduction[TurnOnSetup]):
             problems.append(f"{self.y.size} readings of {self.count} turn-ons: give one of each, or several")
         if np.any(self.since < 0.0) or np.any(self.since < 0.45 * self.length):
             problems.append("since: the middle of a reading cannot lie before half of it has passed")
+        problems += self._times()
         if "day" in w and any(np.unique(self.day[self.turn == k]).size > 1 for k in range(self.count)):
             problems.append("day: a turn-on has rows of two days")
         return problems
+
+    def _times(self) -> list[str]:
+        """Return that times since a turn-on go another way than the times of the readings."""
+        same = self.turn[1:] == self.turn[:-1]
+        mean = 0.5 * (np.asarray(self.windows["t_start"], dtype=float) + np.asarray(self.windows["t_end"], dtype=float))
+        step, since = np.diff(mean)[same], np.diff(self.since)[same]
+        if not step.size or np.all(np.abs(since - step) <= 0.05 * np.abs(step) + 1.0):
+            return []
+        own, other = float(np.median(since)), float(np.median(step))
+        return [
+            f"since: it grows by {own:.4g} s from a reading to the next one of a turn-on, the times by {other:.4g} s: "
+            "a unit is mistaken, or rows"
+        ]
 
     def _read(self) -> None:
         w = self.windows

@@ -4,7 +4,4 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
-CONTROL = Source(
-    "table.control.gain", "control accelerometer", "1", "u_gain", "relative, positive where it reads more",
-    doc="relative standard uncertainty of the control accelerometer",
-)  # fmt: skip
+CONTROL = Source("table.control.gain", "control accelerometer", "1", "u_gain", "relative, positive where it reads more")

@@ -1,20 +1,21 @@
 """How often the 95 % intervals of gyro_bandwidth contain the true value: random gyros and noise.
 
-    python tests/benchmarks/bandwidth_coverage.py [--runs 300] [--seed 1]
+    python tests/benchmarks/bandwidth_coverage.py [--runs 300] [--seed 1] [--unstated]
 
 Each run draws filter, loop, split and scale factor, white noise of gyro and reading and, in half of the runs each,
 flicker, a random walk, stated errors of gain and lag of the reading, runs the whole co-simulation on a shortened plan
-and reduces it.
+and reduces it.  --unstated: the errors of the reading are simulated, but nobody states them.
 """
 
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import sys
 
 import numpy as np
-from held import Held, found
+from held import Held, found, stated
 
 from gyrobench.engine.session import Session
 
@@ -49,13 +50,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--unstated", action="store_true")
     given = parser.parse_args()
+    logging.getLogger("gyrobench").setLevel(logging.ERROR)  # a line for each simulated error
     rng = np.random.default_rng(given.seed)
     held = Held()
     for k, part in enumerate(PARTS):
         with Session(NAME, {"gyro": part}) as session:
             for run in range(given.runs // len(PARTS)):
-                for c in found(session, drawn(rng, part), 100_000 * given.seed + 10_000 * k + run):
+                values = stated(drawn(rng, part), given.unstated)
+                for c in found(session, values, 100_000 * given.seed + 10_000 * k + run):
                     held.count(c.name, c)
     return int(held.show(6) > 0)
 

@@ -20,6 +20,11 @@ def found(session: Session, values: Mapping[str, Any], seed: int) -> Sequence[Co
     return coefficients
 
 
+def stated(values: Mapping[str, Any], unstated: bool) -> dict[str, Any]:
+    """Return the values of a run, unstated: without what is stated of the errors of its set-up."""
+    return {n: 0.0 if unstated and n.startswith("u_") else v for n, v in values.items()}
+
+
 class Held:
     """Of each measure, whether its 95 % intervals hold the truth, and its error over u, run by run."""
 

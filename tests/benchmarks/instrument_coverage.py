@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from held import Held, found
+from held import Held, found, stated
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
@@ -124,9 +124,7 @@ def main() -> int:
     held = Held()
     with Session(given.test) as session:
         for run in range(given.runs):
-            values = DRAWN[given.test](rng)
-            if given.unstated:
-                values |= {n: 0.0 for n in values if n.startswith("u_")}
+            values = stated(DRAWN[given.test](rng), given.unstated)
             for c in found(session, values, 100_000 * given.seed + run):
                 held.count(c.name.split("(")[0].replace(f"_{values.get('axis')}", "_along"), c)
     return int(held.show(12) > 0)

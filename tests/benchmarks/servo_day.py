@@ -19,7 +19,8 @@ from pathlib import Path
 
 import quoted
 
-from gyrobench.engine.session import RunError, run
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.system.system import load_system
 

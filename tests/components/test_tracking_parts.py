@@ -226,3 +226,43 @@ def test_a_predicted_error_follows_a_constant_rate() -> None:
         errors.append(part.error[1] - part.miss[1])
     assert np.mean(errors[-100:]) == pytest.approx(0.0, abs=0.02 * 0.3e-3)
     assert np.max(np.abs(errors[-100:])) < 0.02 * 5e-3
+
+
+def test_recorded_path_is_met_and_smooth() -> None:
+    """Five points: each is met, the rates are the derivative of the direction, and it rests behind the last."""
+    t, path = [0.0, 1.0, 1.5, 2.5, 4.0], [[0.0, 0.0], [0.1, 0.2], [0.15, 0.1], [0.3, 0.4], [0.2, 0.5]]
+    part = Target(kind=3, points=5)
+    for k in range(5):
+        part.set(f"path_t[{k + 1}]", t[k])
+        for j in (0, 1):
+            part.set(f"path[{k + 1},{j + 1}]", path[k][j])
+    part.initialize()
+    u, w, alpha = [], [], []
+    for k in range(4500):
+        u.append(list(part.direction))
+        w.append(list(part.omega))
+        alpha.append(list(part.alpha))
+        part.do_step(k * H, H)
+    for time, (a, b) in zip(t, path, strict=True):
+        direction = [-math.sin(b) * math.cos(a), math.cos(b) * math.cos(a), math.sin(a)]
+        assert u[round(time / H)] == pytest.approx(direction, abs=1e-12)
+    slope = (np.array(u)[2:] - np.array(u)[:-2]) / (2 * H)
+    assert np.cross(np.array(u)[1:-1], slope) == pytest.approx(np.array(w)[1:-1], abs=1e-5)
+    assert (np.array(w)[2:] - np.array(w)[:-2]) / (2 * H) == pytest.approx(np.array(alpha)[1:-1], abs=0.02)
+    assert w[-1] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("points", "times", "message"),
+    [
+        (2, [0.0, 1.0], "3 points or more"),
+        (3, [0.0, 1.0, 1.0], "time of point 3 is not after"),
+        (3, [1.0, 2.0, 3.0], "0"),
+    ],
+)
+def test_impossible_paths_are_refused(points: int, times: list[float], message: str) -> None:
+    part = Target(kind=3, points=points)
+    for k, t in enumerate(times, 1):
+        part.set(f"path_t[{k}]", t)
+    with pytest.raises(ComponentError, match=message):
+        part.initialize()

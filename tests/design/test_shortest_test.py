@@ -150,8 +150,8 @@ def test_the_printed_command_is_the_plan(designed: DesignedTest) -> None:
 @pytest.mark.long
 def test_the_prediction_is_what_drawn_data_give() -> None:
     """The same fit of 120 made records by hand: mean of the stated u and standard deviation of the estimates."""
-    from gyrobench.reduction.estimation.findings import Group
     from gyrobench.reduction.estimation.linear_fit import fit
+    from gyrobench.reduction.estimation.reported import Group
 
     t0 = np.arange(30) * 100.0
     X = np.column_stack([np.ones(30), np.cos(t0 / 500.0)])

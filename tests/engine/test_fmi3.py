@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from gyrobench.engine.session import RunError, Session, run
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session, run
 from gyrobench.exchange.container import export_container
 from gyrobench.exchange.ssp_export import ExportError, export_ssp
 from gyrobench.exchange.ssp_import import read_ssp

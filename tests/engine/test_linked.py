@@ -10,7 +10,8 @@ import pytest
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine import engine_library, linked_system
 from gyrobench.engine.native_engine import NativeEngine
-from gyrobench.engine.session import RunError, RunInterrupted, Session, run
+from gyrobench.engine.run_errors import RunError, RunInterrupted
+from gyrobench.engine.session import Session, run
 from gyrobench.packaging import CompilerError
 from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite, load_test

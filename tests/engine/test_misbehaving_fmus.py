@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from gyrobench.engine import supervision
-from gyrobench.engine.session import RunError, Session, run
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.execution_order import AlgebraicLoopError
 from gyrobench.system.system import System

@@ -20,7 +20,8 @@ from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE, CheckpointManager, ResumeError
 from gyrobench.engine.fmu_instance import FmuInstance
 from gyrobench.engine.run_driver import ProgressReport
-from gyrobench.engine.session import RunInterrupted, Session, run
+from gyrobench.engine.run_errors import RunInterrupted
+from gyrobench.engine.session import Session, run
 from gyrobench.record.record import Record
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError

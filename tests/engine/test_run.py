@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from gyrobench.engine.session import RunError, RunInterrupted, Session, run
+from gyrobench.engine.run_errors import RunError, RunInterrupted
+from gyrobench.engine.session import Session, run
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.system.parameters import slot_seed

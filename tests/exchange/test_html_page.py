@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ import pytest
 from browser import Browser, needs_chromium
 from fmpy import simulate_fmu
 
+from gyrobench.component import Parameter
+from gyrobench.exchange import html_page
 from gyrobench.exchange.html_page import export_page
-from gyrobench.exchange.ssp_export import ExportError
+from gyrobench.exchange.ssp_export import ExportError, stop_time
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.system import load_system
 
@@ -106,3 +109,15 @@ def test_without_a_compiler_for_it(tmp_path: Path, command: Any, monkeypatch: py
     code, out, err = command("export", LOOP, "--to", "html", "--out", tmp_path / "x.html")
     assert (code, out) == (2, "") and "pip install gyrobench[cross]" in err
     assert not (tmp_path / "x.html").exists()
+
+
+def test_progress_is_that_of_the_plan_and_a_slider_says_what_its_option_means() -> None:
+    """The end of gimbal_tracking allows a minute for each of its 53 phases; the plan alone takes 10 minutes."""
+    system = load_system("gimbal_tracking")
+    plan = system.plan().duration()
+    assert html_page._planned(system, stop_time(system)) == pytest.approx(plan) and plan < 0.3 * stop_time(system)
+    assert html_page._planned(system, 10.0) == 10.0
+    decl = Parameter(60.0, "s", "time the gate is open")
+    scalar = SimpleNamespace(name="ride", start=60.0, reference=1, decl=decl)
+    shown = html_page._parameter(SimpleNamespace(scalar=scalar), system)  # type: ignore[arg-type]
+    assert shown["doc"] == system.options["ride"].doc != decl.doc

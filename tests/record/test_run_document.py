@@ -13,7 +13,8 @@ import pytest
 
 from gyrobench import reading
 from gyrobench.bench import Bench, standard_folder
-from gyrobench.engine.session import RunInterrupted, run
+from gyrobench.engine.run_errors import RunInterrupted
+from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import (
     LinearModel,

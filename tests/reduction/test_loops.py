@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.loops import loop_curves
-from gyrobench.reduction.loops.loop_measures import cross_axis, drift, gates, phasor, response, step, step_noise_std
+from gyrobench.reduction.loops.loop_drift import drift
+from gyrobench.reduction.loops.loop_measures import cross_axis, gates, phasor, response, step, step_noise_std
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 DT = 1e-3

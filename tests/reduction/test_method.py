@@ -16,10 +16,11 @@ from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.drift import harmonic
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.merge_channels import merge
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.estimation.sentences import plus_minus
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.sources import Effect
@@ -306,7 +307,7 @@ def test_what_a_run_says() -> None:
     assert run_metadata.number(document, "k", "gyro.k") == 3.0
     assert run_metadata.truth_of(document, ("D_F", "D_I")) == {"D_F": 1e-6}
     assert run_metadata.truth_of(RunDocument(), ("D_F",)) is None
-    assert run_metadata.sizes(document.options, ("u_axis", "u_mount")) == {"u_axis": 1e-4, "u_mount": 0.0}
+    assert run_metadata.sizes(document.options) == {"u_axis": 1e-4}
     assert run_metadata.phases(document, ("up", "down")) == {2: PlanRow(phase=2, face="up")}
     with pytest.raises(ReductionError, match="mount up unknown; there are down"):
         run_metadata.phases(document, ("down",))

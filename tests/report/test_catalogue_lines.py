@@ -49,6 +49,17 @@ def test_every_line_of_a_catalogue_is_said_by_the_code(file: Path) -> None:
     assert not [english for english in sorted(lines) if stale(english)]
 
 
+def test_a_sentence_of_several_tests_stands_once() -> None:
+    """In the catalogue of the bench, or, of options, of the studio; a word may be another one in another test."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for file in FILES:
+        for line in language._read(file)["texts"].items():
+            if len(line[0].split()) > 3:
+                places.setdefault(line, []).append(file.parent.name)
+    assert len(places) > 2500, "the lines are read"
+    assert not {line[0]: where for line, where in places.items() if len(where) > 1}
+
+
 def test_a_line_that_nothing_says_is_found() -> None:
     """Of a sentence of the code the half is changed: 'The table axis is at right angles to the pole ...'."""
     assert not stale("The table axis is at right angles to the pole and sees no Earth rate.")

@@ -6,8 +6,9 @@ import dataclasses
 from pathlib import Path
 
 import pytest
+from other_results import unplotted
 from reading import pdf_text
-from simulated import tumble, unplotted
+from simulated import tumble
 
 from gyrobench.bench import UsageError
 from gyrobench.report import certificate_page

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from fontTools.fontBuilder import FontBuilder
 from fontTools.pens.ttGlyphPen import TTGlyphPen
-from simulated import tumble, unplotted
+from other_results import unplotted
+from simulated import tumble
 
 from gyrobench import report
 from gyrobench.report import fonts

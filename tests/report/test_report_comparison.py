@@ -5,8 +5,9 @@ import math
 from pathlib import Path
 
 import pytest
+from other_results import unplotted, with_coefficient
 from reading import pdf_text
-from simulated import tumble, unplotted, with_coefficient
+from simulated import tumble
 
 from gyrobench import report
 from gyrobench.workflow.run_comparison import compare_folders

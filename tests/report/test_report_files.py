@@ -10,8 +10,9 @@ import sys
 import jsonschema
 import numpy as np
 import pytest
+from other_results import unplotted, with_coefficient
 from reading import Written, pdf_text
-from simulated import tumble, unplotted, with_coefficient
+from simulated import tumble
 
 from gyrobench import report
 from gyrobench import result as result_module

@@ -17,11 +17,13 @@ from gyrobench.bench import Bench
 from gyrobench.report.assets import read_content
 from gyrobench.report.channel_figure import panels, scaled
 from gyrobench.report.comparison_page import comparison
+from gyrobench.report.plots import by_axis
 from gyrobench.report.responses import blocks, draw
 from gyrobench.report.result_json import Report, document
 from gyrobench.report.style import styled
 from gyrobench.report.tables import unit_groups
 from gyrobench.result import Coefficient, Curve, LoopResult, Response, Result
+from gyrobench.result_entries import Series
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import load_system
 
@@ -203,3 +205,17 @@ def test_one_unit_or_few_units_of_many_rows_are_groups() -> None:
     assert unit_groups(drift) == [("°/h", [0]), ("°/h/g", [1, 2]), ("°/h/g²", [3, 4])]
     assert unit_groups(drift[:1]) == [("°/h", [0])]
     assert unit_groups(rows("s", "Hz", "s", "V")) == []
+
+
+def test_each_quantity_has_axes_of_its_own() -> None:
+    """Two rates in deg/h share a label where they are the same quantity alone."""
+    x = ("table angle", "°")
+
+    def series(label: str, name: str, unit: str) -> Series:
+        return Series.of(label, ([0.0, 1.0, 2.0, 3.0], *x), ([0.0, 1.0, 0.0, 1.0], name, unit), [0.5] * 4, [0.5] * 4)
+
+    drawn = [
+        series("mount 1", "drift rate", "°/h"), series("mount 2", "drift rate", "°/h"),
+        series("table", "rate of the table", "°/h"),
+    ]  # fmt: skip
+    assert [[s.label for s in alike] for alike in by_axis(drawn)] == [["mount 1", "mount 2"], ["table"]]

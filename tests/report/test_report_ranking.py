@@ -7,8 +7,9 @@ import json
 import math
 
 import pytest
+from other_results import with_coefficient
 from scipy import stats
-from simulated import tumble, with_coefficient
+from simulated import tumble
 
 from gyrobench.report.comparison_page import comparison
 from gyrobench.report.notebook_html import comparison_html, result_html

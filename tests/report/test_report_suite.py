@@ -6,7 +6,8 @@ import dataclasses
 import re
 
 import pytest
-from simulated import tumble, with_coefficient
+from other_results import with_coefficient
+from simulated import tumble
 
 from gyrobench.record.run_document import SuiteTestRun
 from gyrobench.reduction.suite.method_comparison import Member, combine_methods

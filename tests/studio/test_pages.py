@@ -298,8 +298,8 @@ def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
 
 
 PAGES = (
-    "/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/campaign", "/laboratory", "/part/cage",
-    "/learn",
+    "/", "/system/fixed_position", "/data", "/runs", "/tune", "/design", "/identify", "/campaign", "/laboratory",
+    "/part/cage", "/learn",
 )  # fmt: skip
 
 

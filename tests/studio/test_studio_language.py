@@ -127,8 +127,8 @@ def test_no_english_label_on_a_page_in_chinese(page: Any, studio: tuple[str, Pat
     try:
         page.get_by_role("heading", name="运行记录").wait_for()
         for path in (
-            "/", "/system/fixed_position", "/data", "/data?test=drift_record", "/runs", "/tune", "/design", "/campaign",
-            "/laboratory", "/learn", "/run/fixed_position/run1",
+            "/", "/system/fixed_position", "/data", "/data?test=drift_record", "/runs", "/tune", "/identify", "/design",
+            "/campaign", "/laboratory", "/learn", "/run/fixed_position/run1",
             "/compare?run=fixed_position/run1&run=fixed_position/run2",
         ):  # fmt: skip
             page.goto(base + path)

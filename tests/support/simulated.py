@@ -7,7 +7,6 @@ report something real to show.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, TypeVar
 
 import numpy as np
 from scipy import stats
@@ -22,14 +21,12 @@ from gyrobench.result import (
     Harmonic,
     PowerSpectrum,
     Reason,
-    Result,
     Series,
     StepChange,
     StepCheck,
     Test,
 )
 
-R = TypeVar("R", bound=Result)
 NAMES = ["D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_IS", "D_OS"]
 MEANINGS = [
     "constant",
@@ -397,15 +394,3 @@ def provenance(seed: int, width: float) -> dict:
         "timing": dict.fromkeys(slots, 0.41),
         "versions": {"gyrobench": "0.1.0", "fmpy": "0.3.26", "numpy": "2.4.6"},
     }
-
-
-def unplotted(result: DriftTestResult) -> DriftTestResult:
-    """The result without what its figures of data are drawn from, for a test of the words around them."""
-    return replace(result, series=[], correlation=[], budget=[], acf=None, allan=None, psd=None)
-
-
-def with_coefficient(result: R, index: int, **changes: Any) -> R:
-    """The result with changes of one of its coefficients."""
-    rows = list(result.coefficients)
-    rows[index] = replace(rows[index], **changes)
-    return replace(result, coefficients=rows)

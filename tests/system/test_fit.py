@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from fmpy import read_model_description
 
-from gyrobench.system.binding import SocketMismatchError, fit, load_mapping
+from gyrobench.system.binding import SocketMismatchError, fit
+from gyrobench.system.mapping_files import load_mapping
 from gyrobench.system.sockets import SOCKETS, element_names, socket
 
 Foreign = Callable[[str], Path]

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from gyrobench.packaging import load_part
-from gyrobench.system.binding import SocketMismatchError, load_mapping
+from gyrobench.system.binding import SocketMismatchError
 from gyrobench.system.configurable import InvalidConfigurationError
+from gyrobench.system.mapping_files import load_mapping
 from gyrobench.system.parameters import defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.part_values import PartValues

@@ -199,6 +199,10 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
         (rows(axis=0), "axes exchanged"),
         (rows(sense=-1.0), "reversed"),
         (rows(factor=0.1), "more than without any"),
+        # at 25 Hz sin x/x - 1 = -0.363 of the true cone, a quarter of it, -0.091, of one of twice the half-angle
+        (rows(factor=2.0), "not the full angle"),
+        # 2 pi times the frequency: at 25 Hz -0.058 of the cone that is stated, whose sin x/x - 1 is about -1
+        ([[*row[:2], 2.0 * math.pi * row[2], *row[3:]] for row in rows()], "not rad/s"),
     ],
 )
 def test_mistakes_are_named(given: list[list[float]], said: str) -> None:

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from gyrobench import report
-from gyrobench.engine.session import ParameterRefusedError, Session, run
+from gyrobench.engine.run_errors import ParameterRefusedError
+from gyrobench.engine.session import Session, run
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.report.comparison_page import comparison
 from gyrobench.system.system import InvalidConfigurationError, load_system

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures
 
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 
 Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures, session, table
 
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 from gyrobench.result import Result
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import InvalidConfigurationError, load_system

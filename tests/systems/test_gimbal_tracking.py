@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,27 @@ def in_scipy(angle: Any, seconds: float, track: float, kind: int) -> np.ndarray:
         held = coming.pop(k, held)
         x = (step @ np.append(x, held))[:n]
     return np.array(errors)
+
+
+@pytest.mark.long
+def test_a_recorded_path_is_the_motion_that_it_records(tmp_path: Path) -> None:
+    """The fly-by of 50 m/s across from a file with 0.1 s between its rows: lag and errors as by its equations."""
+    t = np.arange(0.0, 20.0, 0.1)
+    azimuth = np.degrees(-np.arctan2(50.0 * t, 900.0 - 100.0 * math.sqrt(0.75) * t * 0.2))
+    rows = "\n".join(f"{a:.1f},{20.0 + b:.9f}" for a, b in zip(t, azimuth, strict=True))
+    file = tmp_path / "path.csv"
+    file.write_text("time [s],azimuth [deg]\n" + rows)
+    given = {**QUIET, "bending": 0.0, "field": 0.3, "type": 1}
+    _, recorded = tracked(path=str(file), **given)
+    v = [50.0, -20.0 * math.sqrt(0.75), 0.0]
+    flown = {f"target.velocity[{k}]": x for k, x in enumerate(v, 1)} | {"target.distance": 900.0, "target.kind": 2}
+    _, straight = tracked(flown, **given)
+    c, d = recorded.channels, straight.channels
+    late = c["time"] > c["time"][-1] - 8.0
+    assert c["tracker.rate[2]"][late] == pytest.approx(d["tracker.rate[2]"][late], rel=2e-3)
+    assert c["tracker.miss[2]"][late] == pytest.approx(
+        d["tracker.miss[2]"][late], abs=0.01 * np.ptp(d["tracker.miss[2]"])
+    )
 
 
 @pytest.mark.long

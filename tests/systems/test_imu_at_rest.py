@@ -192,6 +192,14 @@ def test_frozen_channels_and_repeated_rows_are_named(tmp_path: Path) -> None:
     assert rows.text.startswith("2048 of 4096 rows")
 
 
+def test_rows_of_two_units_in_one_file_are_named(tmp_path: Path) -> None:
+    """Levels 30 apart in noise of 10 deg/h: said, and no limit is judged."""
+    columns = {n: v for n, v in unit_at_rest(2048).items() if n[:6] in ("time [", "gyro_x")}
+    columns["gyro_x [deg/h]"][::2] += 30.0
+    reasons = [r for r in reduce(tmp_path, columns).reasons if r.id == "drift_record.rows"]
+    assert "Every second row is 30" in reasons[0].text or "Every second row is 29" in reasons[0].text
+
+
 def test_runs_of_equal_samples_over_blocks() -> None:
     """A run over the edge of two blocks is one run; noise in coarse steps has runs and is not frozen."""
     rng = np.random.default_rng(1)

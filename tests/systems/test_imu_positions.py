@@ -336,3 +336,20 @@ def test_position_that_is_off_contradicts_the_model(tmp_path: Path) -> None:
         w[n] = np.where(w["phase"] == 8, w[n] + math.radians(1.0), w[n])
     result = reduction.Reduction.from_record(laboratory(tmp_path, w, world))
     assert any(r.id.startswith("residuals.contradict") and "constants of the phases" in r.text for r in result.reasons)
+
+
+def test_an_axis_that_leans_up_and_down_is_in_the_scale_factor() -> None:
+    """x leans by 8 mrad towards z both ways, no other error: it reads cos 8e-3 - 1 = -32 ppm too little, z 8 mg.  z
+    may have a bias of it as well; noise alone leaves 0.5 ppm.
+    """
+    rng, n, g, lean = np.random.default_rng(4), 40, World().gravity, 8e-3
+    sign, start = np.repeat([1.0, -1.0], n), 3.0 * np.arange(2 * n)
+    read = {"x": g * math.cos(lean) * sign, "y": np.zeros(2 * n), "z": np.full(2 * n, g * math.sin(lean))}
+    w = {"phase": np.repeat([1, 2], n), "t_start": start, "t_end": start + 3.0}
+    w |= {f"mean_a{a}": v + 3e-5 * rng.normal(size=2 * n) for a, v in read.items()}
+    w |= {f"mean_g{a}": 1e-6 * rng.normal(size=2 * n) for a in "xyz"}
+    updown: Any = importlib.import_module(".updown", room)
+    world = World()
+    found = next(c for c in updown.UpDownReduction.reduce(w, setup(world)).coefficients if c.name == "Sa_xx")
+    assert found.estimate == pytest.approx(-32.0, abs=3.0)
+    assert found.interval[0] < 0.0 < found.interval[1] and found.u == pytest.approx(32.0 / math.sqrt(3.0), rel=0.1)

@@ -124,7 +124,7 @@ def test_the_reduction_has_set_up_effects_corrections_and_a_verdict(bench: Path,
     line, arcsec = lines["fixture.level", "D_F"], math.pi / 648000.0
     shift = corrected["D_F"].estimate - plain["D_F"].estimate
     assert shift == pytest.approx(-10.0 * arcsec * line.sensitivity, rel=0.1)
-    assert any(row[0] == "fixture off level, about east" for t in corrected.tables for row in t.rows)
+    assert any(row[0] == "level of the fixture about east" for t in corrected.tables for row in t.rows)
 
 
 def test_a_source_is_declared_in_one_place(bench: Path) -> None:
@@ -133,7 +133,11 @@ def test_a_source_is_declared_in_one_place(bench: Path) -> None:
     """
     system, arcsec = load_system(NAME, bench), math.pi / 648000.0
     option = system.options["u_level"]
-    assert option.unit == "rad" and option.default == 0.0 and option.doc.startswith("fixture off level, about east")
+    assert (
+        option.unit == "rad"
+        and option.default == 0.0
+        and option.doc == "standard uncertainty of the level of the fixture about east"
+    )
     values = {"dwell": "100s", "u_level": "5arcsec"}
     with Session(system) as session:
         level, tilted = (session.run({**values, **more}, seed=2) for more in ({}, {"table.tilt[1]": "100arcsec"}))

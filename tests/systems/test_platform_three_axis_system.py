@@ -7,7 +7,8 @@ import pytest
 from gimbal_oracle import isolation, three_axis_loop
 from gimballed import only
 
-from gyrobench.engine.session import RunError, Session, run
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session, run
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.frequency_response import unstable
 from gyrobench.reduction.loops import margins as m

@@ -244,6 +244,12 @@ def test_rates_without_their_sign(tmp_path: Path) -> None:
         measured(write(tmp_path / "a.csv", np.abs(rate), mean))
 
 
+def test_readings_without_their_sign(tmp_path: Path) -> None:
+    """abs(w) = asymmetry 2, scale factor 0: no residual shows it."""
+    rate, mean = lab(np.random.default_rng(2))
+    assert "given without their sign" in said(measured(write(tmp_path / "a.csv", rate, np.abs(mean))))
+
+
 @pytest.mark.parametrize(
     ("rate_factor", "mean_factor", "words"),
     [(1.0, -1.0, "reversed"), (1.0, math.pi / 180.0, "rad/s"), (1.0, 3600.0, "°/h"), (1.0, 1.25, "Check the senses")],

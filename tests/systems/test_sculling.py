@@ -191,6 +191,7 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
         (rows(sense=-1.0), "antiphase"),
         (rows(factor=0.1), "more than with nothing"),
         (rows(rest=1e6), "gravity taken off"),
+        ([[*row[:2], 2.0 * math.pi * row[2], *row[3:]] for row in rows()], "not rad/s"),
     ],
 )
 def test_mistakes_are_named(given: list[list[float]], said: str) -> None:

@@ -32,7 +32,8 @@ from stated import FAINT
 from undiagnosed import reduce_undiagnosed
 
 from gyrobench import drift, frames
-from gyrobench.engine.session import RunError, Session, run
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session, run
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError

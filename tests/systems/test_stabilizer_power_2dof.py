@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from gimballed import session as with_methods
 
-from gyrobench.engine.session import ParameterRefusedError, RunError, Session
+from gyrobench.engine.run_errors import ParameterRefusedError, RunError
+from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan

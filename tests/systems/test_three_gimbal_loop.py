@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from gimballed import DEG, STILL, measures, session, table
 
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModels
 from gyrobench.reduction.loops import margins as m

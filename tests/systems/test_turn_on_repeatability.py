@@ -255,6 +255,8 @@ def test_mistakes_are_named() -> None:
     assert "fewer than two turn-ons" in problems(turn_on=np.ones(count))
     assert "two days" in problems(day=np.arange(count) % 2)
     assert "since" in problems(since=np.zeros(count))
+    minutes = 60.0 * np.array([row[4] for row in rows()])  # 10 s from reading to reading, 600 s of since
+    assert "since: it grows by 600 s from a reading" in problems(since=minutes)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyrobench.engine.session import ParameterRefusedError, RunError, Session
+from gyrobench.engine.run_errors import ParameterRefusedError, RunError
+from gyrobench.engine.session import Session
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "vertical_gyro"

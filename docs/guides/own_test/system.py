@@ -15,7 +15,7 @@ class SixPositionReduction(RestTest):
     names = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS")  # what they tell apart: no two axes share gravity
     method = "Least squares over six positions"
 
-    @Source("fixture.level", "fixture off level, about east", "rad", "u_level", parameter="table.tilt[1]")
+    @Source("fixture.level", "level of the fixture about east", "rad", "u_level", parameter="table.tilt[1]")
     def level(self, found):
         return -self.believed(found, self.axes @ frames.rotation(frames.E, SMALL).T)
 

@@ -26,7 +26,8 @@ from gyrobench.campaign.execution.campaign_plan import MEASURED, PlannedRun
 from gyrobench.campaign.execution.guard import Guard, LostRun, lost_runs
 from gyrobench.campaign.execution.rows import result_columns
 from gyrobench.engine import engine_library
-from gyrobench.engine.session import RunError, Session
+from gyrobench.engine.run_errors import RunError
+from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import MACHINE, temporary_folder
 from gyrobench.packaging import compiler

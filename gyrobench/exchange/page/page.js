@@ -66,8 +66,9 @@ async function run() {
     spent += took;
     slice = Math.max(1, Math.round(took > 0 ? Math.min(4 * slice, (slice * SLICE) / took) : 4 * slice));
     if (performance.now() < next) continue;
-    at("progress").value = (count - 1) / content.rows;
-    at("state").textContent = say("{n} of {n2}", quantity(time()), quantity(content.rows * content.every * content.step));
+    const planned = Math.max(content.planned ?? content.rows * content.every * content.step, time());
+    at("progress").value = time() / planned;
+    at("state").textContent = say("{n} of {n2}", quantity(time()), quantity(planned));
     const drawn = performance.now();
     draw();
     next = performance.now() + Math.max(4 * SLICE, 5 * (performance.now() - drawn)); // the run has most of the time
@@ -128,6 +129,8 @@ function control(p, i) {
 }
 
 // ------------------------------------------------------------------------------------------- curves
+const raised = (power) => [...`${power}`].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("");
+
 function scale(unit, shown, largest) {
   if (unit === "rad") [shown, unit] = ["°", 180 / Math.PI];
   else if (unit === "rad/s") [shown, unit] = largest > content.fast ? ["°/s", 180 / Math.PI] : ["°/h", 648000 / Math.PI];
@@ -135,7 +138,7 @@ function scale(unit, shown, largest) {
   const size = largest * unit;
   if (size === 0 || (size >= 1e-2 && size < 1e5)) return [unit, shown];
   const power = 3 * Math.floor(Math.log10(size) / 3);
-  return [unit / 10 ** power, "VANmsW".includes(shown) && PREFIXES[power] ? PREFIXES[power] + shown : `10^${power} ${shown}`];
+  return [unit / 10 ** power, "VANmsW".includes(shown) && PREFIXES[power] ? PREFIXES[power] + shown : `10${raised(power)} ${shown}`];
 }
 
 function ticks(low, high, most) {

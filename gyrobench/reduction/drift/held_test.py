@@ -25,9 +25,10 @@ from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels, composite, drift_terms, servo_regression
 from gyrobench.reduction.drift.supplies import Supplies
 from gyrobench.reduction.estimation.drift_test import DriftReduction
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
 from gyrobench.reduction.setup.run_metadata import remount_of
 from gyrobench.reduction.setup.setups import SiteSetup

@@ -29,10 +29,11 @@ from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.pulses import CurrentWindows
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.drift_test import DriftReduction
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.sources import TURNED, Effect
 from gyrobench.reduction.setup.window_checks import window_problems

@@ -29,11 +29,12 @@ from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.drift_test import DriftReduction
-from gyrobench.reduction.estimation.findings import Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
+from gyrobench.reduction.estimation.reported import Group
 from gyrobench.reduction.setup import setups, sources
 from gyrobench.reduction.setup.sources import Effect, Source
 from gyrobench.reduction.setup.stops import whole_stops

@@ -24,6 +24,7 @@ from gyrobench.reduction.estimation.mixture import equivalent_dof
 from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.reported import Estimates
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.result import AllanDeviation, Autocorrelation, PowerSpectrum, Reason, Series, Table, Test
@@ -34,31 +35,6 @@ if TYPE_CHECKING:
 RAW, WHITENED = "ljung_box.raw", "ljung_box.whitened"  # ids of tests of the residuals
 RUNS, NORMAL_RESIDUALS = "runs", "shapiro_wilk"
 CONTRADICTED = 0.01  # probability that the tests of a clean record speak against its model or noise
-
-
-@dataclass(frozen=True)
-class Group:
-    """Rows of the data that belong together, with what they are drawn against (in the printed unit)."""
-
-    label: str  # "mount 1, against the Earth"
-    rows: ArrayLike  # indices of the rows, or a mask
-    x: ArrayLike  # one for each row
-    x_name: str  # "table angle"
-    x_unit: str  # "°"
-    dense: tuple[ArrayLike, ArrayLike] | None = None  # x and rows of X of the plotted curve
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """What is reported, in SI, in the order of the quantities; see NoiseEstimate."""
-
-    value: Array
-    covariance: Array
-    u: Array
-    half_width: Array
-    p: Array
-    dof: Array
-    gain: Array  # (q, n): value = gain y, of changes if the values are derived
 
 
 @dataclass

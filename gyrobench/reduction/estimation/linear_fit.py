@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise_mixture_fit, nuisances
-from gyrobench.reduction.estimation.findings import Estimates, Findings, Group
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import RegressionError
+from gyrobench.reduction.estimation.reported import Estimates, Group
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.units import DPH
 

@@ -17,8 +17,9 @@ import numpy as np
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.loops.gimbals import DEG, Flight, rate_servo_limits
+from gyrobench.reduction.loops.loop_drift import drift
 from gyrobench.reduction.loops.loop_limits import bandwidth
-from gyrobench.reduction.loops.loop_measures import Gate, Step, drift
+from gyrobench.reduction.loops.loop_measures import Gate, Step
 from gyrobench.reduction.loops.loop_reduction import LoopReduction
 from gyrobench.reduction.loops.loop_summary import margins
 from gyrobench.reduction.loops.platform_measures import stiffness

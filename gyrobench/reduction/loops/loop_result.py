@@ -23,13 +23,12 @@ from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
+from gyrobench.reduction.loops.loop_drift import Drift, drift
 from gyrobench.reduction.loops.loop_measures import (
     LAST,
-    Drift,
     Gate,
     Point,
     Step,
-    drift,
     gates,
     response,
     short_rest,

@@ -6,7 +6,8 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.fit_result import Account
 from gyrobench.reduction.estimation.sentences import Sentence, told
 from gyrobench.reduction.loops.loop_curves import line, over_time, thinned, trace
-from gyrobench.reduction.loops.loop_measures import Drift, Gate, Point, drift, wrapped
+from gyrobench.reduction.loops.loop_drift import Drift, drift
+from gyrobench.reduction.loops.loop_measures import Gate, Point, wrapped
 from gyrobench.reduction.loops.loop_reduction import LoopReduction, MeasureReduction
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins

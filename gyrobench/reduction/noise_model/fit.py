@@ -23,7 +23,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
-from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale
+from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, filtered, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
@@ -43,6 +43,7 @@ STEPS = 5
 TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
 DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no model of the record
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
+LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
 SAMPLE = 250  # draws of the ramp and the minimum
@@ -99,19 +100,6 @@ def fit_noise(
     )
 
 
-def scale_of(rate: Array, tau0: float, means: bool) -> Scale:
-    """Return the units in which a rate (n,) is fitted: its level, and the rms of its differences over sqrt 2."""
-    level = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
-    difference = np.diff(rate)
-    size = math.sqrt(0.5 * float(np.nanmean(difference**2))) if np.isfinite(difference).any() else 1.0
-    return Scale(tau0, size or 1.0, level, means)
-
-
-def times(e: Estimate, unit: float) -> Estimate:
-    """Return an estimate in another unit."""
-    return Estimate(e.value * unit, e.low * unit, e.high * unit, e.determined)
-
-
 # ------------------------------------------------------------------ steps
 def _without_steps(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
     """Return the record without the steps of its level that the likelihood asks for, and the models of what is left."""
@@ -160,7 +148,12 @@ def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> A
     """Return the spectrum (n,) of terms at the ordinates of a stretch, interpolated; 1 for that of the mean."""
     k = np.arange(1.0, n)
     few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
-    S = spectrum(*joined(parts), Grid(math.pi * few / n, means))
+    grid = Grid(math.pi * few / n, means)
+    S = spectrum(*joined(parts), grid)
+    for term, p in parts:  # a stretch leaks into the zeros of a mean
+        if term.filter.startswith(("mean", "average")):
+            own = term.spectrum(p, grid)
+            S = np.maximum(S, LEAK * float(np.trapezoid(own, few)) / n**2)
     return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])
 
 
@@ -357,13 +350,18 @@ def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
 
 
 def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, scale: Scale) -> Minimum:
-    """Return the least deviation of the model without resonances, up to a quarter of the record."""
+    """Return the least deviation of the model without resonances, up to a quarter of the record.
+
+    What a filter takes of the noise at short averaging times is no minimum: of a deviation that rises from one sample
+    on, what follows its first summit counts.
+    """
     m = np.unique(np.rint(np.geomspace(1.0, max(samples / 4.0, 2.0), AVERAGES)))
     slow = 0.5 * (ramp.value * m) ** 2 if ramp.determined else 0.0
     rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in resampled(clouds, SAMPLE)]
-    curves = np.concatenate(rows)
-    place = np.argmin(curves, axis=1)
     own = np.sqrt(allan(at.model, at.p[None], m, scale.means)[0] + slow)
+    summit = _summit(own)
+    m, own, curves = m[summit:], own[summit:], np.concatenate(rows)[:, summit:]
+    place = np.argmin(curves, axis=1)
     k = int(np.argmin(own))
     low, high = np.quantile(np.min(curves, axis=1), [0.025, 0.975])
     early, late = np.quantile(m[place], [0.025, 0.975])
@@ -371,6 +369,12 @@ def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, 
     least = Estimate(float(own[k]), *about(float(own[k]), float(low), float(high)), reached)
     when = Estimate(float(m[k]), float(min(early, m[k])), float(max(late, m[k])), reached)
     return Minimum(times(least, scale.size), times(when, scale.tau0), reached)
+
+
+def _summit(deviation: Array) -> int:
+    """Return the place of the first summit of a deviation (k,) that rises from its beginning on, 0 without any."""
+    falls = np.flatnonzero(np.diff(deviation) < 0.0)
+    return int(falls[0]) if falls.size else 0
 
 
 def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) -> dict[str, float]:

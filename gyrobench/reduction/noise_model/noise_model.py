@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.steps import LevelStep
-from gyrobench.reduction.noise_model.terms import PEAKS, Grid
+from gyrobench.reduction.noise_model.terms import PEAKS, Grid, filter_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -65,6 +65,19 @@ class Scale:
         root = math.sqrt(self.tau0)
         return {"N": self.size * root, "B": self.size, "K": self.size / root, "R": self.size / self.tau0,
                 "Q": self.size * self.tau0}  # fmt: skip
+
+
+def scale_of(rate: Array, tau0: float, means: bool) -> Scale:
+    """Return the units in which a rate (n,) is fitted: its level, and the rms of its differences over sqrt 2."""
+    level = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
+    difference = np.diff(rate)
+    size = math.sqrt(0.5 * float(np.nanmean(difference**2))) if np.isfinite(difference).any() else 1.0
+    return Scale(tau0, size or 1.0, level, means)
+
+
+def times(e: Estimate, unit: float) -> Estimate:
+    """Return an estimate in another unit."""
+    return Estimate(e.value * unit, e.low * unit, e.high * unit, e.determined)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,17 +164,12 @@ class NoiseModel:
         if found is None:
             return ""
         t, q = found
-        if t.filter == "first":
-            return f"low-pass of first order, time constant {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
-        if t.filter == "second":
-            f = math.exp(q[1]) / (2.0 * math.pi * self.scale.tau0)
-            return f"low-pass of second order, {f:.3g} Hz, damping {math.exp(q[2]):.2g}"
-        if t.filter == "average":
-            return f"mean over {1e3 * self.scale.tau0 * math.exp(q[1]):.3g} ms"
-        if t.filter.startswith("mean"):
-            return f"mean over {t.filter[4:]} samples"
-        level = float(np.exp(-2.0 * np.sum(q[1::2])))
-        return f"smooth shape of {t.filter[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+        words, at = list[str](), 1
+        for part in t.filter.split("+"):
+            size = filter_of(part)[1]
+            words.append(_filter_words(part, q[at : at + size], self.scale.tau0))
+            at += size
+        return ", after a ".join(words)
 
     def peaks(self) -> list[tuple[float, float, float]]:
         """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
@@ -173,3 +181,23 @@ class NoiseModel:
                 wide = width / (math.exp(q[1]) * tau0)
                 out.append((frequency, wide, self.scale.size * math.exp(0.5 * q[0])))
         return out
+
+
+def _filter_words(name: str, p: Array, tau0: float) -> str:
+    """Return what a filter of parameters p (k,) is, in words."""
+    if name == "first":
+        return f"low-pass of first order, time constant {_seconds(tau0 * math.exp(p[0]))}"
+    if name == "second":
+        return (
+            f"low-pass of second order, {math.exp(p[0]) / (2.0 * math.pi * tau0):.3g} Hz, damping {math.exp(p[1]):.2g}"
+        )
+    if name == "average":
+        return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
+    if name.startswith("mean"):
+        return f"mean over {name[4:]} samples"
+    level = float(np.exp(-2.0 * np.sum(p[::2])))
+    return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+
+
+def _seconds(t: float) -> str:
+    return f"{t:.3g} s" if t >= 1.0 else f"{1e3 * t:.3g} ms"

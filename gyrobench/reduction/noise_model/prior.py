@@ -15,12 +15,13 @@ from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
 GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum is smoothed
 FEWEST = 12.0  # ordinates of a group
 SHORTEST_TAU = 6.0  # samples, of a Gauss-Markov process: what is faster is the filter
+LONGEST_MEAN = 64.0  # samples, of a filter
 APART = math.log(3.0)  # least distance of the logarithms of two tau: nearer ones are one process to any record
 #: logarithms of the least and largest value of the parameters of filters; their prior is even
 FILTERS = {
     "first": [(0.05, 30.0)],
     "second": [(0.03, 6.0), (0.1, 5.0)],
-    "average": [(1.05, 64.0)],
+    "average": [(1.05, LONGEST_MEAN)],
 }
 HARD = 1e3  # slope of the walls, of the square of what is beyond
 
@@ -79,10 +80,10 @@ class Prior:
                 limits.append((math.log(SHORTEST_TAU), self.longest))
             elif term.name in PEAKS:
                 limits += [(math.log(3.0), self.longest), (-7.0, math.log(math.pi))]
-            elif term.filter.startswith("shape"):
-                limits += [(-6.0, 6.0)] * (term.size - 1)
-            else:
-                limits += [(math.log(a), math.log(b)) for a, b in FILTERS.get(term.filter, [])]
+            for part in term.filter.split("+"):
+                if part.startswith("shape"):
+                    limits += [(-6.0, 6.0)] * int(part[5:])
+                limits += [(math.log(a), math.log(b)) for a, b in FILTERS.get(part, [])]
         low, high = zip(*limits, strict=True)
         return np.array(low), np.array(high)
 

@@ -11,7 +11,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
-from gyrobench.reduction.noise_model.prior import SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
 from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
@@ -21,13 +21,15 @@ WIDEST = 0.25  # information of a parameter that the record does not tell: its v
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
-SIMPLE, SHAPES = ("none", "first", "second", "average"), ("shape3", "shape6", "shape10")
+BEHIND = ("first", "shape3")
+SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
     "first": [[math.log(0.5)], [math.log(5.0)]],
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
+    "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
@@ -130,9 +132,14 @@ class ModelSearch:
         return self.seen[model]
 
     def at_bound(self, found: Fitted) -> bool:
-        """Return whether a process is as fast as one may be: then it is the filter that lacks something."""
-        least = math.log(SHORTEST_TAU) + 1e-3
-        return any(t == GM and q[1] < least for t, q in split(found.model, found.p))
+        """Return whether a process is as fast as one may be: then it is the filter that lacks something; or a mean as
+        long as one may be: then it stands for slow noise.
+        """
+        least, most = math.log(SHORTEST_TAU) + 1e-3, math.log(LONGEST_MEAN) - 1e-3
+        return any(
+            (t == GM and q[1] < least) or (t.filter.startswith("average") and q[1] > most)
+            for t, q in split(found.model, found.p)
+        )
 
     @property
     def best(self) -> Fitted:
@@ -195,12 +202,16 @@ class ModelSearch:
         if parts[0][0].name != "white":
             return
         (term, q), rest = parts[0], parts[1:]
-        if (
-            term.filter == "average"
-            and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02
-            and whole > 1
-        ):
-            names = (*names, f"mean{whole}")
+        first, _, behind = term.filter.partition("+")
+        if first == "average" and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02 and whole > 1:
+            new = NoiseTerm("white", f"mean{whole}+{behind}" if behind else f"mean{whole}")
+            made = joined([(new, np.delete(q, 1)), *rest])
+            yield made[0], [made[1]]
+        for after in BEHIND if (first == "average" or first.startswith("mean")) and not behind else ():
+            new = NoiseTerm("white", f"{first}+{after}")  # a mean of what has passed a filter already
+            for guess in STARTS.get(after, [[0.0] * (new.size - q.size)]):
+                made = joined([(new, np.concatenate([q, guess])), *rest])
+                yield made[0], [made[1]]
         for name in names:
             if name == term.filter or (name == "none" and W in at.model):
                 continue

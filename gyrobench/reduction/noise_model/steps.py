@@ -17,7 +17,7 @@ from scipy import fft
 
 from gyrobench.arrays import Array
 
-EDGE = 3  # samples from an end of a stretch, within which a step is not told from wild samples
+EDGE = 16  # samples from an end of a stretch, within which a step is not told from wild samples or the end itself
 
 
 @dataclass(frozen=True)

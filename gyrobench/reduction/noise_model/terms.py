@@ -14,7 +14,8 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
                      angle of a damped oscillator that noise drives   sigma^2, tau, omega0
     band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
 
-Filters: "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
+Filters, "mean4+first" of two in a row:
+"none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
 "mean4" over 4 of them; "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
@@ -37,6 +38,7 @@ from gyrobench.reduction.series.noise_spectra import folded
 
 PEAKS = ("resonance", "band")
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
+NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
 FASTEST = 1e-300  # pole
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
@@ -163,7 +165,13 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
 
 
 def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
-    """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none."""
+    """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none.
+
+    Of two in a row, "mean4+first", the parameters of the first one come first.
+    """
+    if "+" in name:
+        (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
+        return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
     if name.startswith("mean"):
         return _mean(int(name[4:])), 0
     return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
@@ -216,7 +224,7 @@ class NoiseTerm:
             return np.asarray(v)
         if self.name in PEAKS:
             return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2])) ** 2))
-        if self.name == "white" and (self.filter == "second" or self.filter.startswith("shape")):
+        if self.name == "white" and (self.filter == "second" or "shape" in self.filter):
             grid = Grid(math.pi * (np.arange(RISES) + 0.5) / RISES)
             return np.asarray(v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1))
         return np.zeros_like(v)
@@ -303,7 +311,7 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         z1, z2, share = _second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
         return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
-    if name.startswith("mean"):
+    if name.startswith("mean") and "+" not in name:
         count = int(name[4:])
         lag = np.arange(count + 1.0)
         return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
@@ -313,7 +321,7 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         gamma = lower * np.maximum(1.0 - lag / k, 0.0) + upper * np.maximum(1.0 - lag / (k + 1.0), 0.0)
         gamma = gamma / (lower * k + upper * (k + 1.0))
     else:
-        S = filter_of(name)[0](p, Grid(np.pi * np.arange(LAGS + 1) / LAGS))
+        S = filter_of(name)[0](p, Grid(np.pi * np.maximum(np.arange(LAGS + 1), NEARLY_ZERO) / LAGS))
         gamma = np.fft.irfft(S, axis=-1)[..., : LAGS // 2]
     return _allan_covariance(gamma, m)
 

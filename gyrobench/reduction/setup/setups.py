@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
@@ -54,7 +54,6 @@ class Setup:
         shared["robust"] = bool(run.options.get("robust", False))
         shared["sizes"] = sizes(run.options)
         shared["parameters"] = {} if run.measured else run.parameters
-        shared |= {f.name: shared["sizes"].get(f.name, 0.0) for f in fields(cls) if f.name.startswith("u_")}
         return cls(**{**shared, **own})
 
     @property

@@ -54,7 +54,8 @@ class Source:
 
     id, name, note, doc: may hold fields in braces, of several sources that are alike (:meth:`of`).  option: whose
     value, SI, is the standard uncertainty; "" where the test states it.  parts: of several independent errors of one
-    size.  large: handling errors (diagnosis.handling_candidates) that are its large form.  doc, default: of the option.
+    size.  large: handling errors (diagnosis.handling_candidates) that are its large form.  doc, default: of the option;
+    without doc it states the standard uncertainty of the name.
     parameter: "slot.name" or "slot.name[k]" whose value is the error, of a part that does not name the id itself.
     """
 
@@ -81,7 +82,7 @@ class Source:
     @property
     def meaning(self) -> str:
         """What the option states."""
-        return self.doc or f"{self.name}, standard uncertainty"
+        return self.doc or f"{'relative ' * (self.unit == RELATIVE)}standard uncertainty of the {self.name}"
 
     def effect(self, sizes: Any, error: Array | None = None, **more: Any) -> Effect:
         """Return the source with what it does to the data of a test; see gyrobench.reduction.estimation.effects.
@@ -225,10 +226,7 @@ UNBALANCE = Source(
     "servo.unbalance", "unbalance over stiffness", "rad", "u_unbalance", "angle at 1 g across the axis",
     ("mass along z", "mass along y"), doc="angle by unbalance of the table at 1 g over the stiffness, std. unc.",
 )  # fmt: skip
-TIME_BASE = Source(
-    "time_base", "time base", RELATIVE, "u_time", "relative", large=("time_unit",),
-    doc="relative standard uncertainty of the time base",
-)  # fmt: skip
+TIME_BASE = Source("time_base", "time base", RELATIVE, "u_time", "relative", large=("time_unit",))
 
 # ------------------------------------------------------------------------------------------------ the instrument on it
 INPUT_TO_OUTPUT = Source(
@@ -250,10 +248,7 @@ REMOUNT = Source(
     "mount.scatter", "drift from mount to mount", "rad/s", "u_remount", "of each mount by itself",
     doc="std. unc. of the drift from mount to mount, where the plan does not show it",
 )  # fmt: skip
-LATITUDE = Source(
-    "latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",),
-    doc="standard uncertainty of the latitude",
-)  # fmt: skip
+LATITUDE = Source("latitude", "latitude", "rad", "u_latitude", STATED, large=("hemisphere",))
 GRAVITY = Source("gravity", "gravity", "m/s²", "u_gravity", doc="standard uncertainty of gravity")
 
 # ------------------------------------------------------------------------------------------------ its supplies
@@ -284,9 +279,13 @@ def drifting(source: Source) -> Source:
 
 # ------------------------------------------------------------------------------------------------ current and readings
 TORQUER_SCALE = Source(
-    "torquer.scale_factor", "torquer scale factor", RELATIVE, "u_scale_factor", f"relative, {STATED}",
-    large=("current_unit",), doc="relative standard uncertainty of the torquer scale factor",
-)  # fmt: skip
+    "torquer.scale_factor",
+    "torquer scale factor",
+    RELATIVE,
+    "u_scale_factor",
+    f"relative, {STATED}",
+    large=("current_unit",),
+)
 TORQUER_NONLINEARITY = Source(
     "torquer.nonlinearity", "torquer nonlinearity", RELATIVE, "u_nonlinearity",
     "relative departure from proportionality at {full}",
@@ -308,10 +307,7 @@ CURRENT_OFFSET_OF = replace(CURRENT_OFFSET, id="current.{axis}.offset", name="ze
 CURRENT_RESOLUTION_OF = replace(
     CURRENT_RESOLUTION, id="current.{axis}.resolution", name="resolution of the {axis} current meter"
 )
-VOLTMETER = Source(
-    "voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative",
-    doc="relative standard uncertainty of the voltmeter",
-)  # fmt: skip
+VOLTMETER = Source("voltmeter.scale", "voltmeter", RELATIVE, "u_voltage", "relative")
 
 #: reading of the rate of a vibrating table; input axis of a gyro on it
 READING_GAIN = Source(
@@ -345,11 +341,11 @@ PULSES = (PULSE_ASYMMETRY, PULSE_MEAN, PULSE_LATE, PULSE_GROWING, PULSE_CURVED, 
 
 
 def stating(names: Mapping[str, Any]) -> dict[str, Source]:
-    """Return those of a module's names that say what an option states, or tables of them: option -> source."""
+    """Return the first source of each option that a module's names hold, or tables of them: option -> source."""
     found: dict[str, Source] = {}
     for value in names.values():
         for s in value.values() if isinstance(value, dict) else (value,):
-            if isinstance(s, Source) and s.doc:
+            if isinstance(s, Source) and s.option:
                 found.setdefault(s.option, s)
     return found
 

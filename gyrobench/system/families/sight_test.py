@@ -33,6 +33,7 @@ ON_INNER = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # gyro axes x, y along x (pitch) 
 INTEGRAL = 8.0  # crossover over the corner of the integral
 NOTCH = (0.1, 0.7)  # damping of its zeros and of its poles
 TONES = (0.3, 0.6, 0.85, 1.0, 1.2, 1.6, 2.2, 2.6, 3.0, 3.6)  # of the crossover
+SWINGS = {1.0: 40.0, 3.0: 16.0, 8.0: 16.0}  # sines of the base, Hz, and how long the gyro's noise lets each take, s
 NEVER = 100  # number of a phase that no plan has
 
 
@@ -84,7 +85,7 @@ class SightTest(LoopTest):
         "stiction": Option(0.0, "N.m", "break-away torque of each joint; 0.8 of it while it slips", 0.0),
         "gyro_noise": Option("0.005deg/s/sqrt(Hz)", "rad/s/sqrt(Hz)", "one-sided noise density of the gyro", 0.0),
         "gyro_bandwidth": Option(100.0, "Hz", "bandwidth of the gyro", 1.0, sets="gyro.bandwidth"),
-        "base": Option("1deg", "rad", "amplitude of the base at and below 1 Hz; falls with 1/f2; 0: no sines", 0.0),
+        "base": Option("1deg", "rad", "amplitude of the base at and below 1 Hz; falls with 1/f; 0: no sines", 0.0),
         "sweeps": Option(True, bool, "test sines for the margins of each axis"),
         "load_step": Option(0.05, "N.m", "disturbance torque of the steps; 0: none", 0.0),
         "psd": Option("vehicle", str, f"vibration of the base: {', '.join(SPECTRA)}, none, or a CSV file with spectra"),
@@ -128,7 +129,8 @@ class SightTest(LoopTest):
             tones = sorted([fc * x for x in TONES] + [x for x in (0.96 * self["bending"],) if fc < x < 4.0 * fc])
             found += sweep(f"loop {axis}", "test", tones, self.test, axis=k, settle=1.0, periods=40)
         for name, k in (("x", 1), ("z", 3)) if self["base"] else ():
-            found += sweep(f"base {name}", "motion", [1.0, 3.0, 8.0], self.swing, axis=k, settle=1.0, dwell=4.0)
+            for f, dwell in SWINGS.items():
+                found += sweep(f"base {name}", "motion", [f], self.swing, axis=k, settle=1.0, dwell=dwell)
         return [*found, self.ride()]
 
     def plan(self) -> LoopPlan:
@@ -141,7 +143,7 @@ class SightTest(LoopTest):
 
     def swing(self, f: float) -> float:
         """Return the amplitude of a sine of the base, rad."""
-        return float(self["base"] * min(1.0, 1.0 / (f * f)))
+        return float(self["base"] * min(1.0, 1.0 / f))
 
     def spectrum(self) -> VibrationSpectrum | None:
         """Return the vibration of the base.  Raises DataError and OSError, of a file."""
