@@ -30,6 +30,7 @@ from gyrobench.identification.line_spectrum import (
     periods_used,
 )
 from gyrobench.identification.loop_curve import loop_curve
+from gyrobench.identification.loop_doubts import CHANGED, LEVEL_END, halves, level_end
 from gyrobench.identification.loop_margins import margins
 from gyrobench.identification.loop_record import LoopRecord, read_loop
 from gyrobench.identification.plant_fit import fit_plant, parse_fit
@@ -122,12 +123,17 @@ def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.i
     if int(known.sum()) < (LINES if samples else BANDS):
         raise DataError(record.name, [_too_few(record, samples, lines, int(known.sum()))])
     s = responses["S"]
-    curve = loop_curve(type(s)(*(getattr(s, n)[known] for n in ("f", "value", "u", "dof", "center", "radius"))))
+    seen = type(s)(*(getattr(s, n)[known] for n in ("f", "value", "u", "dof", "center", "radius")))
+    curve = loop_curve(seen)
     found, missing = margins(curve)
     notes += _drift(record, samples) + _clipped(record)
     count = periods_used(record.r.size, samples) if samples else 0
     strong = [d for d in kinds if d.kind == "odd" and d.significant and d.level > STRONG]
     dependent = "odd harmonics show that the loop depends on its amplitude" if strong else ""
+    moved = halves(record, samples, lines.f[known]) if samples else ""
+    end, doubted = level_end(seen)
+    notes = [*filter(None, (moved, end)), *notes]
+    dependent = dependent or (CHANGED if moved else LEVEL_END if doubted else "")
     return Identification(
         record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2]), dependent
     )

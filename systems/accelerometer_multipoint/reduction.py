@@ -22,6 +22,7 @@ import numpy as np
 
 from gyrobench.frames import G0
 from gyrobench.reduction.diagnosis import handling_candidates
+from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
 from gyrobench.reduction.setup.run_metadata import phases
 from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.toolkit import (
@@ -55,6 +56,7 @@ from .refusals import four_positions, position_problems, record_problems, setup_
 from .sources import PLACES
 
 UG = 1e-6
+FAR = 0.1  # of the scale, from which on something else than the accelerometer is meant
 KS = ("k0", "k1", "k2", "k3", "k4", "k5")
 MEANING = {
     "k0": ("bias", "µg", UG),
@@ -255,8 +257,12 @@ class Reduction(DriftReduction[MultipointSetup]):
         return out
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Return the result with the harmonics of each mount."""
-        return replace(result, harmonics=self._harmonics())
+        """Return the result with the harmonics of each mount; a scale that is 10 % off is that of no accelerometer."""
+        k1 = next((c.estimate for c in result.coefficients if c.name.startswith("k1")), 1.0)
+        far = []
+        if not abs(k1 - 1.0) < FAR:
+            far = [Reason("force.factor", factor_sentence(k1, FORCES), ("pass", "fail"), severity="doubt")]
+        return replace(result, harmonics=self._harmonics(), reasons=[*result.reasons, *far])
 
     def _harmonics(self) -> list[Harmonic]:
         out = []

@@ -224,7 +224,10 @@ class Reduction(ChannelTests[ConingSetup]):
         return [Table("coning.expected", "Drift along the axis of the cone", caption, head, rows)]
 
     def reasons(self) -> list[Reason]:
-        return list(mistakes.implausible(self.setup, Cones.of(self.windows), self.windows))
+        found = list(mistakes.implausible(self.setup, Cones.of(self.windows), self.windows))
+        if not found and self.setup.truth is None:
+            found = list(mistakes.other_chain(self.setup, Cones.of(self.windows), self.windows))
+        return found
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         """Return the largest drift along the axis of the cone, and across it."""

@@ -174,7 +174,10 @@ class Reduction(DriftReduction[ScullingSetup]):
         return [*said, found.noise_sentence("readings"), *found.nuisance_sentences()]
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        reasons: list[Reason] = list(mistakes.implausible(self.setup, Motions.of(self.windows), self.windows))
+        motions = Motions.of(self.windows)
+        reasons: list[Reason] = list(mistakes.implausible(self.setup, motions, self.windows))
+        if not reasons and self.setup.truth is None:
+            reasons = list(mistakes.other_chain(self.setup, motions, self.windows))
         table = self.expected(result.coefficients)
         return replace(result, tables=[table, *result.tables], reasons=[*result.reasons, *reasons])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -281,3 +282,46 @@ def test_gaps_and_controllers(file: Path, tmp_path: Path) -> None:
     two = changed(file, tmp_path, rows=9000)
     found = gb.identify(two)
     assert found.period == 0.0 and any(n.startswith("2.2 periods are in the record") for n in found.notes)
+
+
+# ---------------------------------------------------------------------------------------------- a record of two loops
+def own(periods: int = 8, stiffer: float = 1.0, seed: int = 3) -> LoopRecord:
+    """Inertia, friction, PI controller of 8 Hz, a step late; from half of the record on with another inertia."""
+    rng, h = np.random.default_rng(seed), 1e-3
+    r = np.tile(odd_multisine(PERIOD, rng, 1.0, 150.0), periods)
+    u, y = np.zeros(r.size), np.zeros(r.size)
+    rate = integral = command = 0.0
+    for k in range(r.size):
+        J = 2.0 * (stiffer if k >= r.size // 2 else 1.0)
+        y[k] = rate + 1e-4 * rng.standard_normal()
+        u[k] = command + r[k]
+        integral += h * y[k]
+        command = -100.0 * (y[k] + 10.0 * integral)
+        rate += h * (u[k] - 4.0 * rate) / J
+    return LoopRecord("own", h, r, u, y, PLACES[0], UNITS)
+
+
+@pytest.fixture(scope="module")
+def steady() -> LoopRecord:
+    return own()
+
+
+def test_a_loop_that_changes_is_said(steady: LoopRecord) -> None:
+    """Margins of the mean of two loops belong to neither, and their interval was that of noise."""
+    changed = identify_record(own(stiffer=1.2))
+    assert "the loop changed" in changed.dependent and any("the loop changed" in n for n in changed.notes)
+    found = identify_record(steady)
+    assert not found.dependent and not any("changed" in n or "fall" in n for n in found.notes)
+
+
+def test_a_step_of_the_sensor_is_no_change_of_the_loop(steady: LoopRecord) -> None:
+    y = steady.y + 5.0 * steady.y.std() * (np.arange(steady.y.size) > 0.55 * steady.y.size)
+    assert not any("changed" in n for n in identify_record(replace(steady, y=y)).notes)
+
+
+@pytest.mark.parametrize("mistake", ["late", "scale", "controller"])
+def test_an_input_of_another_kind_is_said(steady: LoopRecord, mistake: str) -> None:
+    """The margins were stated to a tenth of a degree, 5 to 50 degrees off."""
+    u = {"late": np.roll(steady.u, 2), "scale": 3.0 * steady.u, "controller": steady.u - steady.r}[mistake]
+    found = identify_record(replace(steady, u=u))
+    assert "does not fall" in found.dependent and any("does not fall" in n for n in found.notes)

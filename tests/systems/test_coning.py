@@ -210,7 +210,7 @@ def test_mistakes_are_named(given: list[list[float]], said: str) -> None:
     units = (1.0, 1.0, 1.0, DEG, DPH, DPH, DPH)
     windows = {n: np.array(v) * u for n, v, u in zip(names, zip(*given, strict=True), units, strict=True)}
     setup = ConingSetup(axis="z", chain=Chain(0.01, 0.0, 0.0, False, 1))
-    reasons = [r.text for r in Reduction.reduce(windows, setup).reasons if r.id == "coning.implausible"]
+    reasons = [r.text for r in Reduction.reduce(windows, setup).reasons if r.id.startswith("coning.")]
     assert reasons and said in reasons[0]
 
 

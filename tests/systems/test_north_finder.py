@@ -372,6 +372,7 @@ def test_two_positions_ask_for_the_side(
     """w = A cos(psi - angle) + bias at 0 and 180 deg, psi = -63 deg: A cos is that of +63 deg, whatever the noise."""
     rng, A = np.random.default_rng(4), 15.041067 * math.cos(0.8)
     lines = [f"# latitude = {math.degrees(0.8)!r}deg", "# method = two", "# type_b = none", f"# rough = {rough}deg"]
+    lines.append("# arrangement = checked")
     lines += [f"# sigma_rough = {sigma_rough}deg"] * bool(sigma_rough)
     lines.append("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [deg/h]")
     for k in range(20):

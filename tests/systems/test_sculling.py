@@ -199,7 +199,7 @@ def test_mistakes_are_named(given: list[list[float]], said: str) -> None:
     units = (1.0, 1.0, 1.0, DEG, 1.0, UG)
     windows = {n: np.array(v) * u for n, v, u in zip(names, zip(*given, strict=True), units, strict=True)}
     setup = ScullingSetup(chain=VelocityChain(0.01, sculling=False))
-    reasons = [r.text for r in Reduction.reduce(windows, setup).reasons if r.id == "sculling.implausible"]
+    reasons = [r.text for r in Reduction.reduce(windows, setup).reasons if r.id.startswith("sculling.")]
     assert len(reasons) == 1 and said in reasons[0]
 
 

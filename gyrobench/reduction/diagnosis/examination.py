@@ -23,11 +23,13 @@ def examined(
     """Return the reduction of a record, with the diagnosis in it where it is measured and not ordinary, and with what
     no residual shows where it does not state that it was checked.
 
-    candidates: record -> the mistakes that make sense in the test; None: no diagnosis.  regression_of: as of
-    :func:`unshown.unshown`.  Raises ReductionError.
+    candidates: record -> the mistakes that make sense in the test; None: no diagnosis, but what no residual shows is
+    asked for all the same.  regression_of: as of :func:`unshown.unshown`.  Raises ReductionError.
     """
-    if candidates is None or not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
+    if not record.run.measured:  # a simulated one knows its truth, and its set-up errors by name
         return reduce(record)
+    if candidates is None:
+        return _asked(record, reduce(record), reduce, regression_of)
     try:
         result = reduce(record)
     except GyrobenchError as error:
@@ -39,6 +41,13 @@ def examined(
         near = plausibility.earth_rate_warnings(result, Location.of(record.run))
         result = replace(result, reasons=[*result.reasons, *near])
     found = with_diagnosis(record, result, reduce, candidates)
+    return _asked(record, found, reduce, regression_of)
+
+
+def _asked(
+    record: Record, found: DriftTestResult, reduce: Reduce, regression_of: Callable[[Record], Any] | None
+) -> DriftTestResult:
+    """Return the result with what no residual shows, where the record does not state that it was checked."""
     if record.run.arrangement == "checked" or any(r.id == HANDLING for r in found.reasons):
         return found
-    return replace(found, reasons=[*found.reasons, *unshown(record, result, reduce, regression_of)])
+    return replace(found, reasons=[*found.reasons, *unshown(record, found, reduce, regression_of)])

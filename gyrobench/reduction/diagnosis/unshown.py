@@ -3,10 +3,11 @@
     reasons = unshown(record, result, reduce, regression_of)       # of a record that does not state that it was checked
 
 A tumble with mounts and dwells exchanged, a multi-position test with its mounts exchanged, the latitude of another
-city, a meter that is off by a factor are fitted as well as the truth.  So each of :func:`mistakes` is made in a copy of
-the record.  Where the copy can be fitted as well - no F test of the two scatters with p < LEVEL - and an estimate
-changes by more than its u, the record rests on that mistake not having been made, and passes only where it states so:
-``arrangement = checked``.  A plan whose redundancy shows a mistake is not asked about it.
+city, a meter that is off by a factor, two gyros of a north finder exchanged are fitted as well as the truth.  So each
+of :func:`mistakes` is made in a copy of the record.  Where the copy can be fitted as well - no F test of the two
+scatters with p < LEVEL - and an estimate changes by more than its u, the record rests on that mistake not having been
+made, and passes only where it states so: ``arrangement = checked``.  A plan whose redundancy shows a mistake is not
+asked about it.
 
 The copies are fitted by least squares of the test's own regression, without the effects of its nuisance model: a
 mistake that only these would take in is found otherwise (handling_errors).  Only those that fit are reduced,
@@ -24,14 +25,17 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
+from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import (
     ANGLES,
     attitude_name,
     changed,
+    exchanged_columns,
     exchanged_labels,
     relabelled,
     reversed_columns,
+    scaled,
     wrong_hemisphere,
 )
 from gyrobench.reduction.diagnosis.handling_errors import (
@@ -45,6 +49,7 @@ from gyrobench.reduction.diagnosis.handling_errors import (
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.setup.conditions import READINGS
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
 
@@ -52,8 +57,11 @@ ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
 #: scales that nobody states, what begins their columns, and what states an uncertainty of them
+FORCES = ("f_x", "f_y")  # of the accelerometers of a north finder
+#: columns that stand beside each other in a table, and are of one kind
+NEIGHBOURS = (("mean_x", "mean"), FORCES, ("drift_x", "drift_y"), ("drift_y", "drift_z"), ("drift_x", "drift_z"))
 METERS = (
-    ("the readings", ("mean",), ("u_voltage",)),
+    ("the readings", READINGS, ("u_voltage",)),
     ("the currents", ("current",), ("u_current",)),
     ("the rates", ("rate_",), ("u_time",)),
     ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
@@ -71,7 +79,13 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
     yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
-    yield from reversed_columns(record, [n for n in record.windows if n.startswith("mean")], "the reading", False)
+    yield from reversed_columns(record, [n for n in record.windows if n.startswith(READINGS)], "the reading", False)
+    for a, b in NEIGHBOURS:
+        yield from exchanged_columns(record, [(a, b)], f"the columns {a} and {b} exchanged")
+    forces = [n for n in FORCES if n in record.windows]
+    if forces:
+        yield from reversed_columns(record, forces, "the specific force", False)
+        yield from scaled(record, forces, {"the specific force in m/s² and given as g": 1.0 / G0})
     options = record.run.options
     latitude = float(options.get("latitude", 0.0))
     if "latitude" in options and not options.get("u_latitude"):
@@ -83,7 +97,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _meters(record)
-    if options.get("u_mount") or not all(n in record.windows for n in ANGLES):
+    if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)
     places = dict.fromkeys(attitude_name(row) for row in record.run.plan if attitude_name(row))

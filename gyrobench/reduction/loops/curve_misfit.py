@@ -1,4 +1,4 @@
-"""Whether a fitted curve leaves residuals that neighbours in frequency share: then the response has another shape.
+"""Misfit of a curve by residuals that neighbours in frequency share: then the response has another shape.
 
 Where the uncertainty of the points is not known, their scatter about the curve takes its place, and chi squared says
 nothing of the curve.  The order of the residuals does: of m unknowns fitted to N points, r = M e with M the projection

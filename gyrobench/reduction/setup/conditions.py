@@ -15,6 +15,9 @@ from gyrobench.record.record import Record
 from gyrobench.result import Coefficient, Reason, Result
 
 R = TypeVar("R", bound=Result)
+#: what the columns of readings begin with
+READINGS = ("mean", "drift_", "acceleration", "force")
+LEAST, MOST = 3, 3000  # rows of a block that was copied, of a record in which one is looked for
 CHANCE = 5.0  # decades by which rows that are equal are no chance
 TYPE_B_UNSTATED = "type_b.unstated"
 #: estimates that belong to the mean temperature of the record -> their change per kelvin in the gyro, and its sign
@@ -67,7 +70,7 @@ def reasons(record: Record) -> list[Reason]:
     found = [Reason("part.external", text) for text in run.external]
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
-        found += identical_phases(record)
+        found += identical_phases(record) or identical_rows(record)
     if run.measured and not run.type_b_stated:
         text = (
             "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
@@ -113,6 +116,43 @@ def identical_phases(record: Record) -> list[Reason]:
         "The coefficients are wrong until the record is corrected."
     )
     return [Reason("record.identical_phases", text, blocks=("pass", "fail"), severity="error")]
+
+
+def identical_rows(record: Record) -> list[Reason]:
+    """Return which rows hold the readings of others before them, bit for bit, where these are all different.
+
+    A block of n rows that are all different is found again by chance at one of N^2 places with 1 in D^n; D as of
+    :func:`identical_phases`.
+    """
+    for name, values in record.windows.items():
+        y = np.asarray(values, dtype=float) if name.startswith(READINGS) else np.zeros(0)
+        length, first, second = _longest_copy(y) if LEAST <= y.size <= MOST else (0, 0, 0)
+        own = y[second : second + length]
+        if length < LEAST or np.unique(own).size < length:
+            continue
+        rest = np.concatenate([y[:second], y[second + length :]])
+        if length * math.log10(max(_rarity(own), _rarity(rest, 0))) < CHANCE + 2.0 * math.log10(y.size):
+            continue
+        text = (
+            f"Rows {second + 1} to {second + length} hold the readings of rows {first + 1} to {first + length} again, "
+            "bit for bit: the data of one were copied over the other. The coefficients are wrong until the record is "
+            "corrected."
+        )
+        return [Reason("record.identical_rows", text, blocks=("pass", "fail"), severity="error")]
+    return []
+
+
+def _longest_copy(y: Array) -> tuple[int, int, int]:
+    """Return length and first rows of the longest block that is found again, without overlap, further below."""
+    best = (0, 0, 0)
+    for lag in range(1, y.size):
+        same = np.concatenate([[False], y[:-lag] == y[lag:], [False]])
+        edges = np.flatnonzero(same[1:] != same[:-1])
+        lengths = np.minimum(edges[1::2] - edges[0::2], lag)
+        if lengths.size and int(lengths.max()) > best[0]:
+            k = int(np.argmax(lengths))
+            best = (int(lengths[k]), int(edges[2 * k]), int(edges[2 * k]) + lag)
+    return best
 
 
 def _rarity(values: Array, most: int | None = None) -> float:
