@@ -144,10 +144,7 @@ class LoopFindings(MeasureFindings):
         key = "" if loop == "stabilizer" else f" {loop}"
         self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
         values = m.measured_values(sure, self.excluded[loop])
-        model = computed.get("discrete")
-        closest = (None, None) if model is None else (model.crossover, model.phase)
-        if model is not None and "crossover" in values:  # a loop may cross several times
-            closest = model.near(values["crossover"][0])
+        closest = _beside(computed.get("discrete"), values)
         twin = None
         if "phase" in values and models.discrete is not None:
             twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
@@ -372,6 +369,13 @@ class LoopFindings(MeasureFindings):
             self.tables.append(Table("margins.agreement", title, AGREEMENT, AGREEMENT_COLUMNS, self.agreement))
         self.facts["allan"] = self.allan
         return super().result(replace(account, reasons=()), summary, ranked_by)
+
+
+def _beside(model: m.Margins | None, values: Mapping[str, tuple[float, float]]) -> tuple[float | None, float | None]:
+    """Return crossover and phase margin of the model; of several crossovers the one next to the measured."""
+    if model is None:
+        return None, None
+    return model.near(values["crossover"][0]) if "crossover" in values else (model.crossover, model.phase)
 
 
 def _margin_note(run: RunDocument) -> str:
