@@ -2,8 +2,8 @@
 
     python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing] [part of a name]
 
-Truths are white noise through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that swing (rms,
-angular frequency, decay of each); unit time is a sample.
+Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
+swing (rms, angular frequency, decay of each); unit time is a sample.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 
@@ -25,6 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.fit import fit_noise
 
 TRUTHS: dict[str, dict[str, Any]] = {
+    "white noise": {"N": 1.0},
     "low-pass, one process, walk": {"N": 1.0, "lag": 0.56, "markov": [(0.05, 200.0)], "K": 3e-4},
     "one process": {"N": 1.0, "markov": [(0.0444, 270.0)]},
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
@@ -83,6 +84,7 @@ def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
                 e, true = model[term], truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
                 stated[term].append(e.determined)
+            stated["filter"].append(bool(model.filter_words()))
             left = list(truth.get("markov", []))
             for g in (g for g in model.processes if g.tau.determined):
                 if not left:
