@@ -1,4 +1,4 @@
-"""What stops a run: errors of its parts, of the user, of what was set."""
+"""Errors that stop a run: of its parts, of the user, of what was set."""
 
 from __future__ import annotations
 

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 def take_sources(system: type[System], reduction: type) -> None:
     """Give a system the options of the sources of its reduction, and what simulates them among what it assumes."""
     sources = list(declared(reduction).values())
+    if sources and not hasattr(reduction, "all_effects"):
+        raise TypeError(
+            f"{reduction.__name__} declares the source {sources[0].id} by @Source and is no DriftReduction, which "
+            "would use it: its error would not be in u"
+        )
     system.options = {**system.options, **(type_b(*(s for s in sources if s.option)) | dict(system.options))}
     new = {s.parameter for s in sources} - {"", *system.assumed}
     system.assumed = (*system.assumed, *sorted(new))

@@ -162,6 +162,11 @@ class Reduction(DriftReduction[RateTableSetup]):
             "shape of the scale factor", "the scale factor has a shape beyond asymmetry and cubic",
             "no shape beyond asymmetry and cubic",
         )  # fmt: skip
+        found.f_test(
+            "hysteresis.rate", "way to the rate times the rate", (self.d * np.abs(x))[:, None],
+            "hysteresis", "the hysteresis changes with the rate: h is of no rate",
+            "no hysteresis that changes with the rate",
+        )  # fmt: skip
 
     def account(self, found: Findings) -> Account:
         large = self.large

@@ -5,7 +5,7 @@
     python tests/benchmarks/identification.py --runs 40 --friction       # the truth is the best linear approximation
 
 A line for each response and each margin: how many of the intervals held the truth, the rms error (degrees, dB, relative
-else) and the median of U.
+else), the median of U and the largest error over its own U.
 """
 
 from __future__ import annotations
@@ -67,6 +67,8 @@ class Count:
         self.held["plant fitted"] += 1
         self.all["model describes the plant"] += 1
         self.held["model describes the plant"] += not fit.lacks
+        if fit.lacks:  # said, and nothing of it is used
+            return
         for name, value in truth.items():
             low, high = fit.interval(name)
             self.all[name] += 1
@@ -91,7 +93,9 @@ class Count:
         for name, count in self.all.items():
             line = f"{name:34s} {self.held[name] / count:.3f} of {count}"
             if name in self.errors:
-                line += f"   rms {np.sqrt(np.mean(np.square(self.errors[name]))):.3g}  U {np.median(self.U[name]):.3g}"
+                errors, U = np.array(self.errors[name]), np.array(self.U[name])
+                line += f"   rms {np.sqrt(np.mean(errors**2)):.3g}  U {np.median(U):.3g}"
+                line += f"  largest error / U {np.max(np.abs(errors) / U):.1f}"
             print(line)
         print(f"seconds each: mean {np.mean(self.seconds):.2f}, largest {np.max(self.seconds):.2f}")
         print(dict(self.notes))

@@ -168,6 +168,13 @@ def test_a_source_without_its_option_is_named(bench: Path) -> None:
         load_system(NAME, bench).reduction_object()
 
 
+def test_a_source_that_nothing_would_use_is_refused(bench: Path) -> None:
+    file = bench / "systems" / NAME / "system.py"
+    file.write_text(EXAMPLE.read_text("utf-8").replace("(RestTest)", ""), encoding="utf-8")
+    with pytest.raises(TypeError, match=r"declares the source fixture\.level by @Source and is no DriftReduction"):
+        load_system(NAME, bench)
+
+
 def test_what_the_skeleton_leaves_to_a_reduction_is_asked_for_before_a_run(bench: Path) -> None:
     file = bench / "systems" / NAME / "system.py"
     bare = EXAMPLE.read_text("utf-8").replace("(RestTest)", "(DriftReduction)").replace("import Source", "import *")

@@ -210,6 +210,14 @@ def test_a_measured_file(tmp_path: Path) -> None:
     assert "times the rate" not in said(result)
 
 
+def test_hysteresis_that_changes_with_the_rate_is_said(tmp_path: Path) -> None:
+    """It was in h, 8 u off the mean of nothing, and no word was said."""
+    rate, mean = lab(np.random.default_rng(1))
+    ways = np.repeat(np.sign(np.diff(rate[::2], prepend=rate[0])), 2)
+    result = measured(write(tmp_path / "a.csv", rate, mean + 0.05 * ways * np.abs(rate) / 50.0))
+    assert {"residuals.contradict", "hysteresis.rate"} <= {r.id for r in result.reasons}
+
+
 def exchanged(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The rates of the second and the third step, in the two readings of each."""
     return rate[[0, 1, 4, 5, 2, 3, *range(6, rate.size)]], mean

@@ -125,15 +125,15 @@ class LoopFindings(MeasureFindings):
         computed = self.limits[loop] = {}
         rows = {"measured": shown.row("measured")}
         for kind, label in NAMES.items():
-            model = models.of(kind)
-            if model is None:
+            linear = models.of(kind)
+            if linear is None:
                 continue
-            dense = model_response(model, span)[:, 0, 0]
+            dense = model_response(linear, span)[:, 0, 0]
             limits = computed[kind] = m.margins(span, dense)
             rows[kind] = limits.row(label)
             curves.append(curve(label, span, dense))
             if limits.crossover is not None:
-                self._agreement(sure, model_response(model, at)[:, 0, 0], limits, (label, title), up_to)
+                self._agreement(sure, model_response(linear, at)[:, 0, 0], limits, (label, title), up_to)
         if computed and not self.unstable:
             self._conditional(title, computed.get("continuous") or computed["discrete"])
         drawn = bode(title, "loop", caption, points, curves, "gain", "1")
@@ -144,7 +144,7 @@ class LoopFindings(MeasureFindings):
         key = "" if loop == "stabilizer" else f" {loop}"
         self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
         values = m.measured_values(sure, self.excluded[loop])
-        closest = rows.get("discrete", [None] * 3)
+        closest = _beside(computed.get("discrete"), values)
         twin = None
         if "phase" in values and models.discrete is not None:
             twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
@@ -154,8 +154,8 @@ class LoopFindings(MeasureFindings):
         before = len(self.coefficients)
         none = "" if "phase" in values or self.unstable else why_no_crossover(sure, len(points), self.record.run)
         for name, what, unit, value, closed in (
-            (f"f_c{key}", "gain crossover frequency", "Hz", widened.get("crossover", (None,)), closest[1]),
-            (f"PM{key}", "phase margin", "°", widened.get("phase", (None,)), closest[2]),
+            (f"f_c{key}", "gain crossover frequency", "Hz", widened.get("crossover", (None,)), closest[0]),
+            (f"PM{key}", "phase margin", "°", widened.get("phase", (None,)), closest[1]),
         ):
             self.measure(name, what, unit, *value, closed=closed, no_value=none)
         if "phase" in values:
@@ -369,6 +369,13 @@ class LoopFindings(MeasureFindings):
             self.tables.append(Table("margins.agreement", title, AGREEMENT, AGREEMENT_COLUMNS, self.agreement))
         self.facts["allan"] = self.allan
         return super().result(replace(account, reasons=()), summary, ranked_by)
+
+
+def _beside(model: m.Margins | None, values: Mapping[str, tuple[float, float]]) -> tuple[float | None, float | None]:
+    """Return crossover and phase margin of the model; of several crossovers the one next to the measured."""
+    if model is None:
+        return None, None
+    return model.near(values["crossover"][0]) if "crossover" in values else (model.crossover, model.phase)
 
 
 def _margin_note(run: RunDocument) -> str:
