@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.units import DEG
 
@@ -94,10 +94,10 @@ class Reduction(MeasureReduction):
             found.coefficients[-1] = replace(found.coefficients[-1], u_a=float(self.figures.u[k]) / scale)
             found.budget += [s.line(name, unit, scale, k) for s in by if s.u > 0.0]
         known = [k for k in range(len(FIGURES)) if math.isfinite(self.figures.value[k])]
-        shifts = predicted_shifts(
-            self.run, by, [(k, FIGURES[k][0], *FIGURES[k][2:], float(self.figures.u[k])) for k in known]
-        )
+        own = [(k, FIGURES[k][0], *FIGURES[k][2:], float(self.figures.u[k])) for k in known]
+        shifts = predicted_shifts(self.run, by, own)
         found.tables += [shifts] if shifts else []
+        found.reasons += not_stated(self.run, by, own)
         self._doubts()
         span = np.geomspace(points.f[0], highest, 200)
         fitted = logarithm(curve_of.p, span)
@@ -162,10 +162,6 @@ class Reduction(MeasureReduction):
             at = ", ".join(f"{f:.3g} Hz" for f in points.saturated)
             found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
                                           "smaller rate.")  # fmt: skip
-        stated = any(s.u > 0.0 for s in self._sensitivities())
-        if self.run.measured and not stated and self.run.type_b != "none":
-            found.doubt("type_b.unstated", "No uncertainty of the table or its reading is stated: u is of the points "
-                                           "alone. State u_gain, u_lag ..., or declare type_b = none.")  # fmt: skip
         if points.known and c.chi2 > c.dof + 4.0 * math.sqrt(2.0 * c.dof):
             text = (
                 f"The curve does not fit the points: χ² = {c.chi2:.3g} of {c.dof} degrees of freedom. u of the figures "

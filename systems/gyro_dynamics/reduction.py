@@ -26,7 +26,7 @@ from gyrobench.reduction.loops.loop_toolkit import (
     told,
     trace,
 )
-from gyrobench.reduction.loops.response_errors import Sensitivity, predicted_shifts
+from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 
 from .mistakes import mistakes
@@ -75,6 +75,9 @@ class Reduction(MeasureReduction):
         points = self.points = points_of(self.record, self.K_sg, self.output)
         self.figures: DynamicFigures | None = None
         self.steps: StepFigures | None = figures_of(points.turns)
+        none, sources = np.zeros(len(FIGURES)), (READING_GAIN, READING_LAG, TIME_BASE, COSINE, PICKOFF)
+        self.by = [Sensitivity(s, self._u(s), none) for s in sources]
+        self.shown: list[tuple[int, str, str, float, float]] = []  # without sines
         reasons = []
         if points.response is not None:
             reasons = list(mistakes(points.response))
@@ -122,7 +125,7 @@ class Reduction(MeasureReduction):
         self.figures, self.response = found, r
         by, highest = self._sensitivities(r, found), float(r.f[-1])
         truth = true_values(self.run, highest, self.output)
-        shown = []
+        shown: list[tuple[int, str, str, float, float]] = []
         for k, (name, meaning, unit, scale) in enumerate(FIGURES):
             if self.output and name in ("f_3dB", "K_I", "K_O"):
                 continue
@@ -142,6 +145,7 @@ class Reduction(MeasureReduction):
             shown.append((k, name, unit, scale, own))
         shifts = predicted_shifts(self.run, by, shown)
         self.found.tables += [shifts] if shifts else []
+        self.by, self.shown = [s for s in by if s.source is not SPIN], shown
         self._figure(r, found)
 
     def _why(self, name: str, highest: float) -> str:
@@ -261,10 +265,7 @@ class Reduction(MeasureReduction):
         if points.saturated:
             at = ", ".join(points.saturated)
             found.doubt("gyro.saturated", f"The pickoff was beyond its range at {at}. Take a smaller angle.")
-        sources = (READING_GAIN, READING_LAG, TIME_BASE, COSINE, PICKOFF)
-        if self.run.measured and self.run.type_b != "none" and not any(self._u(s) > 0.0 for s in sources):
-            found.doubt("type_b.unstated", "No uncertainty of the table or its reading is stated: u is of the points "
-                                           "alone. State u_gain, u_lag ..., or declare type_b = none.")  # fmt: skip
+        found.reasons += not_stated(self.run, self.by, self.shown)
         fit = self.figures.fit if self.figures else None
         if fit and points.known and fit.chi2 > fit.dof + 4.0 * math.sqrt(2.0 * fit.dof):
             text = (

@@ -155,7 +155,7 @@ def rows_of(order: int = 2, bandwidth: float = 50.0, noise: float = 1e-3) -> np.
     return np.column_stack([f, np.full(20, 10.0), 10.0 * np.abs(h), np.degrees(np.unwrap(np.angle(h)))])
 
 
-def measured(tmp_path: Path, rows: np.ndarray, comments: str = "# type_b = none") -> Result:
+def measured(tmp_path: Path, rows: np.ndarray, comments: str = "# type_b = none\n# arrangement = checked") -> Result:
     system = load_system(NAME).with_values({})
     result: Result = system.reduce(system.read_measured(written(tmp_path, rows, comments), {}))
     return result
@@ -176,6 +176,22 @@ def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
     ids = [r.id for r in measured(tmp_path, rows_of(), "").reasons]
     assert "type_b.unstated" in ids
     assert "type_b.unstated" not in [r.id for r in measured(tmp_path, rows_of(), "# u_gain = 1e-3").reasons]
+
+
+@pytest.mark.long
+def test_what_no_residual_shows_is_asked_for(tmp_path: Path) -> None:
+    """Frequencies in rad/s are fitted as well: f_3dB is 6.28 times what it is, with a u of a thousandth."""
+    rows = rows_of()
+    rows[:, 0] *= 2.0 * np.pi
+    result = measured(tmp_path, rows, "# type_b = none")
+    asked = next(r for r in result.reasons if r.id == "arrangement.unstated")
+    assert asked.blocks == ("pass",) and "frequencies in rad/s given as Hz" in asked.text
+    assert "a time base wrong by 2 % (f_3dB by" in asked.text.replace("delay", "f_3dB").replace("f_90", "f_3dB")
+    for said in ("# u_time = 1e-3", "# u_gain = 1e-3"):
+        result = measured(tmp_path, rows, said)
+        text = next(r.text for r in result.reasons if r.id == "arrangement.unstated")
+        assert ("a time base" in text) is ("u_gain" in said) and ("a gain of" in text) is ("u_time" in said)
+    assert "arrangement.unstated" not in [r.id for r in measured(tmp_path, rows).reasons]
 
 
 def mistaken(kind: str) -> np.ndarray:

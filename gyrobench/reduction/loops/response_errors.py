@@ -6,7 +6,7 @@ The sensitivity of a figure is taken by moving the points and taking the figures
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,12 +21,13 @@ from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor, response
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
-from gyrobench.reduction.setup.sources import Source
+from gyrobench.reduction.setup.sources import READING_GAIN, TIME_BASE, Source
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import BudgetLine, Table
+from gyrobench.result import BudgetLine, Reason, Table
 
 ROUNDING = 1e-6  # least relative uncertainty of a point
 LINES = 12  # numbers from which neighbour_noise estimates
+WRONG = {READING_GAIN.id: "a gain of table or reading wrong by 2 %", TIME_BASE.id: "a time base wrong by 2 %"}
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
 ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
 
@@ -110,3 +111,34 @@ def predicted_shifts(
     )
     head = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
     return Table(PREDICTED, "Predicted shifts by simulated errors", caption, head, rows)
+
+
+def not_stated(
+    run: RunDocument, by: Sequence[Sensitivity], figures: Sequence[tuple[int, str, str, float, float]]
+) -> Iterator[Reason]:
+    """Yield what a measured record does not state though no residual shows it: uncertainties of table and reading, and
+    that units and scales were checked (see gyrobench.reduction.diagnosis.unshown).
+
+    figures: as of :func:`predicted_shifts`; none where the record has no sines.
+    """
+    if not run.measured:
+        return
+    if run.type_b != "none" and not any(s.u > 0.0 for s in by):
+        text = (
+            "No uncertainty of the table or its reading is stated: u is of the points alone. State u_gain, u_lag ..., "
+            "or declare type_b = none."
+        )
+        yield Reason("type_b.unstated", text, ("pass", "fail"), severity="doubt")
+    if run.arrangement == "checked":
+        return
+    said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id]]
+    for s in by:
+        moved = {name: abs(0.02 * float(np.nan_to_num(s.change[k]))) / u for k, name, _, _, u in figures if u > 0.0}
+        far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
+        if s.source.id in WRONG and s.u == 0.0 and far:
+            said.append(f"{WRONG[s.source.id]} ({', '.join(f'{n} by {moved[n]:.2g} u' for n in far)})")
+    text = (
+        f"No residual of this record would show: {'; '.join(said)}. State that units and scales were checked "
+        "(arrangement = checked)."
+    )
+    yield Reason("arrangement.unstated", text, ("pass",), severity="doubt")
