@@ -137,7 +137,9 @@ def test_the_area_is_the_time_constant_whatever_the_turn() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ files
-def measured(tmp_path: Path, head: str, rows: np.ndarray, comments: str = "type_b = none;arrangement = checked") -> Result:
+def measured(
+    tmp_path: Path, head: str, rows: np.ndarray, comments: str = "type_b = none;arrangement = checked"
+) -> Result:
     file = tmp_path / "r.csv"
     text = [f"# {c}" for c in ("K_sg = 10V/rad", "H = 0.12N.m.s", *comments.split(";"))]
     file.write_text("\n".join([*text, head, *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n", "utf-8")
