@@ -22,7 +22,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.setup.sources import TIME_BASE
+from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -145,6 +145,7 @@ class Reduction(DriftReduction[ScullingSetup]):
             VIBRATION.effect(s, shift(vibration=1e-3)),
             PHASE.effect(s, shift(phase=1e-3)),
             TIME_BASE.effect(s, found.error(-np.asarray(self.windows["acceleration"], dtype=float))),
+            GRAVITY.effect(s, found.error(-np.ones(motions.number.size))),  # what is taken off
         ]
 
     def account(self, found: Findings) -> Account:

@@ -108,7 +108,7 @@ class ScullingTest(StrapdownMotion):
         | GONE_THROUGH
         | NUISANCES
         | CORRECTIONS
-        | type_b("time", sources)
+        | type_b("time", "gravity", sources)
     )  # fmt: skip
     noises = tuple(f"imu.{a}_{n}" for a in AXES for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     measured_data = MEASURED

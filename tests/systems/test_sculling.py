@@ -161,10 +161,12 @@ def rows(sense: float = 1.0, factor: float = 1.0, rest: float = 2.0e3) -> list[l
 HEAD = ["interval = 10ms", "bandwidth = 0Hz", "acc_bandwidth = 0Hz", "sculling = false", "samples = 1", "size = 0mm"]
 
 
-def reduced(command: Command, folder: Path, table: list[list[float]], code: int = 0) -> Any:
+def reduced(
+    command: Command, folder: Path, table: list[list[float]], code: int = 0, type_b: str = "type_b = none"
+) -> Any:
     names = "t_start [s],t_end [s],frequency [Hz],angle [deg],vibration [m/s2],acceleration [ug]"
     file = folder / "sculling.csv"
-    lines = [*(f"# {x}" for x in (*HEAD, "type_b = none")), names]
+    lines = [*(f"# {x}" for x in (*HEAD, type_b)), names]
     file.write_text("\n".join([*lines, *(",".join(f"{v:.9g}" for v in row) for row in table)]) + "\n")
     found, _, err = command("reduce", NAME, "--data", str(file), "--out", str(folder / "r"), "--force")
     assert found == code, err
@@ -183,6 +185,14 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
         assert low < hand / UG < high and high - low < 40.0
         assert expected == pytest.approx(hand / UG, rel=1e-3)
     assert not any(r["id"] == "sculling.implausible" for r in result["reasons"])
+
+
+def test_gravity_is_in_the_acceleration_at_rest_alone(command: Command, tmp_path: Path) -> None:
+    """What is taken off too much is in b; differences to the readings at rest do not have it."""
+    plain, gravity = (reduced(command, tmp_path, rows(), type_b=x) for x in ("type_b = none", "u_gravity = 1e-3m/s2"))
+    for before, after in zip(plain["coefficients"], gravity["coefficients"], strict=True):
+        extra = 1e-3 / UG if after["name"] == "b" else 0.0
+        assert after["u"] == pytest.approx(math.hypot(before["u"], extra), rel=1e-3)
 
 
 @pytest.mark.parametrize(
