@@ -57,7 +57,7 @@ class Dependencies:
         if isinstance(e, ast.Name):
             return set(locals_.get(e.id, set()))
         if isinstance(e, ast.Attribute):
-            name = flat_name(e, code)
+            name = flat_name(e, code, self.source)
             if name is not None:
                 return self.reach.get(name, set()) | ({name} & self.known)
         inputs: set[str] = set()
@@ -81,7 +81,7 @@ class Dependencies:
                 while isinstance(base, ast.Subscript):
                     base = base.value
                 follows = self.read(s.value, code, locals_) | self.read(target, code, locals_) | under
-                name = flat_name(base, code)
+                name = flat_name(base, code, self.source)
                 where = self.reach if name is not None else locals_
                 where.setdefault(name if name is not None else ast.unparse(base), set()).update(follows)
             elif isinstance(s, ast.Expr):
@@ -105,7 +105,7 @@ class Dependencies:
         return given
 
 
-def flat_name(e: ast.AST, code: Code) -> str | None:
+def flat_name(e: ast.AST, code: Code, source: PartCode) -> str | None:
     """Return the part's name of ``self.X``, ``self.der.X``, ``self.noise.X`` or ``self.block.X``; None otherwise."""
     if not isinstance(e, ast.Attribute):
         return None
@@ -116,7 +116,9 @@ def flat_name(e: ast.AST, code: Code) -> str | None:
         return code.flat(e.attr)
     if of in ("self.der", "self.noise"):
         return f"{of.removeprefix('self.')}.{code.flat(e.attr)}"
-    return f"{code.flat(of.removeprefix('self.'))}_{e.attr}" if of.startswith("self.") else None
+    blocks = code.placed.blocks if code.placed else source.cls.placed
+    placed = blocks.get(of.removeprefix("self.")) if of.startswith("self.") else None
+    return placed.names.get(e.attr) if placed else None
 
 
 def reached(code: Code, source: PartCode) -> Iterator[Code]:
@@ -134,7 +136,7 @@ def reached(code: Code, source: PartCode) -> Iterator[Code]:
 
 def read_names(code: Code, source: PartCode) -> set[str]:
     """Return every variable that is named in a piece of code and in what it calls."""
-    return {name for c in reached(code, source) for n in c.nodes() if (name := flat_name(n, c)) is not None}
+    return {name for c in reached(code, source) for n in c.nodes() if (name := flat_name(n, c, source)) is not None}
 
 
 def written_names(code: Code, source: PartCode) -> set[str]:
@@ -146,7 +148,7 @@ def written_names(code: Code, source: PartCode) -> set[str]:
                 base: ast.AST = n.targets[0] if isinstance(n, ast.Assign) else n.target
                 while isinstance(base, ast.Subscript):
                     base = base.value
-                name = flat_name(base, c)
+                name = flat_name(base, c, source)
                 if name is not None:
                     names.add(name)
     return names

@@ -20,6 +20,7 @@ class Translation:
         self.under_way: list[object] = []
         self.names: list[str] = []  # of the procedures, before those of one name are numbered
         self.written: set[str] = set()  # by the sampled methods
+        self.named: dict[str, int] = {}  # equations of a name
         for kind in ("start", "flow", "outputs"):
             self.equation(kind, False)
         for kind in ("flow", "outputs"):
@@ -41,7 +42,7 @@ class Translation:
         calls = []
         for piece, code in pieces:
             method = Method(self, code, dual, kind)
-            name = f"{code.placed.name if code.placed else piece.owner.__name__}_{kind}{suffix}"
+            name = self.own_name(f"{code.placed.name if code.placed else piece.owner.__name__}_{kind}{suffix}")
             where = f"{code.placed.name}: {type(code.placed.block).__name__}" if code.placed else piece.owner.__name__
             self.functions.append(f"/* {where} */\n{method.text(name)[1]}")
             calls.append(f"    {name}({args});")
@@ -50,13 +51,19 @@ class Translation:
         head = f"static inline void {kind}{suffix}(Part *part{seed})"
         self.functions.append("\n".join([f"{head} {{", *unused, *calls, "}"]))
 
+    def own_name(self, name: str) -> str:
+        """Return a name that no other equation has: blocks within a block whose suffix is "" are named as it is."""
+        self.named[name] = self.named.get(name, 0) + 1
+        return name if self.named[name] == 1 else f"{name}{self.named[name]}_"
+
     def sampled(self) -> None:
         turns = []
         for piece, code in self.source.equations["sampled"]:
             method = Method(self, code, False, "sampled")
             bases = sum(c.node.name == code.node.name for _, c in self.source.equations["sampled"]) > 1
             owner = code.placed.name if code.placed else piece.owner.__name__ if bases else ""
-            name = (f"{owner}_{code.node.name}" if owner else code.node.name) + "_"  # no name of the runtime ends so
+            # no name of the runtime ends so
+            name = self.own_name((f"{owner}_{code.node.name}" if owner else code.node.name) + "_")
             self.functions.append(method.text(name)[1])
             self.written |= method.touched
             call = f"{name}(part);"

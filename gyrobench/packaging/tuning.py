@@ -100,7 +100,7 @@ def _kept(source: PartCode) -> Iterator[Code]:
             for code in reached(equation, source):
                 for n in code.nodes():
                     for test in _tests(n):
-                        read = {flat_name(e, code) or "" for e in ast.walk(test)} - {""}
+                        read = {flat_name(e, code, source) or "" for e in ast.walk(test)} - {""}
                         assert isinstance(n, ast.If)
                         body = ast.FunctionDef(code.node.name, code.node.args, n.body, [], lineno=n.lineno)
                         branch = replace(code, node=body)

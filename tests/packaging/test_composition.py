@@ -12,7 +12,7 @@ import pytest
 from gyrobench.bench import standard_folder
 from gyrobench.component import Block, Component, ComponentError, Input, Noise, Output, Parameter, State, sampled
 from gyrobench.packaging import SubsetError, load_part
-from gyrobench.packaging.dependencies import reached
+from gyrobench.packaging.dependencies import followed, initial_dependencies, reached
 from gyrobench.packaging.instance import TARGETS, make
 from gyrobench.packaging.source import PartCode
 
@@ -336,3 +336,41 @@ def test_calling_a_kind_of_equation_runs_all_of_it() -> None:
     one.x = [1.0, 2.0]
     one.flow()
     assert one.der.x == [-1.0, 7.0]
+
+
+def test_blocks_within_a_block_that_add_nothing_to_its_name(bench: Path) -> None:
+    """Both have a start and a sampled method of one name, which are two functions in C; what reads their discretes from
+    outside changes with them.
+    """
+    folder = bench / "components" / "pair"
+    folder.mkdir()
+    (folder / "model.py").write_text(
+        "from gyrobench.component import Block, Component, Discrete, Output, Parameter, sampled\n"
+        + "".join(
+            f"\n\nclass {name}(Block):\n    {p} = Parameter({p[1]}.0, 'V', 'first')\n    {q} = Discrete(0.0, 'V')\n\n"
+            f"    def start(self):\n        self.{q} = self.{p}\n\n"
+            f"    @sampled(every=1)\n    def tick(self):\n        self.{q} = {k} * self.{q}\n"
+            for name, p, q, k in (("Twice", "p2", "q2", "2.0"), ("Thrice", "p3", "q3", "3.0"))
+        )
+        + "\n\nclass Two(Block):\n    suffixes = {'a': '', 'b': ''}\n    a = Twice()\n    b = Thrice()\n\n"
+        "    def sum(self):\n        return self.a.q2 + self.b.q3\n"
+        "\n\nclass Pair(Component):\n    two = Two()\n    y = Output('V')\n\n"
+        "    def outputs(self):\n        self.y = self.two.sum()\n"
+    )
+    for target in TARGETS:
+        one = make("pair", target, bench=bench)
+        one.initialize()
+        seen = [one.get(["y"])[0]]
+        for k in range(2):
+            one.step(k * 1e-3, 1e-3)
+            seen.append(one.get(["y"])[0])
+        one.free()
+        assert seen == [5.0, 4.0 + 9.0, 8.0 + 27.0], target  # 2 + 3, each times its factor at each step
+    assert followed(PartCode(load_part("pair", bench))) is None
+
+
+def test_a_declaration_of_a_block_is_found_by_its_name_in_the_part() -> None:
+    """Of a block within a block, one shared, and the transpose of an array, which is no block."""
+    friction = initial_dependencies(PartCode(load_part("table_body")))["der.axis_w"]
+    assert {"axis_friction", "axis_friction_static"} <= friction
+    assert "base" in initial_dependencies(PartCode(load_part("fixture")))["f"]  # self.base.T @ ...
