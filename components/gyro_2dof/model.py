@@ -279,8 +279,10 @@ class Gyro2dof(Component):
         about_x = drift[0] + excited * torquer_rate(self.k_y * (1.0 + self.k_T_y * T), self.k2_y, self.k3_y, self.i_y)
         about_y = drift[1] + excited * torquer_rate(self.k_x * (1.0 + self.k_T_x * T), self.k2_x, self.k3_x, self.i_x)
         if self.K_q != 0.0 or self.K_phi > 0.0:
-            about_x = about_x + (self.K_q * self.psi_y - self.K_phi * self.psi_x) / self.speed()
-            about_y = about_y - (self.K_q * self.psi_x + self.K_phi * self.psi_y) / self.speed()
+            K_q = self.K_q / self.speed()
+            K_phi = self.K_phi / self.speed()
+            about_x = about_x + K_q * self.psi_y - K_phi * self.psi_x
+            about_y = about_y - K_q * self.psi_x - K_phi * self.psi_y
         return vector([about_x, about_y])
 
     def flow(self) -> None:

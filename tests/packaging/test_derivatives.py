@@ -167,7 +167,8 @@ def test_casadi_agrees(instance: Callable, name: str, monkeypatch: pytest.Monkey
     monkeypatch.undo()
     for k, (der, out) in enumerate(part.tangents({n: 1.0} for n in names)):
         largest = np.max(np.abs(oracle[:, k]))
-        np.testing.assert_allclose(der + out, oracle[:, k], rtol=1e-12, atol=1e-14 * largest)
+        # terms that cancel are some times as large as what is left of them, the largest of the column
+        np.testing.assert_allclose(der + out, oracle[:, k], rtol=1e-12, atol=1e-13 * largest)
 
 
 @pytest.mark.parametrize("name", ["lag", "linear", "swing", "floated_gyro", "rebalance_analog"])

@@ -29,7 +29,8 @@ from gyrobench.workflow.inputs import load_test
 
 FOLDER = Path(words.__file__).parent
 SAID = ("say", "heading", "spoken")
-STAY = {
+RIDES = {"vehicle", "ship", "helicopter", "aircraft", "truck"}  # values of an option, as they are typed
+STAY = RIDES | {
     "min",
     "gyrobench",
     "Python",
