@@ -32,6 +32,16 @@ def test_jitter_is_that_of_the_linear_model(quiet: Any) -> None:
 
 
 @pytest.mark.long
+def test_a_largest_angle_has_the_random_walk_of_the_gyro(quiet: Any) -> None:
+    """0.005 deg/s/sqrt(Hz), one-sided: after the second of the load 8.727e-5 sqrt(1/2) = 61.7 µrad; the rests of the
+    load, half a second each, show a third of it.
+    """
+    walk = math.radians(0.005) * math.sqrt(0.5) * 1e6
+    for name in ("peak pitch", "peak yaw"):
+        assert 0.75 * walk < quiet[name].u < 1.4 * walk
+
+
+@pytest.mark.long
 def test_noise_of_the_gyro_by_hand() -> None:
     """No vibration: with |T| about 1 below the crossover, rms of n/(2 pi f) from 1 Hz on, peaked by the loop.
 

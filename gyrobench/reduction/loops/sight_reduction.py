@@ -51,7 +51,10 @@ class SightReduction(LoopReduction):
         y = gate[LOS[k]] - (float(rest.mean()) if rest.size else 0.0)
         meaning = f"largest angle of the line of sight after {gate.amplitude:g} N·m"
         at = int(np.argmax(np.abs(y)))
-        u = peak_noise(y[y.size // 2 :], 1, at, y)  # settled; the hold is the ride, which vibrates
+        u = peak_noise(y[y.size // 2 :], 1, at, y)  # settled
+        if (ride := self.ride()) is not None:
+            # the gyro's random walk, which is in the long ride alone, makes the largest angle at any time of a flat top
+            u = max(u, peak_noise(ride[self.sight[k]], 1, y.size - 1, y))
         self.found.measure(f"peak {name}", meaning, "µrad", abs(float(y[at])), u, scale=MICRO)
         self.found.step(gate, LOS[k], scale=MICRO, unit="µrad", y_name=f"line of sight, {name}")
 
