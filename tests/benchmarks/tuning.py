@@ -52,7 +52,7 @@ def brute(name: str, wishes: list[str], names: tuple[str, str]) -> float:
     """Return the best worst ratio of a grid of controllers, over the corners and the middle of the spread."""
     corners = [dict(zip(names, p, strict=True)) for p in itertools.product((1 - SHARE, 1 + SHARE), repeat=2)]
     found, step = grid_of(name, [{}, *corners])
-    shape, parsed = ControllerStructure("lead"), parse_wishes(wishes)
+    shape, parsed = ControllerStructure("lead").of(found[0]), parse_wishes(wishes)
     wanted = load_system(name).crossovers().get("stabilizer")
     decades = box(shape, parsed, wanted, step)
     problem = TuningProblem(shape, parsed, found, decades, frequencies(found, decades, parsed, 250))
