@@ -229,6 +229,15 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     assert found["τ"]["u"] < 2.0 and found["t_w"]["u"] < 7.0  # a second one of some percent is not excluded
 
 
+@pytest.mark.long
+def test_a_late_stamp_of_the_turn_on_is_asked_for(command: Command, tmp_path: Path) -> None:
+    """A reading of 10 s late, A is exp(10/60) = 1.18 times as large, and the residuals are the same."""
+    late = [[*row[:4], row[4] + 10.0, *row[5:]] for row in rows()]
+    _, _, result = reduced(command, tmp_path, late)
+    asked = next(r["text"] for r in result["reasons"] if r["id"] == "arrangement.unstated")
+    assert "the times since the turn-on short by one reading (A by" in asked
+
+
 def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:
     """No warm-up, no noise: the biases as they are, sample standard deviation within days."""
     table = [row for row in rows(0.0) if row[4] == 245.0]

@@ -97,6 +97,10 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _meters(record)
+    if np.any(later := np.diff(np.asarray(record.windows.get("since", ()), dtype=float)) > 0.0):
+        gap = float(np.median(np.diff(record.windows["since"])[later]))
+        words = "the times since the turn-on short by one reading"
+        yield HandlingCandidate(words, changed(record, since=record.windows["since"] + gap))
     if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)
