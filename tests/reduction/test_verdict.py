@@ -99,6 +99,5 @@ def written_verdicts() -> Iterator[str]:
 
 @pytest.mark.long
 def test_one_function_writes_verdicts() -> None:
-    """SuiteQuantity has a word of comparison (agree, disagree), SuiteMember the verdict of its test, told again."""
-    told = {"method_comparison.py:SuiteQuantity", "method_comparison.py:SuiteMember"}
-    assert set(written_verdicts()) == {"verdict.py:replace", *told}
+    """SuiteQuantity has a word of comparison (agree, disagree)."""
+    assert set(written_verdicts()) == {"verdict.py:replace", "method_comparison.py:SuiteQuantity"}

@@ -132,6 +132,6 @@ def test_no_documented_command_is_questioned() -> None:
             known = {
                 n: v
                 for n, v in values.items()
-                if n.partition(".")[0] not in foreign and n not in ("profile", "program")
+                if n.partition(".")[0] not in foreign and n not in ("profile", "program", "path")
             }
             resolved(system, known, own)
