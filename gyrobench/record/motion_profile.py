@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import CsvColumn, DataError, read_measured
 
 POINTS = 400  # of the part base_motion
@@ -24,6 +25,17 @@ _COLUMNS = (
     CsvColumn("roll", "rad", "roll, about y (forward)", required=False),
     CsvColumn("heading", "rad", "heading, about z (up), counter-clockwise from above", required=False),
 )
+
+
+def gaps(t: Array) -> list[str]:
+    """Return the gaps in the times of a recording as problems, eight at most."""
+    intervals = np.diff(t)
+    usual = np.median(intervals) if t.size >= 3 else np.inf
+    return [
+        f"a gap of {intervals[k]:.6g} s after time = {t[k]:.6g} s, where the median interval is {usual:.6g} s: cut the "
+        "recording there, or fill it"
+        for k in np.flatnonzero(intervals > GAP * usual)[:8]
+    ]
 
 
 def read_profile(file: Path, slot: str = "motion") -> dict[str, Any]:
@@ -42,12 +54,7 @@ def read_profile(file: Path, slot: str = "motion") -> dict[str, Any]:
     if not 3 <= t.size <= POINTS:
         advice = f"thin it to every {-(-t.size // POINTS)}th row" if t.size > POINTS else "a recording is expected"
         problems.append(f"{t.size} points: 3 to {POINTS} are allowed; {advice}")
-    intervals = np.diff(t)
-    for k in np.flatnonzero(intervals > GAP * np.median(intervals))[:8] if t.size >= 3 else ():
-        problems.append(
-            f"a gap of {intervals[k]:.6g} s after time = {t[k]:.6g} s, where the median interval is "
-            f"{np.median(intervals):.6g} s: cut the recording there, or fill it"
-        )
+    problems += gaps(t)
     if problems:
         raise DataError(file, problems)
     table = np.column_stack([np.zeros(t.size) if a is None else a for a in angles])

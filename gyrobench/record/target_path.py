@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import CsvColumn, DataError, read_measured
+from gyrobench.record.motion_profile import gaps
 
 POINTS = 400  # of the part moving_target
-GAP = 3.0  # intervals longer than this many median intervals are gaps
 STEEP = np.radians(85.0)  # largest turn about x: beyond it a turn about z is next to none
 FIRST = 16  # intervals from which the search for the rows to keep begins
 RECORDED = 3  # its kind
@@ -62,12 +62,7 @@ def read_path(file: Path, tolerance: float) -> TargetPath:
     problems = []
     if t.size < 3:
         problems.append(f"{t.size} rows: 3 or more are needed")
-    intervals = np.diff(t)
-    for k in np.flatnonzero(intervals > GAP * np.median(intervals))[:8] if t.size >= 3 else ():
-        problems.append(
-            f"a gap of {intervals[k]:.6g} s after time = {t[k]:.6g} s, where the median interval is "
-            f"{np.median(intervals):.6g} s: cut the recording there, or fill it"
-        )
+    problems += gaps(t)
     over = np.flatnonzero(np.abs(elevation) > 0.5 * np.pi)
     if over.size:
         problems.append(

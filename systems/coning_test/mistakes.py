@@ -11,6 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_columns, exchanged_rows
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
+from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
 from gyrobench.result import Reason
 
 from .closed import AXES, cone_rate
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 MORE = 1.3  # of the rate of the cone: more drift than no coning terms at all make
 ACROSS = 3.0  # times the drift along the axis of the cone: another axis, where it is a good part of the cone's rate
 PART = 0.02
-GYROS = 0.05  # of the rate of the cone: more than scale factors and misalignments make
-CLEAR = 4.0  # standard uncertainties
-OFF = 0.1  # the same, of which nothing passes
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
@@ -45,24 +43,19 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
 def other_chain(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) -> Iterator[Reason]:
     """Yield that the drift along the axis of the cone is not that of the stated chain, by more than gyros explain."""
     own = AXES.index(setup.axis)
+    motions = [(cone_rate(f, theta), float(setup.chain.drift(f, theta, own)[own])) for f, theta in cones.cones]
     y = np.asarray(windows[f"drift_{setup.axis}"], dtype=float)
-    rest = y[cones.number < 0]
-    for k, (f, theta) in enumerate(cones.cones):
-        rate, stated = cone_rate(f, theta), float(setup.chain.drift(f, theta, own)[own])
-        here = y[cones.number == k]
-        u = float(np.hypot(np.std(rest, ddof=1) / np.sqrt(rest.size), np.std(here, ddof=1) / np.sqrt(here.size)))
-        drift = float(here.mean() - rest.mean())
-        if abs(drift - stated) > GYROS * abs(rate) + CLEAR * u:
-            text = (
-                f"At {f:g} Hz the attitude drifts by {drift / rate:.3g} of ω (1 − cos θ), the stated filter, output "
-                f"rate and algorithm make {stated / rate:.3g}. Are frequency (Hz, not rad/s) and half-angle (not the "
-                "full angle) in the units that are given, and interval, bandwidth, coning and samples those of the "
-                "unit?"
-            )
-            far = abs(drift - stated) > OFF * abs(rate) + CLEAR * u
-            blocked, severity = (("pass",), "doubt") if far else ((), "warning")
-            yield Reason("coning.stated", text.replace(" -", " −"), blocked, severity=severity)
-            return
+    if (off := first_departure(y, cones.number, motions)) is None:
+        return
+    k, drift, far = off
+    rate, stated = motions[k]
+    text = (
+        f"At {cones.cones[k][0]:g} Hz the attitude drifts by {drift / rate:.3g} of ω (1 − cos θ), the stated filter, "
+        f"output rate and algorithm make {stated / rate:.3g}. Are frequency (Hz, not rad/s) and half-angle (not the "
+        "full angle) in the units that are given, and interval, bandwidth, coning and samples those of the unit?"
+    )
+    blocked, severity = SEVERITY[far]
+    yield Reason("coning.stated", text.replace(" -", " −"), blocked, severity=severity)
 
 
 def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) -> Iterator[Reason]:

@@ -12,6 +12,7 @@ from gyrobench.frames import G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
+from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
 from gyrobench.result import Reason
 
 from .closed import reading
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 MORE = 1.3  # of the reading: more than with nothing taken back at all
 PART = 0.02  # of the reading: the other sign
-INSTRUMENTS = 0.05  # of the reading: more than scale factors and misalignments make
-CLEAR = 4.0  # standard uncertainties
-OFF = 0.1  # the same, of which nothing passes
 REST = 0.5  # m/s2 at rest: gravity is still there
 
 
@@ -40,23 +38,19 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
 
 def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:
     """Yield that the acceleration is not that of the stated chain, by more than the instruments explain."""
-    y = np.asarray(windows["acceleration"], dtype=float)
-    rest = y[motions.number < 0]
-    for k, m in enumerate(motions.motions):
-        read, stated, here = reading(m, setup.chain.gravity), setup.chain.rise(m), y[motions.number == k]
-        u = float(np.hypot(np.std(rest, ddof=1) / np.sqrt(rest.size), np.std(here, ddof=1) / np.sqrt(here.size)))
-        found = float(here.mean() - rest.mean())
-        if abs(found - stated) > INSTRUMENTS * abs(read) + CLEAR * u:
-            text = (
-                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the stated "
-                f"filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle and vibration "
-                "(amplitudes) in the units that are given, and interval, filters, sculling, samples and size those of "
-                "the unit?"
-            )
-            far = abs(found - stated) > OFF * abs(read) + CLEAR * u
-            blocked, severity = (("pass",), "doubt") if far else ((), "warning")
-            yield Reason("sculling.stated", text.replace(" -", " −"), blocked, severity=severity)
-            return
+    expected = [(reading(m, setup.chain.gravity), setup.chain.rise(m)) for m in motions.motions]
+    off = first_departure(np.asarray(windows["acceleration"], dtype=float), motions.number, expected)
+    if off is None:
+        return
+    k, found, far = off
+    read, stated = expected[k]
+    text = (
+        f"At {motions.motions[k].frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the "
+        f"stated filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle and vibration "
+        "(amplitudes) in the units that are given, and interval, filters, sculling, samples and size those of the unit?"
+    )
+    blocked, severity = SEVERITY[far]
+    yield Reason("sculling.stated", text.replace(" -", " −"), blocked, severity=severity)
 
 
 def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:

@@ -52,7 +52,7 @@ from gyrobench.campaign.execution.axes import (
     draw,
     parse_axis,
 )
-from gyrobench.campaign.execution.definition_files import _texts, flat, memory, plain, problem_of, read_table
+from gyrobench.campaign.execution.definition_files import as_texts, flat, memory, plain, problem_of, read_table
 from gyrobench.errors import GyrobenchError
 from gyrobench.reading import shorten
 from gyrobench.system.values import parse_number
@@ -300,7 +300,7 @@ def read_definition(file: Path) -> Definition:
     content = reading.toml(reading.read_text(file, UsageError), file, UsageError)
     content.setdefault("name", file.stem)
     for table in {"set", "over"} & content.keys():
-        content[table] = _texts(content[table])
+        content[table] = as_texts(content[table])
     return from_mapping(content, file.parent, str(file))
 
 

@@ -53,12 +53,12 @@ def read_table(file: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _texts(value: Any) -> Any:
+def as_texts(value: Any) -> Any:
     """Return numbers of a file as texts: the size of one without a unit is questioned, as on the command line."""
     if isinstance(value, dict):
-        return {k: _texts(v) for k, v in value.items()}
+        return {k: as_texts(v) for k, v in value.items()}
     if isinstance(value, list) and not any(isinstance(v, list | dict) for v in value):
-        return [_texts(v) for v in value]
+        return [as_texts(v) for v in value]
     return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 

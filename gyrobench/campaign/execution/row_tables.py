@@ -29,7 +29,7 @@ LAST = {
 Row = Mapping[str, Any]
 
 
-def _as_table(rows: Sequence[Row], units: Mapping[str, str]) -> pa.Table:
+def as_table(rows: Sequence[Row], units: Mapping[str, str]) -> pa.Table:
     """Return rows as a table: columns in the order in which the rows, sorted by index, first have them."""
     rows = sorted(rows, key=lambda row: row["index"])
     names = dict.fromkeys([*FIRST, *(name for row in rows for name in row if name not in LAST), *LAST])
@@ -54,11 +54,11 @@ def _plain(value: Any, kind: pa.DataType) -> Any:
     return float(value) if kind == pa.float64() else value
 
 
-def _units(table: pa.Table) -> dict[str, str]:
+def units_of(table: pa.Table) -> dict[str, str]:
     return {f.name: f.metadata[b"unit"].decode() for f in table.schema if f.metadata and b"unit" in f.metadata}
 
 
-def _concatenated(tables: Sequence[pa.Table]) -> pa.Table:
+def concatenated(tables: Sequence[pa.Table]) -> pa.Table:
     """Return tables one after the other; a column that is text in one of them is text."""
     texts = {f.name for t in tables for f in t.schema if f.type == pa.string()}
     return pa.concat_tables([_texts(t, texts) for t in tables], promote_options="default") if tables else pa.table({})
@@ -81,7 +81,7 @@ def merge(tables: Sequence[pa.Table]) -> pa.Table:
     Columns of results are in the order in which the rows first have them.
     """
     if not tables:
-        return _as_table([], {})
+        return as_table([], {})
     places: dict[str, tuple[int, int]] = {}
     for table in tables:
         index = table.column("index")
@@ -101,7 +101,7 @@ def merge(tables: Sequence[pa.Table]) -> pa.Table:
         return True, places.get(f"{base}.estimate", last), base, NUMBERS.index(number)
 
     results = sorted((n for n in names if n in places or not n.startswith("in.")), key=order)
-    rows = _concatenated([*tables, _as_table([], {})])  # rows of older versions have fewer columns
+    rows = concatenated([*tables, as_table([], {})])  # rows of older versions have fewer columns
     seen: set[str] = set()
     first = []
     for run in rows.column("run").to_pylist():
@@ -111,12 +111,12 @@ def merge(tables: Sequence[pa.Table]) -> pa.Table:
     return rows.select([*FIRST, *results, *LAST]).combine_chunks()
 
 
-def _with_plan(table: pa.Table, plan: Mapping[str, Row], units: Mapping[str, str]) -> pa.Table:
+def with_plan(table: pa.Table, plan: Mapping[str, Row], units: Mapping[str, str]) -> pa.Table:
     """Return rows with the columns that the plan knows as it has them now, in their order."""
     runs = table.column("run").to_pylist()
     if not runs:
         return table
-    planned = _as_table([{**plan[run], "run": run} for run in runs], units)
+    planned = as_table([{**plan[run], "run": run} for run in runs], units)
     row = {run: k for k, run in enumerate(planned.column("run").to_pylist())}
     planned = planned.take(pa.array([row[run] for run in runs]))
     inputs = [n for n in planned.column_names if n.startswith("in.")]

@@ -30,7 +30,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from gyrobench import reading
-from gyrobench.campaign.execution.row_tables import Row, _as_table, _concatenated, _units, _with_plan, merge
+from gyrobench.campaign.execution.row_tables import Row, as_table, concatenated, merge, units_of, with_plan
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderLock, write_whole
 from gyrobench.notebook import MissingPackageError
@@ -107,12 +107,12 @@ class Campaign:
 
     def log(self) -> pandas.DataFrame:
         """Return how the runs were executed: run, worker, attempts, seconds, finished_at, tries."""
-        return _concatenated(self._tables("log")).to_pandas()
+        return concatenated(self._tables("log")).to_pandas()
 
     def arrow(self) -> pa.Table:
         """Return the rows of the runs as an Arrow table; its units are :attr:`units`."""
         table = merge(self._tables("runs"))
-        self.units |= _units(table)
+        self.units |= units_of(table)
         return table
 
     def read(self, path: str) -> bytes:
@@ -201,7 +201,7 @@ class CampaignStore(Campaign):
         text = json.dumps(reading.sealed(self.definition), indent=1, ensure_ascii=False) + "\n"
         self._write(FILE, text.encode("utf-8", "backslashreplace"))
         table = self._arrange(plan, units or {})
-        self.units = {**_units(table), **(units or {})}
+        self.units = {**units_of(table), **(units or {})}
         return dict(zip(table.column("run").to_pylist(), table.column("state").to_pylist(), strict=True))
 
     def _arrange(self, plan: Mapping[str, Row], units: Mapping[str, str]) -> pa.Table:
@@ -209,7 +209,7 @@ class CampaignStore(Campaign):
         files = {folder: self._files(folder) for folder in ("runs", "earlier")}
         table = merge([t for folder in files for t in self._tables(folder)])
         wanted = [run in plan for run in table.column("run").to_pylist()]
-        planned = _with_plan(table.filter(pa.array(wanted, pa.bool_())), plan, units)
+        planned = with_plan(table.filter(pa.array(wanted, pa.bool_())), plan, units)
         others = table.filter(pa.array([not w for w in wanted], pa.bool_()))
         for folder, content in (("runs", planned), ("earlier", others)):
             file = self._write_table(folder, content) if content.num_rows else ""
@@ -244,7 +244,7 @@ class CampaignStore(Campaign):
                 raise CampaignError(f"{column}: in {unit} here, in {self.units[column]} in other runs")
         if log:
             self._write_table("log", pa.Table.from_pylist(list(log), schema=LOG))
-        self._write_table("runs", _as_table(rows, self.units))
+        self._write_table("runs", as_table(rows, self.units))
         if len(self._files("runs")) > FILES_BEFORE_MERGE:
             self.consolidate()
 
@@ -264,7 +264,7 @@ class CampaignStore(Campaign):
             k = table.schema.get_field_index("report")
             self._replace(files, "runs", table.set_column(k, table.field(k), [pa.array(paths, pa.string())]))
         if len(files := self._files("log")) > 1:
-            self._replace(files, "log", _concatenated(self._tables("log")))
+            self._replace(files, "log", concatenated(self._tables("log")))
         if self.local is not None:
             for folder in ("runs", "log"):
                 for half in set((self.local / folder).glob("*")) - set((self.local / folder).glob("*.parquet")):
