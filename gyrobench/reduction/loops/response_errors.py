@@ -17,9 +17,11 @@ from scipy import special
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT, TOO_LARGE
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor, response
+from gyrobench.reduction.setup.conditions import TYPE_B_UNSTATED
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.sources import READING_GAIN, TIME_BASE, Source
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -128,12 +130,16 @@ def not_stated(
             "No uncertainty of the table or its reading is stated: u is of the points alone. State u_gain, u_lag ..., "
             "or declare type_b = none."
         )
-        yield Reason("type_b.unstated", text, ("pass", "fail"), severity="doubt")
+        yield Reason(TYPE_B_UNSTATED, text, ("pass", "fail"), severity="doubt")
     if run.arrangement == "checked":
         return
     said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id]]
     for s in by:
-        moved = {name: abs(0.02 * float(np.nan_to_num(s.change[k]))) / u for k, name, _, _, u in figures if u > 0.0}
+        moved = {
+            name: (TOO_LARGE - 1.0) * abs(float(np.nan_to_num(s.change[k]))) / u
+            for k, name, _, _, u in figures
+            if u > 0.0
+        }
         far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
         if s.source.id in WRONG and s.u == 0.0 and far:
             said.append(f"{WRONG[s.source.id]} ({', '.join(f'{n} by {moved[n]:.2g} u' for n in far)})")
@@ -141,4 +147,4 @@ def not_stated(
         f"No residual of this record would show: {'; '.join(said)}. State that units and scales were checked "
         "(arrangement = checked)."
     )
-    yield Reason("arrangement.unstated", text, ("pass",), severity="doubt")
+    yield Reason(ARRANGEMENT, text, ("pass",), severity="doubt")

@@ -3,8 +3,7 @@
 Two instruments whose rows are in one column, a multiplexer, rows that were interpolated.  Noise knows no rows: level
 and logarithm of the mean square of even and odd rows, each less the mean of its two neighbours, have the same
 expectation.  Their differences in blocks of the record are compared by the t test, which holds for noise of any
-distribution and one
-whose level changes.  [own derivation]
+distribution, and for one whose level changes.  [own derivation]
 """
 
 from __future__ import annotations
