@@ -20,10 +20,10 @@ def filled(page: Any, fields: dict[str, str], command: str) -> None:
     """Fill fields by their labels, see the command, start it, and wait for its end."""
     for label, text in fields.items():
         page.get_by_label(label).fill(text)
-    page.wait_for_function("t => document.querySelector('.code').textContent.startsWith(t)", arg=command)
+    page.wait_for_function("t => document.querySelector('.code')?.textContent.startsWith(t)", arg=command)
     page.get_by_role("button", name="Start").click()
     page.wait_for_url("**/job/**")
-    page.wait_for_function("['done', 'failed'].includes(document.querySelector('[role=status]').textContent)")
+    page.wait_for_function("['done', 'failed'].includes(document.querySelector('[role=status]')?.textContent)")
 
 
 def test_a_loop_is_tuned_by_a_form(page: Any, studio: tuple[str, Path]) -> None:
@@ -108,7 +108,7 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     page.get_by_role("option", name="fixed_position/run1").click()
     page.keyboard.press("Escape")
     page.get_by_label("Number of the certificate").fill("2026-7")
-    page.wait_for_function("document.querySelector('.code').textContent.includes('--number=2026-7')")
+    page.wait_for_function("document.querySelector('.code')?.textContent.includes('--number=2026-7')")
     page.get_by_role("button", name="Make the certificate").click()
     page.get_by_role("link", name="Its pages").click()
     page.frame_locator("iframe.report").get_by_text("2026-7").first.wait_for()
@@ -123,7 +123,7 @@ def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[st
     page.locator('[aria-label="FMU for gyro"] input[type=file]').set_input_files(fmu)
     mapping = page.get_by_label("Mapping")
     assert "into the socket SdfGyro" in mapping.input_value()
-    page.wait_for_function("document.querySelector('.code').textContent.includes('--map gyro=')")
+    page.wait_for_function("document.querySelector('.code')?.textContent.includes('--map gyro=')")
     mapping.fill((TESTS / "foreign" / "vendor_gyro.toml").read_text(encoding="utf-8"))
     page.get_by_role("button", name="Run").click()
     run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
