@@ -48,8 +48,17 @@ def test_from_the_first_page_to_a_report(page: Any, studio: tuple[str, Path]) ->
     page.get_by_role("link", name=f"fixed_position/{folder.name}").wait_for()
 
 
+#: a page waits for its connection as long as a test does: after 20 s it would look for another way
+PATIENT = f"""let made;
+Object.defineProperty(window, "io", {{
+  get: () => made,
+  set: (io) => (made = (address, options) => io(address, {{ ...options, timeout: {LIMIT} }})),
+}});"""
+
+
 def test_the_gallery_needs_no_answer_of_the_studio(page: Any, studio: tuple[str, Path]) -> None:
     """Searched and left by a click where the studio hears nothing: cards are links, none moves later."""
+    page.add_init_script(PATIENT)
     page.route_web_socket("**", lambda socket: None)  # it opens, and no message ever comes
     page.goto(base_of(studio) + "/")
     cards = page.locator(".card:visible")
@@ -69,6 +78,7 @@ def test_the_gallery_needs_no_answer_of_the_studio(page: Any, studio: tuple[str,
 
 def test_what_is_typed_before_there_is_a_connection_counts(page: Any, studio: tuple[str, Path]) -> None:
     held: list[Any] = []
+    page.add_init_script(PATIENT)
     page.route_web_socket("**", lambda socket: held.append(socket))  # it opens, and the studio does not know yet
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("latitude", exact=True).fill("12deg")
