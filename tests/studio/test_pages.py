@@ -244,7 +244,7 @@ def test_what_is_drawn_stands_as_the_record_says(
         row = int(slider.get_attribute("aria-valuenow"))
         rows.add(row)
         expected = {body: axes[0] for body, axes in attitudes(bodies, record, np.array([row])).items()}
-        soon(lambda axes=expected: off_by(page, axes) < 1e-9, True)  # type: ignore[misc]
+        soon(lambda axes=expected: off_by(page, axes) < 1e-9, True)
     if name == next(iter(MOVING)):  # what stands still is drawn for a second, and then no more
         frames = "getElement(document.querySelector('.scene').id.slice(1)).framesDrawn"
         page.wait_for_function(f"() => {frames} > 0")
