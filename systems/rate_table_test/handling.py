@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from gyrobench.units import DEG
 from .steps import direction, levels
 
 UNSIGNED = "are its readings of one sense given without their sign?"
+Rows = np.ndarray[Any, np.dtype[np.intp]]
 LATEST = 1.05  # of a step that a mean holds of another rate; more is no transition
 FAR = 0.1  # scale factor error from which on something else than the gyro is meant
 
@@ -52,8 +54,8 @@ def _reversed_steps(record: Record) -> Iterator[HandlingCandidate]:
 
 
 def _transitions(record: Record) -> Iterator[HandlingCandidate]:
-    """Means that hold a part of the rate before or after: of the row that the others contradict most, which is left
-    out; of all rows that begin a rate, or end one, whose rate then becomes the mixture.
+    """Means that hold a part of the rate before or after, or all of it: of the row and of the rate that the others
+    contradict most, which are left out; of all rows that begin a rate, or end one, whose rate becomes the mixture.
     """
     w = record.windows
     rate, mean = (np.asarray(w[n], dtype=float) for n in ("rate", "mean"))
@@ -68,35 +70,47 @@ def _transitions(record: Record) -> Iterator[HandlingCandidate]:
     }
     x, d = rate / full, direction(rate)
     X = np.column_stack([np.ones_like(x), x, np.abs(x), x**3, d])
-    yield from _one_transition(record, X, mean, step)
+    yield _left_out(record, X, mean, step, [np.array([k]) for k in range(rate.size)])
+    several = [rows for k in range(level[-1] + 1) if (rows := np.flatnonzero(level == k)).size > 1]
+    if several:
+        yield _left_out(record, X, mean, step, several)
     edge = {"before": np.concatenate([[True], np.diff(level) > 0]), "after": np.append(np.diff(level) > 0, True)}
-    for where, words in (("before", "begins"), ("after", "ends")):
-        held = np.where(edge[where], step[where], 0.0)
-        basis = np.linalg.qr(X)[0]
+    basis = np.linalg.qr(X)[0]
+    for where, at in edge.items():
+        held = np.where(at, step[where], 0.0)
         own = held - basis @ (basis.T @ held)
         if not np.linalg.norm(own) > 0.1 * np.linalg.norm(held):  # one reading a rate: it is a hysteresis
             continue
         part = float(own @ mean / (own @ own))
+        before = f"a part of {part:.2g} of the rate before in each reading that begins a rate (settle longer)"
+        after = f"a part of {part:.2g} of the rate after in each reading that ends a rate (settle longer)"
         if 0.0 < part <= LATEST:
-            text = f"a part of {part:.2g} of the rate {where} in each reading that {words} a rate (settle longer)"
-            yield HandlingCandidate(text, changed(record, rate=rate + part * held))
+            words = before if where == "before" else after
+            yield HandlingCandidate(words, changed(record, rate=rate + part * held))
 
 
-def _one_transition(record: Record, X: Array, mean: Array, step: dict[str, Array]) -> Iterator[HandlingCandidate]:
-    """The row that is furthest from a fit of the others, left out, where it lies towards the rate before or after."""
+def _left_out(record: Record, X: Array, mean: Array, step: dict[str, Array], groups: list[Rows]) -> HandlingCandidate:
+    """Return the record without the group of rows that is furthest from a fit of the others, by how far it lies towards
+    the rate before or after.
+    """
     basis, s, _ = np.linalg.svd(X, full_matrices=False)
     basis = basis[:, s > 1e-9 * s[0]]
-    free = 1.0 - np.sum(basis**2, axis=1)
     left = mean - basis @ (basis.T @ mean)
-    score = np.where(free > 1e-6, np.abs(left) / np.sqrt(np.maximum(free, 1e-6)), 0.0)
-    row = int(np.argmax(score))
-    off = float(left[row] / free[row]) if score[row] > 0.0 else 0.0
-    parts = {where: off / float(d[row]) for where, d in step.items() if d[row]}
+
+    def off(rows: Rows) -> Array:
+        H = basis[rows]
+        out: Array = np.linalg.lstsq(np.eye(rows.size) - H @ H.T, left[rows], rcond=1e-6)[0]
+        return out
+
+    rows = max(groups, key=lambda g: float(left[g] @ off(g)))
+    far = float(np.mean(off(rows)))
+    parts = {where: far / float(d[rows[0]]) for where, d in step.items() if d[rows[0]]}
     found = [f"{p:.2g} of the rate {where}" for where, p in parts.items() if 0.0 < p <= LATEST]
-    if off:
-        what = f"it holds {' or '.join(found)}" if found else f"it is off by {off / DEG:.3g} °/s".replace("-", "−")
-        kept = {n: np.delete(np.asarray(v), row) for n, v in record.windows.items()}
-        yield HandlingCandidate(f"row {row + 1} left out: {what}", Record(kept, {}, record.run))
+    what = f"held is {' or '.join(found)}" if found else f"off by {far / DEG:.3g} °/s".replace("-", "−")
+    first, last = rows[[0, -1]] + 1
+    where = f"row {first}" if first == last else f"rows {first} to {last}"
+    kept = {n: np.delete(np.asarray(v), rows) for n, v in record.windows.items()}
+    return HandlingCandidate(f"{where} left out ({what})", Record(kept, {}, record.run))
 
 
 def implausible(e: Coefficient, a: Coefficient) -> list[Reason]:

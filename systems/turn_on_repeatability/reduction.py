@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
@@ -44,6 +45,7 @@ from gyrobench.units import DPH
 from . import components, mistakes, temperature
 from .components import Spread, spread
 from .draws import Posterior
+from .labels import labelled
 from .truth import true_values
 from .warming import Kind, Warming, fitted, means
 
@@ -219,7 +221,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             dof = max(self.count - np.unique(self.day).size - 1, 1)
             added.append(temperature.coefficient(s.slope, dof, self.read, self.late, truth.get("b_T")))
         own = list(result.coefficients)
-        if self.tau.size + self.tau_E.size:
+        if self.tau.size + self.tau_E.size and asked.whole():
             self.drawn = self._draws()
             self.endless = self._endless()
             own = [self._allowed(c) for c in own]
@@ -236,6 +238,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
             self.setup.limit, longest
         )
+        if not asked.whole():
+            return Coefficient("t_w", meaning, SECONDS, own, math.nan, NORMAL, (math.nan, math.nan))
         times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t)))
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
         if self.endless or not math.isfinite(own):
@@ -385,16 +389,3 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
 
 reduce = Reduction.reduce
-
-
-def labelled(record: Record) -> dict[str, Array]:
-    """Return the windows with turn_on, day and rate; of a run by its plan."""
-    windows = dict(record.windows)
-    if not record.run.measured:
-        rows = {row.phase: row for row in record.run.plan}
-        phase = np.asarray(windows["phase"]).astype(int).tolist()
-        windows["turn_on"] = np.array(phase)
-        windows["day"] = np.array([round(rows[p].target_y) for p in phase])
-        if record.run.options["rate"]:
-            windows["rate"] = np.array([rows[p].target for p in phase])
-    return windows

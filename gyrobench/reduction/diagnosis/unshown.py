@@ -66,6 +66,7 @@ METERS = (
     ("the currents", ("current",), ("u_current",)),
     ("the rates", ("rate_",), ("u_time",)),
     ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
+    ("the levels of vibration", ("level",), ("u_gain",)),
     ("the times", ("t_",), ("u_time",)),
 )
 NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
