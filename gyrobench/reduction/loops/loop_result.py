@@ -183,7 +183,7 @@ class LoopFindings(MeasureFindings):
         p, h = self.record.run.parameters, self.record.run.step
         found = 0.0
         for slot, (first, ahead) in held.items():
-            period = round(float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0) / h)  # type: ignore[arg-type]
+            period = round(float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0) / h)
             if period > 1:
                 t = self.record.channels["time"]
                 found = ahead + h * held_lead(period, round(first / h), round(float(t[1] - t[0]) / h))

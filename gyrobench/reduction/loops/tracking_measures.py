@@ -60,7 +60,7 @@ class TrackingMeasures(LoopReduction):
         The linear model of the tracker holds for half a period, samples at each step h show the half less h/2.
         """
         p, h = self.run.parameters, self.run.step
-        exposure, processing, order = (float(p.get(f"tracker.{n}") or 0.0) for n in TRACKER)  # type: ignore[arg-type]
+        exposure, processing, order = (float(p.get(f"tracker.{n}") or 0.0) for n in TRACKER)
         return {} if order else {"tracker": (max(exposure, h) + processing, 0.5 * h)}
 
     def inside(self) -> list[str]:
