@@ -35,7 +35,7 @@ def said(tmp_path: Path, system: str, text: str) -> dict[str, Reason]:
 
 
 def eight_positions(settles: float) -> str:
-    """Three cycles, four readings in each position; the first one ``settles`` deg/h too high, the next ones 1/e of it."""
+    """Three cycles, four readings in a position; the first one ``settles`` deg/h too high, the next one 1/e of it."""
     rng = np.random.default_rng(4)
     w = EARTH * np.array([0.0, math.cos(math.radians(45.75)), math.sin(math.radians(45.75))])
     lines = [STATED + "# nuisances = none\n", "cycle,position,t_start [s],t_end [s],mean_x [mA],mean_y [mA]\n"]
