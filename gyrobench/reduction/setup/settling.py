@@ -4,8 +4,8 @@ Of each dwell with three readings or more: what its first reading (a) and its la
 between.  Stationary noise is the same backwards in time, a drift that is linear within the dwells gives a = -b, so
 
 * a + b has the mean 0: a t test over the dwells; it has not where each of them settles from the same side;
-* a + b and a - b are not correlated, since a and b scatter alike (Pitman and Morgan, 1939), here by ranks, which no
-  single outlier moves; they are where the sense of settling is that of the step before the dwell.
+* a + b and a - b are not correlated, since a and b scatter alike (Pitman and Morgan, 1939), neither as they are nor by
+  their ranks, which no single outlier moves; they are where the sense of settling is that of the step before the dwell.
 
 Either is said where its p, times the number of tests of the record, is below LEVEL.  The effect upon the mean of n
 readings is then of the size of its uncertainty or more (4/sqrt(n) times), and the same in every dwell of its kind: no
@@ -79,9 +79,10 @@ def _tested(ends: Array) -> tuple[bool, float]:
     """Return whether the test of the means is the likelier one, and the less p of both."""
     m, even, odd = len(ends), ends.sum(axis=1), ends[:, 0] - ends[:, 1]
     t = float(even.mean() / np.std(even, ddof=1)) * math.sqrt(m)
-    r = float(np.corrcoef(*(np.argsort(np.argsort(v)) for v in (even, odd)))[0, 1])
-    by_rank = abs(r) * math.sqrt((m - 2) / max(1.0 - r * r, 1e-12))
-    aside, scattered = (2.0 * float(special.stdtr(dof, -x)) for dof, x in ((m - 1, abs(t)), (m - 2, by_rank)))
+    ranks = [np.argsort(np.argsort(v)) for v in (even, odd)]
+    r = min(abs(float(np.corrcoef(x, y)[0, 1])) for x, y in ((even, odd), ranks))
+    by_scatter = r * math.sqrt((m - 2) / max(1.0 - r * r, 1e-12))
+    aside, scattered = (2.0 * float(special.stdtr(dof, -x)) for dof, x in ((m - 1, abs(t)), (m - 2, by_scatter)))
     return aside < scattered, min(aside, scattered)
 
 
