@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gyrobench.record.frequency_response import model_response
+from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import (
@@ -49,7 +50,7 @@ def open_loop_point(
     """Return L = (r - e)/e at the sine of a phase, and whether it counts.  by_neighbours: as loop_measures.response.
 
     u is that of S = e/r, which is linear in the noise: |dL/L| = |dS| / |S (1 - S)|.  coherence: the smaller one
-    of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average (held_lead).
+    of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average.
     Raises as loop_measures.response.
     """
     t, e, r = gate.t, gate[inside], gate[test]
@@ -74,14 +75,29 @@ def unled(L: complex, f: float, lead: float) -> complex:
     return L / (p + (p - 1.0) * L)
 
 
+def lead_of(record: Record, held: Mapping[str, tuple[float, float]]) -> float:
+    """Return by how much samples of a record show a held signal earlier than a model of it does, s; 0 where none is.
+
+    held: slot -> time at which its first sample is there, and lead of samples at each communication step before the
+    model, s; the last slot with a sampling period counts.
+    """
+    p, h, t = record.run.parameters, record.run.step, record.channels["time"]
+    found = 0.0
+    for slot, (first, ahead) in held.items():
+        period = float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0)
+        if period > 1.5 * h:
+            found = ahead + h * held_lead(round(period / h), round(first / h), round(float(t[1] - t[0]) / h))
+    return found
+
+
 def held_lead(period: int, arrives: int, every: int) -> float:
-    """Return by how many steps samples of a held signal show it too early on average.
+    """Return by how many steps samples of a held signal show it earlier, on average, than samples at each step do.
 
     period: steps for which each value is held; arrives: step of the first; every: steps from sample to sample.  Samples
-    meet the ages o, o + g, ..., g the greatest common divisor of both periods; the signal has all from 0 to ``period``.
+    meet the ages o, o + g, ..., g the greatest common divisor of both periods; those at each step 0, 1, 2 ...
     """
     g = math.gcd(period, every)
-    return 0.5 * g - (-arrives) % g
+    return 0.5 * (g - 1.0) - (-arrives) % g
 
 
 def excluded_words(title: str, points: Sequence[Point], counts: Sequence[bool]) -> str:
