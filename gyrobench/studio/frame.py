@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from html import escape
@@ -174,7 +175,7 @@ class CopyLines:
 
     def __init__(self) -> None:
         self.text = {"In the shell": "", "In Python": ""}
-        self.shown: dict[str, ui.label] = {}
+        self.shown: dict[str, ui.html] = {}
         self.boxes: dict[str, ui.element] = {}
         with ui.element("section").classes("lines").props(spoken("The same as a command and in Python")):
             for name in self.text:
@@ -183,7 +184,7 @@ class CopyLines:
                         ui.label(say(name)).classes("small-head")
                         copy = ui.button(icon="content_copy", on_click=lambda n=name: self._copy(n))
                         copy.props(f'flat dense round size=sm title="{say("Copy")}"').props(spoken(f"Copy: {name}"))
-                    self.shown[name] = ui.label().classes("code").props("tabindex=0")
+                    self.shown[name] = ui.html("", sanitize=False).classes("code").props("tabindex=0")
 
     def _copy(self, name: str) -> None:
         ui.clipboard.write(self.text[name])
@@ -191,7 +192,9 @@ class CopyLines:
 
     def show(self, command: str, python: str) -> None:
         """Show other lines."""
+        whole = r'<span class="word">\g<0></span>'  # no line ends within a word of a command
+        html = {"In the shell": re.sub(r"\S+", whole, escape(command)), "In Python": escape(python)}
         for name, text in zip(self.text, (command, python), strict=True):
             self.text[name] = text
-            self.shown[name].set_text(text)
+            self.shown[name].set_content(html[name])
             self.boxes[name].set_visibility(bool(text))
