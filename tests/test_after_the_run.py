@@ -115,6 +115,7 @@ def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: 
         assert json.loads(Path(folder, "result.json").read_text(encoding="utf-8"))["coefficients"][0]["name"] == "g"
 
 
+@pytest.mark.long
 def test_a_figure_that_cannot_be_drawn(gyrobench: Call) -> None:
     """The failure is in gyrobench's drawing: its line is named, as there is none of the user's."""
     code, out, err = gyrobench("run", "own", "--set", "raises=figure", "--out", "r", pages=True)
@@ -124,6 +125,7 @@ def test_a_figure_that_cannot_be_drawn(gyrobench: Call) -> None:
     assert not Path("r/report.html").exists() and Path("r/result.json").is_file() and Path("r/run.json").is_file()
 
 
+@pytest.mark.long
 def test_a_template_of_the_users_own_that_fails(gyrobench: Call) -> None:
     Path("reports/templates").mkdir()
     template = Path("reports/templates/report.html.j2").resolve()
@@ -140,6 +142,7 @@ def test_the_user_stops_the_reduction(gyrobench: Call) -> None:
     assert err == "gyrobench: interrupted; the record is kept in r; to reduce it: gyrobench report r\n"
 
 
+@pytest.mark.long
 def test_the_traceback_on_request(gyrobench: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GYROBENCH_TRACEBACK", "1")
     code, _, err = gyrobench("run", "own", "--set", "raises=zero", "--out", "r")

@@ -66,28 +66,31 @@ def test_run_prints_table_verdict_step_check_and_paths(runs: Path) -> None:
     assert "verdict: fail" in (runs / "b.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_step_check_changes_less_than_a_tenth_of_u(runs: Path) -> None:
     check = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))["step_check"]
     assert len(check["rows"]) == 9
     assert check["worst"] == max(r["ratio"] for r in check["rows"]) < 0.1
 
 
-def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: Call, runs: Path) -> None:
-    code, out, _ = gyrobench("verify", runs / "b")  # without pages
+def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: Call) -> None:
+    assert gyrobench("run", NAME, *TINY, "--out", "b")[0] == 0
+    code, out, _ = gyrobench("verify", "b")  # without pages
     assert code == 0 and "all 4 files as they were written" in out
     assert gyrobench("sign", "--new-key", "lab.key") == (
         0,
         "lab.pub: give it to those who verify; keep lab.key to yourself\n",
         "",
     )
-    assert gyrobench("sign", runs / "b", "--key", "lab.key")[0] == 0
-    assert "signed by lab.pub" in gyrobench("verify", runs / "b", "--key", "lab.pub")[1]
-    result, kept = runs / "b" / "result.json", (runs / "b" / "result.json").read_bytes()
-    result.write_bytes(kept.replace(b'"verdict": "fail"', b'"verdict": "pass"'))
-    code, _, err = gyrobench("verify", runs / "b")
+    assert gyrobench("sign", "b", "--key", "lab.key")[0] == 0
+    assert "signed by lab.pub" in gyrobench("verify", "b", "--key", "lab.pub")[1]
+    result = Path("b/result.json")
+    kept = result.read_bytes()
+    result.write_bytes(kept.replace(b'"verdict": "', b'"verdict": "not '))
+    code, _, err = gyrobench("verify", "b")
     assert code == 1 and "- result.json: changed after the report was written" in err
     result.write_bytes(kept)
-    code, _, err = gyrobench("sign", runs / "b")
+    code, _, err = gyrobench("sign", "b")
     assert code == 2 and "name a folder and the --key that signs it" in err
 
 
@@ -235,6 +238,7 @@ def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     assert "  - phase 4 (mount 2, against the Earth): " in err and "of 36 windows" in err
 
 
+@pytest.mark.long
 def test_interrupt_does_not_replace_a_whole_record(
     gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -271,6 +275,7 @@ def faulty(foreign: Callable[..., Path]) -> Path:
     return foreign("faulty")
 
 
+@pytest.mark.long
 def test_crash_of_a_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:
     code, out, err = gyrobench(
         "run", NAME, *TINY, "--part", f"gyro={faulty}", "--out", "r",

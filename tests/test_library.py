@@ -182,6 +182,7 @@ def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------- measured data, suites
+@pytest.mark.long
 def test_measured_data_are_reduced(folder: Path) -> None:
     from gyrobench.bench import standard_folder
 
@@ -290,6 +291,7 @@ def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monke
         bare.result  # noqa: B018
 
 
+@pytest.mark.long
 def test_an_interrupted_run_holds_what_was_recorded(folder: Path) -> None:
     """Ctrl-C in a notebook: an error with the record until then, in memory or, with out, in the folder to resume."""
 

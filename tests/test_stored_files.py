@@ -123,6 +123,7 @@ def test_the_content_is_on_the_disk_before_the_name(tmp_path: Path, monkeypatch:
     assert events == ["disk .part", "name", "disk "] * 2  # table, run.json
 
 
+@pytest.mark.long
 def test_an_unzipped_archive_that_was_changed_is_unzipped_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

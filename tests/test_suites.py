@@ -96,6 +96,7 @@ def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
         jsonschema.validate(json.loads((done / name / "run.json").read_text(encoding="utf-8")), run_schema)
 
 
+@pytest.mark.long
 def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Path) -> None:
     suite = load_test(NAME)
     assert isinstance(suite, Suite)
@@ -104,6 +105,7 @@ def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Pat
     assert alone.windows["mean"].tolist() == Record.load(done / "fixed_position").windows["mean"].tolist()
 
 
+@pytest.mark.long
 def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> None:
     from html.parser import HTMLParser
 
@@ -140,6 +142,7 @@ def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> No
 
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext")
+@pytest.mark.long
 def test_the_pdf_says_the_same(done: Path) -> None:
     text = subprocess.run(
         ["pdftotext", "-layout", done / "report.pdf", "-"], capture_output=True, text=True, check=True
@@ -148,11 +151,13 @@ def test_the_pdf_says_the_same(done: Path) -> None:
         assert words_ in text.stdout
 
 
+@pytest.mark.long
 def test_the_terminal_gives_the_answer(done: Path) -> None:
     said = (done.parent / "out.txt").read_text(encoding="utf-8")
     assert "methods: consistent" in said and "largest E_n" in said and "ω_d" in said
 
 
+@pytest.mark.long
 def test_the_shared_scale_factor_is_named(done: Path) -> None:
     """Two tests have a torquer in their loop; the latitude is a source of one alone."""
     found = result(done)["suite"]

@@ -97,6 +97,7 @@ def test_workers_and_order_change_no_bit_and_nothing_is_done_twice(two: Any, tmp
     assert rows(tmp_path / "two") == rows(tmp_path / "one") == rows(tmp_path / "parts")
 
 
+@pytest.mark.long
 def test_nobody_else_reaches_the_scheduler_of_local_workers(two: Any) -> None:
     """Neither without TLS nor with a certificate of one's own: whoever is let in can have code executed here."""
     address = two.scheduler.address

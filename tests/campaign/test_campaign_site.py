@@ -161,6 +161,7 @@ def test_page_opens_from_disk_without_complaint(browser: Browser, page: Path, wi
 
 
 @needs_chromium
+@pytest.mark.long
 def test_complaints_would_be_seen(browser: Browser, page: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken.html"
     script = "<script>missing()</script><img src='http://localhost:9/x.png'></main>"
@@ -195,6 +196,7 @@ def test_table_filters_sorts_and_turns_pages_by_keyboard(browser: Browser, page:
 
 
 @needs_chromium
+@pytest.mark.long
 def test_numbers_are_rounded_to_their_u_and_what_is_missing_comes_last(browser: Browser, page: Path) -> None:
     browser.open(page, 1280)
     failed = column(browser, "state").index("hung")
@@ -211,6 +213,7 @@ def test_numbers_are_rounded_to_their_u_and_what_is_missing_comes_last(browser: 
 
 
 @needs_chromium
+@pytest.mark.long
 def test_a_reason_leads_to_its_runs_and_a_mistake_is_named(browser: Browser, page: Path, folder: Path) -> None:
     rows = Campaign.open(folder).table()
     browser.open(page, 390)

@@ -99,6 +99,7 @@ def test_shortened_tumble():
         assert abs(error) < (1.2e-4 if row["window_phase"] < 3 else 1e-9)
 
 
+@pytest.mark.long
 def test_windows_are_whole_turns():
     rows, _, _ = tumble(5e-3, order=["sampler", *ORDER[:-1]])
     for phase, sense in ((1, 1), (2, -1)):

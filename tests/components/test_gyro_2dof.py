@@ -52,6 +52,7 @@ def looped(late=False, **parameters):
     return Wired(parts, list(parts), wires, late)
 
 
+@pytest.mark.long
 def test_ageing_temperature_and_translation_of_each_channel():
     """Hu 1981, eq. 2-39..2-42 in torque sign (omega_d = -omega_M) for both channels, the y channel in its own axes.
 

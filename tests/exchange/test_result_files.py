@@ -136,6 +136,7 @@ def test_each_format_gives_the_coefficients_of_the_own_run(
     assert assumed == (form != "mat 4")  # this file states a parameter
 
 
+@pytest.mark.long
 def test_channels_of_the_array(own: gb.Run, elsewhere: Array) -> None:
     run = gb.load(NAME, VALUES).reduce_result(elsewhere)
     assert estimates(run.result) == estimates(own.result)
@@ -147,6 +148,7 @@ def test_channels_of_the_array(own: gb.Run, elsewhere: Array) -> None:
             np.testing.assert_array_equal(column[: len(rows)], elsewhere[name][rows[: len(column)]], err_msg=name)
 
 
+@pytest.mark.long
 def test_what_comes_after_the_end_of_the_plan_is_left_out(own: gb.Run, elsewhere: Array) -> None:
     """An importer goes on to its stop time; a run of the bench, and its channels, end with the plan."""
     longer = np.concatenate([elsewhere, np.repeat(elsewhere[-1:], 300)])

@@ -184,6 +184,7 @@ def test_random_systems_come_back(runs: list[Any]) -> None:
     assert 0.92 < inside < 0.98
 
 
+@pytest.mark.long
 def test_each_rate_is_read_within_its_u(runs: list[Any]) -> None:
     """Deviation of gates and degrees from the rate of the table: that of the clock drawn, within 4 u each."""
     for k, result in enumerate(runs):
@@ -203,6 +204,7 @@ def test_lag_of_type_1_against_type_2(session: Session) -> None:
     assert abs(two.estimate) < 3 * two.u
 
 
+@pytest.mark.long
 def test_stamps_at_the_second_crossing_are_a_quarter_period_late(session: Session) -> None:
     """Half a period at most, all fine angles alike: T_0/4 = 104.17 us at 2.4 kHz; in the middle none."""
     late = measured(session, {"reader.mode": 0, "reader.stamp": 0})["delay"]

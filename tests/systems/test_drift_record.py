@@ -222,6 +222,7 @@ def test_a_deviation_that_only_falls_bounds_the_least_one_from_above(tmp_path: P
     assert found.no_value and found.interval[0] == 0.0 < found.interval[1] < 0.1 and " at " not in found.meaning
 
 
+@pytest.mark.long
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.
 

@@ -76,6 +76,7 @@ def test_a_platform_that_takes_no_acceleration_of_the_base_fits(foreign: Foreign
         assert {"BASE_X", "LOAD_Z"} <= wired and not wired & {"BACC_X", "BACC_Y", "BACC_Z"}
 
 
+@pytest.mark.long
 def test_measures_of_the_vendors_platform(both: Any) -> None:
     """The channels follow rate_gain: stiffness drag feedback = 150 40 = 6000 N.m/rad.  There is no linear model of the
     vendor's, which is said, and margins without it."""

@@ -102,6 +102,7 @@ def test_each_error_makes_the_drift_of_the_closed_form(session: Session) -> None
     assert found == pytest.approx(np.linalg.solve(rows, w) - w, rel=3e-3, abs=2e-4 * DPH)
 
 
+@pytest.mark.long
 def test_slow_drift_is_in_the_interval(session: Session) -> None:
     """Drift that 20 s cannot tell from a constant: the interval holds the constant one, and is not many times too wide.
 

@@ -72,6 +72,7 @@ def test_one_axis_alone(plain: Any) -> None:
     assert ratio == pytest.approx([0.866, 0.5, 1.0], abs=0.03)
 
 
+@pytest.mark.long
 def test_phase_that_the_filters_cost(plain: Any, filtered: Any) -> None:
     """Steady filter of value and slope, w = 5 wc: (sqrt2 w s + w2)/(s2 + sqrt2 w s + w2) at s = j wc, i.e. x = 1/5:
 

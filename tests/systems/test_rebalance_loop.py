@@ -142,6 +142,7 @@ def test_ripple_in_steps_of_a_fraction_of_the_saw(pwm: Session) -> None:
     assert value(run(pwm, {**noise, **plan}), "ripple") < 0.1 * closed
 
 
+@pytest.mark.long
 def test_three_loops() -> None:
     """The same asymmetry of the currents: a bias in the binary loop, a scale factor by sign in the one on demand; the
     analog loop has neither, but what its torquer does.

@@ -173,6 +173,7 @@ def reduced(
     return json.loads((folder / "r" / "result.json").read_text()) if code == 0 else err
 
 
+@pytest.mark.long
 def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     result = reduced(command, tmp_path, rows())
     found = {c["name"]: c for c in result["coefficients"]}

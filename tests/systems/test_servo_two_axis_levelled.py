@@ -101,6 +101,7 @@ def test_refusals(session: Session) -> None:
             session.run({**SHORT, **more})
 
 
+@pytest.mark.long
 def test_a_laboratory(run: tuple[dict[str, Any], Any], tmp_path: Path, command: Command) -> None:
     values, record = run
     w, plan = record.windows, {row.phase: row.label for row in record.run.plan if row.mode == "servo"}

@@ -210,6 +210,7 @@ def test_the_step_costs_margin_in_the_first_order(steps: Session) -> None:
         np.testing.assert_allclose(coarse / fine, 2.0, atol=0.08)
 
 
+@pytest.mark.long
 def test_measures_of_the_whole_run(whole: Any) -> None:
     result = load().reduce(whole, {"PM": (45.0, None)})
     assert "the gain may fall by 27.0791 ± 0.0078 dB (95 %) to an oscillation at 2.04 Hz" in result.summary[0]

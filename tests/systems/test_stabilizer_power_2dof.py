@@ -180,6 +180,7 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     assert "delays of delayed connections: gyro.u_y → stabilizer.u: 0.0001 s" in rows.caption
 
 
+@pytest.mark.long
 def test_measures_of_the_whole_run(whole: Any) -> None:
     result = load().reduce(whole)
     assert result.summary[0].startswith("Crossover 1.3293") and "rise by 23.123 ± 0.019 dB" in result.summary[0]

@@ -120,6 +120,7 @@ CASES = [("integrating", 0.0, 0.0, 10.0), ("rate-integrating", C, 0.0, 100.0), (
 
 
 @pytest.mark.parametrize("kind, c, k, time", CASES)
+@pytest.mark.long
 def test_cosimulation_converges_to_the_equations(session, kind, c, k, time):
     """The exchange errs by about M h t/(2 J0) in a and some M h/H in b: half of it at half the step."""
     errors = []

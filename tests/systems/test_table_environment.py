@@ -114,6 +114,7 @@ def test_leans_add_up_as_rotations() -> None:
     assert found == pytest.approx(11.0 * ERU * math.sin(math.radians(1.2)), rel=1e-12)
 
 
+@pytest.mark.long
 def test_budgets_of_a_report(found: DriftTestResult) -> None:
     """The effect of a cause is its level times the sensitivity found; the total is the root of the squares."""
     table = next(t for t in found.tables if t.id == "budget.surroundings")

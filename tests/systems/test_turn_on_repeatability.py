@@ -122,6 +122,7 @@ def test_time_constants_are_found() -> None:
     assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)]).tau[0].size == 1
 
 
+@pytest.mark.long
 def test_a_second_exponential_that_is_hardly_seen() -> None:
     """Records written from the equation, 2 exp(-t/20) + 0.7 exp(-t/80) in noise of 0.2 deg/h: most fits find one
     exponential, about 2.4 at the turn-on for 2.7.  Intervals must hold what is there; 12 of 12 are held by 0.95 with
