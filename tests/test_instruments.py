@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 
 import gyrobench as gb
 from gyrobench.bench import Bench, UsageError, standard_folder
@@ -19,7 +19,6 @@ from gyrobench.units import EARTH_RATE
 from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instruments
 from systems.north_finder.after import RandomErrors
 
-Command = Callable[..., tuple[int, str, str]]
 ALL = sorted(Bench(standard_folder()).instruments())
 TABLES = [n for n in ALL if find_instrument(n).kind == "turntable"]
 SHEETS = [n for n in ALL if find_instrument(n).kind in ("fibre", "laser", "vibrating")]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 from fuzzing import CORPUS
 
 from gyrobench import files
@@ -19,8 +19,6 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import NO_DIGEST, RecordError, RunDocument, read_run
 from gyrobench.system.system import load_system
 from gyrobench.workflow.run_comparison import read_result
-
-Command = Callable[..., tuple[int, str, str]]
 
 
 def flip(file: Path, old: bytes, new: bytes) -> None:

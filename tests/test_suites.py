@@ -7,12 +7,12 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+from commanding import Command
 from processes import unhurried
 
 from gyrobench.bench import standard_folder
@@ -22,7 +22,6 @@ from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite, load_test
 
-Call = Callable[..., tuple[int, str, str]]
 NAME = "drift_test_suite"
 PLANS = {
     "tumble_single_axis": ["rate=30deg/s", "dwell=20", "settle=0.5", "windows=12"],
@@ -37,13 +36,6 @@ def words(*tests: str, sets: tuple[str, ...] = ()) -> list[str]:
 
 
 TWO = words("tumble_single_axis", "fixed_position")
-
-
-@pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
-    """Runs a command in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    return command
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +159,7 @@ def test_the_shared_scale_factor_is_named(done: Path) -> None:
 
 
 @pytest.mark.long
-def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
+def test_report_again_and_from_the_runs(done: Path, gyrobench: Command) -> None:
     """The same numbers from the suite's folder, and from the folders of its tests as if they came from elsewhere."""
     before = result(done)
     assert gyrobench("report", done, figures=False)[0] == 0
@@ -181,7 +173,7 @@ def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
 
 
 @pytest.mark.long
-def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -> None:
+def test_specification_and_strict(done: Path, gyrobench: Command, tmp_path: Path) -> None:
     spec = tmp_path / "limits.toml"
     for limit, code, verdict in ((5.0, 0, "pass"), (0.001, 1, "fail")):
         spec.write_text(f'[coefficients.D_F]\nunit = "deg/h"\nmin = {-limit}\nmax = {limit}\n', encoding="utf-8")
@@ -190,7 +182,7 @@ def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -
 
 
 @pytest.mark.long
-def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
+def test_disagreement_fails_strict(done: Path, gyrobench: Command) -> None:
     """The fixed position of another gyro: the run says so, and names the parameter."""
     other = words("fixed_position", "servo_vertical_level", sets=("fixed_position.gyro.D_F=0.5deg/h",))
     code, out, _ = gyrobench("run", NAME, *other, "--strict", "--out", "o")
@@ -200,7 +192,7 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 # ------------------------------------------------------------------------------------ stopped and failed
 @pytest.mark.long
-def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_suite_goes_on(gyrobench: Command, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
@@ -229,7 +221,7 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
 
 
 @pytest.mark.long
-def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
+def test_one_failed_test_does_not_stop_the_others(gyrobench: Command) -> None:
     """A current limit that saturates: the reduction of this one test refuses, the report is of the others."""
     three = words(*PLANS, sets=("fixed_position.rebalance.i_max=1e-9",))
     code, out, err = gyrobench("run", NAME, *three, "--out", "s")
@@ -265,13 +257,13 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
         (["reduce", "fixed_position", "--data", "a", "--data", "b"], "one record at a time"),
     ],
 )  # fmt: skip
-def test_refused(gyrobench: Call, arguments: list[str], text: str) -> None:
+def test_refused(gyrobench: Command, arguments: list[str], text: str) -> None:
     code, _, err = gyrobench(*arguments)
     assert code == 2 and text in err
     assert not Path("reports").exists()
 
 
-def test_show_and_list(gyrobench: Call) -> None:
+def test_show_and_list(gyrobench: Command) -> None:
     code, out, _ = gyrobench("show", NAME, "--json")
     found = json.loads(out)
     assert code == 0 and [t["name"] for t in found["tests"]] == found["sets"]["floated"].split()
@@ -282,7 +274,7 @@ def test_show_and_list(gyrobench: Call) -> None:
 
 # ------------------------------------------------------------------------------------- measured records
 @pytest.mark.long
-def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
+def test_measured_records_become_a_suite(gyrobench: Command, done: Path) -> None:
     """The simulated windows as a laboratory would write them down: same numbers, no truth; what it does not state and a
     signature wants is said.
     """

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import synthetic_campaign as synthetic
 from browser import OVERLAPS, Browser, needs_chromium
+from commanding import Command
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
@@ -107,7 +108,7 @@ def test_a_folder_of_something_else_is_not_touched(folder: Path, tmp_path: Path)
 
 
 @pytest.mark.long
-def test_command_prints_the_answer(command: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_command_prints_the_answer(command: Command, tmp_path: Path) -> None:
     small = synthetic.sweep(tmp_path / "small", 6)
     code, out, _ = command("site", small, "--out", tmp_path / "site")
     assert code == 0

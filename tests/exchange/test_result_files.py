@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from fmpy import simulate_fmu
 from fmpy.util import write_csv
 from scipy.io import savemat
@@ -33,7 +33,6 @@ VALUES: dict[str, Any] = {
 }
 SETTINGS = [word for n, v in VALUES.items() for word in ("--set", f"{n}={v}")]
 COARSE = 0.1  # s between the rows: many steps, less than the shortest window
-Command = Callable[..., tuple[int, str, str]]
 Array = np.ndarray[Any, Any]
 
 

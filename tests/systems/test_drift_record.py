@@ -6,12 +6,12 @@ import importlib
 import json
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.engine.session import Session
 from gyrobench.record import block_means
@@ -23,7 +23,6 @@ from gyrobench.system.system import System, load_system
 
 NAME = "drift_record"
 DPH = math.pi / 648000.0
-Command = Callable[..., tuple[int, str, str]]
 P: Any = importlib.import_module(".preparation", type(load_system(NAME)).__module__)
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from gimballed import DEG, STILL, measures
 
 from gyrobench.engine.run_errors import RunError
 from gyrobench.engine.session import Session
 
-Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 NAME = "platform_three_gimbal"
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_platform.toml"

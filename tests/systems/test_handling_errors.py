@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from test_tumble_measured import laboratory
 from tumbling import NAME, SHORT
 
@@ -22,7 +23,6 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 
-Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'
 DIAGNOSIS = "handling.diagnosis"
 

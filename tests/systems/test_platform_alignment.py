@@ -30,12 +30,6 @@ FIXED = {"coarse_time": 40.0, "fast": 0.04, "fast_time": 60.0, "slow": 0.02, "wa
 
 
 @pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(load_system(NAME)) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def aligned(session: Any) -> Any:
     """One noisy alignment at default values: (record, result)."""
     record = session.run({}, seed=3)

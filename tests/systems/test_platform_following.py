@@ -24,12 +24,6 @@ QUIET = {
 PERFECT = {**QUIET, "mounting": 0.0, "torquer": 0.0, "residual": 0.0, "quantum": 0.0, "time": 20.0}
 
 
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as s:
-        yield s
-
-
 def drifts(s: Session, **values: Any) -> tuple[np.ndarray, Any]:
     result = s.system.with_values({}).reduce(s.run({**PERFECT, **values}))
     c = {c.name: c for c in result.coefficients}

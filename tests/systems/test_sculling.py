@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +20,6 @@ from gyrobench.system.system import load_system
 from systems.sculling_test.closed import ScullingMotion, UnitErrors, VelocityChain
 from systems.sculling_test.reduction import Reduction, ScullingSetup
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "sculling_test"
 DEG, UG = math.pi / 180.0, 1e-6 * G0
 SHORT: dict[str, Any] = {"readings": 2, "cycles": 1, "window": 1.0, "nuisances": "none"}
@@ -95,12 +94,6 @@ def test_what_is_left_by_hand() -> None:
         assert VelocityChain(T, 0.0, 90.0, 60.0).rise(m) == pytest.approx(hand, rel=0.01)
     same = UnitErrors(levers=np.tile([0.0, 0.03, 0.05], (3, 1)))  # one place: its mean acceleration is nothing
     assert abs(VelocityChain(T).rise(ScullingMotion(20.0, theta, a), same)) < 1e-3 * 0.5 * (125.0 * theta) ** 2 * 0.05
-
-
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def steady() -> dict[str, Any]:

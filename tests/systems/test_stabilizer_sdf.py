@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from gyrobench.engine.session import Session
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "stabilizer_sdf"
@@ -86,12 +85,6 @@ def test_numbers_of_the_method():
 
 
 # ------------------------------------------------------------------------------------------ co-simulation
-@pytest.fixture(scope="module")
-def session():
-    with Session(NAME) as s:
-        yield s
-
-
 def load(record):
     """t, a, b of the load phase from its opening on."""
     inside = record.channels["exciter.gate"] > 0.5

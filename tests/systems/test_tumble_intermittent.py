@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tumble as T
+from commanding import Command
 from tumbling import DPH, STOPPING, errors, gyro, latitude, load, quiet
 
 from gyrobench.engine.session import Session
@@ -17,8 +17,6 @@ from gyrobench.exchange.external_record import shortest_window
 from gyrobench.reduction.estimation import noise
 from gyrobench.result import Result
 from gyrobench.workflow.saved_run import lacking_phases
-
-Command = Callable[..., tuple[int, str, str]]
 
 
 def reduced_run(session: Session, values: dict[str, Any], seed: int = 1) -> Result:

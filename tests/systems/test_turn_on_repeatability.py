@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
@@ -19,7 +19,6 @@ from systems.turn_on_repeatability import components
 from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
 from systems.turn_on_repeatability.warming import Kind, Warming, fitted, means
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "turn_on_repeatability"
 DPH = math.pi / 648000.0
 
