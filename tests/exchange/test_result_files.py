@@ -20,6 +20,8 @@ from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.system import load_system
 
+pytestmark = pytest.mark.long
+
 NAME = "tumble_single_axis"
 VALUES: dict[str, Any] = {
     "rate": "6000 ERU",
@@ -114,7 +116,6 @@ def write(series: Array, form: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("form", ["csv", "npy", "parquet", "mat 5", "mat 4", "mat normal"])
-@pytest.mark.long
 def test_each_format_gives_the_coefficients_of_the_own_run(
     form: str, own: gb.Run, elsewhere: Array, command: Command, tmp_path: Path
 ) -> None:
@@ -135,7 +136,6 @@ def test_each_format_gives_the_coefficients_of_the_own_run(
     assert assumed == (form != "mat 4")  # this file states a parameter
 
 
-@pytest.mark.long
 def test_channels_of_the_array(own: gb.Run, elsewhere: Array) -> None:
     run = gb.load(NAME, VALUES).reduce_result(elsewhere)
     assert estimates(run.result) == estimates(own.result)
@@ -147,7 +147,6 @@ def test_channels_of_the_array(own: gb.Run, elsewhere: Array) -> None:
             np.testing.assert_array_equal(column[: len(rows)], elsewhere[name][rows[: len(column)]], err_msg=name)
 
 
-@pytest.mark.long
 def test_what_comes_after_the_end_of_the_plan_is_left_out(own: gb.Run, elsewhere: Array) -> None:
     """An importer goes on to its stop time; a run of the bench, and its channels, end with the plan."""
     longer = np.concatenate([elsewhere, np.repeat(elsewhere[-1:], 300)])
@@ -182,7 +181,6 @@ def file_observer(folder: Path, **slots: str) -> Any:
     return CosimObserver(CosimObserver._CosimObserver__create_key, pointer)  # the wrapper lacks this one
 
 
-@pytest.mark.long
 def test_libcosim_by_its_csv_files(own: gb.Run, command: Command, tmp_path: Path) -> None:
     """Coupled in parallel, six digits.  The SSP repeats the values of its export, so none is given."""
     pytest.importorskip("libcosimpy")
@@ -257,7 +255,6 @@ def refusals(series: Array) -> dict[str, tuple[Array, str]]:
     }
 
 
-@pytest.mark.long
 def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: Array, tmp_path: Path) -> None:
     test = gb.load(NAME, VALUES)
     for what, (series, words) in refusals(elsewhere).items():
@@ -285,7 +282,6 @@ def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: A
         test.reduce_result(file)
 
 
-@pytest.mark.long
 def test_files_that_are_none(command: Command, tmp_path: Path) -> None:
     for name, content, words in (
         ("a.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 200, "save it with save"),
