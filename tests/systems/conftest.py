@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 from commanding import Command
-from tumbling import NAME
 
 from gyrobench.engine.session import Session
 
 
 @pytest.fixture(scope="module")
 def session(request: pytest.FixtureRequest) -> Iterator[Session]:
-    """The system NAME of a module, else the tumble; standard parts, native engine, and every run starts afresh."""
-    with Session(getattr(request.module, "NAME", NAME)) as prepared:
+    """The system NAME of the module: standard parts, native engine, and every run starts afresh."""
+    with Session(request.module.NAME) as prepared:
         yield prepared
 
 

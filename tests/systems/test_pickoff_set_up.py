@@ -14,6 +14,7 @@ from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import Result
 
+NAME = "pickoff_scale_factor"
 ARCSEC = math.pi / 648000.0
 MINUTE = 60.0 * ARCSEC  # 2.909e-4 rad
 

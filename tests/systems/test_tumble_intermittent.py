@@ -18,6 +18,8 @@ from gyrobench.reduction.estimation import noise
 from gyrobench.result import Result
 from gyrobench.workflow.saved_run import lacking_phases
 
+NAME = "tumble_single_axis"
+
 
 def reduced_run(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
     system = load().with_values(values)
