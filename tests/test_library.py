@@ -216,10 +216,7 @@ def test_a_suite_runs_in_folders(folder: Path) -> None:
 # ------------------------------------------------------------------------------------------- mistakes
 MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
     "system": (lambda r: gb.load("tumble_single_axes"), "did you mean tumble_single_axis"),
-    "suite": (
-        lambda r: gb.load("drift_test_suite"),
-        "is a suite of tests: gyrobench.load_suite",
-    ),
+    "suite": (lambda r: gb.load("drift_test_suite"), "is a suite of tests: gyrobench.load_suite"),
     "no suite": (lambda r: gb.load_suite(NAME), "is one test, not a suite"),
     "option": (lambda r: gb.load(NAME, lattitude=1), "lattitude: no such option .*latitude"),
     "unit": (lambda r: gb.load(NAME, latitude="3 V"), "latitude"),

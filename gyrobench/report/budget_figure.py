@@ -5,19 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gyrobench.report.plots import short
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    WIDE,
-    axis_label,
-    chart,
-    svg,
-)
+from gyrobench.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION, WIDE, axis_label, chart, svg
 from gyrobench.result import BudgetLine
 
 _HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo")

@@ -6,18 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from gyrobench.report.plots import acf, finite, plain_log
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    VERMILION,
-    WIDE,
-    axis_label,
-    chart,
-    svg,
-    time_axis,
-    zero_line,
-)
+from gyrobench.report.style import BLUE, GREEN, ORANGE, VERMILION, WIDE, axis_label, chart, svg, time_axis, zero_line
 from gyrobench.result import DriftColumn
 
 COLOURS = (BLUE, GREEN, ORANGE)

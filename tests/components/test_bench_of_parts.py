@@ -5,19 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from wired import (
-    DEG_H,
-    QUIET,
-    FloatedGyro,
-    Native,
-    RebalanceAnalog,
-    Sampler,
-    Sequencer,
-    Site,
-    TableRate,
-    Wired,
-    plan,
-)
+from wired import DEG_H, QUIET, FloatedGyro, Native, RebalanceAnalog, Sampler, Sequencer, Site, TableRate, Wired, plan
 
 from gyrobench.drift import STANDARD, drift
 from gyrobench.frames import earth_rate_local, polar_base, to_face, tumble_faces

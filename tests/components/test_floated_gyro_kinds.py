@@ -74,11 +74,7 @@ def euler(part, omega, alpha, seconds):
     """
     j_i = 5e-6
     tensor = np.array(
-        [
-            [j_i, -part.J_IO, -part.J_SI],
-            [-part.J_IO, part.J, -part.J_OS],
-            [-part.J_SI, -part.J_OS, j_i + part.dJ],
-        ]
+        [[j_i, -part.J_IO, -part.J_SI], [-part.J_IO, part.J, -part.J_OS], [-part.J_SI, -part.J_OS, j_i + part.dJ]]
     )
 
     def right(t, x):

@@ -43,12 +43,7 @@ def looped(late=False, **parameters):
     }
     for key, x in inputs.items():
         setattr(parts["gyro"], key, x)
-    wires = [
-        ("gyro.u_x", "about_y.u"),
-        ("about_y.i", "gyro.i_y"),
-        ("gyro.u_y", "about_x.u"),
-        ("about_x.i", "gyro.i_x"),
-    ]
+    wires = [("gyro.u_x", "about_y.u"), ("about_y.i", "gyro.i_y"), ("gyro.u_y", "about_x.u"), ("about_x.i", "gyro.i_x")]
     return Wired(parts, list(parts), wires, late)
 
 

@@ -108,8 +108,7 @@ def test_beyond_90_degrees_of_pitch():
 
 
 @pytest.mark.parametrize(
-    "gain, moved, error, swing",
-    [(SEC, 182.0, 0.32, None), (ONE, 182.0, 1.31, 12.3), (SIGN, 41.0, 0.003, None)],
+    "gain, moved, error, swing", [(SEC, 182.0, 0.32, None), (ONE, 182.0, 1.31, 12.3), (SIGN, 41.0, 0.003, None)]
 )
 @pytest.mark.long
 def test_crossing_pitch_90(gain, moved, error, swing):
