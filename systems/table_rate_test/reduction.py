@@ -37,11 +37,7 @@ SHOWN = 1500  # intervals of a drawn line
 RAMP = 0.6  # s of a change of rate that is drawn
 BEYOND = 1e-3  # p of a scatter that rounding does not explain
 #: errors of the readings by cycles a turn, u of their amplitudes; the last: twice in a cycle of the scale
-SCALE = (
-    (1.0, ONCE),
-    (2.0, TWICE),
-    (None, CYCLE),
-)
+SCALE = ((1.0, ONCE), (2.0, TWICE), (None, CYCLE))
 READOUTS = (
     "Relative errors of the rate by counts over the whole phase, by the last gate and by the last interval of the "
     "inverse rate; tracking error and standard deviation of the true rate"

@@ -51,10 +51,7 @@ def told(result: Result, source: str) -> np.ndarray[Any, Any]:
 
 @pytest.mark.parametrize(
     ("about", "axis", "expected"),
-    [
-        ("y", 1, {"D_I": -W * C, "D_O": W * C, "D_S": -W * S}),
-        ("z", 2, {"D_O": W * S, "D_S": W * C}),
-    ],
+    [("y", 1, {"D_I": -W * C, "D_O": W * C, "D_S": -W * S}), ("z", 2, {"D_O": W * S, "D_S": W * C})],
 )
 def test_axis_tilt(session: Session, about: str, axis: int, expected: dict[str, float]) -> None:
     """Turned by t about y the table axis is x - t z, about z it is x + t y: the drift taken from the table is wrong by

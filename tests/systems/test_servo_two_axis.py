@@ -130,11 +130,7 @@ def shifted(session: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]
     [
         # a sin(x) read with the outer, a cos(2 y) with the inner angle: rows are sine, cosine
         ({"outer.encoder_amplitude[1]": 1.0}, "outer angle error, once", 0),
-        (
-            {"inner.encoder_amplitude[2]": 1.0, "inner.encoder_phase[2]": math.pi / 2},
-            "inner angle error, twice",
-            1,
-        ),
+        ({"inner.encoder_amplitude[2]": 1.0, "inner.encoder_phase[2]": math.pi / 2}, "inner angle error, twice", 1),
         # the outer axis tilted about its table's second axis Z, the same in both mounts: rows are mounts
         ({"outer.tilt[2]": 1.0}, "table set up, about Z", None),
         # the inner axis tilted about its table's first axis Z, out of the right angle with X

@@ -254,10 +254,7 @@ def test_angles_of_a_laboratory(tmp_path: Path, reversal: bool, zero: float) -> 
         (("\n2,10,", "\n1,10,"), "phase 1: its rows have several rates or positions"),
         (("method = two_heads", "method = reversal"), "positions with turned = 0 and with turned = 1"),
         (("method = two_heads", "method = three"), "method = three: two_heads or reversal"),
-        (
-            ("reading_2 [deg],", "reading_2 [rad],"),
-            "reading_2: does not follow the position",
-        ),
+        (("reading_2 [deg],", "reading_2 [rad],"), "reading_2: does not follow the position"),
     ],
 )
 def test_errors_of_angles(tmp_path: Path, swap: tuple[str, str], text: str) -> None:
