@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,9 @@ WORDS = {"named", "withheld", "asked for", "harmless", "not seen"}
 
 @pytest.fixture(scope="module")
 def bench() -> Any:
-    sys.path.insert(0, str(BENCHMARKS))
-    try:
+    with pytest.MonkeyPatch.context() as path:
+        path.syspath_prepend(str(BENCHMARKS))
         return importlib.import_module("instrument_mistakes")
-    finally:
-        sys.path.remove(str(BENCHMARKS))
 
 
 def rows(bench: Any) -> list[list[str]]:
