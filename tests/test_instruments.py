@@ -237,6 +237,13 @@ def test_the_accelerometers_of_a_unit_by_hand() -> None:
         with_instruments("crg20", {"accelerometers": "accelerometer_mems"}, load_system("drift_record"))
 
 
+def test_a_rate_gyro_states_accelerometers_or_why_not() -> None:
+    for name, file in Bench(standard_folder()).instruments().items():
+        sheet = find_instrument(name)
+        if sheet.kind in ("fibre", "laser", "vibrating") and not sheet.accelerometers:
+            assert "\n# accelerometers: " in file.read_text(encoding="utf-8"), name
+
+
 @pytest.mark.long
 def test_accelerometers_of_a_sheet_drift_as_it_says(command: Command, tmp_path: Path) -> None:
     """STIM300, a minute: 0.06 m/s/sqrt(h) is in the interval, which is narrower than a fifth of it."""

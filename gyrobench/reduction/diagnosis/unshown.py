@@ -62,6 +62,7 @@ EARLY = 0.01  # of the time of a reading
 FORCES = ("f_x", "f_y")  # of the accelerometers of a north finder
 #: columns that stand beside each other in a table, and are of one kind
 NEIGHBOURS = (("mean_x", "mean"), FORCES, ("drift_x", "drift_y"), ("drift_y", "drift_z"), ("drift_x", "drift_z"))
+GYROS = (("mean_gx", "mean_gy"), ("mean_gy", "mean_gz"), ("mean_gx", "mean_gz"))  # where no angles show the axes
 METERS = (
     ("the readings", READINGS, ("u_voltage",)),
     ("the currents", ("current",), ("u_current",)),
@@ -83,7 +84,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     yield from _two_pairs(record)
     yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
     yield from reversed_columns(record, [n for n in record.windows if n.startswith(READINGS)], "the reading", False)
-    for a, b in NEIGHBOURS:
+    for a, b in (*NEIGHBOURS, *(GYROS if "outer_start" not in record.windows else ())):
         yield from exchanged_columns(record, [(a, b)], f"the columns {a} and {b} exchanged")
     forces = [n for n in FORCES if n in record.windows]
     if forces:
