@@ -58,6 +58,22 @@ class _Scaled:
     removed: Array
 
 
+@dataclass(frozen=True)
+class _Fit:
+    """A treated record with the models of what is left, their draws, the one that is reported, and the ramp."""
+
+    treated: Treated
+    found: ModelSearch
+    clouds: list[Cloud]
+    at: Fitted
+    ramp: Estimate
+    agreements: tuple[DeviationAgreement, DeviationAgreement]
+
+    @property
+    def agrees(self) -> bool:
+        return all(a.holds for a in self.agreements) and self.treated.settled
+
+
 def fit_noise(
     rate: Array,
     tau0: float,
@@ -77,14 +93,14 @@ def fit_noise(
     rate = np.asarray(rate, dtype=float)
     scale = scale_of(rate, tau0, means)
     raw = rate if raw is None else np.asarray(raw, dtype=float)
-    treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
-    treated, found = _without_steps(treated, means)
-    clouds = posterior.draw(found)
-    judge = _Judge(found, _deviations(raw / scale.size, treated), treated)
-    at = judge.choose(clouds)
-    ramp = _ramp(found, clouds)
-    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
-    whole, clean = judge.both(allan(at.model, at.p, judge.own.tau, means) + slow)
+    rate, raw = (rate - scale.level) / scale.size, raw / scale.size
+    fitted = _fit(treat(rate, remove_lines, find_wild), raw, means)
+    if not fitted.agrees and not all(x.steady for x in fitted.treated.lines):
+        # two lines for one that wanders leave holes in what may be a narrow band of noise
+        again = _fit(treat(rate, remove_lines, find_wild, wandering=False), raw, means)
+        fitted = again if again.agrees else fitted
+    treated, found, clouds, at, ramp = fitted.treated, fitted.found, fitted.clouds, fitted.at, fitted.ramp
+    whole, clean = fitted.agreements
     of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
     return NoiseModel(
         scale=scale,
@@ -98,6 +114,17 @@ def fit_noise(
         models=len(found.seen),
         filtered=_filtered(clouds),
     )
+
+
+def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
+    """Return the model of a treated record; raw (n,): as it was, in its unit."""
+    treated, found = _without_steps(treated, means)
+    clouds = posterior.draw(found)
+    judge = _Judge(found, _deviations(raw, treated), treated)
+    at = judge.choose(clouds)
+    ramp = _ramp(found, clouds)
+    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
+    return _Fit(treated, found, clouds, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means) + slow))
 
 
 # ------------------------------------------------------------------ steps

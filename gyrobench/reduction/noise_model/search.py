@@ -10,9 +10,9 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
@@ -22,13 +22,16 @@ MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 BEHIND = ("first", "shape3")
-SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
+SIMPLE = ("none", "first", "second", "average", "average+first", "butterworth", "cascade")
+SHAPES = ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
     "first": [[math.log(0.5)], [math.log(5.0)]],
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
+    "butterworth": [[math.log(t), math.log(2.0)] for t in (0.15, 0.6, 2.5)],
+    "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
     "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
@@ -165,8 +168,9 @@ class ModelSearch:
         S, excess = self.excess(at)
         scan = np.linspace(math.log(SHORTEST_TAU) + 0.1, self.prior.longest, 20)
         found = list[tuple[float, Array]]()
+        passes = passed(at.model, at.p, data.grid) if term.name in SLOW else None
         for rest in [np.array([t]) for t in scan] if term == GM else [np.empty(0)]:
-            unit = term.unit(rest, data.grid) / S
+            unit = term.unit(rest, data.grid) / S * (1.0 if passes is None else passes)
             info, score = float(data.all_count @ unit**2), float(unit @ excess)
             v = max(score / info, 0.7 * info**-0.5)
             found.append((max(score, 0.0) ** 2 / info, np.array([math.log(v), *rest])))
@@ -216,9 +220,12 @@ class ModelSearch:
             if name == term.filter or (name == "none" and W in at.model):
                 continue
             new = NoiseTerm("white", name)
+            if name in DIGITAL and W not in at.model:  # what a digital low-pass holds back lets the least noise be seen
+                rest = [*parts[1:], (W, np.array([math.log(float(np.min(self.prior.level)))]))]
             for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
                 made = joined([(new, np.append(q[0], guess)), *rest])
                 yield made[0], [made[1]]
+            rest = parts[1:]
 
     def climb(self, at: Fitted, names: tuple[str, ...]) -> Fitted:
         """Go to the best neighbour, until there is none."""
@@ -285,7 +292,7 @@ class ModelSearch:
                 continue
             self._freeze(found)
             settled = False
-        for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
+        for _ in range(len(self.resonances)):  # each again, with the others and the broadband terms as they are now
             term, p = self.resonances.pop(0)
             self.data.hold(self.resonances)
             at = self.best
