@@ -28,7 +28,7 @@ from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, f
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
-from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -177,8 +177,8 @@ def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> A
     few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
     grid = Grid(math.pi * few / n, means)
     S = spectrum(*joined(parts), grid)
-    for term, p in parts:  # a stretch leaks into the zeros of a mean
-        if term.filter.startswith(("mean", "average")):
+    for term, p in parts:  # a stretch leaks into the zeros of a mean, and into what a digital low-pass holds back
+        if term.filter.startswith(("mean", "average", *DIGITAL)):
             own = term.spectrum(p, grid)
             S = np.maximum(S, LEAK * float(np.trapezoid(own, few)) / n**2)
     return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])

@@ -17,7 +17,8 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
 Filters, "mean4+first" of two in a row:
 "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
 "mean4" over 4 of them; digital low-passes with zeros at half the sampling rate (bilinear transform), "butterworth" of
-any order and a "cascade" of equal ones of first order (of two-sample means, too); "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+any order and a "cascade" of equal ones of first order (of means over two samples, too); "shape",
+|H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
 [DRIFT-NOISE-MODEL; own derivation]
