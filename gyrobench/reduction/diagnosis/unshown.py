@@ -46,6 +46,7 @@ from gyrobench.reduction.diagnosis.handling_errors import (
     undone,
     with_options,
 )
+from gyrobench.reduction.drift.late_temperature import following
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
@@ -65,6 +66,7 @@ METERS = (
     ("the currents", ("current",), ("u_current",)),
     ("the rates", ("rate_",), ("u_time",)),
     ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
+    ("the levels of vibration", ("level",), ("u_gain",)),
     ("the times", ("t_",), ("u_time",)),
 )
 NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
@@ -101,6 +103,10 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         gap = float(np.median(np.diff(record.windows["since"])[later]))
         words = "the times since the turn-on short by one reading"
         yield HandlingCandidate(words, changed(record, since=record.windows["since"] + gap))
+    if "since" in record.windows and "temperature" in record.windows:
+        tau = float(np.max(record.windows["since"]))
+        words = f"an instrument {tau:.3g} s behind the temperature"
+        yield HandlingCandidate(words, changed(record, temperature=following(record.windows, tau)))
     if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)

@@ -93,20 +93,21 @@ class LoopFindings(MeasureFindings):
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
-        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test"
-    ) -> list[Point]:
+        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test",
+        lead: float = 0.0,
+    ) -> list[Point]:  # fmt: skip
         """Return the open loop L = -(inside - test) / inside of the sines of a kind on an axis, with margins.
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
-        test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
-        the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns the points
-        that count.
+        test: what was added there, lead as in open_loop_point.  Adds the Bode plot, a table of margins (measured, and
+        of both linear models), the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase
+        margin.  Returns the points that count.
         """
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
         points, counts = map(
-            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours) for g in sines), strict=True)
+            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours, lead) for g in sines), strict=True)
         )
         counts = [c and not self.unstable for c in counts]
         sure = [p for p, c in zip(points, counts, strict=True) if c]
