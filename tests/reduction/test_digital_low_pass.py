@@ -76,8 +76,8 @@ def test_a_sensor_behind_a_butterworth_filter(seed: int) -> None:
 
 @pytest.mark.long
 def test_one_narrow_band_under_angle_noise() -> None:
-    """A dither of rms 2 that keeps its phase for 400 samples under angle noise of 1: its band was fitted beside a filter
-    that stood for the angle noise and kept as it was, twice as wide; none of four records agreed with its model.
+    """A dither of rms 2 that keeps its phase for 400 samples under angle noise of 1: its band, fitted beside a filter
+    that stood for the angle noise and then kept, was twice as wide; none of four records agreed with its model.
     """
     rng = np.random.default_rng(77)
     n, fine, tau, omega = 9608, 8, 400.0, 2.94
