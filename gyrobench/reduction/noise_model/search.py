@@ -34,6 +34,7 @@ STARTS: dict[str, list[list[float]]] = {
     "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
     "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
+HELD_BACK = 0.3  # of the spectrum, just below half the sampling rate: what a digital low-pass passes there at most
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
@@ -216,8 +217,10 @@ class ModelSearch:
             for guess in STARTS.get(after, [[0.0] * (new.size - q.size)]):
                 made = joined([(new, np.concatenate([q, guess])), *rest])
                 yield made[0], [made[1]]
+        level = self.prior.level
+        falls = bool(level[-1] < HELD_BACK * np.median(level))
         for name in names:
-            if name == term.filter or (name == "none" and W in at.model):
+            if name == term.filter or (name == "none" and W in at.model) or (name in DIGITAL and not falls):
                 continue
             new = NoiseTerm("white", name)
             if name in DIGITAL and W not in at.model:  # what a digital low-pass holds back lets the least noise be seen
