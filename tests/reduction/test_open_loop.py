@@ -90,10 +90,10 @@ def test_stated_crossovers_hold_at_every_noise(noise: float, stated: int) -> Non
 
 
 def test_held_signal_in_the_loop_is_taken_back_to_its_mean_age() -> None:
-    """Held for 20 steps: each 13th sample meets all ages 0 to 19, mean 9.5 instead of 10; each 10th those of 0 and 10,
-    mean 5; and where the value arrives 4 steps after a sample, 6 and 16, mean 11: half a step, 5, and -1 too early.
+    """Held for 20 steps: each 13th sample meets all ages 0 to 19, mean 9.5; each 10th those of 0 and 10, mean 5; and
+    where the value arrives 4 steps after a sample, 6 and 16, mean 11: 4.5 too early, and 1.5 too late.
     """
-    assert [held_lead(20, at, every) for at, every in ((0, 13), (4, 13), (0, 10), (4, 10))] == [0.5, 0.5, 5.0, -1.0]
+    assert [held_lead(20, at, every) for at, every in ((0, 13), (4, 13), (0, 10), (4, 10))] == [0.0, 0.0, 4.5, -1.5]
     f, lead = 3.0, 4e-3
     y, r = 0.3 - 0.8j, 1.7 + 0.2j  # what comes back, what is added: L = y/(r - y)
     seen = y * np.exp(2j * math.pi * f * lead)

@@ -49,7 +49,7 @@ def open_loop_point(
     """Return L = (r - e)/e at the sine of a phase, and whether it counts.  by_neighbours: as loop_measures.response.
 
     u is that of S = e/r, which is linear in the noise: |dL/L| = |dS| / |S (1 - S)|.  coherence: the smaller one
-    of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average (held_lead).
+    of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average.
     Raises as loop_measures.response.
     """
     t, e, r = gate.t, gate[inside], gate[test]
@@ -75,13 +75,13 @@ def unled(L: complex, f: float, lead: float) -> complex:
 
 
 def held_lead(period: int, arrives: int, every: int) -> float:
-    """Return by how many steps samples of a held signal show it too early on average.
+    """Return by how many steps samples of a held signal show it earlier, on average, than samples at each step do.
 
     period: steps for which each value is held; arrives: step of the first; every: steps from sample to sample.  Samples
-    meet the ages o, o + g, ..., g the greatest common divisor of both periods; the signal has all from 0 to ``period``.
+    meet the ages o, o + g, ..., g the greatest common divisor of both periods; those at each step 0, 1, 2 ...
     """
     g = math.gcd(period, every)
-    return 0.5 * g - (-arrives) % g
+    return 0.5 * (g - 1.0) - (-arrives) % g
 
 
 def excluded_words(title: str, points: Sequence[Point], counts: Sequence[bool]) -> str:

@@ -14,10 +14,10 @@ from gyrobench.reduction.estimation.sentences import told
 from gyrobench.reduction.loops.loop_curves import over_time
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_reduction import LoopReduction
-from gyrobench.reduction.loops.open_loop import held_lead
 from gyrobench.reduction.loops.tracking_error import TrackingError, error_coefficients, lag
 from gyrobench.result import Reason
 
+TRACKER = ("exposure", "processing", "order")
 SIGHT = {"pitch": 1, "yaw": 3}  # elements of the exciter
 MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
@@ -46,25 +46,22 @@ class TrackingMeasures(LoopReduction):
 
     def loops(self) -> None:
         """Measure the tracking loops and the steps of the wanted direction."""
-        lead = self.lead()
+        held = self.held()
         for axis, k in SIGHT.items():
             self.found.open_loop(
-                f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command", lead=lead
+                f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command", held=held
             )
         for gate in self.found.of("command", shape="step"):
             self.acquire(gate)
 
-    def lead(self) -> float:
-        """Return by how much the samples of the record show the held error too early on average, s.  [TRACK-IMAGE]
+    def held(self) -> dict[str, tuple[float, float]]:
+        """Return when the first error of the tracker is there, s; {} where a prediction makes it continuous.
 
-        0 where a prediction makes it continuous, and for a tracker without the parameters of optical_tracker.
+        The linear model of the tracker holds for half a period, samples at each step h show the half less h/2.
         """
-        times = [self.run.parameters.get(f"tracker.{n}") for n in ("period", "exposure", "processing")]
-        if None in times or self.run.parameters.get("tracker.order"):
-            return 0.0
-        t, h = self.found.record.channels["time"], self.run.step
-        period, exposure, processing = (round(float(x) / h) for x in times)  # type: ignore[arg-type]
-        return h * held_lead(period, (exposure or 1) + processing, round(float(t[1] - t[0]) / h))
+        p, h = self.run.parameters, self.run.step
+        exposure, processing, order = (float(p.get(f"tracker.{n}") or 0.0) for n in TRACKER)
+        return {} if order else {"tracker": (max(exposure, h) + processing, 0.5 * h)}
 
     def inside(self) -> list[str]:
         """Return for which share of the time the error is inside the accuracy."""
