@@ -22,7 +22,7 @@ MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 BEHIND = ("first", "shape3")
-SIMPLE = ("none", "first", "second", "average", "average+first", "butterworth", "cascade")
+SIMPLE = ("none", "first", "second", "average", "average+first")
 SHAPES = ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
@@ -217,10 +217,8 @@ class ModelSearch:
             for guess in STARTS.get(after, [[0.0] * (new.size - q.size)]):
                 made = joined([(new, np.concatenate([q, guess])), *rest])
                 yield made[0], [made[1]]
-        level = self.prior.level
-        falls = bool(level[-1] < HELD_BACK * np.median(level))
         for name in names:
-            if name == term.filter or (name == "none" and W in at.model) or (name in DIGITAL and not falls):
+            if name == term.filter or (name == "none" and W in at.model):
                 continue
             new = NoiseTerm("white", name)
             if name in DIGITAL and W not in at.model:  # what a digital low-pass holds back lets the least noise be seen
@@ -246,6 +244,19 @@ class ModelSearch:
                             self.fit(model, start)
             at = self.best
         return at
+
+    def try_digital(self) -> None:
+        """Try digital low-passes in place of the best filter where the spectrum falls; they stay if one is better."""
+        level, before = self.prior.level, dict(self.seen)
+        if level[-1] > HELD_BACK * np.median(level):
+            return
+        for model, starts in self.filters(self.best, DIGITAL):
+            for start in starts:
+                self.fit(model, start)
+        if any(t.filter in DIGITAL for t in self.best.model):
+            self.climb(self.best, SIMPLE + DIGITAL)
+        else:
+            self.seen = before
 
     # ------------------------------------------------------------------ resonances
     def peak(self, at: Fitted, vain: Sequence[Array] = (), clear: float = CLEAR) -> Array | None:
@@ -383,6 +394,7 @@ def search(data: Ordinates) -> ModelSearch:
     found = ModelSearch(data, Prior(data))
     found.fit((N,), np.array([math.log(float(np.median(found.prior.level)))]))
     found.climb(found.best, SIMPLE)
+    found.try_digital()
     found.add_resonances()
     found.climb(found.best, SIMPLE + SHAPES)
     if found.resonances:
