@@ -22,8 +22,7 @@ MOST_MARKOV, MOST_RESONANCES = 3, 24
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 BEHIND = ("first", "shape3")
-SIMPLE = ("none", "first", "second", "average", "average+first")
-SHAPES = ("shape3", "shape6", "shape10")
+SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
@@ -221,12 +220,11 @@ class ModelSearch:
             if name == term.filter or (name == "none" and W in at.model):
                 continue
             new = NoiseTerm("white", name)
-            if name in DIGITAL and W not in at.model:  # what a digital low-pass holds back lets the least noise be seen
-                rest = [*parts[1:], (W, np.array([math.log(float(np.min(self.prior.level)))]))]
+            least = [(W, np.array([math.log(float(np.min(self.prior.level)))]))]  # shows in a stop band
+            others = rest + least if name in DIGITAL and W not in at.model else rest
             for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
-                made = joined([(new, np.append(q[0], guess)), *rest])
+                made = joined([(new, np.append(q[0], guess)), *others])
                 yield made[0], [made[1]]
-            rest = parts[1:]
 
     def climb(self, at: Fitted, names: tuple[str, ...]) -> Fitted:
         """Go to the best neighbour, until there is none."""
@@ -250,9 +248,8 @@ class ModelSearch:
         level, before = self.prior.level, dict(self.seen)
         if level[-1] > HELD_BACK * np.median(level):
             return
-        for model, starts in self.filters(self.best, DIGITAL):
-            for start in starts:
-                self.fit(model, start)
+        for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL) for s in starts]:
+            self.fit(model, start)
         if any(t.filter in DIGITAL for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
