@@ -17,7 +17,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.plant import HeldController, Plant
+from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import grid, measured
 from gyrobench.tuning.sight_jitter import SightModel, SightWays
 from gyrobench.tuning.structures import BLOCKS, Controller, ControllerStructure
@@ -83,7 +83,7 @@ class TuningProblem:
         """Return ln ratio of each loop and wish; below UNSTABLE where a loop is not stable."""
         self.evaluations += 1
         step = self.plants[0].step
-        held = HeldController(controller, step)
+        held = self.plants[0].with_controller(controller)
         shape = len(self.plants), len(self.wishes)
         growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
         if np.any(growth >= ROUNDING):
@@ -114,7 +114,7 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    if not problem.structure.blocks:
+    if problem.structure.computed:
         return _computed(problem)
     low, high = problem.box.T
     nominal, corners = problem.of(1), problem.of(problem.corners)

@@ -19,6 +19,7 @@ from gyrobench.record.frequency_response import Complex, reached
 from gyrobench.record.run_document import LinearModel
 from gyrobench.system.wiring import Assembly
 from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
+from gyrobench.tuning.own_controllers import own_controller, own_values
 from gyrobench.tuning.structures import Controller
 
 
@@ -34,6 +35,14 @@ class Plant:
     c: Array
     step: float
     values: Mapping[str, float]
+
+    def with_controller(self, controller: Controller) -> HeldController:
+        """Return a controller as it works in this loop."""
+        return HeldController(controller, self.step)
+
+    def controller_response(self, controller: Controller, f: Array) -> Complex:
+        """Return the response of a controller in this loop at frequencies in Hz."""
+        return self.with_controller(controller).response(np.exp(2j * np.pi * np.asarray(f, float) * self.step))
 
     def response(self, f: Array) -> Complex:
         """Return the response at frequencies in Hz."""
@@ -59,9 +68,9 @@ def plants(
 ) -> list[Plant]:
     """Return the plant at each point of the spread.  Raises LinearizationError and ComponentError."""
     models = [_opened(assembly, {**parameters, **values}, part_of, step, ports) for values in points]
-    if len({len(m.states) for m in models}) > 1:
+    if len({len(m.states) for m, _ in models}) > 1:
         raise UsageError("--over: the parts have other states at some points of the spread: narrow it")
-    matrices = [_matrices(m) for m in models]
+    matrices = [_matrices(m, gain) for m, gain in models]
     between = np.any([reached(a, b) & reached(a.T, c.T) for a, b, c in matrices], axis=0)
     if not between.any():
         raise UsageError("the voltage of the stabilizer does not reach its input: the loop is open")
@@ -74,10 +83,13 @@ def plants(
 def _opened(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float,
     ports: LoopPorts,
-) -> LinearModel:  # fmt: skip
-    """Return the loop with -1 in the place of the controller, opened before it."""
+) -> tuple[LinearModel, float]:  # fmt: skip
+    """Return the loop with a gain in the place of the controller, opened before it, and this gain."""
     linear = Linear(assembly, operating_point(assembly, parameters, part_of), step)
-    return without_controller(linear, ports.slot, {("v", "u"): -1.0}).discrete(ports.opened)
+    own = own_controller(parameters, ports.slot)
+    if own is not None:
+        return linear.discrete(ports.opened), own.gain(own_values(parameters, ports.slot))
+    return without_controller(linear, ports.slot, {("v", "u"): -1.0}).discrete(ports.opened), 1.0
 
 
 def without_controller(linear: Linear, slot: str, gains: Mapping[tuple[str, str], float]) -> Linear:
@@ -96,31 +108,38 @@ def without_controller(linear: Linear, slot: str, gains: Mapping[tuple[str, str]
     return linear
 
 
-def _matrices(model: LinearModel) -> tuple[Array, Array, Array]:
-    """Return a, b, c of a model with one input and one output."""
+def _matrices(model: LinearModel, gain: float) -> tuple[Array, Array, Array]:
+    """Return a, b, c of a model with one input and one output, over a gain that is in it."""
     n = len(model.states)
     if np.any(np.asarray(model.D, float)):
         raise UsageError("the loop has no delay of a step: it cannot be tuned")
     a, b, c = (np.asarray(m, float) for m in (model.A, model.B, model.C))
-    return a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
+    return a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n) / gain
 
 
 class HeldController:
     """A continuous controller in the loop: exact for a held input, as the parts are."""
 
     def __init__(self, controller: Controller, step: float) -> None:
-        from scipy.linalg import expm
         from scipy.signal import tf2ss
 
         num, den = (np.trim_zeros(np.array(p), "b")[::-1] for p in (controller.num, controller.den))
         a, b, c, d = tf2ss(num, den)
         n = len(den) - 1
-        a, b, c = a.reshape(n, n), b.reshape(n, 1), c.reshape(1, n)
+        a, b, c = a[:n, :n], b[:n], c[:, :n]
+        self.a, self.b, self.c, self.d = self._sampled(a, b, c, float(np.ravel(d)[0]), step)
+
+    @staticmethod
+    def _sampled(a: Array, b: Array, c: Array, d: float, step: float) -> tuple[Array, Array, Array, float]:
+        """Return x+ = a x + b u, y = c x + d u: y at the end of the step in which u is held."""
+        from scipy.linalg import expm
+
+        n = len(a)
         whole = np.zeros((n + 1, n + 1))
         whole[:n, :n], whole[:n, n:] = a * step, b * step
         both = expm(whole)
-        self.a, self.b, self.c = both[:n, :n], both[:n, n:], c
-        self.d, self.step = float(np.ravel(d)[0]), step
+        a, b = both[:n, :n], both[:n, n:]
+        return a, b, c @ a, float((c @ b)[0, 0]) + d
 
     def response(self, z: Complex) -> Complex:
         """Return the response at points z: the output at the end of a step sees the input held in it."""
@@ -128,15 +147,14 @@ class HeldController:
         if n == 0:
             return np.full(z.size, self.d + 0j)
         states = np.linalg.solve(z[:, None, None] * np.eye(n) - self.a, np.broadcast_to(self.b, (z.size, n, 1)) + 0j)
-        return np.asarray(self.d + z * (self.c @ states)[:, 0, 0])
+        return np.asarray(self.d + (self.c @ states)[:, 0, 0])
 
     def loop(self, plant: Plant) -> tuple[Array, Array, Array]:
         """Return a, b, c of the open loop: states of plant and controller, input r, output w."""
-        direct = float((self.c @ self.b)[0, 0]) + self.d if len(self.a) else self.d
         n, m = len(plant.a), len(self.a)
         a = np.zeros((n + m, n + m))
-        a[:n, :n], a[:n, n:], a[n:, n:] = plant.a, plant.b @ self.c @ self.a, self.a
-        b = np.vstack([plant.b * direct, self.b])
+        a[:n, :n], a[:n, n:], a[n:, n:] = plant.a, plant.b @ self.c, self.a
+        b = np.vstack([plant.b * self.d, self.b])
         return a, b, np.hstack([plant.c, np.zeros((1, m))])
 
     def poles(self, plants: Sequence[Plant]) -> Array:

@@ -25,6 +25,7 @@ from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_lo
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import System
 from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
+from gyrobench.tuning.own_controllers import own_controller, own_values
 from gyrobench.tuning.robustness import bandwidth_limit, crossovers, gain_limits, measured
 from gyrobench.tuning.wishes import JITTER, Wish
 
@@ -184,7 +185,8 @@ def proof_of(
             return most / float(np.interp(x, f, effort))
 
         plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "", ports.kind)
-        record = _run(session, settings, at, plan, step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), seed)
+        record = _run(session, settings, at, plan, step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), seed,
+                      ports)  # fmt: skip
         tried = _read(record, at, f, L, wishes, load, ports, sight)
         if found is None or not (tried.limits or tried.why_not):
             found = tried
@@ -195,14 +197,15 @@ def proof_of(
 
 
 def _run(
-    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], plan: LoopPlan, period: float, seed: int
+    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], plan: LoopPlan, period: float, seed: int,
+    ports: LoopPorts,
 ) -> Record:  # fmt: skip
     """Run a plan at a point of the spread in the place of the system's own; period: of the channels, s."""
     system = session.system
     kept = dict(vars(system))
     vars(system).update(plan=lambda: plan, channel_period=period, nominal={})
     try:
-        return session.run({**settings, **at}, seed)
+        return ports.measured(session.run({**settings, **at}, seed))
     finally:
         vars(system).clear()
         vars(system).update(kept)
@@ -217,8 +220,11 @@ def _read(
     judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
     limit = known_limit(record.run.parameters, ports)
-    cut = _cut(phases, ports.slot, limit)
-    noise = f"{ports.slot} (noise alone has its voltage at the limit of {limit:.3g} V {100.0 * cut:.2g} % of the time)"
+    own = own_controller(record.run.parameters, ports.slot)
+    cut = _limited(phases, ports.slot) if own else _cut(phases, ports.slot, limit)
+    what, unit = ("output", own.unit) if own else ("voltage", "V")
+    at_limit = f"at the limit of {limit:.3g} {unit} {100.0 * cut:.2g} % of the time"
+    noise = f"{ports.slot} (noise alone has its {what} {at_limit})"
     more = [noise + ", which takes gain from the loop"] if cut > CUT else []
     friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *more])
     step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
@@ -240,9 +246,22 @@ def _read(
 
 
 def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
-    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less."""
+    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less.
+
+    Of a part with a controller of its own: its largest output.
+    """
+    own = own_controller(parameters, ports.slot)
+    if own is not None:
+        return own.limit(own_values(parameters, ports.slot))
     slots = (ports.slot, "platform") if ports.kind == "test" else (ports.slot,)
     return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in slots)
+
+
+def _limited(phases: Sequence[Gate], slot: str) -> float:
+    """Return the part of the time at rest in which a part says that it is at its limit."""
+    flag = f"{slot}.saturated"
+    at_rest = [g[flag] for g in phases if g.label == REST and flag in g.channels]
+    return float(np.mean(at_rest[0] > 0.5)) if at_rest else 0.0
 
 
 def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:
