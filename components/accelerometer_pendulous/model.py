@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, Rotation, State, sampled
 from gyrobench.component.blocks.gyro import GaussMarkov
 from gyrobench.component.math import Number, clip, floor
@@ -38,6 +40,7 @@ class AccelerometerPendulous(Component):
     """
 
     version = "1.0.0"
+    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
 
     scale = Parameter(1e3 * G0, "m/s2/A", "specific force per current, lambda (1 g0/mA)", above=0.0)
     k0 = Parameter(50.0 * UG, "1", "bias, in g0 (50 ug)")

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gyrobench.component import Component, Discrete, Input, Output, Parameter, State, sampled
 from gyrobench.component.math import Number, clip, floor, pi
 
@@ -21,10 +23,12 @@ class AcquisitionCard(Component):
     """
 
     version = "1.0.0"
+    smooth: ClassVar[dict[str, float]] = {"bits": 0.0}
+    sampling = "period"
 
     f_c = Parameter(720.0, "Hz", "corner of the RC filter; 0: none", min=0.0)
     gain = Parameter(1.0, "1", "volts at the converter per unit of z", above=0.0)
-    bits = Parameter(14, int, "bits of the converter", min=2, max=32)
+    bits = Parameter(14, int, "bits of the converter; 0: no rounding", min=0, max=32)
     span = Parameter(5.0, "V", "span of the converter, largest voltage of each sign", above=0.0)
     period = Parameter(0.0, "s", "sampling period; 0: every communication step", min=0.0)
 
@@ -42,6 +46,7 @@ class AcquisitionCard(Component):
     since = Discrete(0.0, "1", "communication steps since it was taken")
 
     def start(self) -> None:
+        self.refuse(self.bits == 1.0, "bits = 1: 2 to 32, or 0 for none")
         codes = 1.0
         for k in range(31):
             codes = 2.0 * codes if k < self.bits - 1.0 else codes
@@ -69,8 +74,9 @@ class AcquisitionCard(Component):
 
     def outputs(self) -> None:
         sample = self.held if self.period > 0.0 else self.filtered()
-        code = floor(self.gain * sample / self.lsb + 0.5)
-        kept = clip(code, -self.codes, self.codes - 1.0)
+        code = self.gain * sample / self.lsb
+        code = floor(code + 0.5) if self.bits > 0.5 else code
+        kept = clip(code, -self.codes, self.codes - 1.0 if self.bits > 0.5 else self.codes)
         self.estimate = kept * self.lsb / self.gain
         self.overload = 1.0 if kept != code else 0.0
         delay = 1.0 / (2.0 * pi * self.f_c) if self.f_c > 0.0 else 0.0

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gyrobench.component import Discrete, Noise, Output, Parameter, State, sampled
 from gyrobench.component.blocks.rate_gyro import AngleCounter, RateGyro, locked
 from gyrobench.component.math import cos, fabs, pi, sin, sqrt
@@ -27,6 +29,7 @@ class GyroFog(RateGyro):
     """
 
     version = "1.0.0"
+    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
     white_noise, without_own_noise = "electronics", {"optical": 0.0}
 
     length = Parameter(1000.0, "m", "length of the fibre of a coil, L", above=0.0)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gyrobench.component import Discrete, Noise, Output, Parameter, sampled
 from gyrobench.component.blocks.rate_gyro import AngleCounter, RateGyro
 from gyrobench.component.math import Number, cos, exp, pi, sin, tan, vector
@@ -26,6 +28,7 @@ class GyroHemispherical(RateGyro):
     """
 
     version = "1.0.0"
+    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
     white_noise = "white"
 
     gain = Parameter(0.277, "1", "Bryan factor k: turn of the pattern over that of the body", above=0.0, max=1.0)

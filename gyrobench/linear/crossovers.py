@@ -18,6 +18,8 @@ def crossovers(model: LinearModel, wanted: float) -> list[tuple[float, float]]:
     top = min(SPAN * wanted, 0.499 / model.step) if model.step else SPAN * wanted
     f = np.geomspace(wanted / SPAN, top, POINTS)
     response = model_response(model, f)[:, 0, 0]
+    if not np.all(response):  # of a part that has no slope
+        return []
     size, turn = np.log(np.abs(response)), np.degrees(np.unwrap(np.angle(response)))
     crossed = []
     for k in np.flatnonzero((size[:-1] > 0.0) & (size[1:] <= 0.0)):

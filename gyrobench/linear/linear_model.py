@@ -50,7 +50,8 @@ class LinearizationError(GyrobenchError):
 def operating_point(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]]
 ) -> dict[str, Component]:
-    """Return the parts as plain classes with these parameters and starts ("slot.name", SI), started and propagated.
+    """Return the parts as plain classes with these parameters and starts ("slot.name", SI), started and propagated;
+    those that round (a converter, an output word) without it, as a slope of 0 is not that of their curve.
 
     part_of: slot -> class; raises LinearizationError for a slot without a part of this bench.  Raises
     ComponentError where a part does not start.
@@ -64,6 +65,8 @@ def operating_point(
             for element, x in flatten(parameter, value).items() if of == slot else ():
                 if element in known:
                     part.set(element, float(x))
+        for name, x in part.smooth.items():
+            part.set(name, x)
         parts[slot] = part
 
     def feed(slot: str) -> None:

@@ -1,4 +1,4 @@
-"""The linear model of a part that samples every n communication steps (its parameter Ts).
+"""The linear model of a part that samples every n communication steps (its parameter Component.sampling).
 
 Its step repeats after n, x+ = A_i x + B_i u, y = C_i x+ + D_i u in phase i.  Two models follow.
 
@@ -22,7 +22,6 @@ from gyrobench.component import Component, ComponentError
 from gyrobench.linear.sampled_model import ALIKE, DELTA, MAX_DISCRETE, SETTLED, SampledStep, differences
 from gyrobench.record.frequency_response import reached
 
-PERIOD = "Ts"  # parameter with the sampling period
 TRIED = 12  # periods with random inputs, and as many after them
 MOST = 200  # communication steps in it
 
@@ -56,7 +55,7 @@ def multirate_step(part: Component, inputs: list[str], outputs: list[str], step:
     Raises ValueError (the text says why) for a part whose steps do not repeat after it.
     """
     known = {s.name for s in part.layout if s.section == "parameter"}
-    n = round(float(part.get(PERIOD)) / step) if PERIOD in known else 0
+    n = round(float(part.get(part.sampling)) / step) if part.sampling in known else 0
     if n < 2 or not inputs:
         return None
     if n > MOST:

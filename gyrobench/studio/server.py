@@ -35,6 +35,7 @@ PORT = 8765
 TRIED = 20  # ports, from the first
 SERVED = ("report.html", "report.pdf", "result.json", "run.json", "comparison.html", "comparison.pdf")
 LOOK = 0.5  # s between two looks for jobs to start
+AWAY = 60.0  # s without an answer of a browser, which may have much to do, after which its page is loaded anew
 MESSAGE = 1 << 22  # bytes of a message of a page
 
 
@@ -118,7 +119,7 @@ def build(studio: Studio) -> FastAPI:
     add_command_pages(studio)
     add_part_page(studio)
     add_learn_pages(studio, app)
-    ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=20)
+    ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=AWAY)
     return app
 
 

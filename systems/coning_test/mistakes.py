@@ -51,8 +51,8 @@ def other_chain(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
     rate, stated = motions[k]
     text = (
         f"At {cones.cones[k][0]:g} Hz the attitude drifts by {drift / rate:.3g} of ω (1 − cos θ), the stated filter, "
-        f"output rate and algorithm make {stated / rate:.3g}. Are frequency (Hz, not rad/s) and half-angle (not the "
-        "full angle) in the units that are given, and interval, bandwidth, coning and samples those of the unit?"
+        f"output rate and algorithm make {stated / rate:.3g}. Are frequency (Hz, not rad/s), half-angle (not the full "
+        "angle) and drift in the units that are given, and interval, bandwidth, coning and samples those of the unit?"
     )
     blocked, severity = SEVERITY[far]
     yield Reason("coning.stated", text.replace(" -", " −"), blocked, severity=severity)

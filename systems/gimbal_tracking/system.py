@@ -90,8 +90,7 @@ class GimbalTracking(SightTest):
         for wire in (f"exciter.command[{three}] -> track_{axis}.test", f"track_{axis}.v -> decoupler.command[{two}]")
     }
     loops = SightTest.loops | {f"track {axis}": f"track_{axis}.u" for axis in AXES}
-    #: s, no part of the time between images: where samples meet a held error always at the same ages, their mean age is
-    #: not that of the signal
+    #: s, no part of the time between images: samples meet a held error at all of its ages
     channel_period = 6e-4
     options = SightTest.options | {
         "track": Option(1.5, "Hz", "crossover of both tracking loops, for the gains", 0.05, 20.0),

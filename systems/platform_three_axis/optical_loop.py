@@ -22,8 +22,7 @@ LOOPS = {f"track {axis}": f"track_{axis}.u" for axis in SIGHT}
 CORNER = 6.0  # crossover over the corner of the integral
 TONES = (0.35, 0.6, 0.8, 1.0, 1.25, 1.7, 2.5, 3.6)  # of the crossover
 TEST = 4e-4  # V (rad), of the test sines
-#: s, between samples of the record.  No part of the time between images: where samples meet a held error always at the
-#: same ages, their mean age is not that of the signal, and the loops are measured with less delay than they have
+#: s, between samples of the record; no part of the time between images: samples meet a held error at all of its ages
 CHANNEL_PERIOD = 1.3e-3
 RATES = [1e-3, 5e-3]  # rad/s, of the target about x and z
 FACTORS: dict[str, Any] = {

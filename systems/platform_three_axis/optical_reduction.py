@@ -6,6 +6,7 @@ from gyrobench.reduction.loops.loop_toolkit import Account, margins, told
 from gyrobench.reduction.loops.tracking_measures import SIGHT, TrackingMeasures
 
 AXES = ("pitch", "roll", "azimuth")
+HELD = {f"estimator_{axis}": (0.0, 0.0) for axis in "xyz"}  # where they are fitted
 
 
 class OpticalReduction(TrackingMeasures):
@@ -20,7 +21,7 @@ class OpticalReduction(TrackingMeasures):
     def measure(self) -> Account:
         found = self.found
         for k, axis in enumerate(AXES, 1):
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held=HELD)
         self.loops()
         ride = self.ride()
         if ride is not None:

@@ -27,7 +27,7 @@ from gyrobench.reduction.loops.platform_measures import peak_noise
 from gyrobench.reduction.loops.rides import share, still
 
 from .budget import budget
-from .optical_reduction import OpticalReduction
+from .optical_reduction import HELD, OpticalReduction
 
 AXES = ("pitch", "roll", "azimuth")
 RATES = (
@@ -60,7 +60,7 @@ class Reduction(LoopReduction):
         for gate in found.of("command", shape="step"):
             self._command(gate)
         for k, axis in enumerate(AXES, 1):
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k)
+            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held=HELD)
         if found.at_rest is not None:
             self._drift(found.at_rest)
         self._lock()

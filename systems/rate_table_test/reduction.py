@@ -167,6 +167,14 @@ class Reduction(DriftReduction[RateTableSetup]):
             "hysteresis", "the hysteresis changes with the rate: h is of no rate",
             "no hysteresis that changes with the rate",
         )  # fmt: skip
+        with_time = [(self.t0 + self.t1)[self.large], *(np.asarray(v)[self.large] for n, v in self.windows.items()
+                                                        if n.startswith("temperature"))]  # fmt: skip
+        found.f_test(
+            "scale.time", "rate times time and temperature",
+            np.column_stack([x * (v - np.mean(v)) for v in with_time if np.ptp(v) > 0.0]),
+            "constancy of the scale factor", "the scale factor changes with time or temperature: e is of their means",
+            "no scale factor that changes with time or temperature",
+        )  # fmt: skip
 
     def account(self, found: Findings) -> Account:
         large = self.large

@@ -46,8 +46,9 @@ def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
     read, stated = expected[k]
     text = (
         f"At {motions.motions[k].frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the "
-        f"stated filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle and vibration "
-        "(amplitudes) in the units that are given, and interval, filters, sculling, samples and size those of the unit?"
+        f"stated filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle, vibration "
+        "(amplitudes) and acceleration in the units that are given, and interval, filters, sculling, samples and size "
+        "those of the unit?"
     )
     blocked, severity = SEVERITY[far]
     yield Reason("sculling.stated", text.replace(" -", " −"), blocked, severity=severity)

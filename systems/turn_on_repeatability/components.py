@@ -21,6 +21,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.uncertainty import NORMAL
+from gyrobench.result import Coefficient
+from gyrobench.units import DPH
 
 DRAWS, POINTS = 20_000, 4000
 Numbers = np.ndarray[Any, np.dtype[np.intp]]  # of the day of each bias, from 0
@@ -99,3 +102,11 @@ def _of_days(x: Array, number: Numbers, D: int) -> Array:
 def _component(value: float, drawn: Array, dof: int) -> VarianceComponent:
     low, high = np.sqrt(np.maximum(np.quantile(drawn, [0.025, 0.975]), 0.0)).tolist()
     return VarianceComponent(math.sqrt(max(value, 0.0)), low, high, dof)
+
+
+def coefficient(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:
+    """Return the component, SI, as it is reported; truth: SI."""
+    low, high = part.low / DPH, part.high / DPH
+    shown = None if truth is None else truth / DPH
+    return Coefficient(name, meaning, "°/h", part.rms / DPH, (high - low) / (2.0 * NORMAL), NORMAL, (low, high),
+                       truth=shown)  # fmt: skip

@@ -18,8 +18,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
 
+from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
@@ -42,9 +42,10 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import DPH
 
-from . import mistakes
-from .components import Spread, VarianceComponent, spread
+from . import components, mistakes, temperature
+from .components import Spread, spread
 from .draws import Posterior
+from .labels import labelled
 from .truth import true_values
 from .warming import Kind, Warming, fitted, means
 
@@ -72,6 +73,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
     def __init__(self, windows: Mapping[str, Array], setup: TurnOnSetup) -> None:
         super().__init__(windows, setup)
         self.tau, self.tau_E = np.zeros(0), np.zeros(0)
+        self.late = False
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
@@ -116,6 +118,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         w = self.windows
         self.y, self.since, t0, t1 = (np.asarray(w[n], dtype=float) for n in ("mean", "since", "t_start", "t_end"))
         self.length = t1 - t0
+        self.read = float(np.max(self.since + 0.5 * self.length))
         self.numbers, self.turn = np.unique(np.asarray(w["turn_on"]).astype(int), return_inverse=True)
         self.count = self.numbers.size
         self.single = self.count == self.y.size
@@ -213,15 +216,12 @@ class Reduction(DriftReduction[TurnOnSetup]):
         )
         for name, meaning, part in meanings:
             if part is not None:
-                added.append(_of_component(name, meaning, part, truth.get(name)))
+                added.append(components.coefficient(name, meaning, part, truth.get(name)))
         if s.slope is not None:
-            k, u = (x / DPH for x in s.slope)
             dof = max(self.count - np.unique(self.day).size - 1, 1)
-            factor = float(special.stdtrit(dof, 0.975))
-            added.append(Coefficient("b_T", "change of the bias with temperature", "°/h/K", k, u, factor,
-                                     (k - factor * u, k + factor * u)))  # fmt: skip
+            added.append(temperature.coefficient(s.slope, dof, self.read, self.late, truth.get("b_T")))
         own = list(result.coefficients)
-        if self.tau.size + self.tau_E.size:
+        if self.tau.size + self.tau_E.size and asked.whole():
             self.drawn = self._draws()
             self.endless = self._endless()
             own = [self._allowed(c) for c in own]
@@ -238,6 +238,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
             self.setup.limit, longest
         )
+        if not asked.whole():
+            return Coefficient("t_w", meaning, SECONDS, own, math.nan, NORMAL, (math.nan, math.nan))
         times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t)))
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
         if self.endless or not math.isfinite(own):
@@ -339,6 +341,14 @@ class Reduction(DriftReduction[TurnOnSetup]):
         )
         return [TIME_BASE.effect(self.setup, None, values=values)]
 
+    def test(self, found: Findings) -> None:
+        if "temperature" not in self.windows or self.single:
+            return
+        columns = temperature.lags(self.windows, found.est.X, self.read)
+        bad, good = temperature.LATE, "no drift within turn-ons of a gyro that follows the temperature late"
+        shown = columns.size and found.f_test("late", "lag of the temperature", columns, "temperature", bad, good)
+        self.late = bool(shown) and (found.tests[-1].p or 0.0) < temperature.LEVEL
+
     def account(self, found: Findings) -> Account:
         q = self.tau.size
         return Account(
@@ -379,23 +389,3 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
 
 reduce = Reduction.reduce
-
-
-def _of_component(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:
-    low, high = part.low / DPH, part.high / DPH
-    shown = None if truth is None else truth / DPH
-    return Coefficient(name, meaning, "°/h", part.rms / DPH, (high - low) / (2.0 * NORMAL), NORMAL, (low, high),
-                       truth=shown)  # fmt: skip
-
-
-def labelled(record: Record) -> dict[str, Array]:
-    """Return the windows with turn_on, day and rate; of a run by its plan."""
-    windows = dict(record.windows)
-    if not record.run.measured:
-        rows = {row.phase: row for row in record.run.plan}
-        phase = np.asarray(windows["phase"]).astype(int).tolist()
-        windows["turn_on"] = np.array(phase)
-        windows["day"] = np.array([round(rows[p].target_y) for p in phase])
-        if record.run.options["rate"]:
-            windows["rate"] = np.array([rows[p].target for p in phase])
-    return windows

@@ -32,4 +32,6 @@ def true_values(run: RunDocument) -> dict[str, float] | None:
     if not any(float(p.get(f"gyro.{n}", 0.0)) for n in QUIET):
         found |= {"σ_on": float(p["switched.between_turn_ons"]), "σ_day": float(p["switched.between_days"])}
     scale = 1.0 + float(np.ravel(p.get("gyro.scale", 0.0))[0])
+    if "gyro.bias_T" in p:
+        found["b_T"] = float(np.ravel(p["gyro.bias_T"])[0])
     return found | {"E": float(p["switched.scale_warm"]) * scale, "τ_E": float(p["switched.scale_tau"])}

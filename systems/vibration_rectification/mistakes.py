@@ -12,6 +12,7 @@ from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
 from gyrobench.result import Coefficient, Reason
 
+NOTHING = 0.1  # of gravity, up less down: not that axis, or not turned over; a unit of a thousandth is below it, too
 FAR = 1e5  # ppm, scale factor error from which on something else than the accelerometer is meant
 
 
@@ -33,6 +34,11 @@ def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:
     """Yield why a scale factor error beyond 10 % is that of no accelerometer."""
     for c in found:
         if c.name == "S" and abs(c.estimate) > FAR:
-            yield Reason(
-                "force.factor", factor_sentence(1.0 + c.estimate * 1e-6, FORCES), ("pass", "fail"), severity="doubt"
-            )
+            factor = 1.0 + c.estimate * 1e-6
+            text = factor_sentence(factor, FORCES)
+            if abs(factor) < NOTHING:
+                text = (
+                    f"The accelerometer reads {factor:.2g} times gravity, up less down: was it not turned over, or "
+                    "does another axis stand up?"
+                ).replace("-", "−")
+            yield Reason("force.factor", text, ("pass", "fail"), severity="doubt")

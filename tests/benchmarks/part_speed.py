@@ -1,8 +1,9 @@
 """Time of one communication step of 1 ms of every native part: set inputs, step, get outputs.
 
-Run by hand: ``python tests/benchmarks/part_speed.py [--write] [part ...]``.  Parameters (noise on) and inputs are those
-of the parts' reference runs, repeated.  The processor time of the best of many short rounds counts: the machine may be
-shared.  --write: mean, median and counts of all parts into docs/figures.toml.
+Run by hand: ``python tests/benchmarks/part_speed.py [--write] [--quick] [part ...]``.  Parameters (noise on) and inputs
+are those of the parts' reference runs, repeated; --quick: without flicker, twelve processes an axis.  The processor
+time of the best of many short rounds counts: the machine may be shared.  --write: mean, median and counts of all parts
+into docs/figures.toml.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import ctypes
 import statistics
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import quoted
@@ -33,11 +35,14 @@ def driver(folder: Path) -> ctypes.CDLL:
     return ctypes.CDLL(str(folder / "driver.so"))
 
 
-def measure(library: ctypes.CDLL, part: str, out: Path) -> float | None:
+def measure(library: ctypes.CDLL, part: str, out: Path, quick: bool = False) -> float | None:
     """Seconds a step, of 1 ms or, where the part refuses that, of the length in its reference run; None, said, where it
     refuses the repetition of its inputs.
     """
     reference = read_reference(Bench(standard_folder()).part_folder(part) / "reference.csv")
+    if quick:
+        quiet = {n: 0.0 for n in reference.parameters if "flicker" in n and not n.endswith("_tau")}
+        reference = replace(reference, parameters={**reference.parameters, **quiet})
     try:
         return measure_at(H, reference, library, part, out)
     except RuntimeError as refused:
@@ -95,22 +100,22 @@ def write(times: list[float]) -> None:
 
 
 def main(words: list[str]) -> None:
-    parts = [w for w in words if w != "--write"]
-    if parts and parts != words:
-        sys.exit("--write is of all parts")
+    parts = [w for w in words if not w.startswith("--")]
+    if "--write" in words and words != ["--write"]:
+        sys.exit("--write is of all parts, as they are")
     with tempfile.TemporaryDirectory() as folder:
         library = driver(Path(folder))
         print(f"{'part':20} us a step of 1 ms")
         times = []
         known = Bench(standard_folder()).parts()
         for part in parts or sorted(n for n, f in known.items() if (f / "reference.csv").exists()):
-            if (seconds := measure(library, part, Path(folder))) is not None:
+            if (seconds := measure(library, part, Path(folder), "--quick" in words)) is not None:
                 if part not in CARRIERS:
                     times.append(seconds)
                 print(f"{part:20} {seconds * 1e6:.4f}", flush=True)
         if times:
             print(f"{'mean':20} {sum(times) / len(times) * 1e6:.4f}   (budget 0.06, each part 0.2)")
-    if parts != words:
+    if "--write" in words:
         write(times)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Browser, needs_chromium
+from browser import LIMIT, Browser, needs_chromium
 from fmpy import simulate_fmu
 
 from gyrobench.component import Parameter
@@ -28,7 +28,7 @@ needs_ziglang = pytest.mark.skipif(
 
 def ended(browser: Browser) -> np.ndarray[Any, Any]:
     """The rows of the page once its run has ended: time and outputs."""
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + LIMIT
     while browser.run("document.body.dataset.run") not in ("ended", "failed"):
         assert time.monotonic() < deadline, browser.console
         time.sleep(0.05)

@@ -12,7 +12,7 @@ from scipy.signal import cont2discrete, lfilter
 from gyrobench.record.run_document import PlanRow
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.margins import measured_values
-from gyrobench.reduction.loops.open_loop import coherence_limit, open_loop_point
+from gyrobench.reduction.loops.open_loop import coherence_limit, held_lead, open_loop_point, unled
 
 DT = 1e-3
 F = (2.0, 4.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0)
@@ -87,3 +87,14 @@ def test_stated_crossovers_hold_at_every_noise(noise: float, stated: int) -> Non
     if noise < 3.0:
         assert np.mean(np.abs(scores) < 2.0) > 0.9
     assert np.max(np.abs(scores), initial=0.0) < 4.0
+
+
+def test_held_signal_in_the_loop_is_taken_back_to_its_mean_age() -> None:
+    """Held for 20 steps: each 13th sample meets all ages 0 to 19, mean 9.5; each 10th those of 0 and 10, mean 5; and
+    where the value arrives 4 steps after a sample, 6 and 16, mean 11: 4.5 too early, and 1.5 too late.
+    """
+    assert [held_lead(20, at, every) for at, every in ((0, 13), (4, 13), (0, 10), (4, 10))] == [0.0, 0.0, 4.5, -1.5]
+    f, lead = 3.0, 4e-3
+    y, r = 0.3 - 0.8j, 1.7 + 0.2j  # what comes back, what is added: L = y/(r - y)
+    seen = y * np.exp(2j * math.pi * f * lead)
+    assert unled(seen / (r - seen), f, lead) == pytest.approx(y / (r - y), rel=1e-12)

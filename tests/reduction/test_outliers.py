@@ -7,6 +7,7 @@ import pytest
 from finding import judged
 
 from gyrobench import units
+from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import nuisances, outliers
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import fit
@@ -116,3 +117,37 @@ def test_derived_quantities_have_both() -> None:
     assert odd is not None and abs(odd.without.value[0] + 2.0 / 3.0) < 4.0 * odd.without.u[0]
     (row,) = outliers.robust(found)[0].rows
     assert row[0] == "c" and abs(row[3] + 2.0 / 3.0) < 4.0 * row[4]
+
+
+def unequal(seed: int, shift: float = 0.0) -> Findings:
+    """40 windows of 60 s and 72 of 240 s in turns, white noise: of the short ones twice as much, 0.02 deg/h; the first
+    long one shifted by so many of its standard deviations.
+    """
+    length = np.tile(np.repeat([60.0, 240.0], [20, 36]), 2)
+    e = np.random.default_rng(seed).normal(size=length.size)
+    e[20] += shift
+    y, t = 0.3 + 0.01 * e * np.sqrt(240.0 / length), np.concatenate([[0.0], np.cumsum(length)])
+    wanted = [Quantity.of("a", "constant", "deg/h")]
+    return fit(wanted, np.ones((y.size, 1)), DPH * y, t[:-1], t[1:], [], "rate", "°/h", DPH)
+
+
+def test_short_windows_are_no_outliers_among_long_ones() -> None:
+    """A clean record is named in 1 %; by the scatter of all, a 4 sigma of a short one was 5.5: 13 % of the records."""
+    assert sum(outliers.find(unequal(seed)) is not None for seed in range(30)) <= 2
+
+
+def test_an_outlier_among_long_windows_is_in_their_standard_deviations() -> None:
+    """10 sigma of a long one, 0.1 deg/h, are 7 of the scatter of all rows, sqrt((40 * 4 + 72)/112) = 1.44 sigma."""
+    odd = outliers.find(unequal(3, 10.0))
+    assert odd is not None and odd.rows.tolist() == [20]
+    assert odd.t[0] == pytest.approx(10.0, abs=2.5)
+
+
+def test_relative_variances_are_those_of_the_covariance() -> None:
+    """White alone goes with 1/T, a reading with 1/T2, a process that is slow against the windows with 1."""
+    t1 = np.cumsum([100.0, 100.0, 400.0])
+    t0 = np.concatenate([[0.0], t1[:-1]])
+    for model, long in (((1.0, 0.0, 0.0), 0.25), ((1.0, 0.0, 1.0), 0.0625), ((1e7, 1.0, 0.0), 1.0)):
+        assert noise_model.relative_variance(t0, t1, model) == pytest.approx([1.0, 1.0, long], rel=1e-4)
+    process = np.diag(noise_model.process_covariance(t0, t1, 90.0))
+    assert noise_model.relative_variance(t0, t1, (90.0, 1.0, 0.0)) == pytest.approx(process / process[0])

@@ -83,7 +83,7 @@ def look(page: str, folder, width: int, dark: bool = False) -> tuple[dict, str]:
     ]  # fmt: skip
     if dark:
         flags.append("--blink-settings=preferredColorScheme=0")
-    run = subprocess.run([CHROMIUM, *flags, path.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    run = subprocess.run([CHROMIUM, *flags, path.as_uri()], capture_output=True, text=True, timeout=300, check=True)
     match = re.search(r'<pre id="probe">(.+?)</pre>', run.stdout, flags=re.S)
     assert match, run.stderr[-2000:]
     return json.loads(html.unescape(match.group(1))), run.stderr

@@ -29,7 +29,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
     assert address, line
     yield address[0], home
     process.terminate()
-    process.wait(20)
+    process.wait(1e-3 * LIMIT)
 
 
 @pytest.fixture(scope="module")  # not of the session: while it lives, no other test could run an event loop
@@ -37,7 +37,7 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
-        found = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        found = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"], timeout=LIMIT)
         yield found
         found.close()
 
@@ -46,8 +46,8 @@ def browser() -> Iterator[Any]:
 def context(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
     """A browser that has opened the first address once: it has the cookie and keeps the scripts of the front end."""
     made = browser.new_context(viewport=VIEW)
+    made.set_default_timeout(LIMIT)  # of all its pages
     page = made.new_page()
-    page.set_default_timeout(LIMIT)
     page.goto(studio[0])
     page.close()
     yield made
@@ -58,7 +58,6 @@ def context(studio: tuple[str, Path], browser: Any) -> Iterator[Any]:
 def page(studio: tuple[str, Path], context: Any) -> Iterator[Any]:
     """An empty page; every request, and every complaint of the page, is looked at in the end."""
     page = context.new_page()
-    page.set_default_timeout(LIMIT)
     page.set_viewport_size(VIEW)
     base = studio[0].partition("/?")[0]
     outside: list[str] = []

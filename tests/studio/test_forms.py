@@ -11,7 +11,7 @@ from typing import Any
 import foreign_fmus
 import numpy as np
 import pytest
-from studio_pages import CHROMIUM, NONE, TESTS, base_of, run_of
+from studio_pages import CHROMIUM, NONE, TESTS, base_of, run_of, soon
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NONE)
 
@@ -103,7 +103,7 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     assert profile["name"] == 'Labor "Nord"' and profile["country"] == "DE"
     assert profile["signatories"] == [{"role": "Head", "name": "A. B."}]
     page.goto(base_of(studio) + "/laboratory")
-    assert page.get_by_label("Name", exact=True).input_value() == 'Labor "Nord"'
+    soon(lambda: page.get_by_label("Name", exact=True).input_value(), 'Labor "Nord"')
     page.get_by_label("Run of an instrument, runs of a lot").click()
     page.get_by_role("option", name="fixed_position/run1").click()
     page.keyboard.press("Escape")

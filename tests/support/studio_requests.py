@@ -13,7 +13,7 @@ import uuid
 from dataclasses import dataclass
 from urllib.parse import urlencode
 
-WALL = 60.0  # s, for one answer
+WALL = 300.0  # s, for one answer
 NAMES = ("fixed_position", "tumble_single_axis", "floated_gyro", "run1")
 PAGES = (
     "/", "/system/", "/part/", "/run/", "/runs", "/files/", "/picture/", "/wiring/", "/job/", "/pages/", "/data?file=",

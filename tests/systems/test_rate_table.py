@@ -232,9 +232,43 @@ def row_before(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return rate[2::2], mean[:-2:2]
 
 
+def late_row(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row 13, the first reading at 25 deg/s after 37.5: 0.3 of its mean is of the rate before."""
+    mean[12] += 0.3 * (rate[11] - rate[12])
+    return rate, mean
+
+
+def row_of_the_step_before(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    mean[20] = mean[19]
+    return rate, mean
+
+
+def late_rows(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first of both readings of each rate has begun too early: 0.1 of it is of the rate before."""
+    mean[2::2] += 0.1 * (rate[1:-1:2] - rate[2::2])
+    return rate, mean
+
+
+def rate_left_out(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both readings at 25 deg/s on the way down are at 37.5: the table stayed."""
+    mean[12:14] = mean[10:12] + 0.01
+    return rate, mean
+
+
+def wild_row(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Beyond both neighbours: 50 deg/s is the largest rate."""
+    mean[8] += 5.0
+    return rate, mean
+
+
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
+        (late_row, "row 13 left out (held is 0.3 of the rate before)"),
+        (row_of_the_step_before, "row 21 left out (held is 1 of the rate before)"),
+        (rate_left_out, "rows 13 to 14 left out (held is 1 of the rate before)"),
+        (late_rows, "a part of 0.1 of the rate before in each reading that begins a rate"),
+        (wild_row, "row 9 left out (off by 5 °/s)"),
         (exchanged, "the rates of steps 2 and 3 exchanged"),
         (reversed_step, "the sense of the rate reversed in 2 rows"),
         (row_before, "the reading belonging to the row before"),

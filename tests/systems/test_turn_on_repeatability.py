@@ -13,6 +13,7 @@ import pytest
 
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
+from gyrobench.reduction.drift.late_temperature import following
 from gyrobench.reduction.toolkit import ReductionError
 from gyrobench.system.system import load_system
 from systems.turn_on_repeatability import components
@@ -166,6 +167,32 @@ def test_a_warm_up_longer_than_the_record() -> None:
         assert found[name].no_value and low < true < high, name
 
 
+# ------------------------------------------------------------------------------------------------ temperature
+def test_a_temperature_that_is_followed_late() -> None:
+    """20 until 100 s, then 30; tau 50 s: 30 - 10/e in the middle of a reading of 100 s."""
+    windows = {"temperature": [20.0, 30.0, 30.0], "t_start": [0.0, 100.0, 200.0], "t_end": [10.0, 200.0, 300.0]}
+    expected = [20.0, 30.0 - 10.0 * math.exp(-1.0), 30.0 - 10.0 * math.exp(-3.0)]
+    assert following(windows, 50.0) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("lag", [300.0, 0.1])
+def test_a_gyro_that_lags_has_no_coefficient_of_temperature(lag: float) -> None:
+    """Turn-ons of 60 s, 2 deg/h/K, steps of a kelvin: 300 s late b_T was 1.03 +- 0.02, without a word."""
+    rng = np.random.default_rng(3)
+    turn, since = np.repeat(np.arange(15), 12), np.tile(2.5 + 5.0 * np.arange(12), 15)
+    windows = {"t_start": 60.0 * turn + since - 2.5, "t_end": 60.0 * turn + since + 2.5, "turn_on": turn + 1,
+               "day": np.ones(turn.size), "since": since, "temperature": 293.0 + turn}  # fmt: skip
+    own = 0.2 * rng.normal(size=15)[turn] + 3.0 * np.exp(-since / 20.0) + 0.05 * rng.normal(size=turn.size)
+    windows["mean"] = DPH * (own + 2.0 * following(windows, lag))
+    result = Reduction.reduce(windows, TurnOnSetup(limit=DPH, truth={"b_T": 2.0 * DPH}))
+    b_T = next(c for c in result.coefficients if c.name == "b_T")
+    assert b_T.meaning.endswith("of turn-ons of 60 s")
+    if lag > 1.0:
+        assert b_T.no_value == "the gyro follows the temperature late"
+    else:
+        assert not b_T.no_value and abs(b_T.z) < 3.0 and b_T.u < 0.05
+
+
 # ------------------------------------------------------------------------------------------------ runs
 @pytest.mark.long
 def test_a_gyro_that_warms_up_comes_back() -> None:
@@ -192,13 +219,13 @@ def test_a_gyro_that_warms_up_comes_back() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ files
-def rows(noise: float = 0.02) -> list[list[float]]:
+def rows(noise: float = 0.02, on: float = 0.3) -> list[list[float]]:
     """t0, t1, turn_on, day, since (s), mean (deg/h), temperature: 6 turn-ons on 3 days, 2 exp(-t/60), 0.1 deg/h/K."""
     rng = np.random.default_rng(8)
     out, t = [], 0.0
     for k in range(6):
         T = 20.0 + 3.0 * rng.normal()
-        own = 5.0 + 0.3 * rng.normal() + 0.1 * (T - 20.0)
+        own = 5.0 + on * rng.normal() + 0.1 * (T - 20.0)
         for j in range(25):
             since = 5.0 + 10.0 * j
             mean = own + 2.0 * 6.0 * (math.exp(-(since - 5.0) / 60.0) - math.exp(-(since + 5.0) / 60.0))
@@ -232,10 +259,12 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_late_stamp_of_the_turn_on_is_asked_for(command: Command, tmp_path: Path) -> None:
     """A reading of 10 s late, A is exp(10/60) = 1.18 times as large, and the residuals are the same."""
-    late = [[*row[:4], row[4] + 10.0, *row[5:]] for row in rows()]
+    late = [[*row[:4], row[4] + 10.0, *row[5:]] for row in rows(on=0.01)]
     _, _, result = reduced(command, tmp_path, late)
     asked = next(r["text"] for r in result["reasons"] if r["id"] == "arrangement.unstated")
     assert "the times since the turn-on short by one reading (A by" in asked
+    # the turn-ons are long apart, at temperatures by chance: a gyro 255 s behind keeps exp(-1) of each step
+    assert "an instrument 255 s behind the temperature (b_T by" in asked
 
 
 def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:

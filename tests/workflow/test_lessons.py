@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Browser, needs_chromium
+from browser import LIMIT, Browser, needs_chromium
 
 import gyrobench as gb
 from gyrobench import units
@@ -196,7 +196,7 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
 
 
 def ended(browser: Browser) -> None:
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + LIMIT
     while browser.run("document.body.dataset.run") not in ("ended", "failed"):
         assert time.monotonic() < deadline, browser.console
         time.sleep(0.05)

@@ -125,6 +125,9 @@ class FilteredRateGyro(RateGyro):
     rate = y within +-range_max, sampled every `period`, in steps of `resolution`
     """
 
+    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    sampling = "period"
+
     bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
     range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
     period = Parameter(0.0, "s", "time between two output samples; 0: every step", min=0.0)

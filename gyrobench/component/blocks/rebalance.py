@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gyrobench.component.component import Component
 from gyrobench.component.composition import sampled
 from gyrobench.component.declarations import Discrete, Input, Noise, Output, Parameter, State
@@ -15,6 +17,8 @@ class AnalogRebalance(Component):
     reads, and what balanced the gyro up to now.  Read so, the exchange of u and i once a step does not shift the
     reading against the table angle (read as i it is one step early).  [LOOP-REBALANCE, REBAL-ANALOG]
     """
+
+    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     K_p = Parameter(119.92139898087, "A/V", "proportional gain", min=0.0)

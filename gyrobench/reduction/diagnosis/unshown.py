@@ -46,6 +46,7 @@ from gyrobench.reduction.diagnosis.handling_errors import (
     undone,
     with_options,
 )
+from gyrobench.reduction.drift.late_temperature import following
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
@@ -56,6 +57,7 @@ from gyrobench.units import DEG
 ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
+EARLY = 0.01  # of the time of a reading
 #: scales that nobody states, what begins their columns, and what states an uncertainty of them
 FORCES = ("f_x", "f_y")  # of the accelerometers of a north finder
 #: columns that stand beside each other in a table, and are of one kind
@@ -65,6 +67,7 @@ METERS = (
     ("the currents", ("current",), ("u_current",)),
     ("the rates", ("rate_",), ("u_time",)),
     ("the angles", ("angle_", "outer_", "inner_", "range_"), ("u_angle",)),
+    ("the levels of vibration", ("level",), ("u_gain",)),
     ("the times", ("t_",), ("u_time",)),
 )
 NAMED, LARGEST = 8, 3  # mistakes, and estimates of each
@@ -73,8 +76,8 @@ UNITY = 1.0  # u, least change of an estimate that counts
 
 def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
-    readings reversed, latitude, scale factors, scales of meters and the zero of the angles in an attitude off - but for
-    what a standard uncertainty is stated of.
+    readings reversed, latitude, scale factors, scales of meters and the zero of the angles in an attitude off, readings
+    begun too early - but for what a standard uncertainty is stated of.
     """
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
@@ -97,10 +100,20 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _meters(record)
+    if "mean" in record.windows and len(rate := np.asarray(record.windows.get("rate", ()), dtype=float)) > 1:
+        mean = np.array(record.windows["mean"], dtype=float)
+        turned = np.concatenate([[False], np.diff(rate) != 0.0])
+        mean[turned] += EARLY * (rate[:-1] - rate[1:])[turned[1:]]
+        words = "readings begun 1 % of their time before the table had its rate"
+        yield HandlingCandidate(words, changed(record, mean=mean))
     if np.any(later := np.diff(np.asarray(record.windows.get("since", ()), dtype=float)) > 0.0):
         gap = float(np.median(np.diff(record.windows["since"])[later]))
         words = "the times since the turn-on short by one reading"
         yield HandlingCandidate(words, changed(record, since=record.windows["since"] + gap))
+    if "since" in record.windows and "temperature" in record.windows:
+        tau = float(np.max(record.windows["since"]))
+        words = f"an instrument {tau:.3g} s behind the temperature"
+        yield HandlingCandidate(words, changed(record, temperature=following(record.windows, tau)))
     if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)

@@ -50,6 +50,16 @@ def process_covariance(t0: Array, t1: Array, tau: float) -> Array:
     return out
 
 
+def relative_variance(t0: Array, t1: Array, model: tuple[float, float, float]) -> Array:
+    """Variances (n,) of windows over that of one of the median length; model: tau (s), share and reading."""
+    tau, share, reading = model
+    length = t1 - t0
+    window = float(np.median(length))
+    slow = share * mean_variance(length / tau) / float(mean_variance(np.array(window / tau)))
+    out: Array = (1.0 - reading) * (slow + (1.0 - share) * window / length) + reading * (window / length) ** 2
+    return out
+
+
 @dataclass(frozen=True)
 class NoiseGrid:
     """Candidate noise models: correlation time, correlated share of the variance of a window, prior weight.

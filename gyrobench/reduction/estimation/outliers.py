@@ -1,8 +1,8 @@
 """Windows that do not belong to the rest: which rows, what the result is without them, and a robust fit beside.
 
 Search: residuals of the fit as they are and under its likeliest noise model, r_i = (R^-1 v)_i / sqrt((R^-1)_ii) (a
-group of neighbours looks like drift to that), over their median absolute deviation, which many outliers cannot raise
-together (no masking up to a fifth of the rows).  Rows beyond the
+group of neighbours looks like drift to that), each over its standard deviation by that model and all over their median
+absolute deviation, which many outliers cannot raise together (no masking up to a fifth of the rows).  Rows beyond the
 Bonferroni limit are left out, the model with its noise is fitted to the others, and each is tested against that fit:
 externally studentized, t with the degrees of freedom of the others, LEVEL over the number of rows.  Those that pass
 come back.  The fit itself is never changed: what is reported is the plain one, and beside it the one without them.
@@ -56,7 +56,10 @@ def find(found: Findings) -> Outliers | None:
     if found.ideal or most < 1 or not asked.whole():
         return None
     limit = -float(special.ndtri(LEVEL / 2.0 / n)) * MAD
-    each = (np.abs(_decorrelated(found)), np.abs(found.est.residual - found.est.likeliest.set_up))
+    each = (
+        np.abs(_decorrelated(found)),
+        np.abs(found.est.residual - found.est.likeliest.set_up) / _spread(found, found),
+    )
     size = np.max([r / max(float(np.median(r)), 1e-300) for r in each], axis=0)
     rows = np.flatnonzero(size > limit)
     if not rows.size:
@@ -95,6 +98,13 @@ def _decorrelated(found: Findings) -> Array:
     return out
 
 
+def _spread(found: Findings, fitted: Findings) -> Array:
+    """Standard deviations (n,) of the rows by the noise of a fit, up to a factor: of short windows it is larger."""
+    if found.white:
+        return np.ones(found.y.size) if found.weights is None else 1.0 / np.sqrt(found.weights)
+    return np.sqrt(noise_model.relative_variance(found.t_start, found.t_end, fitted.est.noise.best))
+
+
 def _fitted_without(found: Findings, rows: NDArray[np.intp]) -> Findings | None:
     keep = np.ones(found.y.size, dtype=bool)
     keep[rows] = False
@@ -117,9 +127,9 @@ def _against(found: Findings, rest: Findings, rows: NDArray[np.intp]) -> tuple[A
         model = model + names[c.name] @ rest.est.beta[at : at + e.value.size]
         at += e.value.size
     distance = found.y[rows] - model
-    variance = (rest.residual_std * rest.y_scale) ** 2 + np.einsum("ij,jk,ik->i", X, C, X)
-    if found.weights is not None:
-        variance = variance * float(np.median(found.weights)) / found.weights[rows]
+    spread, others = _spread(found, rest), np.delete(np.arange(found.y.size), rows)
+    single = (rest.residual_std * rest.y_scale * spread[rows]) ** 2 / np.mean(spread[others] ** 2)
+    variance = single + np.einsum("ij,jk,ik->i", X, C, X)
     return distance, distance / np.sqrt(variance)
 
 

@@ -41,6 +41,7 @@ from gyrobench.reduction.loops.open_loop import (
     disagreement,
     excluded_words,
     friction_of,
+    held_lead,
     limits_hit,
     open_loop_point,
     why_no_crossover,
@@ -93,20 +94,24 @@ class LoopFindings(MeasureFindings):
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
-        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test"
-    ) -> list[Point]:
+        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test",
+        held: Mapping[str, tuple[float, float]] | None = None,
+    ) -> list[Point]:  # fmt: skip
         """Return the open loop L = -(inside - test) / inside of the sines of a kind on an axis, with margins.
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
-        test: what was added there.  Adds the Bode plot, a table of margins (measured, and of both linear models),
-        the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns the points
-        that count.
+        test: what was added there.  held: slot that holds what comes back from sample to sample -> when its first
+        one is there, and by how much samples at each communication step lead its linear model, s; the last of them
+        counts.  Adds the Bode plot, a table of margins (measured, and of both linear
+        models), the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns
+        the points that count.
         """
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
+        lead = self._lead(held or {})
         points, counts = map(
-            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours) for g in sines), strict=True)
+            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours, lead) for g in sines), strict=True)
         )
         counts = [c and not self.unstable for c in counts]
         sure = [p for p, c in zip(points, counts, strict=True) if c]
@@ -172,6 +177,17 @@ class LoopFindings(MeasureFindings):
             causes = self._causes(sines, noisy)
             self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
+
+    def _lead(self, held: Mapping[str, tuple[float, float]]) -> float:
+        """Return by how much samples of the record show a held signal earlier than the linear models do, s."""
+        p, h = self.record.run.parameters, self.record.run.step
+        found = 0.0
+        for slot, (first, ahead) in held.items():
+            period = round(float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0) / h)
+            if period > 1:
+                t = self.record.channels["time"]
+                found = ahead + h * held_lead(period, round(first / h), round(float(t[1] - t[0]) / h))
+        return found
 
     def _gain_margins(
         self, loop: str, key: str, values: Mapping[str, tuple[float, float]], points: Sequence[Point],

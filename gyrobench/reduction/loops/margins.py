@@ -172,8 +172,11 @@ def interpolate_response(points: Sequence[Point], f: Array, spline: bool = False
 
 
 def measured_margins(points: Sequence[Point]) -> Margins:
-    """Return the margins inside the range of the measured frequencies (4 points at least, else none)."""
-    if len(points) < 4:
+    """Return the margins inside the range of the measured frequencies (4 points at least, else none).
+
+    None either of a response that is 0 somewhere, as of a model through a part that has no slope.
+    """
+    if len(points) < 4 or not all(p.value for p in points):
         return Margins()
     f = grid(min(p.f for p in points), max(p.f for p in points))
     return margins(f, interpolate_response(points, f))

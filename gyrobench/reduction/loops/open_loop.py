@@ -6,9 +6,10 @@ gain of 1 out of nothing; the coherence with r, which holds no noise, shows it.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,16 +43,20 @@ def coherence_limit(segments: int) -> float:
     return max(COHERENCE, 1.0 - CHANCE ** (1.0 / (segments - 1))) if segments > 1 else 0.0
 
 
-def open_loop_point(gate: Gate, inside: str, test: str, by_neighbours: bool = False) -> tuple[Point, bool]:
+def open_loop_point(
+    gate: Gate, inside: str, test: str, by_neighbours: bool = False, lead: float = 0.0
+) -> tuple[Point, bool]:
     """Return L = (r - e)/e at the sine of a phase, and whether it counts.  by_neighbours: as loop_measures.response.
 
     u is that of S = e/r, which is linear in the noise: |dL/L| = |dS| / |S (1 - S)|.  coherence: the smaller one
-    of those of e and of r - e with r.  Raises as loop_measures.response.
+    of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average.
+    Raises as loop_measures.response.
     """
     t, e, r = gate.t, gate[inside], gate[test]
     loop = response(t, e, r - e, gate.f)
+    true = unled(loop.value, gate.f, lead)
     if loop.u is None:
-        return loop, True
+        return replace(loop, value=true), True
     rs, es = segment_phasors(t, gate.f, r, e)
     n = rs.size
     S = complex(1.0 / (1.0 + loop.value))
@@ -60,7 +65,23 @@ def open_loop_point(gate: Gate, inside: str, test: str, by_neighbours: bool = Fa
     scatter = scatter if noise is None else noise / abs(phasor(t, r, gate.f))
     least = min(coherence(rs, es), coherence(rs, rs - es))
     u = scatter / (abs(S) * abs(1.0 - S)) if S not in (0.0, 1.0) else loop.u
-    return Point(loop.f, loop.value, u, least), least >= coherence_limit(n)
+    return Point(loop.f, true, u, least), least >= coherence_limit(n)
+
+
+def unled(L: complex, f: float, lead: float) -> complex:
+    """Return the open loop of a signal y whose samples lead by a time, s, of that of the samples, L = y/(r - y)."""
+    p = cmath.exp(2j * math.pi * f * lead)
+    return L / (p + (p - 1.0) * L)
+
+
+def held_lead(period: int, arrives: int, every: int) -> float:
+    """Return by how many steps samples of a held signal show it earlier, on average, than samples at each step do.
+
+    period: steps for which each value is held; arrives: step of the first; every: steps from sample to sample.  Samples
+    meet the ages o, o + g, ..., g the greatest common divisor of both periods; those at each step 0, 1, 2 ...
+    """
+    g = math.gcd(period, every)
+    return 0.5 * (g - 1.0) - (-arrives) % g
 
 
 def excluded_words(title: str, points: Sequence[Point], counts: Sequence[bool]) -> str:

@@ -17,6 +17,7 @@ from gyrobench.reduction.loops.loop_reduction import LoopReduction
 from gyrobench.reduction.loops.tracking_error import TrackingError, error_coefficients, lag
 from gyrobench.result import Reason
 
+TRACKER = ("exposure", "processing", "order")
 SIGHT = {"pitch": 1, "yaw": 3}  # elements of the exciter
 MISS = ("tracker.miss[1]", "tracker.miss[2]")
 RATE = ("tracker.rate[1]", "tracker.rate[2]")
@@ -45,10 +46,22 @@ class TrackingMeasures(LoopReduction):
 
     def loops(self) -> None:
         """Measure the tracking loops and the steps of the wanted direction."""
+        held = self.held()
         for axis, k in SIGHT.items():
-            self.found.open_loop(f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command")
+            self.found.open_loop(
+                f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command", held=held
+            )
         for gate in self.found.of("command", shape="step"):
             self.acquire(gate)
+
+    def held(self) -> dict[str, tuple[float, float]]:
+        """Return when the first error of the tracker is there, s; {} where a prediction makes it continuous.
+
+        The linear model of the tracker holds for half a period, samples at each step h show the half less h/2.
+        """
+        p, h = self.run.parameters, self.run.step
+        exposure, processing, order = (float(p.get(f"tracker.{n}") or 0.0) for n in TRACKER)
+        return {} if order else {"tracker": (max(exposure, h) + processing, 0.5 * h)}
 
     def inside(self) -> list[str]:
         """Return for which share of the time the error is inside the accuracy."""

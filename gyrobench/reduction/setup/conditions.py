@@ -12,6 +12,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
+from gyrobench.reduction.setup.settling import unsettled
 from gyrobench.result import Coefficient, Reason, Result
 
 R = TypeVar("R", bound=Result)
@@ -70,7 +71,7 @@ def reasons(record: Record) -> list[Reason]:
     found = [Reason("part.external", text) for text in run.external]
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
-        found += identical_phases(record) or identical_rows(record)
+        found += identical_phases(record) or identical_rows(record) or unsettled(record, READINGS)
     if run.measured and not run.type_b_stated:
         text = (
             "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "

@@ -1,0 +1,21 @@
+"""Windows of a record of turn-ons, with the turn-on and the day of each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gyrobench.arrays import Array
+from gyrobench.record.record import Record
+
+
+def labelled(record: Record) -> dict[str, Array]:
+    """Return the windows with turn_on, day and rate; of a run by its plan."""
+    windows = dict(record.windows)
+    if not record.run.measured:
+        rows = {row.phase: row for row in record.run.plan}
+        phase = np.asarray(windows["phase"]).astype(int).tolist()
+        windows["turn_on"] = np.array(phase)
+        windows["day"] = np.array([round(rows[p].target_y) for p in phase])
+        if record.run.options["rate"]:
+            windows["rate"] = np.array([rows[p].target for p in phase])
+    return windows
