@@ -212,7 +212,7 @@ def tune(
     """Return the controller of a stabilizer loop for what is wanted, worst case over a spread, proven in co-simulation.
 
     want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+",
-    or lqg, hinf; "": lead-lag, or gain where the part has no more.  loop: its name, of a system that has several.
+    or lqg, hinf; "": lead-lag, or what the part has.  loop: its name, of a system that has several.
     pareto: two measures of the wishes, for their trade.
     values, options, parts, maps: as of :func:`load`.  ``had``: whether all of it can be had, by the linear models;
     ``proven``: and the co-simulation does not contradict; ``reasons``: why not.  ``settings`` and ``part`` are for

@@ -10,7 +10,8 @@ from gyrobench.record.record import Record
 from gyrobench.system.system import System
 
 #: of an axis that is held, the channels of its angle; {}: element
-ANGLES = ("platform.attitude{}", "platform.los{}", "gyro.alpha")
+ANGLES = ("platform.attitude{}", "platform.los{}", "gyro.alpha", "table.angle")
+LESS = " - "
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class LoopPorts:
     the angle that a load turns; kind: of the excitation that is added to its signal, test or command.
 
     port: input of the slot.  added, behind: channels of what is added to the signal, and of the signal behind the
-    summing point; "": those of a stabilizer.  flag: output of the slot that
+    summing point, "a - b" where it is the difference of two; "": those of a stabilizer.  flag: output of the slot that
     is 1 while its output is at its limit.
     """
 
@@ -51,7 +52,7 @@ class LoopPorts:
     @property
     def channels(self) -> tuple[str, ...]:
         """Return what a run must record to measure the loop."""
-        return (self.test, self.inside, self.limited)
+        return (self.test, *self.inside.split(LESS), self.limited)
 
     @property
     def limited(self) -> str:
@@ -59,17 +60,21 @@ class LoopPorts:
         return f"{self.slot}.{self.flag}"
 
     def measured(self, record: Record) -> Record:
-        """Return a record that has the limit by the name that others have."""
-        if self.limited not in record.channels:
-            return record
-        return replace(record, channels={**record.channels, f"{self.slot}.saturated": record.channels[self.limited]})
+        """Return a record that has the signal behind the summing point, and the limit by the name that others have."""
+        found = dict(record.channels)
+        if LESS in self.inside:
+            a, b = self.inside.split(LESS)
+            found[self.inside] = found[a] - found[b]
+        if self.limited in found:
+            found[f"{self.slot}.saturated"] = found[self.limited]
+        return replace(record, channels=found)
 
 
 STABILIZER = LoopPorts()
 
 
 def loops_of(system: System) -> dict[str, LoopPorts]:
-    """Return the loops that the plan can open by name: of stabilizers, and of a compass that is slaved.
+    """Return the loops that the plan can open by name: of stabilizers, of a table, of a compass that is slaved.
 
     A stabilizer drives a motor, commands a rate or has a motor of its own.
     """
@@ -98,6 +103,12 @@ def _ports(system: System, wires: str, start: LoopPorts) -> Iterator[LoopPorts]:
     if port == "u" and tested and driven:
         element = driven[1] or driven[2] or ""
         yield replace(start, axis=int(tested[2]), angle=angle(element), kind=tested[1])
+    # the torquer of the gyro on a table adds a rate to what the table does
+    turned, felt = wired(r"exciter\.command\[(\d)\] -> (\w+)\.i"), wired(rf"{slot} -> (\w+): omega\b.*")
+    if port == "u" and turned and felt and felt[1] == turned[2] and wired(rf"{turned[2]}\.u -> {slot}\.u"):
+        added, axis = f"exciter.command[{turned[1]}]", int(turned[1])
+        yield replace(start, axis=axis, angle=angle(""), kind="command", added=added,
+                      behind=f"{added}{LESS}{start.slot}.omega[1]")  # fmt: skip
     disturbed, magnetic = wired(r"exciter\.test\[(\d)\] -> (\w+)\.disturbance"), wired(rf"(\w+)\.psi -> {slot}\.psi_m")
     if port == "psi" and disturbed and magnetic and magnetic[1] == disturbed[2]:
         yield replace(start, axis=int(disturbed[1]), added=f"{disturbed[2]}.psi", behind=f"{start.slot}.error",

@@ -40,8 +40,8 @@ def effort(problem: TuningProblem, controller: Controller) -> float:
     """Return the rms of |G / (1 + L)| over frequency, the largest of the spread."""
     response = problem.plants[0].controller_response(controller, problem.f)
     found = 0.0
-    for plant in problem.responses():
-        density = np.abs(response / (1.0 + plant * response)) ** 2
+    for loop in problem.loops(response):
+        density = np.abs(response / (1.0 + loop)) ** 2
         found = max(found, float(np.trapezoid(density, problem.f) / problem.f[-1]))
     return float(np.sqrt(found))
 

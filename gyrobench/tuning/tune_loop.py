@@ -104,7 +104,7 @@ def tune(
     f = frequencies(problem.plants, problem.box, wishes, DENSE)
     held = problem.plants[0].with_controller(controller)
     responses = problem.plants[0].controller_response(controller, f)
-    loops = np.array([p.response(f) for p in problem.plants]) * responses
+    loops = np.array([p.response(f) * responses + p.past(f) for p in problem.plants])
     if np.max(np.abs(held.poles(problem.plants))) > 1.0 + 1e-8:
         raise TuningError(
             f"{system.name}: no {shape.name} was found that holds the loop stable over the whole spread; take another "
@@ -260,7 +260,8 @@ def _known(session: Session, nominal: Mapping[str, Any], name: str, slot_tuned: 
     slot, dot, parameter = name.partition(".")
     if not dot or slot not in session.assembly.bindings:
         raise UsageError(f"--over {name}: write SLOT.PARAMETER; slots: {', '.join(session.assembly.bindings)}")
-    if slot == slot_tuned:
+    own = own_controller(nominal, slot_tuned)
+    if slot == slot_tuned and (own is None or not own.own or parameter.partition("[")[0] in own.own):
         raise UsageError(f"--over {name}: the stabilizer is what is tuned")
     there = session.assembly.bindings[slot].parameters
     bound = there.get(parameter) or there.get(parameter.partition("[")[0])

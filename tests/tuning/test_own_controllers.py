@@ -9,12 +9,13 @@ from scipy import optimize
 from gyrobench.bench import Bench, UsageError
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
+from gyrobench.record.frequency_response import model_response
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.own_controllers import own_controller, own_values
 from gyrobench.tuning.plant import Plant, plants
 from gyrobench.tuning.robustness import measured
-from gyrobench.tuning.structures import ControllerStructure
+from gyrobench.tuning.structures import ControllerStructure, rounded
 from gyrobench.tuning.tune_loop import tune
 from gyrobench.tuning.wishes import parse_wishes
 
@@ -28,6 +29,34 @@ def plant_of(name: str, loop: str) -> tuple[Plant, dict]:
         part_of = lambda slot: load_part(session.names[slot])  # noqa: E731
         found = plants(session.assembly, parameters, part_of, now.step, [{}], loops_of(system)[loop])
     return found[0], parameters
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("network", [2, 4])
+def test_the_networks_of_a_table_make_the_loop_of_the_run(network: int) -> None:
+    """Networks 2 (leads 5:1, a lag 1:5) and 4 (three leads 6.5:1, undamped gyro), written out: L is the discrete loop
+    of the run at the pickoff, with the float's reaction on the table, from far below its crossover to 200 Hz.
+    """
+    system = load_system("table_servo_loop").with_values({"network": network})
+    with Session(system, bench=Bench.find().folder, child=True) as session:
+        now, _, document = session.prepare()
+        q, own = document.parameters, document.linear.loops["stabilizer"].discrete
+        part_of = lambda slot: load_part(session.names[slot])  # noqa: E731
+        plant = plants(session.assembly, q, part_of, now.step, [{}], loops_of(system)["stabilizer"])[0]
+    w = q["table.crossover"]
+    num, den = np.array([1.0]), np.array([1.0])
+    for r in [5.0, 5.0] if network == 2 else [6.5] * 3:
+        num, den = np.polymul(num, [np.sqrt(r) / w, 1.0]), np.polymul(den, [1.0 / np.sqrt(r) / w, 1.0])
+    if network == 2:
+        num, den = np.polymul(num, [12.0 / w, 1.0]), np.polymul(den, [60.0 / w, 1.0])
+    J, H, J_g, C_g, K_g, lag = (q[f"table.{n}"] for n in ("J", "H_g", "J_g", "C_g", "K_g", "lag"))
+    s = 1j * w
+    loop = K_g * H * np.polyval(num, s) / np.polyval(den, s) / (s * (J * s * (J_g * s + C_g) + H * H) * (1.0 + lag * s))
+    controller = rounded(num[::-1] / abs(loop), den[::-1], {})
+    f = np.geomspace(0.5, 200.0, 40)
+    L = plant.response(f) * plant.controller_response(controller, f) + plant.past(f)
+    assert model_response(own, f)[:, 0, 0] == pytest.approx(L, rel=1.5e-3)
+    assert np.abs(plant.with_controller(controller).poles([plant])).max() < 1.0 + 1e-9
 
 
 def margins_of(plant: Plant, K: float) -> tuple[float, float]:
@@ -71,6 +100,8 @@ def test_the_plant_of_a_compass_is_an_integrator_that_waits() -> None:
 def test_a_part_with_one_number_has_the_structure_gain() -> None:
     with pytest.raises(UsageError, match="the part in slot slaving has one number, its gain; leave --structure out"):
         tune(load_system("gyro_magnetic_compass"), ["bandwidth>1mHz"], structure="lead-lag")
+    with pytest.raises(UsageError, match=r"slot table has three networks: lag and lead, .*for lag\+lead\+lead"):
+        tune(load_system("table_servo_loop"), ["bandwidth>1Hz"], structure="lead-lag")
     q = {"stabilizer_x.k_i": 10.0, "stabilizer_x.k_m": 0.02, "stabilizer_x.ratio": 50.0, "stabilizer_x.v_max": 27.0}
     own = own_controller(q, "stabilizer_x")
     assert own is not None and own_controller(q, "stabilizer_y") is None
@@ -87,6 +118,7 @@ def test_a_part_with_one_number_has_the_structure_gain() -> None:
         ("stabilizer_power_two_axis", "y", "stabilizer_y.k_m"),
         ("platform_following", "azimuth", "azimuth.K"),
         ("gyro_magnetic_compass", "", "k"),
+        ("table_servo_loop", "", "table.stiffness"),
     ],
 )
 def test_what_is_promised_is_measured(name: str, loop: str, setting: str) -> None:
