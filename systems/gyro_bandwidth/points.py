@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import gates
+from gyrobench.reduction.loops.open_loop import lead_of
 from gyrobench.reduction.loops.response_errors import line_ratios
 from gyrobench.reduction.setup.window_checks import ReductionError
 
@@ -59,4 +60,5 @@ def _of_phases(record: Record) -> Points:
     shaken = [g for g in gates(record) if g.kind == "motion"]
     over = tuple(g.f for g in shaken if np.any(g["gyro.saturated"] > 0.5))
     r = line_ratios(shaken, TABLE, GYRO)
-    return Points(r.f, r.value, r.u, r.x, True, over)
+    late = lead_of(record, {"gyro": (0.0, 0.5 * record.run.step)})  # a sample is held until the next one
+    return Points(r.f, r.value * np.exp(-2j * np.pi * r.f * late), r.u, r.x, True, over)

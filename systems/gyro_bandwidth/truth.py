@@ -1,7 +1,8 @@
 """Frequency response of the rate gyros of the bench in closed form, as a run on this table shows it.
 
 The table gives the mean rate of each step h: sinc(f h) of the amplitude.  A gyro with states holds it over the step,
-sinc(f h) once more; one that shows the mean of the step that ends is late by h/2.  [GYRO-VIBRATORY, GYRO-MEMS]
+sinc(f h) once more; one that shows the mean of the step that ends is late by h/2.  One that gives a sample each
+period T and holds it is late by T/2 more, sinc(f T) of the amplitude.  [GYRO-VIBRATORY, GYRO-MEMS]
 """
 
 from __future__ import annotations
@@ -39,9 +40,13 @@ def response_of(run: RunDocument) -> Logarithm | None:
     if "reset_error" in p:
         scale -= math.log(1.0 - float(p["reset_error"]))
 
+    T = float(p.get("period") or 0.0)
+
     def of(f: Array) -> Array:
         s = 2j * np.pi * f
         out = np.vstack([np.full(f.size, scale) + np.log(np.sinc(f * h)), np.zeros(f.size)])
+        if h < T:  # a sample is held
+            out += np.vstack([np.log(np.abs(np.sinc(f * T))), -np.pi * f * T])
         if name in MEANS:
             out[1] -= np.pi * f * h
             return out
@@ -70,10 +75,10 @@ def _modes(p: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _bent(p: Mapping[str, Any]) -> bool:
-    """Return whether a gyro is not linear, or its output is sampled, so that it has no transfer function."""
+    """Return whether a gyro is not linear, so that it has no transfer function."""
     open_fibre = "depth" in p and float(p.get("closed", 1.0)) < 0.5
     turned = (
         "closed" in p and "split" in p and float(p["closed"]) < 0.5 and np.any(np.asarray(p.get("phase_error", 0.0)))
     )
-    known = ("period", "cubic", "hysteresis", "asymmetry", "dead_band", "lock_in", "resolution", "counting")
+    known = ("cubic", "hysteresis", "asymmetry", "dead_band", "lock_in", "resolution", "counting")
     return bool(open_fibre or turned) or any(float(p.get(n, 0.0)) != 0.0 for n in known)

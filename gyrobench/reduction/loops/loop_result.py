@@ -41,7 +41,7 @@ from gyrobench.reduction.loops.open_loop import (
     disagreement,
     excluded_words,
     friction_of,
-    held_lead,
+    lead_of,
     limits_hit,
     open_loop_point,
     why_no_crossover,
@@ -109,7 +109,7 @@ class LoopFindings(MeasureFindings):
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
-        lead = self._lead(held or {})
+        lead = lead_of(self.record, held or {})
         points, counts = map(
             list, zip(*(open_loop_point(g, inside, test, self.by_neighbours, lead) for g in sines), strict=True)
         )
@@ -177,17 +177,6 @@ class LoopFindings(MeasureFindings):
             causes = self._causes(sines, noisy)
             self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
-
-    def _lead(self, held: Mapping[str, tuple[float, float]]) -> float:
-        """Return by how much samples of the record show a held signal earlier than the linear models do, s."""
-        p, h = self.record.run.parameters, self.record.run.step
-        found = 0.0
-        for slot, (first, ahead) in held.items():
-            period = round(float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0) / h)
-            if period > 1:
-                t = self.record.channels["time"]
-                found = ahead + h * held_lead(period, round(first / h), round(float(t[1] - t[0]) / h))
-        return found
 
     def _gain_margins(
         self, loop: str, key: str, values: Mapping[str, tuple[float, float]], points: Sequence[Point],

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gyrobench.record.frequency_response import model_response
+from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import (
@@ -72,6 +73,21 @@ def unled(L: complex, f: float, lead: float) -> complex:
     """Return the open loop of a signal y whose samples lead by a time, s, of that of the samples, L = y/(r - y)."""
     p = cmath.exp(2j * math.pi * f * lead)
     return L / (p + (p - 1.0) * L)
+
+
+def lead_of(record: Record, held: Mapping[str, tuple[float, float]]) -> float:
+    """Return by how much samples of a record show a held signal earlier than a model of it does, s; 0 where none is.
+
+    held: slot -> time at which its first sample is there, and lead of samples at each communication step before the
+    model, s; the last slot with a sampling period counts.
+    """
+    p, h, t = record.run.parameters, record.run.step, record.channels["time"]
+    found = 0.0
+    for slot, (first, ahead) in held.items():
+        period = float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0)
+        if period > 1.5 * h:
+            found = ahead + h * held_lead(round(period / h), round(first / h), round(float(t[1] - t[0]) / h))
+    return found
 
 
 def held_lead(period: int, arrives: int, every: int) -> float:
