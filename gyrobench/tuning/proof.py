@@ -188,8 +188,8 @@ def proof_of(
             return share * DRIVEN * v_max / float(np.interp(x, f, effort))
 
         plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "", ports.kind, loud)
-        record = _run(session, settings, at, plan, period, seed, ports)
-        return _read(record, at, f, L, wishes, load, ports, sight)
+        record = _run(session, settings, at, plan, period, seed)
+        return _read(ports.measured(record), at, f, L, wishes, load, ports, sight)
 
     found = tried(1.0)
     if not found.limits and (found.why_not or any(w.bound and not w.kept for w in found.wishes)):
@@ -206,15 +206,14 @@ def proof_of(
 
 
 def _run(
-    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], plan: LoopPlan, period: float, seed: int,
-    ports: LoopPorts,
+    session: Session, settings: Mapping[str, Any], at: Mapping[str, float], plan: LoopPlan, period: float, seed: int
 ) -> Record:  # fmt: skip
     """Run a plan at a point of the spread in the place of the system's own; period: of the channels, s."""
     system = session.system
     kept = dict(vars(system))
     vars(system).update(plan=lambda: plan, channel_period=period, nominal={})
     try:
-        return ports.measured(session.run({**settings, **at}, seed))
+        return session.run({**settings, **at}, seed)
     finally:
         vars(system).clear()
         vars(system).update(kept)
