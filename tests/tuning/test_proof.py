@@ -15,7 +15,7 @@ from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.proof import _gain_margin, _run, proof_of, sine_frequencies
 from gyrobench.tuning.robustness import gain_limits
-from gyrobench.tuning.tune_loop import quiet
+from gyrobench.tuning.tuned_settings import quiet
 from gyrobench.tuning.wishes import parse_wishes
 
 WISHES = parse_wishes(["gain margin=6dB", "S at 1Hz<-10dB"])
