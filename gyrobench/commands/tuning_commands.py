@@ -36,10 +36,10 @@ def tune(
         typer.Option(
             "--structure",
             metavar="FACTOR+FACTOR",
-            help="Factors of the controller beside its gain: lead-lag, pi, lag, lead, notch, rolloff; or a whole one "
-            "that is computed: lqg, hinf.",
+            help="Factors of the controller beside its gain: lead-lag (where none is named), pi, lag, lead, notch, "
+            "rolloff; gain alone; or a whole one that is computed: lqg, hinf.",
         ),
-    ] = "lead-lag",
+    ] = "",
     loop: Annotated[str, typer.Option("--loop", metavar="NAME", help="Loop of a system that has several.")] = "",
     pareto: Annotated[
         list[str] | None,

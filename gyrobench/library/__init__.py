@@ -199,7 +199,7 @@ def tune(
     name: str,
     want: Sequence[str],
     over: Sequence[str] = (),
-    structure: str = "lead-lag",
+    structure: str = "",
     *,
     loop: str = "",
     pareto: Sequence[str] = (),
@@ -212,7 +212,8 @@ def tune(
     """Return the controller of a stabilizer loop for what is wanted, worst case over a spread, proven in co-simulation.
 
     want: "phase margin=40deg", "bandwidth>20Hz" ...  over: "platform.J=±30%" ...  structure: factors joined by "+",
-    or lqg, hinf.  loop: its name, of a system that has several.  pareto: two measures of the wishes, for their trade.
+    or lqg, hinf; "": lead-lag, or what the part has.  loop: its name, of a system that has several.
+    pareto: two measures of the wishes, for their trade.
     values, options, parts, maps: as of :func:`load`.  ``had``: whether all of it can be had, by the linear models;
     ``proven``: and the co-simulation does not contradict; ``reasons``: why not.  ``settings`` and ``part`` are for
     :func:`load`; ``print`` shows all as a text, ``.write(folder)`` writes the page.  Raises errors of type

@@ -17,7 +17,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.plant import HeldController, Plant
+from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import grid, measured
 from gyrobench.tuning.sight_jitter import SightModel, SightWays
 from gyrobench.tuning.structures import BLOCKS, Controller, ControllerStructure
@@ -51,11 +51,12 @@ class TuningProblem:
     evaluations: int = 0
     sights: list[SightModel] = field(default_factory=list)  # of the plants, for a jitter that is wanted
     _responses: list[Complex] = field(default_factory=list)
+    _past: list[Complex] = field(default_factory=list)  # beside the controller
     _ways: list[SightWays] = field(default_factory=list)
 
     def of(self, count: int) -> TuningProblem:
         """Return the problem with the first plants alone."""
-        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[], _ways=[])
+        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[], _past=[], _ways=[])
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -76,14 +77,20 @@ class TuningProblem:
     def responses(self) -> list[Complex]:
         """Return the responses of the plants over f."""
         while len(self._responses) < len(self.plants):
-            self._responses.append(self.plants[len(self._responses)].response(self.f))
+            plant = self.plants[len(self._responses)]
+            self._responses.append(plant.response(self.f))
+            self._past.append(plant.past(self.f))
         return self._responses
+
+    def loops(self, response: Complex) -> Complex:
+        """Return L of each plant with a controller's response over f."""
+        return np.array(self.responses()) * response + np.array(self._past)
 
     def judged(self, controller: Controller) -> Array:
         """Return ln ratio of each loop and wish; below UNSTABLE where a loop is not stable."""
         self.evaluations += 1
         step = self.plants[0].step
-        held = HeldController(controller, step)
+        held = self.plants[0].with_controller(controller)
         shape = len(self.plants), len(self.wishes)
         growth = np.max(np.abs(held.poles(self.plants)), axis=1) - 1.0
         if np.any(growth >= ROUNDING):
@@ -91,7 +98,7 @@ class TuningProblem:
         while len(self._ways) < min(len(self.sights), len(self.plants)):
             self._ways.append(self.sights[len(self._ways)].at(self.f))
         response = held.response(np.exp(2j * np.pi * self.f * step))
-        loops = np.array(self.responses()) * response
+        loops = self.loops(response)
         got = with_jitter(self.wishes, measured(self.wishes, self.f, loops), self._ways, response)
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
@@ -114,7 +121,7 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    if not problem.structure.blocks:
+    if problem.structure.computed:
         return _computed(problem)
     low, high = problem.box.T
     nominal, corners = problem.of(1), problem.of(problem.corners)

@@ -25,12 +25,14 @@ from gyrobench.reduction.loops.open_loop import friction_of, limits_hit, open_lo
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.system import System
 from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
+from gyrobench.tuning.own_controllers import own_controller, own_values
 from gyrobench.tuning.robustness import bandwidth_limit, crossovers, gain_limits, measured
 from gyrobench.tuning.wishes import JITTER, Wish
 
 SINES = 14  # beside those at the limits
 DRIVEN = 0.3  # of the largest voltage, at most, is taken by a test sine
-SMALLER = (1.0, 0.2, 0.04)  # times that, where a part was at a limit all the same
+SMALLER = (0.2, 0.04)  # times that, where a part was at a limit all the same
+LOUDER = 5.0  # times the amplitude of the system's own plan, where noise hides what is wanted
 PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than the fastest
 SLOWER = 40.0
 SLOWEST = 300.0  # below the crossover over this no sine is made for the bandwidth or a limit of the gain
@@ -137,11 +139,12 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
 
 def loop_plan(
     system: System, frequencies: Sequence[float], largest: Callable[[float], float], axis: int = 1, ride: str = "",
-    kind: str = "test",
+    kind: str = "test", loud: float = 1.0,
 ) -> tuple[LoopPlan, float]:  # fmt: skip
     """Return the plan of a proof and the torque of its load step, N.m.
 
-    The sines have the amplitude of the system's own plan, and at most ``largest`` at a frequency: no limit is met.
+    The sines have ``loud`` times the amplitude of the system's own plan, and at most ``largest`` at a frequency: no
+    limit is met.
     """
     own = system.plan()
     phases = list(getattr(own, "phases", []))
@@ -150,7 +153,7 @@ def loop_plan(
 
     def amplitude(f: float) -> float:
         near = min(sines, key=lambda p: abs(np.log(p.frequency / f)), default=None)
-        return min(float(near.amplitude) if near else AMPLITUDE, largest(f))
+        return min(loud * (float(near.amplitude) if near else AMPLITUDE), largest(f))
 
     slowest = min(frequencies)
     rest = LoopPhase(REST, "hold", settle=0.5 / slowest, dwell=1.0 / slowest)
@@ -176,21 +179,29 @@ def proof_of(
     chosen = sine_frequencies(f, L, wishes, step)
     known = session.prepare(settings, seed)[2].parameters
     v_max = known_limit(known, ports)
-    effort = np.abs(G / (1.0 + L))
-    found = None
+    own = own_controller(known, ports.slot)
+    effort = np.abs(G / (1.0 + L)) * (own.per_added(own_values(known, ports.slot), f) if own else 1.0)
+    period = step * max(1, int(1.0 / (SAMPLES * max(chosen) * step)))
+
+    def tried(share: float, loud: float = 1.0) -> Proof:
+        def size(x: float) -> float:
+            return share * DRIVEN * v_max / float(np.interp(x, f, effort))
+
+        plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "", ports.kind, loud)
+        record = _run(session, settings, at, plan, period, seed)
+        return _read(ports.measured(record), at, f, L, wishes, load, ports, sight)
+
+    found = tried(1.0)
+    if not found.limits and (found.why_not or any(w.bound and not w.kept for w in found.wishes)):
+        louder = tried(1.0, LOUDER)
+        return found if louder.limits else louder
     for share in SMALLER:
-
-        def size(x: float, most: float = share * DRIVEN * v_max) -> float:
-            return most / float(np.interp(x, f, effort))
-
-        plan, load = loop_plan(system, chosen, size, ports.axis, sight.ride if sight else "", ports.kind)
-        record = _run(session, settings, at, plan, step * max(1, int(1.0 / (SAMPLES * max(chosen) * step))), seed)
-        tried = _read(record, at, f, L, wishes, load, ports, sight)
-        if found is None or not (tried.limits or tried.why_not):
-            found = tried
-        if not found.limits or tried.why_not or found.cut > CUT:
+        if not found.limits or found.cut > CUT:
             break  # what noise does alone no smaller sine takes away
-    assert found is not None
+        smaller = tried(share)
+        if smaller.why_not:
+            break
+        found = found if smaller.limits else smaller
     return found
 
 
@@ -217,8 +228,11 @@ def _read(
     judged = [open_loop_point(g, ports.inside, ports.test) for g in sines]
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
     limit = known_limit(record.run.parameters, ports)
-    cut = _cut(phases, ports.slot, limit)
-    noise = f"{ports.slot} (noise alone has its voltage at the limit of {limit:.3g} V {100.0 * cut:.2g} % of the time)"
+    own = own_controller(record.run.parameters, ports.slot)
+    cut = _limited(phases, ports.slot) if own else _cut(phases, ports.slot, limit)
+    what, unit = ("output", own.unit) if own else ("voltage", "V")
+    at_limit = f"at the limit of {limit:.3g} {unit} {100.0 * cut:.2g} % of the time"
+    noise = f"{ports.slot} (noise alone has its {what} {at_limit})"
     more = [noise + ", which takes gain from the loop"] if cut > CUT else []
     friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *more])
     step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
@@ -240,9 +254,22 @@ def _read(
 
 
 def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
-    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less."""
+    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less.
+
+    Of a part with a controller of its own: its largest output.
+    """
+    own = own_controller(parameters, ports.slot)
+    if own is not None:
+        return own.limit(own_values(parameters, ports.slot))
     slots = (ports.slot, "platform") if ports.kind == "test" else (ports.slot,)
     return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in slots)
+
+
+def _limited(phases: Sequence[Gate], slot: str) -> float:
+    """Return the part of the time at rest in which a part says that it is at its limit."""
+    flag = f"{slot}.saturated"
+    at_rest = [g[flag] for g in phases if g.label == REST and flag in g.channels]
+    return float(np.mean(at_rest[0] > 0.5)) if at_rest else 0.0
 
 
 def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:

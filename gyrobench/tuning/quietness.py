@@ -16,7 +16,6 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.tuning.controller_search import TuningProblem
-from gyrobench.tuning.plant import HeldController
 from gyrobench.tuning.structures import Controller
 from gyrobench.tuning.wishes import JITTER
 
@@ -39,11 +38,10 @@ class Quieting:
 
 def effort(problem: TuningProblem, controller: Controller) -> float:
     """Return the rms of |G / (1 + L)| over frequency, the largest of the spread."""
-    step = problem.plants[0].step
-    response = HeldController(controller, step).response(np.exp(2j * np.pi * problem.f * step))
+    response = problem.plants[0].controller_response(controller, problem.f)
     found = 0.0
-    for plant in problem.responses():
-        density = np.abs(response / (1.0 + plant * response)) ** 2
+    for loop in problem.loops(response):
+        density = np.abs(response / (1.0 + loop)) ** 2
         found = max(found, float(np.trapezoid(density, problem.f) / problem.f[-1]))
     return float(np.sqrt(found))
 
@@ -56,7 +54,7 @@ def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
     from scipy.optimize import minimize
 
     best = problem.worst(x)
-    if best < SURPLUS or not problem.structure.blocks or any(w.name == JITTER for w in problem.wishes):
+    if best < SURPLUS or problem.structure.computed or any(w.name == JITTER for w in problem.wishes):
         return None
     low, high = problem.box.T
     corners = problem.of(problem.corners)

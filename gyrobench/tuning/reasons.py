@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.controller_search import TuningProblem, search
-from gyrobench.tuning.plant import HeldController, Plant
+from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import crossovers, gain_limits
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import JITTER
@@ -64,8 +64,7 @@ def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResul
     """Return what each source makes of the jitter, where one is wanted and not reached."""
     if not any(r.ratio < 1.0 for r in wanted):
         return []
-    step = problem.plants[k].step
-    response = HeldController(problem.controller(x), step).response(np.exp(2j * np.pi * problem.f * step))
+    response = problem.plants[k].controller_response(problem.controller(x), problem.f)
     ways = problem.sights[k].at(problem.f)
     sources, floor = ways.sources(response), ways.floor()
     parts = sorted(((v, n) for n, v in sources.items() if v > 0.0), reverse=True)

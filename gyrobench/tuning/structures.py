@@ -4,8 +4,8 @@
     lead     (1 + tau2 s)/(1 + T2 s),  tau2 > T2    notch    (s2 + 2 z_z w s + w2)/(s2 + 2 z_p w s + w2)
     rolloff  1/(1 + s/w_r)                          lead-lag = lag+lead+pi, a lag and a lead network with an integral
 
-A gain is in every structure; it is found from the crossover that the search chooses with the nominal plant.  All other
-frequencies are chosen relative to that crossover, by their logarithm.
+A gain is in every structure, and alone it is the structure gain; it is found from the crossover that the search chooses
+with the nominal plant.  All other frequencies are chosen relative to that crossover, by their logarithm.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ BLOCKS = {
     "rolloff": ControllerFactor(((0.0, 2.0),), (0, 2.0), _rolloff),
 }
 COMPUTED = ("lqg", "hinf")  # whole controllers, of gyrobench.tuning.synthesis
-NAMES = {"lead-lag": ["lag", "lead", "pi"]}
+NAMES = {"lead-lag": ["lag", "lead", "pi"], "gain": []}
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,7 @@ class ControllerStructure:
     """A structure by its name; ``ranges``: decades of the numbers behind the crossover, which is the first."""
 
     shortest = 0.0  # s, T2 of a lead, at least
+    computed = False  # as a whole, from the plant
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -173,6 +173,8 @@ def h_infinity(
 class SynthesizedStructure(ControllerStructure):
     """Structure whose controller is computed from the nominal plant and a few numbers."""
 
+    computed = True
+
     def __init__(self, name: str, plant: Plant | None = None) -> None:
         self.name = ALIASES.get(name, name)
         if self.name == "hinf" and find_spec("slycot") is None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,8 @@ from gyrobench.system.system import System
 from gyrobench.system.values import flatten
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
-from gyrobench.tuning.plant import HeldController, Plant, plants
+from gyrobench.tuning.own_controllers import checked_structure, own_controller
+from gyrobench.tuning.plant import Plant, plants
 from gyrobench.tuning.proof import ExpectedJitter, Proof, known_limit, proof_of
 from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
@@ -37,26 +37,21 @@ from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
+from gyrobench.tuning.tuned_settings import TuningError, plan_settings, quiet, settings_of
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
 from gyrobench.tuning.written_loop import TunedLoop
 
-ANY = ("form", "num", "den", "conditioned")  # parameters of a part that takes any transfer function
-NETWORK = ("K", "tau1", "T1", "tau2", "T2", "integral")
 DENSE = 1500  # frequencies of the final figures
 HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
 PEAK = 3.0  # of a random voltage over its rms
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
-class TuningError(GyrobenchError, ValueError):
-    """A loop that cannot be tuned; the text says why."""
-
-
 def tune(
     system: System,
     want: Sequence[str],
     over: Sequence[str] = (),
-    structure: str = "lead-lag",
+    structure: str = "",
     *,
     parts: Mapping[str, str] | None = None,
     maps: Mapping[str, Path] | None = None,
@@ -68,20 +63,25 @@ def tune(
     """Return the controller of a structure with the largest worst ratio of got to wanted over the spread, proven.
 
     want: "phase margin=40deg"; over: "platform.J=±30%".  given: the settings that ``system`` has, for the command.
+    structure: factors joined by "+", or lqg, hinf; "": lead-lag, or what the part has that cannot be another one.
     loop: name of the loop, of a system that has several; the others stay as they are.
     pareto: names of two wishes whose trade is wanted.
     Raises UsageError, TuningError, and what a session raises.
     """
     wishes, implied = with_margin(parse_wishes(want))
-    shape = structure_of(structure)
+    shape = structure_of(structure or "lead-lag")
     pair = traded(pareto, wishes)
     ports = _chosen(system, loop, parts or {})
     system = system.with_values({})
+    vars(system)["channels"] = tuple(dict.fromkeys((*system.channels, *ports.channels)))  # what its own plan needs not
     began = time.perf_counter()
     system.nominal = dict(system.overrides)
     with Session(system, parts, maps, bench=Bench.find().folder, child=True) as session:
         now, _, document = session.prepare({}, seed)
         nominal = document.parameters
+        own = own_controller(nominal, ports.slot)
+        if own is not None:
+            shape = checked_structure(own, structure_of(structure or own.structure), ports.slot)
         ranges = parse_spread(over, lambda name: _known(session, nominal, name, ports.slot))
         for w in wishes:
             if w.f >= HIGHEST / now.step:
@@ -99,22 +99,22 @@ def tune(
     try:
         controller = problem.controller(x)
     except ArithmeticError as error:
-        raise TuningError(f"{system.name}: no controller of structure {structure} was found: {error}") from None
+        raise TuningError(f"{system.name}: no controller of structure {shape.name} was found: {error}") from None
     seconds = time.perf_counter() - began
     f = frequencies(problem.plants, problem.box, wishes, DENSE)
-    held = HeldController(controller, now.step)
-    responses = held.response(np.exp(2j * np.pi * f * now.step))
-    loops = np.array([p.response(f) for p in problem.plants]) * responses
+    held = problem.plants[0].with_controller(controller)
+    responses = problem.plants[0].controller_response(controller, f)
+    loops = np.array([p.response(f) * responses + p.past(f) for p in problem.plants])
     if np.max(np.abs(held.poles(problem.plants))) > 1.0 + 1e-8:
         raise TuningError(
-            f"{system.name}: no {structure} was found that holds the loop stable over the whole spread; take another "
+            f"{system.name}: no {shape.name} was found that holds the loop stable over the whole spread; take another "
             "structure, or a smaller spread"
         )
     ways = [s.at(f) for s in problem.sights]
     got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
     results = _results(wishes, got, problem.plants)
-    part, settings = _settings(shape, controller, nominal, system, ports.slot)
-    settings |= _crossover(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
+    part, settings = settings_of(shape, controller, nominal, system, ports.slot)
+    settings |= plan_settings(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
     reasons = () if had else tuple(reasons_of(models, problem, x, results, f, loops))
     swaps = {**(parts or {}), **({ports.slot: part} if part else {})}
@@ -187,24 +187,12 @@ class _Loop:
         )  # fmt: skip
 
 
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Keep back what the runs of a proof would warn of: that parts are off their nominal values is meant."""
-    log = logging.getLogger("gyrobench")
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(level)
-
-
 def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:
     """Return the loop to tune.  Raises UsageError for a system without one, and where one of several is not named."""
     there = loops_of(system)
     if not there:
         able = ", ".join(tunable())
-        raise UsageError(f"{system.name} has no loop whose stabilizer drives a motor; tune works for {able}")
+        raise UsageError(f"{system.name} has no loop of a stabilizer that a run can measure; tune works for {able}")
     if loop and loop not in there:
         raise UsageError(f"--loop {loop}: {system.name} has no such loop; {suggest_names(loop, there)}")
     if not loop and len(there) > 1:
@@ -272,7 +260,8 @@ def _known(session: Session, nominal: Mapping[str, Any], name: str, slot_tuned: 
     slot, dot, parameter = name.partition(".")
     if not dot or slot not in session.assembly.bindings:
         raise UsageError(f"--over {name}: write SLOT.PARAMETER; slots: {', '.join(session.assembly.bindings)}")
-    if slot == slot_tuned:
+    own = own_controller(nominal, slot_tuned)
+    if slot == slot_tuned and (own is None or not own.own or parameter.partition("[")[0] in own.own):
         raise UsageError(f"--over {name}: the stabilizer is what is tuned")
     there = session.assembly.bindings[slot].parameters
     bound = there.get(parameter) or there.get(parameter.partition("[")[0])
@@ -325,66 +314,6 @@ def _results(wishes: Sequence[Wish], got: Any, models: Sequence[Plant]) -> list[
         worst = int(np.argmin([wish.ratio(g) for g in got[:, k]]))
         found.append(WishResult(wish, float(got[0, k]), float(got[worst, k]), models[worst].values))
     return found
-
-
-def _settings(
-    shape: ControllerStructure, controller: Controller, nominal: Mapping[str, Any], system: System, slot: str
-) -> tuple[str, dict[str, Any]]:  # fmt: skip
-    """Return the part to put into the slot ("": its own) and the settings that make it this controller."""
-    if shape.is_lead_lag and all(f"{slot}.{n}" in nominal for n in NETWORK):
-        neutral = {"tau1": 1.0, "T1": 1.0, "tau2": 0.01, "T2": 0.01, "integral": 0.0}
-        values = {**neutral, **{n: float(v) for n, v in controller.values.items()}}
-        owners = {option.sets: name for name, option in system.options.items()}  # "stabilizer.K" -> its option
-        names = (f"{slot}.{n}" for n in NETWORK)
-        return "", {owners.get(n, n): float(f"{values[n.partition('.')[2]]:.9g}") for n in names}
-    own = all(f"{slot}.{n}" in {k.partition("[")[0] for k in nominal} for n in ANY)
-    num, den = (list(np.trim_zeros(p, "b")) for p in (controller.num, controller.den))
-    for n, row in (("num", num), ("den", den)):  # what the design of the system has beyond is taken away
-        row += [0.0] * (len(np.trim_zeros(np.atleast_1d(nominal.get(f"{slot}.{n}", 0.0)), "b")) - len(row))
-    direct = len(np.trim_zeros(num, "b")) == len(np.trim_zeros(den, "b"))
-    return "" if own else _part_of_any(), {
-        f"{slot}.form": 1,
-        f"{slot}.num": num,
-        f"{slot}.den": den,
-        **({f"{slot}.conditioned": 1} if direct and minimum_phase(controller) else {}),
-    }
-
-
-def minimum_phase(controller: Controller) -> bool:
-    """Return whether the zeros of a controller are stable: else its states cannot follow a limited voltage."""
-    return bool(np.all(np.roots(np.trim_zeros(np.array(controller.num), "b")[::-1]).real < 0.0))
-
-
-def _part_of_any() -> str:
-    """Return the part of the bench that takes any transfer function.  Raises TuningError where there is none."""
-    bench = Bench.find()
-    for name, folder in bench.parts().items():
-        text = (folder / "model.py").read_text(encoding="utf-8")
-        if all(f"    {n} = Parameter(" in text for n in ANY):
-            return name
-    raise TuningError(
-        f"the bench has no part that takes a transfer function ({', '.join(ANY)}); use structure lead-lag"
-    )
-
-
-def _crossover(
-    system: System, nominal: Mapping[str, Any], session: Session, settings: Mapping[str, Any],
-    crossed: Sequence[tuple[float, float]], slot: str,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the option crossover, whose sines the system's own plan has, where nothing else follows it."""
-    option = system.options.get("crossover")
-    if option is None or not crossed:
-        return {}
-    at = float(f"{max(c[0] for c in crossed):.4g}")
-    if not (option.min or 0.0) <= at <= (option.max or np.inf):
-        return {}
-    try:
-        with quiet():
-            other = session.prepare({"crossover": at})[2].parameters
-    except GyrobenchError:
-        return {}
-    plain = {n: v for n, v in nominal.items() if n.partition(".")[0] not in (slot, "exciter")}
-    return {"crossover": f"{at:g}Hz"} if all(other.get(n) == v for n, v in plain.items()) else {}
 
 
 def _notes(proofs: Sequence[Proof]) -> list[str]:

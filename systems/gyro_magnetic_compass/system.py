@@ -137,7 +137,7 @@ class GyroMagneticCompass(LoopTest):
 
     def design(self, parts: PartValues) -> dict[str, Any]:
         # the motion counts counter-clockwise
-        motion = by_phase([p.label for p in self.phases()], ("turn",), {"turn": {"turn": -self["turn"]}})
+        motion = by_phase([p.label for p in self.plan().phases], ("turn",), {"turn": {"turn": -self["turn"]}})
         try:
             field = self.field()
         except FieldError:  # check() says it

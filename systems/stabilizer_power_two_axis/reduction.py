@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,16 @@ from .closed import TwoAxes, one_axis_limit
 from .system import GYRO
 
 AXES = ("x", "y")
+TWO = (
+    "The corrections of the two axes differ (stabilizer_x.k_m, stabilizer_y.k_m): the closed forms of the limit and of "
+    "the angle about the other axis, which take one for both, are left out."
+)
+
+
+def stiffness_of(p: Mapping[str, Any], axis: str, asked: float) -> float:
+    """Return ratio k_u k_i k_m of an axis, N.m/rad; what was asked for where a part does not have them."""
+    names = ("platform.k_u", *(f"stabilizer_{axis}.{n}" for n in ("ratio", "k_i", "k_m")))
+    return float(np.prod([float(p[n]) for n in names])) if all(n in p for n in names) else asked
 
 
 class Reduction(LoopReduction):
@@ -28,7 +40,10 @@ class Reduction(LoopReduction):
     def measure(self) -> Account:
         found, o = self.found, self.run.options
         self.gyro = {n: float(o[n]) for n in GYRO}
-        self.axes = TwoAxes(**self.gyro, K_m=float(o["K_m"]))
+        self.K_m = [stiffness_of(self.run.parameters, name, float(o["K_m"])) for name in AXES]
+        self.axes = TwoAxes(**self.gyro, K_m=self.K_m[0])
+        self.alike = math.isclose(*self.K_m, rel_tol=1e-6)
+        found.warn("power.two_corrections", "" if self.alike else TWO)
         holds = found.of("hold")
         self.quiet = holds[0] if holds else None
         self.own = [drift(self.quiet.t, self.quiet[_angle(k)]) if self.quiet else None for k in (1, 2)]
@@ -44,7 +59,8 @@ class Reduction(LoopReduction):
         )  # fmt: skip
         for gate in holds:
             self._drift(gate)
-        found.tables.append(self._limits())
+        if self.alike:
+            found.tables.append(self._limits())
         return Account(
             method="Load steps about both axes, servo torque, sine sweeps of a loop and of the base, drift hold",
             sources=["STAB-POWER-TWO-AXIS; GSP ch. 5, section 5.1.1, eq. 5-7, 5-8 for each axis"],
@@ -63,13 +79,18 @@ class Reduction(LoopReduction):
         found, rows = self.found, self.found.coefficients
         return [
             *margins(found),
-            f"Both loops together are stable up to a correction of {self.axes.limit():.4g} N·m/rad, one axis alone up "
-            f"to {one_axis_limit(**self.gyro):.4g}.",
+            *([self._stable()] if self.alike else []),
             *isolation(found, "isolation", _angle(1)),
             *told(
                 rows, "A load about x leaves the platform {α* x} off and moves it about y by up to {cross x}.", DRIFTS
             ),
         ]
+
+    def _stable(self) -> str:
+        return (
+            f"Both loops together are stable up to a correction of {self.axes.limit():.4g} N·m/rad, one axis alone up "
+            f"to {one_axis_limit(**self.gyro):.4g}."
+        )
 
     def _load(self, gate: Gate, axis: int) -> None:
         """Measure lean of the gyro, platform about the own axis and how far it moves about the other one."""
@@ -77,9 +98,10 @@ class Reduction(LoopReduction):
         figure: dict[str, Any] = {"scale": ARCSEC, "unit": "″", "quiet": self.quiet}
         b = found.step(gate, f"platform.precession[{axis}]", y_name=f"precession {name}", **figure)
         a = found.loaded(gate, _angle(axis), self.own[axis - 1], y_name=f"platform α_{name}", **figure)
-        stiffness(found, f"K_m {name}", "stiffness of the correction, M / β*", M, b, self.axes.K_m)
+        stiffness(found, f"K_m {name}", "stiffness of the correction, M / β*", M, b, self.K_m[axis - 1])
         found.measure(f"α* {name}", "steady platform angle", "″", a.change, a.u_change, scale=ARCSEC,
-                      closed=self.axes.steady() * M, unsettled=a.unsettled)  # fmt: skip
+                      closed=replace(self.axes, K_m=self.K_m[axis - 1]).steady() * M,
+                      unsettled=a.unsettled)  # fmt: skip
         other = gate[_angle(3 - axis)]
         rest = self.own[2 - axis]
         moved = other - other[0] - (rest.rate * (gate.t - gate.t[0]) if rest else 0.0)
@@ -87,7 +109,7 @@ class Reduction(LoopReduction):
         at = int(np.argmax(np.abs(moved)))
         noise = peak_noise(self.quiet[_angle(3 - axis)] if self.quiet else None, 1, at, moved)
         u = math.hypot(noise, (rest.u if rest else 0.0) * float(gate.t[at] - gate.t[0]))
-        closed = self._cross(M, gate.t[-1] - gate.t[0])
+        closed = self._cross(M, gate.t[-1] - gate.t[0]) if self.alike else None
         found.measure(f"cross {name}", meaning, "″", float(np.abs(moved[at])), u, scale=ARCSEC, closed=closed)
 
     def _cross(self, M: float, time: float) -> float:

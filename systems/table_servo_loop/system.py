@@ -61,7 +61,7 @@ class TableServoLoop(LoopTest):
     factors = {"exciter.command[1] -> gyro.i": torquer("gyro.k", 9)}
     raw = {"table.mode": 3.0} | dict(zip(element_names("table.face", (3, 3)), ALONG, strict=True))
     options = {
-        "network": Option(2, int, "1: gyro of 0.4 ms, 2: of 1 ms, 3 and 4: undamped gyro", 1, 4, sets="table.network"),
+        "network": Option(2, int, "1: gyro of 0.4 ms, 2: of 1 ms, 3 and 4: undamped gyro", 1, 4),
         "crossover": Option(0.0, "Hz", "gain crossover; 0: 50 Hz (networks 1, 2), 10 Hz (3, 4)", 0.0),
         "J": Option(2.56, "kg.m2", "inertia of table and load", sets="table.J"),
         "load": Option(0.0, "N.m", "hung torque, doubled and reversed too; 0: 1 N.m, or 500 g.cm (undamped gyro)", 0.0),
@@ -146,6 +146,7 @@ class TableServoLoop(LoopTest):
             **told,
             **gyro,
             "gyro.k": data_sheet(parts["gyro.k"]),
+            "table.network": parts.given("table.network", self["network"]),
             "table.crossover": 2.0 * math.pi * self.wanted(),
             "table.capture": 0,
         }

@@ -21,8 +21,11 @@ from gyrobench.tuning.proof import ProvenWish
 from gyrobench.tuning.tune_loop import tunable, tune
 
 BUDGET = 20.0  # s
-ONE_AXIS = ("platform_single_axis", "stabilizer_floated_2dof", "stabilizer_sdf")  # with one number of inertia
-STRUCTURES = {"gimbal_stabilization": "pi+lead+notch"}  # others: lead-lag
+INERTIA = {  # one number of it
+    **dict.fromkeys(("platform_single_axis", "stabilizer_floated_2dof", "stabilizer_sdf"), "platform.J"),
+    "stabilizer_power_2dof": "gyro.J_x", "stabilizer_power_two_axis": "platform.J_x", "table_servo_loop": "table.J",
+}  # fmt: skip
+STRUCTURES = {"gimbal_stabilization": "pi+lead+notch"}  # others: what tune chooses
 
 
 def with_loops() -> list[str]:
@@ -43,10 +46,10 @@ def one(name: str, loop: str) -> bool:
     system = load_system(name)
     wanted = system.crossovers().get(loop) or 1.0
     wishes = ["phase margin=40deg", "gain margin=6dB", f"bandwidth>{0.5 * wanted:.3g}Hz"]
-    over = ["platform.J=±20%"] if name in ONE_AXIS else []
+    over = [f"{INERTIA[name]}=±20%"] if name in INERTIA else []
     began = time.perf_counter()
     try:
-        tuned = tune(system, wishes, over, STRUCTURES.get(name, "lead-lag"), loop=loop)
+        tuned = tune(system, wishes, over, STRUCTURES.get(name, ""), loop=loop)
     except GyrobenchError as error:
         print(f"| {name} | {loop} | refused: {error} | | | |", flush=True)
         return False

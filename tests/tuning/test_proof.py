@@ -15,7 +15,7 @@ from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.proof import _gain_margin, _run, proof_of, sine_frequencies
 from gyrobench.tuning.robustness import gain_limits
-from gyrobench.tuning.tune_loop import quiet
+from gyrobench.tuning.tuned_settings import quiet
 from gyrobench.tuning.wishes import parse_wishes
 
 WISHES = parse_wishes(["gain margin=6dB", "S at 1Hz<-10dB"])
@@ -84,6 +84,7 @@ def test_sines_lost_on_one_side_bound_that_side_alone() -> None:
     assert none.bound and abs(none.value / 17.94 - 1.0) < 1e-3
 
 
+@pytest.mark.long
 def test_a_promised_gain_margin_is_where_the_simulation_becomes_unstable() -> None:
     """Conditionally stable loop of a platform whose own test begins with a flight: the base rests in the proof.
 

@@ -28,8 +28,10 @@ from gyrobench.tuning.wishes import parse_wishes
 
 NAMES = ["platform_single_axis", "stabilizer_floated_2dof", "stabilizer_sdf"]
 SEVERAL = [
-    "gimbal_stabilization", "gimbal_tracking", "platform_four_gimbal", "platform_three_axis", "platform_three_gimbal",
+    "gimbal_stabilization", "gimbal_tracking", "platform_following", "platform_four_gimbal", "platform_three_axis",
+    "platform_three_gimbal", "stabilizer_power_two_axis",
 ]  # fmt: skip
+OWN = ["gyro_magnetic_compass", "stabilizer_power_2dof", "table_servo_loop"]  # a controller that the part has
 WISHES = ["phase margin=40deg", "gain margin=6dB", "disk margin=0.5", "bandwidth>10Hz"]
 
 
@@ -120,6 +122,7 @@ def test_what_is_promised_holds_between_the_points_and_in_another_model(tuned) -
     assert least["disk"] == pytest.approx(promised["disk margin"], rel=0.005)
 
 
+@pytest.mark.long
 def test_the_proof_measured_what_the_model_says(tuned) -> None:
     for proof in tuned.proofs:
         assert proof.counted > 15 and proof.holds
@@ -160,9 +163,9 @@ def test_what_is_left_over_buys_quietness() -> None:
     def noise(x: np.ndarray) -> float:
         a, b, c = (held := HeldController(problem.controller(x), step)).loop(found[0])
         closed, n = a - b @ c, len(found[0].a)
-        out = np.hstack([-c * ((held.c @ held.b)[0, 0] + held.d), np.zeros((1, 0))])
-        out[:, n:] += held.c @ held.a
-        return float(np.sqrt(((held.c @ held.b)[0, 0] + held.d) ** 2
+        out = np.hstack([-c * held.d, np.zeros((1, 0))])
+        out[:, n:] += held.c
+        return float(np.sqrt(held.d ** 2
                              + (out @ linalg.solve_discrete_lyapunov(closed, b @ b.T) @ out.T)[0, 0]))  # fmt: skip
 
     assert noise(best) / noise(quiet.x) == pytest.approx(quiet.less, rel=0.02)
@@ -223,8 +226,8 @@ def test_what_cannot_be_had_is_said_with_the_reason() -> None:
 @pytest.mark.long
 def test_systems_without_such_a_loop_are_refused_with_those_that_have_one() -> None:
     able = tunable()
-    assert able == sorted([*NAMES, *SEVERAL])
-    for name in ("stabilizer_power_2dof", "fixed_position"):
+    assert able == sorted([*NAMES, *SEVERAL, *OWN])
+    for name in ("vertical_gyro", "fixed_position"):
         with pytest.raises(UsageError, match=f"{name} has no loop .*; tune works for {', '.join(able)}"):
             tune(load_system(name), ["bandwidth>1Hz"])
 
@@ -254,6 +257,7 @@ def test_spreads_of_parts_refused(over: str, message: str) -> None:
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], parts={"stabilizer": "servo_three_loop"})
 
 
+@pytest.mark.long
 def test_a_wish_beyond_the_communication_step_is_refused() -> None:
     """A step of 0.5 ms: up to 800 Hz."""
     with pytest.raises(UsageError, match=r"S at 900Hz: the communication step of 0\.0005 s reaches up to 800 Hz"):
