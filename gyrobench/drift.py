@@ -50,11 +50,7 @@ MEANING = {
     "D_IS": "acceleration-squared-sensitive drift rate, input and spin reference axes (anisoelasticity)",
 }
 #: the square that cannot be told from the others at constant |g| -> the three that take it up
-FOLDED = {
-    "D_OO": ("D_F", "D_II", "D_SS"),
-    "Dx_yy": ("Dx_0", "Dx_xx", "Dx_zz"),
-    "Dy_xx": ("Dy_0", "Dy_yy", "Dy_zz"),
-}
+FOLDED = {"D_OO": ("D_F", "D_II", "D_SS"), "Dx_yy": ("Dx_0", "Dx_xx", "Dx_zz"), "Dy_xx": ("Dy_0", "Dy_yy", "Dy_zz")}
 _AXES = {"I": 0, "O": 1, "S": 2, "x": 0, "y": 1, "z": 2}
 _OWN = {"x": {"I": "x", "O": "y", "S": "z"}, "y": {"I": "y", "O": "x", "S": "z"}}  # of a channel, signs apart
 

@@ -25,11 +25,12 @@ from gyrobench.bench import Bench, standard_folder
 from gyrobench.units import DEG, DPH
 from gyrobench.workflow.instruments import Instrument, find_instrument
 from gyrobench.workflow.sheet_values import FLOOR
-from systems.north_finder.after import RandomErrors, heading, in_words, reached_after, running
+from systems.north_finder.after import RandomErrors, heading, in_words, position, reached_after, running
 
 PAGE = standard_folder() / "docs" / "heading_after_minutes.md"
 PICTURE = standard_folder() / "reports" / "gallery" / "heading_after.svg"
 LATITUDE, MINUTES, GOAL = 45.0 * DEG, 5.0, 1.0 * DEG
+GRAVITY = 9.806  # m/s2, at 45 degrees
 NORTH = units.EARTH_RATE * math.cos(LATITUDE)
 MOST = 0.5  # rad, beyond which a standard deviation of a heading says nothing
 COLOURS = {"laser": "#1b6ca8", "fibre": "#c2571a", "vibrating": "#3b7d3a"}
@@ -71,9 +72,10 @@ class Sheet:
         """Return the cells of the table."""
         one, two = (self.after(MINUTES, both) for both in (False, True))
         time = reached_after(self.errors, LATITUDE, GOAL)
-        growth = running(
-            RandomErrors(self.errors.white, 0.0, self.errors.flicker), 0.0, 60.0 * MINUTES, 600.0, LATITUDE
-        )
+        drift = RandomErrors(self.errors.white, 0.0, self.errors.flicker)
+        growth = running(drift, 0.0, 60.0 * MINUTES, 600.0, LATITUDE)
+        far = position(drift, None, GRAVITY, 60.0 * MINUTES, 600.0)
+        metres = f"{'' if self.floor else '≥ '}{plain(float(f'{far:.2g}'))}"
         alone = "lost" if self.errors.bias > NORTH else degrees(one, at_best=not self.bias)
         words = in_words(time)
         if time and not self.floor:
@@ -82,7 +84,7 @@ class Sheet:
             self.name, f"{self.errors.white / DEG * 60.0:.3g}",
             f"{self.errors.flicker * FLOOR / DPH:.3g}" if self.floor else "–",
             self.stated_bias(), alone, degrees(two, at_best=not self.floor),
-            words, degrees(growth, at_best=not self.floor),
+            words, degrees(growth, at_best=not self.floor), metres,
         ]  # fmt: skip
 
 
@@ -131,6 +133,7 @@ def table(every: list[Sheet]) -> list[str]:
     head = [
         "sheet", "N / (°/√h)", "instability / (°/h)", "bias / (°/h)", f"one position, {MINUTES:g} min / °",
         f"two positions, {MINUTES:g} min / °", f"{GOAL / DEG:g}° in two positions", "growth in 10 min / °",
+        "position in 10 min / m",
     ]  # fmt: skip
     lines = [head, ["---"] * len(head), *(s.row() for s in every)]
     return [*verdicts(every), "", *(f"| {' | '.join(cells)} |" for cells in lines)]

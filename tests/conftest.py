@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from commanding import Command
 
 if TYPE_CHECKING:
     from gyrobench.system.system import System
@@ -72,7 +73,7 @@ def forks() -> Iterator[None]:
 
 
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
     """Run a gyrobench command: exit code, standard output, standard error.  Anything but an exit fails the test.
 
     pages: a run or reduction writes its HTML and PDF too, which takes a second, three quarters of it for the figures;
@@ -108,9 +109,7 @@ def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.fixture
-def gyrobench(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Callable[..., tuple[int, str, str]]
-) -> Callable[..., tuple[int, str, str]]:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command) -> Command:
     """Run a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
     return command

@@ -5,16 +5,15 @@ from __future__ import annotations
 import ast
 import builtins
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.bench import standard_folder
 from gyrobench.record.record import Record
 from gyrobench.workflow.catalog import init_bench
 
-Call = Callable[..., tuple[int, str, str]]
 SYSTEM = '''
 import numpy as np
 
@@ -74,7 +73,7 @@ FAILURES = {
 
 
 @pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
+def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command) -> Command:
     """Runs a command in a bench with a system ``own``: exit code, standard output, standard error."""
     init_bench(tmp_path / "mine", [])
     folder = tmp_path / "mine" / "systems" / "own"
@@ -87,7 +86,7 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) ->
 
 @pytest.mark.parametrize("raises", FAILURES)
 @pytest.mark.long
-def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: Call, raises: str) -> None:
+def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: Command, raises: str) -> None:
     line, message = FAILURES[raises]
     place = f"{Path('systems/own/system.py').resolve()}:{line}: {message}"
     next_step = "the record is kept in {0}; after correcting the cause: gyrobench report {0}"
@@ -115,7 +114,8 @@ def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: 
         assert json.loads(Path(folder, "result.json").read_text(encoding="utf-8"))["coefficients"][0]["name"] == "g"
 
 
-def test_a_figure_that_cannot_be_drawn(gyrobench: Call) -> None:
+@pytest.mark.long
+def test_a_figure_that_cannot_be_drawn(gyrobench: Command) -> None:
     """The failure is in gyrobench's drawing: its line is named, as there is none of the user's."""
     code, out, err = gyrobench("run", "own", "--set", "raises=figure", "--out", "r", pages=True)
     assert (code, out) == (3, "") and "Traceback" not in err
@@ -124,7 +124,8 @@ def test_a_figure_that_cannot_be_drawn(gyrobench: Call) -> None:
     assert not Path("r/report.html").exists() and Path("r/result.json").is_file() and Path("r/run.json").is_file()
 
 
-def test_a_template_of_the_users_own_that_fails(gyrobench: Call) -> None:
+@pytest.mark.long
+def test_a_template_of_the_users_own_that_fails(gyrobench: Command) -> None:
     Path("reports/templates").mkdir()
     template = Path("reports/templates/report.html.j2").resolve()
     template.write_text("<p>\n{{ nothing.there }}", encoding="utf-8")
@@ -134,19 +135,20 @@ def test_a_template_of_the_users_own_that_fails(gyrobench: Call) -> None:
     assert "report.pdf" not in err and Path("r/report.pdf").is_file()
 
 
-def test_the_user_stops_the_reduction(gyrobench: Call) -> None:
+def test_the_user_stops_the_reduction(gyrobench: Command) -> None:
     code, _, err = gyrobench("run", "own", "--set", "raises=stop", "--out", "r")
     assert code == 130
     assert err == "gyrobench: interrupted; the record is kept in r; to reduce it: gyrobench report r\n"
 
 
-def test_the_traceback_on_request(gyrobench: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.long
+def test_the_traceback_on_request(gyrobench: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GYROBENCH_TRACEBACK", "1")
     code, _, err = gyrobench("run", "own", "--set", "raises=zero", "--out", "r")
     assert code == 3 and "Traceback" in err and "in findings\n" in err and "the record is kept in r" in err
 
 
-def test_an_exception_before_the_run_names_its_line_too(gyrobench: Call) -> None:
+def test_an_exception_before_the_run_names_its_line_too(gyrobench: Command) -> None:
     """Also one that is raised further in, by a library that the user's code calls."""
     file = Path("systems/own/system.py")
     text = SYSTEM + "\n    def check(self):\n        return [np.linalg.inv(np.zeros((2, 2)))]\n"
@@ -157,7 +159,7 @@ def test_an_exception_before_the_run_names_its_line_too(gyrobench: Call) -> None
     assert not Path("r").exists()
 
 
-def test_a_slot_with_an_unknown_socket(gyrobench: Call) -> None:
+def test_a_slot_with_an_unknown_socket(gyrobench: Command) -> None:
     file = Path("systems/own/system.py")
     file.write_text(SYSTEM.replace('Slot("Site"', 'Slot("Sit"'), encoding="utf-8")
     code, _, err = gyrobench("show", "own")

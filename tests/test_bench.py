@@ -362,10 +362,8 @@ def test_no_function_of_a_reduction_or_a_system_is_longer_than_80_lines() -> Non
 
 #: files that may be a little longer than 400 lines
 LONG_FILES = {
-    "gyrobench/reduction/estimation/noise_mixture_fit.py",
     "gyrobench/tuning/tune_loop.py",
     "systems/platform_alignment/plans.py",
-    "systems/turn_on_repeatability/reduction.py",
 }
 
 

@@ -7,10 +7,10 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.commands import cli, progress_display
@@ -20,14 +20,13 @@ from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
 from gyrobench.workflow.progress_words import format_duration
 
-Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
 TINY = ["--set", "rate=30deg/s", "--set", "dwell=2", "--set", "settle=0.5", "--set", "windows=12"]
 
 
 # ------------------------------------------------------------------------------------------ help, list
 @pytest.mark.long
-def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
+def test_help_has_an_example_for_each_command(gyrobench: Command) -> None:
     code, out, _ = gyrobench("--help")
     assert code == 0 and "gyrobench run tumble_single_axis" in out
     names = [c.name or c.callback.__name__ for c in cli.app.registered_commands if c.callback]
@@ -41,7 +40,7 @@ def test_help_has_an_example_for_each_command(gyrobench: Call) -> None:
         )
 
 
-def test_version(gyrobench: Call) -> None:
+def test_version(gyrobench: Command) -> None:
     assert gyrobench("--version")[1].startswith("gyrobench")
 
 
@@ -73,7 +72,7 @@ def test_list_and_help_load_nothing_heavy() -> None:
         assert done.stderr.strip() == "[]", words
 
 
-def test_list(gyrobench: Call) -> None:
+def test_list(gyrobench: Command) -> None:
     code, out, err = gyrobench("list")
     assert (code, err) == (0, "")
     for name in (*Bench(standard_folder()).parts(), NAME, "SdfGyro"):
@@ -82,7 +81,7 @@ def test_list(gyrobench: Call) -> None:
     assert list(found) == ["parts", "systems", "sockets", "specifications", "instruments"]
 
 
-def test_list_is_narrowed_by_words(gyrobench: Call) -> None:
+def test_list_is_narrowed_by_words(gyrobench: Command) -> None:
     """Of every kind, in name, title or method, whatever the case; each word must be there."""
     found = json.loads(gyrobench("list", "Floated", "gyro", "--json")[1])
     assert "floated_gyro" in [r["name"] for r in found["parts"]]
@@ -96,7 +95,7 @@ def test_list_is_narrowed_by_words(gyrobench: Call) -> None:
 
 # ------------------------------------------------------------------------------------------------ show
 @pytest.mark.long
-def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path) -> None:
+def test_show_prints_order_cuts_plan_and_options(gyrobench: Command, tmp_path: Path) -> None:
     code, out, err = gyrobench("show", NAME, "--set", "rate=2deg/s", "--set", "latitude=50deg")
     assert (code, err) == (0, "")
     slots = out.split("slots, in the order of execution; step 0.001 s\n")[1].split("\n\n")[0]
@@ -110,7 +109,7 @@ def test_show_prints_order_cuts_plan_and_options(gyrobench: Call, tmp_path: Path
     assert (tmp_path / "w.svg").read_text(encoding="utf-8").startswith("<svg")
 
 
-def test_values_of_a_file(gyrobench: Call, tmp_path: Path) -> None:
+def test_values_of_a_file(gyrobench: Command, tmp_path: Path) -> None:
     """Options at the top, parameters under their slot; a value given singly goes before that of the file."""
     (tmp_path / "v.toml").write_text(
         'latitude = "50deg"\nturns = 3\n[gyro]\nwhite = "0.05deg/h/sqrt(Hz)"\nreaction = true\n'
@@ -177,7 +176,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("words", "message"), REFUSED, ids=[" ".join(w) for w, _ in REFUSED])
-def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str) -> None:
+def test_refused(gyrobench: Command, tmp_path: Path, words: list[str], message: str) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
     (tmp_path / "bad.fmu").write_text("nothing", encoding="utf-8")
@@ -256,7 +255,7 @@ def test_spans_of_time() -> None:
 
 
 # ------------------------------------------------------------------------------ build, export, validate
-def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_path: Path) -> None:
+def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Command, tmp_path: Path) -> None:
     code, out, _ = gyrobench("build", "site", "sampler", "site")
     assert (code, out) == (0, "fmus/site.fmu\nfmus/sampler.fmu\n")
     assert gyrobench("build", "site", "--target", "python", "--out", "o")[1] == "o/site-python.fmu\n"
@@ -268,7 +267,7 @@ def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Call, tmp_pa
 
 
 @pytest.mark.long
-def test_parts_are_built_side_by_side(gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_are_built_side_by_side(gyrobench: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same files as one after the other; one that cannot be built is named, and those before it are there."""
     from gyrobench import packaging
 
@@ -289,7 +288,9 @@ def test_parts_are_built_side_by_side(gyrobench: Call, tmp_path: Path, monkeypat
 
 
 @pytest.mark.long
-def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_archive_repeats_run_and_report(
+    gyrobench: Command, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     """In a process that has exported nothing: what an export registers with ElementTree is not there."""
     values = (*TINY, "--set", "gyro.D_I=0.7deg/h/g")
     assert gyrobench("run", NAME, *values, "--seed", 7, "--out", "r")[0] == 0
@@ -318,7 +319,7 @@ def test_an_archive_repeats_run_and_report(gyrobench: Call, tmp_path: Path, capl
 
 # ------------------------------------------------------------------------------------------- measured
 @pytest.mark.long
-def test_template_is_reduced_when_filled_in(gyrobench: Call, tmp_path: Path) -> None:
+def test_template_is_reduced_when_filled_in(gyrobench: Command, tmp_path: Path) -> None:
     code, template, _ = gyrobench("reduce", "torquer_scale_factor", "--template")
     assert code == 0 and "current [mA],rate_plus [deg/h]" in template
     # 17 °/h/mA both ways, at eight currents, by arithmetic

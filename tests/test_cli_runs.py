@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 from openpyxl import load_workbook
 from processes import unhurried
 
@@ -22,7 +23,6 @@ from gyrobench.commands import cli, progress_display
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.record.record import Record
 
-Call = Callable[..., tuple[int, str, str]]
 NAME = "tumble_single_axis"
 QUICK = ["--set", "rate=2deg/s", "--set", "dwell=60", "--set", "windows=36"]
 PLAIN = ["--no-report", "--no-check-step"]
@@ -66,33 +66,36 @@ def test_run_prints_table_verdict_step_check_and_paths(runs: Path) -> None:
     assert "verdict: fail" in (runs / "b.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_step_check_changes_less_than_a_tenth_of_u(runs: Path) -> None:
     check = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))["step_check"]
     assert len(check["rows"]) == 9
     assert check["worst"] == max(r["ratio"] for r in check["rows"]) < 0.1
 
 
-def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: Call, runs: Path) -> None:
-    code, out, _ = gyrobench("verify", runs / "b")  # without pages
+def test_a_report_verifies_signed_and_no_more_once_a_file_is_changed(gyrobench: Command) -> None:
+    assert gyrobench("run", NAME, *TINY, "--out", "b")[0] == 0
+    code, out, _ = gyrobench("verify", "b")  # without pages
     assert code == 0 and "all 4 files as they were written" in out
     assert gyrobench("sign", "--new-key", "lab.key") == (
         0,
         "lab.pub: give it to those who verify; keep lab.key to yourself\n",
         "",
     )
-    assert gyrobench("sign", runs / "b", "--key", "lab.key")[0] == 0
-    assert "signed by lab.pub" in gyrobench("verify", runs / "b", "--key", "lab.pub")[1]
-    result, kept = runs / "b" / "result.json", (runs / "b" / "result.json").read_bytes()
-    result.write_bytes(kept.replace(b'"verdict": "fail"', b'"verdict": "pass"'))
-    code, _, err = gyrobench("verify", runs / "b")
+    assert gyrobench("sign", "b", "--key", "lab.key")[0] == 0
+    assert "signed by lab.pub" in gyrobench("verify", "b", "--key", "lab.pub")[1]
+    result = Path("b/result.json")
+    kept = result.read_bytes()
+    result.write_bytes(kept.replace(b'"verdict": "', b'"verdict": "not '))
+    code, _, err = gyrobench("verify", "b")
     assert code == 1 and "- result.json: changed after the report was written" in err
     result.write_bytes(kept)
-    code, _, err = gyrobench("sign", runs / "b")
+    code, _, err = gyrobench("sign", "b")
     assert code == 2 and "name a folder and the --key that signs it" in err
 
 
 @pytest.mark.long
-def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
+def test_report_again_keeps_the_step_check(gyrobench: Command, runs: Path) -> None:
     code, out, _ = gyrobench("report", runs / "a", "--spec", "floated_gyro", "--strict", figures=False)
     assert code == 0 and "step check (" in out and "verdict: pass" in out
     code, out, _ = gyrobench("report", runs / "b", "--spec", "floated_gyro", "--strict", "--json", figures=False)
@@ -100,7 +103,7 @@ def test_report_again_keeps_the_step_check(gyrobench: Call, runs: Path) -> None:
 
 
 @pytest.mark.long
-def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Path) -> None:
+def test_json_is_the_only_thing_on_standard_output(gyrobench: Command, tmp_path: Path) -> None:
     code, out, err = gyrobench("run", NAME, *TINY, "--json", pages=True, figures=False)
     assert code == 0
     (folder,) = (tmp_path / "reports" / "out" / NAME).iterdir()
@@ -110,14 +113,14 @@ def test_json_is_the_only_thing_on_standard_output(gyrobench: Call, tmp_path: Pa
 
 
 @pytest.mark.long
-def test_the_same_run_has_the_same_folder_and_another_one_another(gyrobench: Call, tmp_path: Path) -> None:
+def test_the_same_run_has_the_same_folder_and_another_one_another(gyrobench: Command, tmp_path: Path) -> None:
     for more in ([], ["--set", "latitude=2745arcmin"], ["--seed", "2"]):  # 2745' = 45.75°, the default
         assert gyrobench("run", NAME, *TINY, *more, "--json")[0] == 0
     assert len(list((tmp_path / "reports" / "out" / NAME).iterdir())) == 2
 
 
 @pytest.mark.long
-def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) -> None:
+def test_out_keeps_another_run_unless_forced(gyrobench: Command, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "here"]
     assert gyrobench(*run)[0] == 0
     assert gyrobench(*run)[0] == 0  # the same run again
@@ -130,7 +133,7 @@ def test_out_keeps_another_run_unless_forced(gyrobench: Call, tmp_path: Path) ->
 
 
 @pytest.mark.long
-def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Call, tmp_path: Path) -> None:
+def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: Command, tmp_path: Path) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run, pages=True, figures=False)[0] == 0
     assert (tmp_path / "r" / "report.html").is_file() and (tmp_path / "r" / "report.pdf").is_file()
@@ -146,7 +149,7 @@ def test_without_a_report_the_result_is_kept_and_no_older_page_stays(gyrobench: 
 
 
 @pytest.mark.long
-def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+def test_a_record_is_written_as_csv(gyrobench: Command, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "a", tmp_path / "a")
     code, out, _ = gyrobench("record", "a", "--to", "csv", "--out", "t")
     assert (code, out.split()[:2]) == (0, ["t/windows.csv", "t/channels.csv"])
@@ -164,7 +167,7 @@ def test_a_record_is_written_as_csv(gyrobench: Call, runs: Path, tmp_path: Path)
 
 
 @pytest.mark.long
-def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Command, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "a", tmp_path / "a")
     result = json.loads((runs / "a" / "result.json").read_text(encoding="utf-8"))
     files = gyrobench("record", "a", "--to", "csv", figures=False)[1].split()[2:]
@@ -184,7 +187,7 @@ def test_the_tables_of_a_report_are_written_with_all_digits(gyrobench: Call, run
 
 
 @pytest.mark.long
-def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp_path: Path) -> None:
+def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Command, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text('[coefficients.D_I]\nunit = "mA"\nmin = -1\n', encoding="utf-8")
     code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
     assert code == 3
@@ -194,7 +197,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Call, tmp
 
 
 @pytest.mark.long
-def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
+def test_engines_give_the_same_record(gyrobench: Command, tmp_path: Path) -> None:
     short = [TINY[0], "rate=60deg/s", *TINY[2:], "--set", "table.index_rate=2"]
     for name, more in (("n", []), ("r", ["--engine", "reference"])):
         assert gyrobench("run", NAME, *short, *more, "--out", name)[0] == 0
@@ -202,7 +205,7 @@ def test_engines_give_the_same_record(gyrobench: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
+def test_compare(gyrobench: Command, runs: Path, tmp_path: Path) -> None:
     code, out, _ = gyrobench("compare", runs / "a", runs / "b", "--out", "c")
     assert code == 0 and out.startswith("B (b) ") and "Set differently: " in out.splitlines()[-5]
     assert out.endswith("\n\nc/comparison.json\nc/comparison.html\nc/comparison.pdf\n")
@@ -215,7 +218,7 @@ def test_compare(gyrobench: Call, runs: Path, tmp_path: Path) -> None:
 # ---------------------------------------------------------------------------- interrupted and failed runs
 @pytest.mark.long
 def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if status.windows >= 2:
@@ -235,8 +238,9 @@ def test_interrupted_run_keeps_its_record_and_says_what_it_lacks(
     assert "  - phase 4 (mount 2, against the Earth): " in err and "of 36 windows" in err
 
 
+@pytest.mark.long
 def test_interrupt_does_not_replace_a_whole_record(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = ["run", NAME, *TINY, "--out", "r"]
     assert gyrobench(*run)[0] == 0
@@ -251,7 +255,7 @@ def test_interrupt_does_not_replace_a_whole_record(
 
 @pytest.mark.long
 def test_interrupted_step_check_still_gives_the_report(
-    gyrobench: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gyrobench: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(self: progress_display.ProgressDisplay, status: ProgressReport) -> None:
         if "step check" in self.label:
@@ -271,7 +275,8 @@ def faulty(foreign: Callable[..., Path]) -> Path:
     return foreign("faulty")
 
 
-def test_crash_of_a_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faulty: Path) -> None:
+@pytest.mark.long
+def test_crash_of_a_part_ends_in_a_message(gyrobench: Command, tmp_path: Path, faulty: Path) -> None:
     code, out, err = gyrobench(
         "run", NAME, *TINY, "--part", f"gyro={faulty}", "--out", "r",
         "--set", "gyro.fault=1", "--set", "gyro.at=150", "--set", "rebalance.K_p=0", "--set", "rebalance.K_i=0",
@@ -282,7 +287,7 @@ def test_crash_of_a_part_ends_in_a_message(gyrobench: Call, tmp_path: Path, faul
     assert Record.load(tmp_path / "r").run.stopped_at == pytest.approx(0.15)
 
 
-def test_faults_of_a_part_are_shown_with_file_and_line(gyrobench: Call, tmp_path: Path) -> None:
+def test_faults_of_a_part_are_shown_with_file_and_line(gyrobench: Command, tmp_path: Path) -> None:
     assert gyrobench("init", "mine", "--copy", "site")[0] == 0
     model = tmp_path / "mine" / "components" / "site" / "model.py"
     good = model.read_text(encoding="utf-8")

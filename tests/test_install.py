@@ -54,7 +54,6 @@ def test_the_wheel_holds_tool_and_standard_bench(wheel: Path) -> None:
     assert not odd
 
 
-@pytest.mark.long
 def test_nothing_of_the_checkout_is_in_use(installed: Installed, tmp_path: Path) -> None:
     """Modules and contents are those of the wheel; commands write what they say and nothing else."""
     assert run(installed, tmp_path, "--version") == f"gyrobench {VERSION}\n"
@@ -88,9 +87,8 @@ def test_a_copied_part_can_be_changed_built_and_run(installed: Installed, tmp_pa
     assert d["D_I"]["estimate"] == pytest.approx(d["D_I"]["truth"], abs=0.05)
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(p, marks=() if p == "README.md" else pytest.mark.long) for p in pages.READ_FIRST]
-)
+@pytest.mark.parametrize("page", pages.READ_FIRST)
+@pytest.mark.long
 def test_a_page_does_what_it_prints(page: str, installed: Installed, tmp_path: Path) -> None:
     reader = Reader(installed, page, tmp_path / "reader")
     for step in reader.steps:

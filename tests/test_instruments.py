@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 
 import gyrobench as gb
 from gyrobench.bench import Bench, UsageError, standard_folder
@@ -19,7 +19,6 @@ from gyrobench.units import EARTH_RATE
 from gyrobench.workflow.instruments import find_instrument, parameters, read_instrument, settings, with_instruments
 from systems.north_finder.after import RandomErrors
 
-Command = Callable[..., tuple[int, str, str]]
 ALL = sorted(Bench(standard_folder()).instruments())
 TABLES = [n for n in ALL if find_instrument(n).kind == "turntable"]
 SHEETS = [n for n in ALL if find_instrument(n).kind in ("fibre", "laser", "vibrating")]
@@ -236,6 +235,13 @@ def test_the_accelerometers_of_a_unit_by_hand() -> None:
     assert {n.partition(".")[0] for n in both} == {"accelerometers", "imu"}
     with pytest.raises(UsageError, match="CRG20 states nothing of accelerometers"):
         with_instruments("crg20", {"accelerometers": "accelerometer_mems"}, load_system("drift_record"))
+
+
+def test_a_rate_gyro_states_accelerometers_or_why_not() -> None:
+    for name, file in Bench(standard_folder()).instruments().items():
+        sheet = find_instrument(name)
+        if sheet.kind in ("fibre", "laser", "vibrating") and not sheet.accelerometers:
+            assert "\n# accelerometers: " in file.read_text(encoding="utf-8"), name
 
 
 @pytest.mark.long

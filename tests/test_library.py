@@ -182,6 +182,7 @@ def test_a_part_is_swapped_and_runs_are_compared(folder: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------- measured data, suites
+@pytest.mark.long
 def test_measured_data_are_reduced(folder: Path) -> None:
     from gyrobench.bench import standard_folder
 
@@ -215,10 +216,7 @@ def test_a_suite_runs_in_folders(folder: Path) -> None:
 # ------------------------------------------------------------------------------------------- mistakes
 MISTAKES: dict[str, tuple[Callable[[gb.Run], Any], str]] = {
     "system": (lambda r: gb.load("tumble_single_axes"), "did you mean tumble_single_axis"),
-    "suite": (
-        lambda r: gb.load("drift_test_suite"),
-        "is a suite of tests: gyrobench.load_suite",
-    ),
+    "suite": (lambda r: gb.load("drift_test_suite"), "is a suite of tests: gyrobench.load_suite"),
     "no suite": (lambda r: gb.load_suite(NAME), "is one test, not a suite"),
     "option": (lambda r: gb.load(NAME, lattitude=1), "lattitude: no such option .*latitude"),
     "unit": (lambda r: gb.load(NAME, latitude="3 V"), "latitude"),
@@ -290,6 +288,7 @@ def test_an_error_of_ones_own_after_the_run_holds_the_record(folder: Path, monke
         bare.result  # noqa: B018
 
 
+@pytest.mark.long
 def test_an_interrupted_run_holds_what_was_recorded(folder: Path) -> None:
     """Ctrl-C in a notebook: an error with the record until then, in memory or, with out, in the folder to resume."""
 

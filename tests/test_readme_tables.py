@@ -17,8 +17,7 @@ def rows(page: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("page", "room", "file"),
-    [("parts.md", "components", "model.py"), ("tests_and_loops.md", "systems", "system.py")],
+    ("page", "room", "file"), [("parts.md", "components", "model.py"), ("tests_and_loops.md", "systems", "system.py")]
 )
 def test_each_stands_once(page: str, room: str, file: str) -> None:
     there = Counter(n for row in rows(page) for n in re.findall(rf"\[\w+\]\(\.\./{room}/(\w+)/README.md\)", row))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 from fuzzing import CORPUS
 
 from gyrobench import files
@@ -19,8 +19,6 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import NO_DIGEST, RecordError, RunDocument, read_run
 from gyrobench.system.system import load_system
 from gyrobench.workflow.run_comparison import read_result
-
-Command = Callable[..., tuple[int, str, str]]
 
 
 def flip(file: Path, old: bytes, new: bytes) -> None:
@@ -123,6 +121,7 @@ def test_the_content_is_on_the_disk_before_the_name(tmp_path: Path, monkeypatch:
     assert events == ["disk .part", "name", "disk "] * 2  # table, run.json
 
 
+@pytest.mark.long
 def test_an_unzipped_archive_that_was_changed_is_unzipped_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

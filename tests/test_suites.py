@@ -7,12 +7,12 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+from commanding import Command
 from processes import unhurried
 
 from gyrobench.bench import standard_folder
@@ -22,7 +22,6 @@ from gyrobench.engine.session import run
 from gyrobench.record.record import Record
 from gyrobench.system.suite import Suite, load_test
 
-Call = Callable[..., tuple[int, str, str]]
 NAME = "drift_test_suite"
 PLANS = {
     "tumble_single_axis": ["rate=30deg/s", "dwell=20", "settle=0.5", "windows=12"],
@@ -37,13 +36,6 @@ def words(*tests: str, sets: tuple[str, ...] = ()) -> list[str]:
 
 
 TWO = words("tumble_single_axis", "fixed_position")
-
-
-@pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
-    """Runs a command in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    return command
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +88,7 @@ def test_each_test_leaves_a_run_of_its_own(done: Path) -> None:
         jsonschema.validate(json.loads((done / name / "run.json").read_text(encoding="utf-8")), run_schema)
 
 
+@pytest.mark.long
 def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Path) -> None:
     suite = load_test(NAME)
     assert isinstance(suite, Suite)
@@ -104,6 +97,7 @@ def test_a_test_alone_with_the_seed_of_the_suite_gives_the_same_record(done: Pat
     assert alone.windows["mean"].tolist() == Record.load(done / "fixed_position").windows["mean"].tolist()
 
 
+@pytest.mark.long
 def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> None:
     from html.parser import HTMLParser
 
@@ -140,6 +134,7 @@ def test_the_result_follows_the_schema_and_the_page_the_result(done: Path) -> No
 
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext")
+@pytest.mark.long
 def test_the_pdf_says_the_same(done: Path) -> None:
     text = subprocess.run(
         ["pdftotext", "-layout", done / "report.pdf", "-"], capture_output=True, text=True, check=True
@@ -148,11 +143,13 @@ def test_the_pdf_says_the_same(done: Path) -> None:
         assert words_ in text.stdout
 
 
+@pytest.mark.long
 def test_the_terminal_gives_the_answer(done: Path) -> None:
     said = (done.parent / "out.txt").read_text(encoding="utf-8")
     assert "methods: consistent" in said and "largest E_n" in said and "ω_d" in said
 
 
+@pytest.mark.long
 def test_the_shared_scale_factor_is_named(done: Path) -> None:
     """Two tests have a torquer in their loop; the latitude is a source of one alone."""
     found = result(done)["suite"]
@@ -162,7 +159,7 @@ def test_the_shared_scale_factor_is_named(done: Path) -> None:
 
 
 @pytest.mark.long
-def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
+def test_report_again_and_from_the_runs(done: Path, gyrobench: Command) -> None:
     """The same numbers from the suite's folder, and from the folders of its tests as if they came from elsewhere."""
     before = result(done)
     assert gyrobench("report", done, figures=False)[0] == 0
@@ -176,7 +173,7 @@ def test_report_again_and_from_the_runs(done: Path, gyrobench: Call) -> None:
 
 
 @pytest.mark.long
-def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -> None:
+def test_specification_and_strict(done: Path, gyrobench: Command, tmp_path: Path) -> None:
     spec = tmp_path / "limits.toml"
     for limit, code, verdict in ((5.0, 0, "pass"), (0.001, 1, "fail")):
         spec.write_text(f'[coefficients.D_F]\nunit = "deg/h"\nmin = {-limit}\nmax = {limit}\n', encoding="utf-8")
@@ -185,7 +182,7 @@ def test_specification_and_strict(done: Path, gyrobench: Call, tmp_path: Path) -
 
 
 @pytest.mark.long
-def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
+def test_disagreement_fails_strict(done: Path, gyrobench: Command) -> None:
     """The fixed position of another gyro: the run says so, and names the parameter."""
     other = words("fixed_position", "servo_vertical_level", sets=("fixed_position.gyro.D_F=0.5deg/h",))
     code, out, _ = gyrobench("run", NAME, *other, "--strict", "--out", "o")
@@ -195,7 +192,7 @@ def test_disagreement_fails_strict(done: Path, gyrobench: Call) -> None:
 
 # ------------------------------------------------------------------------------------ stopped and failed
 @pytest.mark.long
-def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_suite_goes_on(gyrobench: Command, done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second test is stopped in the middle; --resume ends it, bit-equal, and leaves the first as it is."""
     run = ["run", NAME, *words("fixed_position", "tumble_single_axis"), "--seed", "3", "--out", "s"]
 
@@ -224,7 +221,7 @@ def test_a_stopped_suite_goes_on(gyrobench: Call, done: Path, monkeypatch: pytes
 
 
 @pytest.mark.long
-def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
+def test_one_failed_test_does_not_stop_the_others(gyrobench: Command) -> None:
     """A current limit that saturates: the reduction of this one test refuses, the report is of the others."""
     three = words(*PLANS, sets=("fixed_position.rebalance.i_max=1e-9",))
     code, out, err = gyrobench("run", NAME, *three, "--out", "s")
@@ -260,13 +257,13 @@ def test_one_failed_test_does_not_stop_the_others(gyrobench: Call) -> None:
         (["reduce", "fixed_position", "--data", "a", "--data", "b"], "one record at a time"),
     ],
 )  # fmt: skip
-def test_refused(gyrobench: Call, arguments: list[str], text: str) -> None:
+def test_refused(gyrobench: Command, arguments: list[str], text: str) -> None:
     code, _, err = gyrobench(*arguments)
     assert code == 2 and text in err
     assert not Path("reports").exists()
 
 
-def test_show_and_list(gyrobench: Call) -> None:
+def test_show_and_list(gyrobench: Command) -> None:
     code, out, _ = gyrobench("show", NAME, "--json")
     found = json.loads(out)
     assert code == 0 and [t["name"] for t in found["tests"]] == found["sets"]["floated"].split()
@@ -277,7 +274,7 @@ def test_show_and_list(gyrobench: Call) -> None:
 
 # ------------------------------------------------------------------------------------- measured records
 @pytest.mark.long
-def test_measured_records_become_a_suite(gyrobench: Call, done: Path) -> None:
+def test_measured_records_become_a_suite(gyrobench: Command, done: Path) -> None:
     """The simulated windows as a laboratory would write them down: same numbers, no truth; what it does not state and a
     signature wants is said.
     """

@@ -97,11 +97,7 @@ def test_per_g0_coefficients() -> None:
 @pytest.mark.parametrize(
     ("text", "to", "message"),
     [
-        (
-            "2mA",
-            "rad",
-            "'mA' .A. does not convert to 'rad'.*units that fit: rad, mrad, urad, deg, arcmin, arcsec",
-        ),
+        ("2mA", "rad", "'mA' .A. does not convert to 'rad'.*units that fit: rad, mrad, urad, deg, arcmin, arcsec"),
         ("2Hz", "rad/s", "does not convert"),
         ("2furlong", "m", "unknown symbol 'furlong'"),
         ("abc", "1", "finite number"),

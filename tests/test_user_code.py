@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench import user_code
 
-Command = Callable[..., tuple[int, str, str]]
 PART = '''from gyrobench.component import Component, Input, Output
 class P(Component):
     """A part."""

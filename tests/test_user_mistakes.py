@@ -6,25 +6,17 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.commands import cli
 from gyrobench.report.result_json import content_hash
 
-Call = Callable[..., tuple[int, str, str]]
 BENCH = ["run", "estimator_bench", "--set", "samples=13000"]
 PLATFORM = ["run", "platform_single_axis"]
 POWER = ["run", "stabilizer_power_2dof"]
-
-
-@pytest.fixture
-def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Call) -> Call:
-    """Runs a command in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    return command
 
 
 PROFILES = {
@@ -68,7 +60,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("words", "message"), REFUSED, ids=[" ".join(w[1:]) for w, _ in REFUSED])
-def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str) -> None:
+def test_refused(gyrobench: Command, tmp_path: Path, words: list[str], message: str) -> None:
     for name, text in PROFILES.items():
         (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
     code, out, err = gyrobench(*words)
@@ -77,7 +69,7 @@ def test_refused(gyrobench: Call, tmp_path: Path, words: list[str], message: str
 
 
 @pytest.mark.long
-def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) -> None:
+def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Command) -> None:
     """The standard stabilizer has no i_motor either: that is the system's own choice, and no news."""
     assert "note:" not in gyrobench("show", "platform_single_axis")[1]
     assert gyrobench("init", "own", "--copy", "stabilizer_lead_lag")[0] == 0
@@ -91,7 +83,7 @@ def test_a_part_of_the_users_own_is_told_what_it_leaves_open(gyrobench: Call) ->
 
 
 @pytest.mark.long
-def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_common(gyrobench: Call) -> None:
+def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_common(gyrobench: Command) -> None:
     """The bench of estimators has one step only, that of its readings."""
     code, out, err = gyrobench(*BENCH, "--check-step", "--out", "a", pages=True)
     assert code == 3 and "step check: " in err and "the report is without it" in err
@@ -115,7 +107,7 @@ def test_a_step_check_that_fails_costs_no_report_and_compare_wants_something_in_
     assert code == 0 and ["c" in rows[0].split(), "a" in rows[1].split()] == [True, True]
 
 
-def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Call) -> None:
+def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Command) -> None:
     code, out, _ = gyrobench("init", "own", "--copy", "vertical_gyro")
     assert code == 0 and "change its model.py" in out and "change its system.py" in out
     assert Path("own/components/vertical_gyro/model.py").is_file()
@@ -123,14 +115,14 @@ def test_init_copies_a_part_and_a_system_of_one_name(gyrobench: Call) -> None:
 
 
 @pytest.mark.long
-def test_a_run_that_breaks_off_says_once_where_its_record_is(gyrobench: Call) -> None:
+def test_a_run_that_breaks_off_says_once_where_its_record_is(gyrobench: Command) -> None:
     values = ["--set", "float_stop=0.01deg", "--set", "time=5s"]
     code, _, err = gyrobench("run", "stabilizer_sdf", *values, "--out", "a")
     assert code == 3 and "the float" in err and err.count("the record until then is kept in a") == 1
     assert Path("a/run.json").is_file()
 
 
-def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Call) -> None:
+def test_a_table_as_a_spreadsheet_saves_it(gyrobench: Command) -> None:
     reduce = ["reduce", "torquer_scale_factor", "--data", "t.csv"]
     head = "current [mA];rate_plus [deg/h];rate_minus [deg/h]\n"
     for data, message in (

@@ -40,7 +40,7 @@ class AccelerometerPendulous(Component):
     """
 
     version = "1.0.0"
-    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
 
     scale = Parameter(1e3 * G0, "m/s2/A", "specific force per current, lambda (1 g0/mA)", above=0.0)
     k0 = Parameter(50.0 * UG, "1", "bias, in g0 (50 ug)")

@@ -23,7 +23,7 @@ class AcquisitionCard(Component):
     """
 
     version = "1.0.0"
-    smooth: ClassVar[dict[str, float]] = {"bits": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"bits": 0.0}
     sampling = "period"
 
     f_c = Parameter(720.0, "Hz", "corner of the RC filter; 0: none", min=0.0)

@@ -29,7 +29,7 @@ class GyroFog(RateGyro):
     """
 
     version = "1.0.0"
-    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
     white_noise, without_own_noise = "electronics", {"optical": 0.0}
 
     length = Parameter(1000.0, "m", "length of the fibre of a coil, L", above=0.0)

@@ -28,7 +28,7 @@ class GyroHemispherical(RateGyro):
     """
 
     version = "1.0.0"
-    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
     white_noise = "white"
 
     gain = Parameter(0.277, "1", "Bryan factor k: turn of the pattern over that of the body", above=0.0, max=1.0)

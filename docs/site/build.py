@@ -37,6 +37,7 @@ CONTENTS = {
         "docs/real_records",
         "docs/data_sheets",
         "docs/heading_after_minutes",
+        "docs/mistakes_of_a_record",
         "tests/benchmarks/README",
         "tests/spec/README",
     ],

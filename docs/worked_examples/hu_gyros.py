@@ -87,9 +87,7 @@ def transform() -> list[Example]:
 def readings() -> list[Example]:
     """What is a result without its data."""
     why = "the currents that it comes from are not printed"
-    return [
-        Example("Table 3-2", "ten coefficients of three tumbles", "30 numbers", "–", "–", math.nan, why=why),
-    ]
+    return [Example("Table 3-2", "ten coefficients of three tumbles", "30 numbers", "–", "–", math.nan, why=why)]
 
 
 def examples() -> list[Example]:

@@ -12,17 +12,7 @@ import typer
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.app import app, echo
 from gyrobench.commands.completion import complete_part
-from gyrobench.commands.options import (
-    Coupling,
-    Json,
-    Map,
-    Order,
-    Out,
-    Part,
-    Set,
-    System,
-    Target,
-)
+from gyrobench.commands.options import Coupling, Json, Map, Order, Out, Part, Set, System, Target
 
 
 @app.command("list")

@@ -137,8 +137,7 @@ def site(
         None
     ),
     publish: Annotated[
-        Path | None,
-        typer.Option("--publish", metavar="DIR", help="Folder for all of it, reports included."),
+        Path | None, typer.Option("--publish", metavar="DIR", help="Folder for all of it, reports included.")
     ] = None,
 ) -> None:
     """Write the site of a campaign as static pages.
@@ -202,12 +201,7 @@ def design(
       gyrobench design tumble_two_axis --time 1h --criterion A --set @noise.toml
       gyrobench design drift_test_suite --set tests="tumble_single_axis tumble_two_axis" --want D_I=0.001deg/h/g
     """
-    from gyrobench.commands.arguments import (
-        parse_assignments,
-        parse_settings,
-        parse_swaps,
-        parse_time,
-    )
+    from gyrobench.commands.arguments import parse_assignments, parse_settings, parse_swaps, parse_time
     from gyrobench.design.designed_test import DesignedSuite, DesignedTest
     from gyrobench.design.shortest_test import design_test
     from gyrobench.design.suite_design import design_suite

@@ -10,14 +10,7 @@ import typer
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands.app import app, echo
 from gyrobench.commands.completion import complete_copy, complete_system
-from gyrobench.commands.options import (
-    Form,
-    Map,
-    Part,
-    Seed,
-    Set,
-    System,
-)
+from gyrobench.commands.options import Form, Map, Part, Seed, Set, System
 
 
 @app.command()

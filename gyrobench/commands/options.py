@@ -11,8 +11,7 @@ import typer
 from gyrobench.commands.completion import complete_setting, complete_slot, complete_specification, complete_system
 
 System = Annotated[
-    str,
-    typer.Argument(metavar="SYSTEM", help="Name of a system, see gyrobench list.", autocompletion=complete_system),
+    str, typer.Argument(metavar="SYSTEM", help="Name of a system, see gyrobench list.", autocompletion=complete_system)
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on standard output.")]
 Set = Annotated[
@@ -123,7 +122,7 @@ Coupling = Annotated[
     Order,
     typer.Option(
         help="sequential: part after part, each with the newest values; parallel: each wire carries the value of the "
-        "step before, so that loops of direct feedthrough run too.",
+        "step before, so that loops of direct feedthrough run too."
     ),
 ]
 

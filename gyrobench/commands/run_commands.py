@@ -250,8 +250,7 @@ def compare(
 def record(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     to: Annotated[
-        TableFormat,
-        typer.Option("--to", help="csv: a file a table, those of the report in report/; xlsx: a workbook."),
+        TableFormat, typer.Option("--to", help="csv: a file a table, those of the report in report/; xlsx: a workbook.")
     ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder; default: of the run, csv/ in it for csv.")

@@ -29,7 +29,7 @@ from gyrobench.report.page_model import (
     text_cell,
 )
 from gyrobench.report.report_files import write_files
-from gyrobench.report.style import BLUE, HALF, MUTED, VERMILION, axis_label, figure, styled, svg
+from gyrobench.report.style import BLUE, HALF, MUTED, VERMILION, axis_label, chart, figure, styled, svg
 from gyrobench.units import display
 
 NAMES = {kind: f"bearing.{kind}" for kind in FORMATS}
@@ -121,8 +121,7 @@ def general(d: BearingDesign) -> str:
 
 def load_curve(d: BearingDesign) -> str:
     """Return W over eps (Hu 1981, fig. 5-24)."""
-    fig, axes = figure(HALF, 70)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 70)
     eps = np.linspace(0.0, FULL, 37)
     ax.plot(eps, [d.bearing.load(float(e)) for e in eps], color=BLUE)
     ax.plot([d.eccentricity], [d.load], "o", color=VERMILION)
@@ -133,8 +132,7 @@ def load_curve(d: BearingDesign) -> str:
 
 def stiffness_curve(d: BearingDesign) -> str:
     """Return K_w of the centred shaft over the gap."""
-    fig, axes = figure(HALF, 70)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 70)
     gaps = np.geomspace(3e-6, 1e-4, 41)
     ax.semilogx(gaps * 1e6, [replace(d.bearing, gap=float(h)).stiffness() * 1e-6 for h in gaps], color=BLUE)
     ax.plot([d.bearing.gap * 1e6], [d.bearing.stiffness() * 1e-6], "o", color=VERMILION)

@@ -14,14 +14,7 @@ import numpy as np
 
 from gyrobench.design.designed_test import DesignedTest
 from gyrobench.design.option_protocol import Choice, OptionProtocol
-from gyrobench.design.plan_runs import (
-    DesignError,
-    Trial,
-    Workbench,
-    designed_values,
-    refuse_type_b,
-    wanted_sizes,
-)
+from gyrobench.design.plan_runs import DesignError, Trial, Workbench, designed_values, refuse_type_b, wanted_sizes
 from gyrobench.errors import GyrobenchError
 
 ROUNDS, RUN = 5, 3  # runs of a choice; choices of known windows that are run

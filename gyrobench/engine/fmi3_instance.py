@@ -11,14 +11,7 @@ import ctypes
 from pathlib import Path
 from typing import Any
 
-from gyrobench.engine.fmu_instance import (
-    ENDED,
-    NO_PROGRESS,
-    FmuCallError,
-    FmuInstance,
-    status_text,
-    with_signatures,
-)
+from gyrobench.engine.fmu_instance import ENDED, NO_PROGRESS, FmuCallError, FmuInstance, status_text, with_signatures
 from gyrobench.engine.program import VariableGroup, type_code
 from gyrobench.engine.run_board import GET, SET, STEP, Status
 from gyrobench.system.binding import Bound

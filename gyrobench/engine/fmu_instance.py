@@ -27,10 +27,7 @@ KEPT = 50  # messages kept for each FMU
 
 #: beyond the statuses of FMI: what the engines themselves find in a call
 NO_PROGRESS, ENDED, OUT_OF_RANGE = 100, 101, 102
-FOUND = {
-    NO_PROGRESS: "it returns early and makes no progress",
-    ENDED: "the FMU asks for the end of the simulation",
-}
+FOUND = {NO_PROGRESS: "it returns early and makes no progress", ENDED: "the FMU asks for the end of the simulation"}
 
 
 def status_text(code: int) -> str:
@@ -140,10 +137,7 @@ class FmuInstance:
             )
         try:
             self.fmu = self.new_slave()(
-                guid=description.guid,
-                unzipDirectory=str(folder),
-                modelIdentifier=identifier,
-                instanceName=slot,
+                guid=description.guid, unzipDirectory=str(folder), modelIdentifier=identifier, instanceName=slot
             )
         except Exception as error:
             raise FmuCallError(slot, "loading", str(error), None) from None

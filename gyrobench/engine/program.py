@@ -278,10 +278,7 @@ def build_program(assembly: Assembly) -> Program:
 
 
 def _sets(
-    p: PartProgram,
-    incoming: list[Connection],
-    code: Callable[[str, Bound], int],
-    source: Callable[[Connection], int],
+    p: PartProgram, incoming: list[Connection], code: Callable[[str, Bound], int], source: Callable[[Connection], int]
 ) -> list[VariableGroup]:
     """Return the calls that set the inputs of a part, one for each type."""
     held = {(g.code, g.references[0]): g.at for g in p.holds}

@@ -125,14 +125,7 @@ def read_ssp(path: Path, step: float | None = None) -> System:
     path = Path(path)
     try:
         return _read(path, step)
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        OverflowError,
-        RecursionError,
-        OSError,
-    ) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, OSError) as error:
         raise InvalidConfigurationError(path.name, [f"not an archive that can be read: {error}"]) from None
 
 

@@ -100,12 +100,11 @@ def linked_source(
         raise ExportError(f"{to}: {why}; {remedy}")
     classes = {slot: (name, load_part(name, bench)) for slot, name in names.items()}
     settings = [(slot, b.reference, float(v)) for slot, given in starts.items() for b, v in given]
-    exposed = _exposed(chosen, assembly, starts, classes, choose(chosen, assembly, seed, expose), to)
+    exposed = _exposed(assembly, starts, classes, choose(chosen, assembly, seed, expose), to)
     return LinkedSource(chosen, SystemSource(chosen.name, program, classes, settings, exposed, chosen.step), notes)
 
 
 def _exposed(
-    system: System,
     assembly: Assembly,
     starts: Starts,
     classes: Mapping[str, tuple[str, type[Component]]],

@@ -11,7 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.report import loop_plane
-from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, figure, svg, zero_line
+from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, chart, figure, svg, zero_line
 
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.2, "zorder": 3}
 DOTS: dict[str, Any] = {"color": BLUE, "marker": "o", "linestyle": "", "markersize": 2.2, "zorder": 4}
@@ -134,8 +134,7 @@ def nyquist(t: LoopIdentification) -> str:
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle
 
-    fig, axes = figure(HALF, 78)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 78)
     g = t.responses["L"]
     which = _known(t) & (np.abs(g.value) < 8.0)
     circles = [Circle((c.real, c.imag), r) for c, r in zip(g.center[which], g.radius[which], strict=True)]
@@ -148,8 +147,7 @@ def nyquist(t: LoopIdentification) -> str:
 
 def nichols(t: LoopIdentification) -> str:
     """Return gain over phase of L."""
-    fig, axes = figure(HALF, 78)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 78)
     g = t.responses["L"]
     for value, style in ((g.value[_known(t)], {**DOTS, "label": "measured"}),
                          (t.curve.L, {"color": VERMILION, "linewidth": 0.9, "label": "curve"})):  # fmt: skip
@@ -164,8 +162,7 @@ def distortion(t: LoopIdentification) -> str:
     """Return the output's amplitude at excited lines and at those that are left out; "" where there are none."""
     if not t.distortions:
         return ""
-    fig, axes = figure(WIDE * 0.8, 62)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 62)
     unit = t.record.shown["output"]
     from gyrobench import units
 

@@ -14,12 +14,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.bench import Bench, UsageError
 from gyrobench.identification.amplitude import difference
-from gyrobench.identification.distortion import (
-    Distortion,
-    distortions,
-    is_odd,
-    with_distortion,
-)
+from gyrobench.identification.distortion import Distortion, distortions, is_odd, with_distortion
 from gyrobench.identification.line_spectrum import (
     PERIODS,
     LineAmplitudes,

@@ -66,7 +66,7 @@ def operating_point(
             for element, x in flatten(parameter, value).items() if of == slot else ():
                 if element in known:
                     part.set(element, float(x))
-        for name, x in part.smooth.items():
+        for name, x in part.unrounded.items():
             part.set(name, x)
         parts[slot] = part
 

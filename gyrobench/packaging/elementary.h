@@ -132,8 +132,9 @@ static EF_VALUE double f_cos(double x) {
     return s.v + s.rest;
 }
 
-/* Sine and cosine of one reduction, as a complex number, which is a value to the compiler: it asks once for both. */
-#ifdef __GNUC__
+/* Sine and cosine of one reduction, as a complex number, which is a value to the compiler: it asks once for both.  As
+   WebAssembly a complex number is returned in memory: there each is a value of its own. */
+#if defined(__GNUC__) && !defined(__wasm__)
 static EF_VALUE double _Complex pair_of(double x) {
     const turned t = turn(x);
     const doubled s = sine(t.n, t.r, t.error), c = sine(t.n + 64, t.r, t.error);

@@ -57,6 +57,8 @@ class CsvColumn:
     whole: bool = False
 
 
+FLAGGED = CsvColumn("flagged", "1", "suspect samples", required=False, whole=True)
+READING_TIMES = (CsvColumn("t_start", "s", "start of the reading"), CsvColumn("t_end", "s", "end of the reading"))
 WINDOW_COLUMNS = (
     CsvColumn("phase", "1", "phase of the plan, from 1", whole=True),
     CsvColumn("t_start", "s", "start of the window"),
@@ -66,7 +68,7 @@ WINDOW_COLUMNS = (
     CsvColumn("mean", "A", "mean torquer current"),
     CsvColumn("std", "A", "standard deviation of the samples", required=False),
     CsvColumn("n", "1", "number of samples", required=False, whole=True),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 
 

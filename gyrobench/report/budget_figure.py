@@ -5,19 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gyrobench.report.plots import short
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    WIDE,
-    axis_label,
-    figure,
-    svg,
-)
+from gyrobench.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION, WIDE, axis_label, chart, svg
 from gyrobench.result import BudgetLine
 
 _HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo")
@@ -43,8 +31,7 @@ def _bars(lines: Sequence[BudgetLine], observed: float | None, key: str) -> str:
     values = [b.contribution for b in rows]
     total = sum(v * v for v in values) ** 0.5
     labels = [short(b.source, 38) for b in rows] + ["root sum of squares"]
-    fig, axes = figure(WIDE, 18 + 6.5 * len(labels))
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE, 18 + 6.5 * len(labels))
     ax.barh(range(len(rows)), values, color=BLUE, height=0.62)
     ax.barh([len(rows)], [total], color=VERMILION, height=0.62, hatch="////", edgecolor="#fefefe", linewidth=0)
     if observed is not None and observed > 0.0:
@@ -67,8 +54,7 @@ def _shares(lines: Sequence[BudgetLine], names: Sequence[str], u: Mapping[str, f
     sources = sorted(weight, key=lambda s: -weight[s])
     shown, minor = sources[:5], sources[5:]
     colours = dict(zip(shown, (BLUE, VERMILION, GREEN, PURPLE, ORANGE), strict=False))
-    fig, axes = figure(WIDE, 24 + 6.2 * len(names) + 4.5 * ((len(shown) + bool(minor) + 1) // 2))
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE, 24 + 6.2 * len(names) + 4.5 * ((len(shown) + bool(minor) + 1) // 2))
     starts = dict.fromkeys(names, 0.0)
     for k, source in enumerate([*shown, *(["other sources"] if minor else [])]):
         members = minor if k == len(shown) else [source]

@@ -18,6 +18,7 @@ from gyrobench.report.style import (
     VERMILION,
     WIDE,
     axis_label,
+    chart,
     figure,
     svg,
 )
@@ -92,8 +93,7 @@ def correlation(table: Table, key: str) -> str:
     shown = table.rows[:ROWS]
     if not shown:
         return ""
-    fig, axes = figure(WIDE, 16 + 4.6 * len(shown))
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE, 16 + 4.6 * len(shown))
     ax.grid(False)
     for i, row in enumerate(shown):
         for j, r in enumerate(row[1:]):

@@ -6,18 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from gyrobench.report.plots import acf, finite, plain_log
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    VERMILION,
-    WIDE,
-    axis_label,
-    figure,
-    svg,
-    time_axis,
-    zero_line,
-)
+from gyrobench.report.style import BLUE, GREEN, ORANGE, VERMILION, WIDE, axis_label, chart, svg, time_axis, zero_line
 from gyrobench.result import DriftColumn
 
 COLOURS = (BLUE, GREEN, ORANGE)
@@ -32,8 +21,7 @@ def record(column: DriftColumn, key: str) -> str:
         return ""
     divisor, unit = time_axis(t)
     usual = sorted(b - a for a, b in pairwise(t))[len(t) // 2]
-    fig, axes = figure(WIDE, 58)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE, 58)
     edges = [k for k in range(1, len(t)) if t[k] - t[k - 1] > 1.5 * usual]
     for a, b in zip([0, *edges], [*edges, len(t)], strict=True):
         x = [v / divisor for v in t[a:b]]
@@ -53,8 +41,7 @@ def record(column: DriftColumn, key: str) -> str:
 
 def deviations(column: DriftColumn, key: str) -> str:
     """All deviations against averaging time, the interval of the first one, and the model."""
-    fig, axes = figure(WIDE * 0.8, 84)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 84)
     ax.set_xscale("log")
     ax.set_yscale("log")
     every = []
@@ -90,8 +77,7 @@ def spectrum(column: DriftColumn, key: str) -> str:
     f, density, low, high = _positive(s.f, s.S, s.low, s.high) if s else ([], [], [], [])
     if len(f) < 2:
         return ""
-    fig, axes = figure(WIDE * 0.8, 76)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 76)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.fill_between(f, low, high, color=BLUE, alpha=0.2, linewidth=0)

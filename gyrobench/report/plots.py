@@ -21,6 +21,7 @@ from gyrobench.report.style import (
     VERMILION,
     WIDE,
     axis_label,
+    chart,
     degree_ticks,
     envelope,
     figure,
@@ -123,8 +124,7 @@ def residuals_in_time(series: Sequence[Series], key: str) -> str:
     if len(seconds) < 3:
         return ""
     divisor, unit = time_axis(seconds)
-    fig, axes = figure(WIDE, 58)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE, 58)
     zero_line(ax)
     spans = []
     for s in sorted((s for s in series if s.t), key=lambda s: min(t for t in s.t if math.isfinite(t))):
@@ -149,8 +149,7 @@ def acf(lags: Sequence[float], values: Sequence[float], bound: Sequence[float], 
     lag, rho = [m for m in lag if m > 0], [r for m, r in zip(lag, rho, strict=True) if m > 0]
     if not lag:
         return ""
-    fig, axes = figure(HALF, 56)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 56)
     (bounds,) = finite(bound)
     if len(bounds) == len(lags):
         ax.fill_between(lags, [-b for b in bounds], bounds, color=GREEN, alpha=0.2, linewidth=0)
@@ -179,8 +178,7 @@ def quantiles(residuals: Sequence[float], key: str) -> str:
     z = (values - values.mean()) / spread
     i = np.arange(1, n + 1)
     x = ndtri((i - 0.375) / (n + 0.25))
-    fig, axes = figure(HALF, 56)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 56)
     band = [ndtri(betaincinv(i, n + 1 - i, q)) for q in (0.025, 0.975)]
     ax.fill_between(x, band[0], band[1], color=GREEN, alpha=0.2, linewidth=0)
     ends = [float(x[0]), float(x[-1])]
@@ -200,8 +198,7 @@ def allan(data: AllanDeviation, key: str) -> str:
         return ""
     tau, dev, low, high = (list(c) for c in zip(*rows, strict=True))
     low = [max(v, 1e-3 * d) for v, d in zip(low, dev, strict=True)]
-    fig, axes = figure(HALF, 62)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 62)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.fill_between(tau, low, high, color=BLUE, alpha=0.2, linewidth=0)
@@ -219,8 +216,7 @@ def psd(data: PowerSpectrum, key: str) -> str:
     if len(rows) < 2:
         return ""
     f, density = envelope([r[0] for r in rows], [r[1] for r in rows])
-    fig, axes = figure(HALF, 62)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 62)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.plot(f, density, "-", color=BLUE, linewidth=1.0)
@@ -250,8 +246,7 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
         return ""
     least = 0.0 if n <= MANY else 0.3  # whose number is written
     side = HALF if n < 11 else WIDE
-    fig, axes = figure(side, 14 + 6.4 * n)
-    ax = axes[0, 0]
+    fig, ax = chart(side, 14 + 6.4 * n)
     ax.grid(False)
     for i in range(1, n):
         for j in range(i):
@@ -279,8 +274,7 @@ def scores(coefficients: Sequence[Coefficient], key: str) -> str:
     rows = [(c.name, c.z, c.k) for c in coefficients if c.z is not None and math.isfinite(c.z) and math.isfinite(c.k)]
     if not rows:
         return ""
-    fig, axes = figure(HALF, 14 + 6.4 * len(rows))
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 14 + 6.4 * len(rows))
     y = range(len(rows))
     for i, (_, _, w) in enumerate(rows):
         ax.fill_betweenx([i - 0.5, i + 0.5], -w, w, color=GREEN, alpha=0.2, linewidth=0)

@@ -19,7 +19,7 @@ from gyrobench.report.page_model import (
 )
 from gyrobench.report.plots import finite, plain_log, short
 from gyrobench.report.result_json import Report
-from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, figure, svg
+from gyrobench.report.style import BLUE, CYCLE, GREEN, MARKERS, MUTED, VERMILION, WIDE, axis_label, chart, figure, svg
 from gyrobench.result import Curve, LoopResult, Response, Result
 
 DECADES = 1e-7  # of the largest value: what a spectrum is drawn down to
@@ -140,8 +140,7 @@ def _over_time(
     lines: Sequence[tuple[str, Sequence[float], Sequence[float]]], first: Response, key: str, curves: Sequence[Curve]
 ) -> str:
     """Return lines (label, x, y) in one figure, with the curves of models over them; a step alone as points."""
-    fig, axes = figure(WIDE * 0.8, 62)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 62)
     points = len(lines) == 1 and first.kind == "step"
     for i, (label, *values) in enumerate(lines):
         x, y = finite(*values)
@@ -162,8 +161,7 @@ def _over_time(
 
 def _over_frequency(lines: Sequence[tuple[str, Sequence[float], Sequence[float]]], first: Response, key: str) -> str:
     """Return lines (label, x, y) in one figure, both axes logarithmic; pairs of a measured line and its model alike."""
-    fig, axes = figure(WIDE * 0.8, 72)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 72)
     for i, (label, *values) in enumerate(lines):
         x, y = finite(*values)
         modelled = label.endswith("linear")

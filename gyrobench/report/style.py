@@ -127,6 +127,12 @@ def figure(width: float, height_mm: float, **grid: Any) -> tuple[Any, Any]:
     return fig, axes
 
 
+def chart(width: float, height_mm: float) -> tuple[Any, Any]:
+    """Return a figure without a window that has one pair of axes, and these."""
+    fig, axes = figure(width, height_mm)
+    return fig, axes[0, 0]
+
+
 def svg(fig: Any, key: str, zoom: Any = None) -> str:
     """Return the figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own.
 

@@ -27,7 +27,7 @@ from gyrobench.report.page_model import (
 from gyrobench.report.references import source_blocks
 from gyrobench.report.result_json import Report, value_at
 from gyrobench.report.signature_section import signing
-from gyrobench.report.style import BLUE, HALF, INK, MUTED, VERMILION, axis_label, figure, styled, svg
+from gyrobench.report.style import BLUE, HALF, INK, MUTED, VERMILION, axis_label, chart, styled, svg
 from gyrobench.report.tables import compact, heading
 from gyrobench.result import NO_VERDICT, SuiteResult
 from gyrobench.result_suite import SuiteMember, SuiteQuantity
@@ -174,8 +174,7 @@ def _cross(report: Report[SuiteResult]) -> list[Any]:
 def _forest(q: SuiteQuantity, key: str) -> Picture:
     """Return the estimates with 95 % intervals by method; the band is the weighted mean, dashed the truth."""
     values = q.values
-    fig, axes = figure(HALF, 15 + 5.5 * len(values))
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 15 + 5.5 * len(values))
     mean = q.mean
     if mean:
         ax.axvspan(mean.estimate - mean.U, mean.estimate + mean.U, color=BLUE, alpha=0.15, linewidth=0)

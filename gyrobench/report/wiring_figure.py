@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from gyrobench.report.style import BLUE, INK, MM, PAPER, VERMILION, WIDE, figure, styled, svg
+from gyrobench.report.style import BLUE, INK, MM, PAPER, VERMILION, WIDE, chart, styled, svg
 
 LABEL, NAME = 7.5, 8.0  # pt
 LINE = 3.4  # mm, of a label
@@ -124,8 +124,7 @@ def _n_squared(order: Sequence[str], wires: Sequence[tuple[str, str, str, str]],
     if len(order) < 2:
         return ""
     places = layout(order, wires)
-    fig, axes = figure((places.width + 2.0) * MM, places.height + 2.0)  # wider than the page: it is made smaller there
-    ax = axes[0, 0]
+    fig, ax = chart((places.width + 2.0) * MM, places.height + 2.0)  # wider than the page: it is made smaller there
     ax.set_axis_off()
     ax.set_xlim(-0.4, places.width + 0.4)
     ax.set_ylim(places.height, 0.0)

@@ -203,7 +203,7 @@ def _missing(c: Connector) -> Proposal:
     return Proposal(c, lines, False)
 
 
-def undeclared(socket: Socket, description: Any, proposals: Sequence[Proposal]) -> list[str]:
+def undeclared(description: Any) -> list[str]:
     """Return the comment on outputs without declared dependencies; empty where all declare them."""
     known = {u.variable.name for u in description.outputs if u.variable is not None and u.dependencies is not None}
     without = [v.name for v in description.modelVariables if v.causality == "output" and v.name not in known]
@@ -226,7 +226,7 @@ def mapping_text(
     """Return a first mapping file (TOML).  parameters: the lines of its table [parameters]."""
     proposals = propose(socket, description, mapping)
     blocks = ["\n".join(p.lines) for p in proposals]
-    notes = undeclared(socket, description, proposals)
+    notes = undeclared(description)
     fits = [] if blocks else ["# Every connector has a variable of its name: no mapping is needed for them."]
     signs = (
         ["# Check units, signs and axes: names do not tell them.  A factor of -1 reverses a sign."] if blocks else []

@@ -63,11 +63,7 @@ SOCKETS: dict[str, Socket] = {
                 out("dB", "T", "differences of the magnetic field over the instrument", 3, optional=True),
             ),
         ),
-        Socket(
-            "Supply",
-            "electrical supplies of a gyro: departures from their nominal values",
-            SUPPLIES,
-        ),
+        Socket("Supply", "electrical supplies of a gyro: departures from their nominal values", SUPPLIES),
         Socket(
             "SdfGyro",
             "single-degree-of-freedom gyro, case inputs and torquer in, pickoff out",

@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.report import loop_plane
-from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, figure, svg, zero_line
+from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, chart, figure, svg, zero_line
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.tuned_loop import LoopTuning
@@ -51,8 +51,7 @@ def _named(t: LoopTuning) -> list[loop_plane.Disk]:
 
 def nyquist(t: LoopTuning) -> str:
     """Return L near the critical point, with the disks that it must not enter."""
-    fig, axes = figure(HALF, 78)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 78)
     for k, L in reversed(list(enumerate(t.loops))):
         ax.plot(L.real, L.imag, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
     if t.proofs and t.proofs[0].points:
@@ -63,8 +62,7 @@ def nyquist(t: LoopTuning) -> str:
 
 def nichols(t: LoopTuning) -> str:
     """Return gain over phase of L, the disks in these coordinates."""
-    fig, axes = figure(HALF, 78)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 78)
     pick = _inside(t)
     for k, L in reversed(list(enumerate(t.loops))):
         size, turn = _polar(L[pick], t.f[pick])
@@ -179,8 +177,7 @@ def _number(wish: Wish, value: float) -> tuple[float, str]:
 
 def trade(t: Trade) -> str:
     """Return one wish over the other, and where both are fulfilled."""
-    fig, axes = figure(HALF, 78)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 78)
     points = [p for p in t.points if math.isfinite(p.first) and math.isfinite(p.second)]
     xy = np.array([[_number(w, v)[0] for w, v in zip(t.wishes, (p.first, p.second), strict=True)] for p in points])
     if len(points):
@@ -200,8 +197,7 @@ def load_step(t: LoopTuning) -> str:
     shown = [p for p in t.proofs if p.step is not None]
     if not shown:
         return ""
-    fig, axes = figure(WIDE * 0.8, 56)
-    ax = axes[0, 0]
+    fig, ax = chart(WIDE * 0.8, 56)
     for p, style in zip(shown, (LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--"}), strict=False):
         assert p.step is not None
         ax.plot(p.step[0], 1e6 * p.step[1], **style, label="worst point" if p.values else "nominal")

@@ -27,12 +27,7 @@ from gyrobench.system.values import InvalidValueError
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, suite_members
 from gyrobench.workflow.run_execution import RunRequest, execute_run
-from gyrobench.workflow.run_folders import (
-    NothingToResumeError,
-    has_complete_record,
-    incomplete_folder,
-    prepare_folder,
-)
+from gyrobench.workflow.run_folders import NothingToResumeError, has_complete_record, incomplete_folder, prepare_folder
 from gyrobench.workflow.saved_run import RunOutcome, reduce_saved_run
 from gyrobench.workflow.suite_report import SuiteOutcome, suite_document, write_suite_report
 from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, user_message

@@ -96,11 +96,7 @@ class AccelerometerFour(TableTest):
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         n = self["points"]
         error = geometry.errors(n, self["head_error"], self["head_seed"], self["head_D1c"], self["head_D1s"])
-        found = {
-            **super().parameters(parts),
-            "table.positions": n,
-            "table.error": [*error.tolist(), *[0.0] * (24 - n)],
-        }
+        found = {**super().parameters(parts), "table.positions": n, "table.error": [*error.tolist(), *[0.0] * (24 - n)]}
         for i in geometry.SENSORS:
             found[f"accelerometer_{i}.mount"] = geometry.mount(i).tolist()
             found |= {f"accelerometer_{i}.{k}?": v for k, v in OTHERS.get(i, {}).items()}

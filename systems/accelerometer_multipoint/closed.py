@@ -84,12 +84,7 @@ def four_points(angle: Array, y: Array, gamma: float) -> dict[str, float]:
     s0, s90, d0, d90 = (p[0] + p[2]) / 2.0, (p[1] + p[3]) / 2.0, (p[0] - p[2]) / 2.0, (p[1] - p[3]) / 2.0
     zero = math.atan2(-d0, -d90)
     k2 = (s90 - s0) / (gamma**2 * math.cos(2.0 * zero))
-    return {
-        "k0": s0 - k2 * (gamma * math.sin(zero)) ** 2,
-        "k1": math.hypot(d0, d90) / gamma,
-        "k2": k2,
-        "theta0": zero,
-    }
+    return {"k0": s0 - k2 * (gamma * math.sin(zero)) ** 2, "k1": math.hypot(d0, d90) / gamma, "k2": k2, "theta0": zero}
 
 
 def stands_for(truth: Mapping[str, float], zeros: Mapping[str, float], gamma: float) -> dict[str, float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
-from gyrobench.record.csv_reader import CsvColumn, DataError
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -50,8 +50,7 @@ READOUTS = tuple(
 )
 COLUMNS = (
     CsvColumn("phase", "1", "number of the position or rate, from 1", whole=True),
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("rate", "rad/s", "rate of the table, 0 at a position"),
     CsvColumn("position", "rad", "position of the table"),
     CsvColumn("turned", "1", "1 after the scale was turned on its shaft", required=False, whole=True),

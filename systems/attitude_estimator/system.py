@@ -74,10 +74,7 @@ class AttitudeEstimatorTest(LoopTest):
         "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0,
                              sets="motion.earth_rate? estimator.earth_rate?"),
     }  # fmt: skip
-    noises = (
-        *(f"imu.noise_{a}_{n}" for a in AXES for n in ("bias", "gyro", "acc_bias", "acc")),
-        "imu.heading_noise",
-    )
+    noises = (*(f"imu.noise_{a}_{n}" for a in AXES for n in ("bias", "gyro", "acc_bias", "acc")), "imu.heading_noise")
     step = 1e-2
     channel_period = 1.0
     channels = (

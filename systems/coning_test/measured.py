@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -28,8 +28,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],frequency [Hz],half_angle [deg],drift_x [deg/h],drift_y [deg/h],drift_z [deg/h]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("frequency", "Hz", "frequency of the cone"),
     CsvColumn("half_angle", "rad", "half-angle of the cone"),
     *(CsvColumn(f"drift_{a}", "rad/s", f"drift of the attitude along {a}") for a in "xyz"),

@@ -306,6 +306,12 @@ def rows_text(p: Prepared, run: RunDocument) -> str:
             "two instruments in one column, a multiplexer, or a line at half the sampling rate. The coefficients are "
             "those of the mixture; take one row of two."
         )
+    if p.returns:
+        return (
+            f"The changes between rows vanish and come back after {number(p.returns)} rows: values of a slower record "
+            "that were held or interpolated. Spectrum, filter and Q are those of that; take the record as it was "
+            "sampled."
+        )
     return ""
 
 

@@ -25,13 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.drift_columns import harmonic_names
 from gyrobench.reduction.estimation.regression import RegressionError
 from gyrobench.reduction.series.checks import SeriesError
-from gyrobench.reduction.series.column_regression import (
-    SeriesFit,
-    SeriesRegression,
-    backward,
-    joint_test,
-    orthonormal,
-)
+from gyrobench.reduction.series.column_regression import SeriesFit, SeriesRegression, backward, joint_test, orthonormal
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 ALPHA = 0.05

@@ -19,10 +19,7 @@ class DriftTestSuite(Suite):
     title = "Drift tests of one gyro by several methods"
     spec = ("CROSS-MAP",)
     sets = {"floated": FLOATED, "two_axis": TWO_AXIS}
-    options = {
-        "tests": Option("floated", str, "names of tests; floated or two_axis: all of that gyro"),
-        **Suite.about,
-    }
+    options = {"tests": Option("floated", str, "names of tests; floated or two_axis: all of that gyro"), **Suite.about}
     shared = ("torquer.scale_factor", "latitude")
     method = (
         "Each test is reduced by itself; its estimates are mapped to the coefficients of the drift model [CROSS-MAP] "

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn, DataError
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn, DataError
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -38,8 +38,7 @@ cycle,position,t_start [s],t_end [s],mean_x [mA],mean_y [mA]
 COLUMNS = (
     CsvColumn("cycle", "1", "cycle of the day, from 1", whole=True),
     CsvColumn("position", "1", "position, 1 to 8", whole=True),
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("mean_x", "A", "mean current of the torquer about x"),
     CsvColumn("mean_y", "A", "mean current of the torquer about y"),
     CsvColumn("day", "1", "day, from 1", required=False, whole=True),

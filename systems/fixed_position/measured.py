@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn, read_head
+from gyrobench.record.csv_reader import FLAGGED, READING_TIMES, CsvColumn, read_head
 from gyrobench.record.multi_day_record import read_runs
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
@@ -36,12 +36,11 @@ t_start [s],t_end [s],mean [mA]
 """
 ATTITUDE = "service attitude"
 COLUMNS: tuple[CsvColumn, ...] = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("mean", "A", "mean torquer current"),
     CsvColumn("day", "1", "day, from 1", required=False, whole=True),
     CsvColumn("std", "A", "standard deviation of the samples", required=False),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 
 

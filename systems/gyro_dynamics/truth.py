@@ -11,8 +11,6 @@ from gyrobench.record.run_document import RunDocument
 
 from .model import read_off
 
-STRAIGHT = {"input": ((0, 0, 1), (1, 0, 0), (0, 1, 0)), "output": ((0, 1, 0), (0, 0, 1), (1, 0, 0))}
-
 
 def true_values(run: RunDocument, highest: float, output: bool) -> Array | None:
     """Return the figures of read_off of the gyro of a run; None for another gyro, a spring, an axis that leans."""

@@ -45,7 +45,7 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import ARCSEC, DPH
 
-from . import norms, tables, turn_errors, turns
+from . import mistakes, norms, tables, turn_errors, turns
 from .channels import AXES, CHANNELS, UG, ImuInstrument, overview
 from .hand_positions import COLUMNS, HandSetup, Positions
 
@@ -294,6 +294,8 @@ class HandReduction(ChannelTests[HandSetup]):
             )
         elif at.enough and not np.array_equal(at.labels[1], np.eye(3)):
             found.append(_labels(at.labels[1]))
+        elif at.enough and "g" not in s.counts:
+            found += [f"gyros: {text}" for text in mistakes.scaled(turns.factor(at.raw_turns), "g")]
         return found or self._moving()
 
     def _moving(self) -> list[str]:

@@ -67,7 +67,7 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
             f"{NAME[kind]}: the readings are not those of three axes in these positions (matrix by rows: {rows}): "
             "a position, an axis or the sense of an angle is mistaken"
         ]
-    return [f"{NAME[kind]}: {text}" for text in (*_permuted(best, kind), *_scaled(size, kind))]
+    return [f"{NAME[kind]}: {text}" for text in (*_permuted(best, kind), *scaled(size, kind))]
 
 
 def _signed_permutations() -> Iterator[Array]:
@@ -97,7 +97,8 @@ def _permuted(p: Array, kind: str) -> list[str]:
     return [f"{text}: the columns are mistaken, or the case is mounted so on the plate"]
 
 
-def _scaled(size: float, kind: str) -> list[str]:
+def scaled(size: float, kind: str) -> list[str]:
+    """Return what readings that are size times what they should be say of their unit."""
     if abs(size - 1.0) < SOUND:
         return []
     near = min(UNITS[kind], key=lambda f: abs(math.log(size / f)))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -22,6 +22,7 @@ from gyrobench.arrays import Array
 STEP = 1e-6  # of S, for slopes
 GUESSES = 90  # of a scale factor that is not known
 TURNED = (0.15, 15.0)  # rad, between which the mean turn lies where it is not known
+GOOD = 0.15  # rad: a turn by hand is found to some degrees with nominal scale factors
 FEW = 12  # turns that a guess looks at
 
 
@@ -117,13 +118,13 @@ def nominal(turns: list[Turn], known: bool) -> tuple[float, Array]:
     axes with which gravity is found best: readings = scale P rate.  Unit matrix: the axes are labelled as those of the
     accelerometers.
     """
-    some = sorted(turns, key=lambda t: -float(np.max(np.abs(t.before - t.after))))[:FEW]
+    some = _largest(turns)
     angles = [float(np.linalg.norm(np.trapezoid(t.rate, t.time, axis=0))) for t in some]
     middle = float(np.median(angles)) or 1.0
     scales = [1.0] if known else [middle / a for a in np.geomspace(*TURNED, GUESSES)]
     each = _offs(some, np.array([s * np.eye(3) for s in scales]))
     identity, good = scales[int(np.argmin(each))], float(np.min(each))
-    if good < 0.15:  # rad: a turn by hand is found to some degrees with nominal scale factors
+    if good < GOOD:
         return identity, np.eye(3)
     best = (0.5 * good, identity, np.eye(3))
     for p in _signed():
@@ -132,6 +133,22 @@ def nominal(turns: list[Turn], known: bool) -> tuple[float, Array]:
         if each[k] < best[0]:
             best = float(each[k]), scales[k], p
     return best[1], best[2]
+
+
+def factor(turns: list[Turn]) -> float:
+    """Return by what factor the readings are too large: 1 where gravity is found with them, or with no factor."""
+    some = _largest(turns)
+    if _offs(some, np.eye(3)[None])[0] < GOOD:
+        return 1.0
+    scale, axes = nominal(turns, False)
+    if not _offs(some, scale * axes[None])[0] < GOOD:
+        return 1.0
+    near = solve([replace(t, rate=t.rate @ axes / scale) for t in some], np.zeros((3, 3)))
+    return scale * (1.0 + float(np.trace(near)) / 3.0)
+
+
+def _largest(turns: list[Turn]) -> list[Turn]:
+    return sorted(turns, key=lambda t: -float(np.max(np.abs(t.before - t.after))))[:FEW]
 
 
 def _offs(turns: list[Turn], matrices: Array) -> Array:

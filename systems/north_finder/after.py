@@ -7,6 +7,7 @@
     free running     s2(t) = s2(0) + t2 s_r2(T, t)            s_r: rate of the time t against that of the alignment T
     s_r2(T, t) = N2 (1/T + 1/t) + (B2/pi) F(T, t) + K2 (T + t)/3,   F(T, T) = 4 ln 2
     d' = -W x d + e:  across W the errors e of the axes turn into each other, along it they do not
+    position         p = int R (1 - cos v (t - s)) e ds + int sin(v (t - s))/v a ds,   v2 = g/R
 
 b: rms of the bias at switch-on, N, B, K: white noise, flicker, random walk; a Gauss-Markov part by its correlation.
 Not modelled: errors of scale factor and axes, temperature, motion of the base, more than two positions.
@@ -16,13 +17,14 @@ Not modelled: errors of scale factor and axes, temperature, motion of the base, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
 from gyrobench import units
+from gyrobench.arrays import Array
 from gyrobench.result import Table
 from gyrobench.units import ARCMIN, DEG, DPH
 
@@ -36,6 +38,7 @@ LONGEST = 86400.0  # s, looked at
 BEYOND = 2.0 * 4.0 ** (1.0 / 3.0)
 CELLS = 200  # of a time, over which readings are taken as even
 EULER = 0.5772156649015329
+RADIUS = 6371008.8  # m, mean of the axes of WGS84, (2 a + b)/3
 WHITE = ("white_y", "white", "electronics", "quantum", "white_x")
 OWN = ("optical", "lock_in")  # noise that a part computes of its physics: its density is not a parameter
 
@@ -102,6 +105,12 @@ class RandomErrors:
     def turned(self, T: float, t: float, turn: float) -> float:
         """Return the variance of an angle that grows for t after T of alignment, across the axis about which all axes
         turn at the rate turn (rad/s); with errors of this size on each.  turn = 0: t2 times :meth:`change`.
+        """
+        return self.weighed(T, t, lambda s: np.exp(1j * turn * s))
+
+    def weighed(self, T: float, t: float, kernel: Callable[[Array], Any]) -> float:
+        """Return the variance of the integral over t after T of alignment of the kernel (of the times since then, s,
+        SI) times what readings have changed since, real or complex.
 
         By weights of readings that sum to zero, -1/2 sum w_i w_j* D(s_i - s_j), D the structure function; a cell's own
         mean of ln and of the lag in closed form.
@@ -109,7 +118,7 @@ class RandomErrors:
         cells = np.array([T, t]) / CELLS
         middle = np.arange(CELLS) + 0.5
         s = np.concatenate([cells[0] * middle - T, cells[1] * middle])
-        grown = np.exp(1j * turn * s[CELLS:]) * cells[1]
+        grown = kernel(s[CELLS:]) * cells[1]
         w = np.concatenate([np.full(CELLS, -grown.sum() / CELLS), grown])
         own = np.repeat(cells, CELLS)
         lag = np.abs(s[:, None] - s[None, :])
@@ -118,7 +127,7 @@ class RandomErrors:
         mean = np.where(far, lag, np.diag(own / 3.0))
         D = 2.0 * self.flicker**2 / math.pi * log + self.walk**2 * mean
         D -= 2.0 * self.markov**2 * np.expm1(-mean / self.markov_tau)
-        white = self.white**2 * (t + abs(complex(grown.sum())) ** 2 / T)
+        white = self.white**2 * (np.sum(np.abs(grown) ** 2) / cells[1] + abs(complex(grown.sum())) ** 2 / T)
         return float(white - 0.5 * np.real(w @ D @ np.conj(w)))
 
     def reversed(self, T: float) -> float:
@@ -157,6 +166,20 @@ def running(rate: RandomErrors, start: float, T: float, t: float, latitude: floa
         across = rate.turned(T, t, units.EARTH_RATE) / rate.turned(T, t, 0.0)
         growth *= 1.0 - math.cos(latitude) ** 2 * (1.0 - across)
     return math.hypot(start, math.sqrt(growth))
+
+
+def position(rate: RandomErrors, force: RandomErrors | None, gravity: float, T: float, t: float) -> float:
+    """Return the standard deviation of a coordinate t seconds after an alignment of T seconds to level, m.
+
+    The level follows the vertical over a sphere (period of 84 minutes): what the rate about the other horizontal axis
+    has changed since tilts it, what the force has changed since moves it.  The force of the alignment is level for it,
+    so that its bias moves nothing.  force: None, left out.  Not modelled: the turning of the axes by the Earth's rate.
+    """
+    v = math.sqrt(gravity / RADIUS)
+    variance = rate.weighed(T, t, lambda s: RADIUS * (1.0 - np.cos(v * (t - s))))
+    if force is not None:
+        variance += force.weighed(T, t, lambda s: np.sin(v * (t - s)) / v)
+    return math.sqrt(variance)
 
 
 def lost(method: str, u_bias: float, latitude: float) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import FLAGGED, READING_TIMES, CsvColumn
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -29,11 +29,10 @@ TEMPLATE = """\
 t_start [s],t_end [s],angle [deg],u [mV]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("angle", "rad", "case angle about the input axis"),
     CsvColumn("u", "V", "pickoff voltage", required=False),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 
 

@@ -28,13 +28,7 @@ from gyrobench.reduction.drift import channels
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.fit_result import with_values
-from gyrobench.reduction.setup.sources import (
-    ANGLE_ONCE,
-    ANGLE_TWICE,
-    AXIS_LEVEL_POLE,
-    INPUT_TO_OUTPUT,
-    VOLTMETER,
-)
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_LEVEL_POLE, INPUT_TO_OUTPUT, VOLTMETER
 from gyrobench.reduction.toolkit import (
     Account,
     Array,

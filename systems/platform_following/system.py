@@ -94,13 +94,7 @@ class PlatformFollowing(TwoGyroTest):
         *(f"follower.turned[{k}]" for k in (1, 2, 3)), *(f"follower.rate[{k}]" for k in (1, 2, 3)),
         *(f"platform.theta[{k}]" for k in (1, 2, 3)), "motion.angle[1]", "motion.angle[2]", "motion.angle[3]",
     )  # fmt: skip
-    shown = (
-        "platform.attitude",
-        "follower.turned",
-        "platform.theta",
-        "motion.angle",
-        "platform.saturated",
-    )
+    shown = ("platform.attitude", "follower.turned", "platform.theta", "motion.angle", "platform.saturated")
 
     bodies = """
         base: z motion.angle[3], x motion.angle[1], y motion.angle[2]

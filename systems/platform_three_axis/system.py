@@ -219,10 +219,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         """Return the parameters of rebalanced gyros and of servos with three loops."""
         start = [self[n] for n in AXES]
         track = 0.0 if self.optical else self["track"]
-        found = {
-            "commands.theta_f_max?": 80 * DEG,
-            **rate_loops.design(parts, self["crossover"], track, start, MOTOR),
-        }
+        found = {"commands.theta_f_max?": 80 * DEG, **rate_loops.design(parts, self["crossover"], track, start, MOTOR)}
         if self.optical:
             found |= optical_loop.design(self["crossover"], self.tracking, len(self.plan().phases))
         return found

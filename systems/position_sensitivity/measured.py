@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import FLAGGED, READING_TIMES, CsvColumn
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -35,8 +35,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],mean_x [mA],mean_y [mA],u_x [mV],u_y [mV]
 """
 COLUMNS: tuple[CsvColumn, ...] = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("mean_x", "A", "mean current of the torquer about x"),
     CsvColumn("mean_y", "A", "mean current of the torquer about y"),
     CsvColumn("u_x", "V", "mean voltage of the x pickoff"),
@@ -44,7 +43,7 @@ COLUMNS: tuple[CsvColumn, ...] = (
     CsvColumn("std_x", "A", "standard deviation of the samples of mean_x", required=False),
     CsvColumn("std_y", "A", "standard deviation of the samples of mean_y", required=False),
     CsvColumn("n", "1", "samples", required=False, whole=True),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 NEEDED = {
     "latitude": "45.75deg", "attitude": "E U -N", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/mA",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import FLAGGED, READING_TIMES, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -22,13 +22,12 @@ TEMPLATE = """\
 t_start [s],t_end [s],rate [deg/s],mean [deg/s]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("rate", "rad/s", "rate of the table"),
     CsvColumn("mean", "rad/s", "mean indicated rate"),
     CsvColumn("cycle", "1", "cycle, from 1", required=False, whole=True),
     CsvColumn("std", "rad/s", "standard deviation of the samples", required=False),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 MEASURED = MeasuredData(
     TEMPLATE, partial(read_record, needed={"latitude": "45.75deg"}, columns=COLUMNS, time="t_start")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -30,8 +30,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],frequency [Hz],angle [deg],vibration [m/s2],acceleration [ug]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("frequency", "Hz", "frequency of the motion"),
     CsvColumn("angle", "rad", "amplitude of the angle"),
     CsvColumn("vibration", "m/s2", "amplitude of the vibration"),

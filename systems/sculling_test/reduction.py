@@ -154,10 +154,7 @@ class Reduction(DriftReduction[ScullingSetup]):
         return Account(
             method="Angle and vibration in phase at known frequencies; least squares of the mean computed acceleration "
             "under an estimated noise model [TEST-SCULLING]",
-            sources=[
-                "TEST-SCULLING; Savage 1998b; Roscoe 2001",
-                "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23",
-            ],
+            sources=["TEST-SCULLING; Savage 1998b; Roscoe 2001", "RED-GLS; Hu 1981, eq. 4-79..4-88, corrected by ER23"],
             equation='"acceleration" = b + sum_k d_k',
             conventions=[
                 "Acceleration: change of the computed velocity along the vertical by the time, gravity taken off.",

@@ -28,12 +28,7 @@ ON_PLATE = {n: replace(TURNED[n], name=f"gyro on the plate, about {n}") for n in
 
 
 def effects(
-    channel: int,
-    found: Findings,
-    seen: Track,
-    phase: NDArray[np.int_],
-    names: tuple[str, ...] | None,
-    setup: HeldSetup,
+    channel: int, found: Findings, seen: Track, phase: NDArray[np.int_], names: tuple[str, ...] | None, setup: HeldSetup
 ) -> list[Effect]:
     """Return all sources with their sensitivities.  channel: 0 x, 1 y.  Each mount is set up by itself: its errors are
     independent of those of the others, and so are sine and cosine of an angle error.  names: coefficients that are

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyrobench.record.csv_reader import CsvColumn, DataError
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn, DataError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
 from gyrobench.system.lab_record import read_record
@@ -36,8 +36,7 @@ TEMPLATE = """\
     "level_x [arcsec],level_y [arcsec]\n"
 )
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("mount", "rad", "azimuth of polygon and level on the table"),
     CsvColumn("position", "rad", "position commanded, cumulative"),
     CsvColumn("deviation", "rad", "reading of the autocollimator"),

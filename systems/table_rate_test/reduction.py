@@ -13,6 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.frames import EARTH_RATE as ERU
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCSEC,
@@ -33,15 +34,12 @@ from .closed_form import SampledLoop
 from .sources import COUNTS, CYCLE, NOISE, ONCE, TWICE
 
 PPM = 1e-6
+WRONG = 0.02  # a scale of times or angles
 SHOWN = 1500  # intervals of a drawn line
 RAMP = 0.6  # s of a change of rate that is drawn
 BEYOND = 1e-3  # p of a scatter that rounding does not explain
 #: errors of the readings by cycles a turn, u of their amplitudes; the last: twice in a cycle of the scale
-SCALE = (
-    (1.0, ONCE),
-    (2.0, TWICE),
-    (None, CYCLE),
-)
+SCALE = ((1.0, ONCE), (2.0, TWICE), (None, CYCLE))
 READOUTS = (
     "Relative errors of the rate by counts over the whole phase, by the last gate and by the last interval of the "
     "inverse rate; tracking error and standard deviation of the true rate"
@@ -167,6 +165,7 @@ class Reduction(MeasureReduction):
         for rate, both in pairs.items():
             self._error(f"error {rate / ERU:.6g} ERU", both)
         self._noise(pairs)
+        self._scales()
         for rate, both in pairs.items():
             sizes, u_each = zip(*(r.ripple for r in both), strict=True)
             found.measure(f"ripple {rate / ERU:.6g} ERU", "standard deviation of the tracking error", "arcsec",
@@ -250,6 +249,26 @@ class Reduction(MeasureReduction):
             self.found.reasons.append(
                 Reason(f"reader.noise{UNSTATED}", text, ("pass",), tuple(names), severity="doubt")
             )
+
+    def _scales(self) -> None:
+        """Ask whether times and angles of a measured record were checked: a rate is their ratio, and no residual shows
+        the clock of a log or the angle of a count.
+        """
+        if not self.run.measured or self.run.arrangement == "checked":
+            return
+        moved = {
+            c.name: WRONG / PPM / c.u
+            for c in self.found.coefficients
+            if c.name.startswith(("time base", "error")) and 0.0 < c.u < WRONG / PPM
+        }
+        if not moved:
+            return
+        said = ", ".join(f"{n} by {moved[n]:.2g} u" for n in sorted(moved, key=lambda n: -moved[n])[:3])
+        text = (
+            f"No residual of this record would show: the times wrong by 2 %; the angles wrong by 2 % ({said}). "
+            "State that units and scales were checked (arrangement = checked)."
+        )
+        self.found.reasons.append(Reason(ARRANGEMENT, text, ("pass",), tuple(moved), severity="doubt"))
 
     def _row(self, r: AtRate) -> list[float | None]:
         """Return rate by counts, gate and inverse rate, with the tracking and the true ripple."""

@@ -37,9 +37,7 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
         | FOLD
         | TILT
         | NUISANCES
-        | {
-            "terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9),
-        }
+        | {"terms": Option(9, int, "terms of the fitted model: 9 (10 terms have rank 9 at 1 g)", 3, 9)}
         | CORRECTIONS
         | type_b("axis", "mount", "remount", "wobble", "angle1", "angle2", "scale_factor", "nonlinearity", "current")
         | type_b("pulse", "switching")

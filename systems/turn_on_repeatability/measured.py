@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import FLAGGED, READING_TIMES, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -21,13 +21,12 @@ TEMPLATE = """\
 t_start [s],t_end [s],turn_on,day,since [s],mean [deg/h]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("turn_on", "1", "number of the turn-on, from 1", whole=True),
     CsvColumn("day", "1", "day", required=False, whole=True),
     CsvColumn("since", "s", "time from the switching on to the middle of the reading"),
     CsvColumn("mean", "rad/s", "mean indicated rate"),
     CsvColumn("rate", "rad/s", "rate of the table", required=False),
-    CsvColumn("flagged", "1", "suspect samples", required=False, whole=True),
+    FLAGGED,
 )
 MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time="t_start"))

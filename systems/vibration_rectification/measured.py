@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gyrobench.record.csv_reader import CsvColumn
+from gyrobench.record.csv_reader import READING_TIMES, CsvColumn
 from gyrobench.system.lab_record import read_record
 from gyrobench.system.system import MeasuredData
 
@@ -22,8 +22,7 @@ TEMPLATE = """\
 t_start [s],t_end [s],up,level [g],rate [deg/h],force [g]
 """
 COLUMNS = (
-    CsvColumn("t_start", "s", "start of the reading"),
-    CsvColumn("t_end", "s", "end of the reading"),
+    *READING_TIMES,
     CsvColumn("up", "1", "1 up, -1 down", whole=True),
     CsvColumn("level", "m/s2", "rms of the vibration"),
     CsvColumn("rate", "rad/s", "mean rate that the gyro reads", required=False),

@@ -27,14 +27,7 @@ from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import (
-    FORCES,
-    Instrument,
-    find_instrument,
-    parameters,
-    settings,
-    with_instruments,
-)
+from gyrobench.workflow.instruments import FORCES, Instrument, find_instrument, parameters, settings, with_instruments
 from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
 
 PAGE = standard_folder() / "docs" / "data_sheets.md"

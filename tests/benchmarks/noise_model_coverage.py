@@ -3,7 +3,8 @@
     python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing] [part of a name]
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
-swing (rms, angular frequency, decay of each); unit time is a sample.
+swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
+rate, of a Butterworth filter that white noise and flicker B pass, before a readout of 0.003.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 
@@ -19,7 +20,7 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import butter, fftconvolve, lfilter
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.fit import fit_noise
@@ -31,6 +32,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
     "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
+    "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
 }
 
 
@@ -46,6 +48,12 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = lfilter([1.0 - a], [1.0, -a], x)
     if count := truth.get("mean", 0):
         x = lfilter(np.full(count, 1.0 / count), [1.0], x)
+    if "B" in truth:  # by half a difference: spectrum B^2/(2 sin(omega/2))
+        k = np.arange(1.0, 2.0 * n)
+        half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
+        x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
+    if "digital" in truth:
+        x = lfilter(*butter(*truth["digital"]), x) + 0.003 * rng.normal(size=n + 500)
     x = x[500:]
     for sigma, tau in truth.get("markov", []):
         a = math.exp(-1.0 / tau)

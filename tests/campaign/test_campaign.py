@@ -24,6 +24,8 @@ from gyrobench.campaign.execution.store import Campaign, CampaignError
 from gyrobench.files import TEMPORARY
 from gyrobench.workflow.user_errors import exit_code
 
+pytestmark = pytest.mark.long
+
 BENCH = Path(__file__).with_name("bench")
 distributed = pytest.importorskip("distributed")
 
@@ -49,7 +51,6 @@ def rows(folder: Path) -> bytes:
 AXES = {"source.offset": "1..2:3", "temperature": "250,300 K"}
 
 
-@pytest.mark.long
 def test_a_sweep_is_what_single_runs_give(two: Any, tmp_path: Path) -> None:
     states: list[str] = []
     frame = gb.sweep(
@@ -77,7 +78,6 @@ def test_a_sweep_is_what_single_runs_give(two: Any, tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.long
 def test_workers_and_order_change_no_bit_and_nothing_is_done_twice(two: Any, tmp_path: Path) -> None:
     times = tmp_path / "times"
     asked = {"system": "weighing", "over": AXES, "seeds": 3, "set": {"duration": "0.05s", "times": str(times)}}
@@ -106,7 +106,6 @@ def test_nobody_else_reaches_the_scheduler_of_local_workers(two: Any) -> None:
             distributed.Client(where, security=security, timeout="2s", set_as_default=False)
 
 
-@pytest.mark.long
 def test_threads_of_this_process_are_workers_too(two: Any, tmp_path: Path) -> None:
     asked = {"system": "weighing", "over": AXES, "set": {"duration": "0.05s"}}
     with distributed.Client(processes=False, n_workers=2, threads_per_worker=2, dashboard_address=None) as client:
@@ -116,7 +115,6 @@ def test_threads_of_this_process_are_workers_too(two: Any, tmp_path: Path) -> No
     assert rows(tmp_path / "a") == rows(tmp_path / "b")
 
 
-@pytest.mark.long
 def test_a_worker_started_by_hand_needs_no_compiler_and_no_bench(two: Any, tmp_path: Path) -> None:
     asked = {"system": "weighing", "over": AXES, "set": {"duration": "0.05s"}}
     (tmp_path / "w").mkdir()
@@ -153,7 +151,6 @@ FAULTS = {
 }
 
 
-@pytest.mark.long
 def test_every_fault_becomes_a_row_with_its_reason_and_the_others_go_on(two: Any, tmp_path: Path) -> None:
     """Runs that hang have a campaign of their own, with a limit that would end a good run on a slow machine."""
     asked = {
@@ -174,7 +171,6 @@ def test_every_fault_becomes_a_row_with_its_reason_and_the_others_go_on(two: Any
     assert set(Campaign.open(tmp_path / "h").log()["attempts"]) == {1}
 
 
-@pytest.mark.long
 def test_a_run_that_lost_its_worker_once_is_done_the_second_time(two: Any, tmp_path: Path) -> None:
     asked = {
         "system": "weighing",
@@ -188,7 +184,6 @@ def test_a_run_that_lost_its_worker_once_is_done_the_second_time(two: Any, tmp_p
     assert "ended its worker process" in log[log["attempts"] == 2]["tries"].iloc[0]
 
 
-@pytest.mark.long
 def test_a_fault_that_is_told_before_its_worker_is_known_to_be_lost_is_not_tried_again(
     two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,7 +201,6 @@ def test_a_fault_that_is_told_before_its_worker_is_known_to_be_lost_is_not_tried
     assert Campaign.open(tmp_path / "c").log()["attempts"].tolist() == [1]
 
 
-@pytest.mark.long
 def test_a_full_disk_ends_the_campaign_and_nothing_is_lost(
     two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -246,7 +240,6 @@ def of_session(session: int) -> list[int]:
     return found
 
 
-@pytest.mark.long
 def test_a_campaign_that_is_killed_goes_on_where_it_was(two: Any, tmp_path: Path) -> None:
     """A third of the runs waits for the kill: however fast the others are, the campaign has not ended by then."""
     times, file = tmp_path / "times", tmp_path / "c.toml"
@@ -279,7 +272,6 @@ def test_a_campaign_that_is_killed_goes_on_where_it_was(two: Any, tmp_path: Path
 
 
 # ---------------------------------------------------------------------------------------- what is kept, data
-@pytest.mark.long
 def test_what_is_kept(two: Any, tmp_path: Path) -> None:
     spec = tmp_path / "spec.toml"
     spec.write_text('title = "t"\n[coefficients.mean]\nmin = 0.0\nmax = 1.4\nunit = "V"\n')
@@ -302,7 +294,6 @@ def test_what_is_kept(two: Any, tmp_path: Path) -> None:
     assert run.result["mean"].estimate == extremes["mean.estimate"][0] == run.record.channels["source.z"].mean()
 
 
-@pytest.mark.long
 def test_measured_files(two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for k in range(3):
         (tmp_path / f"gyro{k}.csv").write_text(f"{k}.0\n{k}.5\n")
@@ -322,7 +313,6 @@ def test_measured_files(two: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert Campaign.open(tmp_path / "c").log()["run"].nunique() == 4
 
 
-@pytest.mark.long
 def test_commands(two: Any, tmp_path: Path, command: Any) -> None:
     words = ["sweep", "weighing", "--over", "source.offset=1,2", "--seeds", 2, "--set", "duration=0.05s"]
     local = {"processes": False, "protocol": "tcp://", "dashboard_address": "127.0.0.1:0"}

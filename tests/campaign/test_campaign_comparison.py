@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import synthetic_campaign as synthetic
+from commanding import Command
 from scipy import stats
 
 from gyrobench.bench import UsageError
@@ -111,7 +111,7 @@ def test_hits_that_go_together_count_as_few_runs() -> None:
     assert effective_runs(independent, np.zeros(1000, int)) == 1.0
 
 
-def test_command_compares_campaigns(command: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_command_compares_campaigns(command: Command, tmp_path: Path) -> None:
     a, b = (synthetic.sweep(tmp_path / name, 40, seed) for name, seed in (("a", 1), ("b", 1)))
     code, out, _ = command("compare", a, b, "--out", tmp_path / "same")
     assert code == 0

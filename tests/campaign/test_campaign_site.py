@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import synthetic_campaign as synthetic
 from browser import OVERLAPS, Browser, needs_chromium
+from commanding import Command
 
 import gyrobench as gb
 from gyrobench.bench import UsageError
@@ -107,7 +108,7 @@ def test_a_folder_of_something_else_is_not_touched(folder: Path, tmp_path: Path)
 
 
 @pytest.mark.long
-def test_command_prints_the_answer(command: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_command_prints_the_answer(command: Command, tmp_path: Path) -> None:
     small = synthetic.sweep(tmp_path / "small", 6)
     code, out, _ = command("site", small, "--out", tmp_path / "site")
     assert code == 0
@@ -161,6 +162,7 @@ def test_page_opens_from_disk_without_complaint(browser: Browser, page: Path, wi
 
 
 @needs_chromium
+@pytest.mark.long
 def test_complaints_would_be_seen(browser: Browser, page: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken.html"
     script = "<script>missing()</script><img src='http://localhost:9/x.png'></main>"
@@ -195,6 +197,7 @@ def test_table_filters_sorts_and_turns_pages_by_keyboard(browser: Browser, page:
 
 
 @needs_chromium
+@pytest.mark.long
 def test_numbers_are_rounded_to_their_u_and_what_is_missing_comes_last(browser: Browser, page: Path) -> None:
     browser.open(page, 1280)
     failed = column(browser, "state").index("hung")
@@ -211,6 +214,7 @@ def test_numbers_are_rounded_to_their_u_and_what_is_missing_comes_last(browser: 
 
 
 @needs_chromium
+@pytest.mark.long
 def test_a_reason_leads_to_its_runs_and_a_mistake_is_named(browser: Browser, page: Path, folder: Path) -> None:
     rows = Campaign.open(folder).table()
     browser.open(page, 390)

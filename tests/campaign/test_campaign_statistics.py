@@ -50,6 +50,7 @@ def test_tolerance_interval_of_normal_values_holds_its_content_as_often_as_it_sa
 
 
 # ------------------------------------------------------------------------------------------------ outliers
+@pytest.mark.long
 def test_outliers_that_mask_each_other_are_named_and_no_other() -> None:
     rng = np.random.default_rng(6)
     mixed = rng.normal(size=(4, 4))

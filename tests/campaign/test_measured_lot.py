@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 from measured_lot import instrument, write_lot, wrong
 
 COUNT = 12
 
 
 @pytest.mark.long
-def test_lot_with_mistakes_ends_in_a_site_that_names_them(
-    command: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
+def test_lot_with_mistakes_ends_in_a_site_that_names_them(command: Command, tmp_path: Path) -> None:
     write_lot(tmp_path / "lot", COUNT)
     bad = {instrument(k): what for k, what in wrong(COUNT).items()}
     out = tmp_path / "out"

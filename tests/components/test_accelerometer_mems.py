@@ -55,6 +55,13 @@ def test_filter_has_three_decibels_at_the_bandwidth() -> None:
     assert math.degrees(math.atan2(quadrature, in_phase)) == pytest.approx(-90.0 - 0.72, abs=0.2)
 
 
+def test_a_step_halved_is_the_same_filter() -> None:
+    """A force held over each of the longer steps, through 40 Hz: exact at both."""
+    force = np.random.default_rng(2).normal(size=(30, 3))
+    whole, halved = readings(force, 2e-3, bandwidth=40.0), readings(np.repeat(force, 2, axis=0), 1e-3, bandwidth=40.0)
+    assert whole == pytest.approx(halved[1::2], rel=1e-10, abs=1e-12)
+
+
 def test_vibration_is_rectified() -> None:
     """A vibration of amplitude A about 0: the mean reads square A2/2, far above the bandwidth too."""
     t = 1e-4 * np.arange(20_000)

@@ -5,19 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from wired import (
-    DEG_H,
-    QUIET,
-    FloatedGyro,
-    Native,
-    RebalanceAnalog,
-    Sampler,
-    Sequencer,
-    Site,
-    TableRate,
-    Wired,
-    plan,
-)
+from wired import DEG_H, QUIET, FloatedGyro, Native, RebalanceAnalog, Sampler, Sequencer, Site, TableRate, Wired, plan
 
 from gyrobench.drift import STANDARD, drift
 from gyrobench.frames import earth_rate_local, polar_base, to_face, tumble_faces
@@ -99,6 +87,7 @@ def test_shortened_tumble():
         assert abs(error) < (1.2e-4 if row["window_phase"] < 3 else 1e-9)
 
 
+@pytest.mark.long
 def test_windows_are_whole_turns():
     rows, _, _ = tumble(5e-3, order=["sampler", *ORDER[:-1]])
     for phase, sense in ((1, 1), (2, -1)):

@@ -226,6 +226,7 @@ def test_capture_from_two_degrees():
     assert -rows[:, 0].min() / ARCSEC < 25
 
 
+@pytest.mark.long
 def test_the_fine_loop_closed_at_two_degrees_diverges():
     _, rows = simulate(True, 3.0)
     assert np.abs(rows[-10000:, 0]).max() > 2 * DEG

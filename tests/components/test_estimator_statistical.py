@@ -44,6 +44,7 @@ def asymptotic(width: float) -> float:
     return float(value / near**2)
 
 
+@pytest.mark.long
 def test_of_normal_noise_it_leaves_more_than_the_mean_not_less() -> None:
     """Small widths: IF = 2 sqrt(2) x e^(-x2/2), E IF2 = 8/sqrt(27) = 1.540; width of one sigma over 96 readings as the
     integral says; the print has it below 1.

@@ -16,8 +16,7 @@ BLANK = dict(zip(FIELDS, (0, 0, 1, 0.0, 0.0, 0.0, 1.0), strict=True))
 
 def exciter(*phases):
     part = Exciter(
-        phases=len(phases),
-        **{f: [{**BLANK, **p}[f] for p in phases] + [BLANK[f]] * (99 - len(phases)) for f in FIELDS},
+        phases=len(phases), **{f: [{**BLANK, **p}[f] for p in phases] + [BLANK[f]] * (99 - len(phases)) for f in FIELDS}
     )
     part.initialize()
     return part
@@ -43,8 +42,7 @@ def test_step_torque_is_there_while_the_gate_is_open():
 
 def test_constant_is_there_from_the_start_of_its_phase_to_the_next():
     part = exciter(
-        {"kinds": 2, "amplitudes": 1e-3, "axes": 3, "settle": 0.01, "dwell": 0.02},
-        {"settle": 0.005, "dwell": 0.005},
+        {"kinds": 2, "amplitudes": 1e-3, "axes": 3, "settle": 0.01, "dwell": 0.02}, {"settle": 0.005, "dwell": 0.005}
     )
     rows = run(part, "command[3]", 0.045)
     assert all(x == (1e-3 if t < 0.03 - 1e-9 else 0.0) for t, x, *_ in rows)

@@ -130,12 +130,7 @@ def test_two_axis_tumble_and_static_servo_mounts():
         gamma, rate = seen(f"servo x {way}", np.eye(3), 0.0)
         assert (gamma[0], rate[0]) == (sign, pytest.approx(-sign * S, abs=1e-15))
     for to, earth in (("east", 0.0), ("north", C), ("west", 0.0), ("south", -C)):  # 5.2
-        for turn, wanted in (
-            ("y up", (0, -1, 0)),
-            ("y down", (0, 1, 0)),
-            ("z down", (0, 0, 1)),
-            ("z up", (0, 0, -1)),
-        ):
+        for turn, wanted in (("y up", (0, -1, 0)), ("y down", (0, 1, 0)), ("z down", (0, 0, 1)), ("z up", (0, 0, -1))):
             gamma, rate = seen(f"servo x {to}, {turn}", np.eye(3), 0.0)
             assert gamma.tolist() == list(wanted)
             assert rate[0] == pytest.approx(earth, abs=1e-15)

@@ -74,11 +74,7 @@ def euler(part, omega, alpha, seconds):
     """
     j_i = 5e-6
     tensor = np.array(
-        [
-            [j_i, -part.J_IO, -part.J_SI],
-            [-part.J_IO, part.J, -part.J_OS],
-            [-part.J_SI, -part.J_OS, j_i + part.dJ],
-        ]
+        [[j_i, -part.J_IO, -part.J_SI], [-part.J_IO, part.J, -part.J_OS], [-part.J_SI, -part.J_OS, j_i + part.dJ]]
     )
 
     def right(t, x):
@@ -94,6 +90,7 @@ def euler(part, omega, alpha, seconds):
     return solve_ivp(right, (0.0, seconds), [0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-15).y[0, -1]
 
 
+@pytest.mark.long
 def test_all_terms_against_eulers_equations_with_vectors():
     """Mounted askew, rates of 1 rad/s about all axes and accelerations: the float angle after 20 ms."""
     mount = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()

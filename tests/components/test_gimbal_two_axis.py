@@ -251,6 +251,7 @@ def test_the_keyhole_is_said(angle: float, flag: float) -> None:
     assert part.keyhole == flag
 
 
+@pytest.mark.long
 def test_a_free_gimbal_keeps_its_line_of_sight_but_for_the_outer_gimbal() -> None:
     """Balanced, without friction, inner angle 0: a base that turns about an axis of the joints leaves it at rest."""
     part = Gimbal(**BARE)

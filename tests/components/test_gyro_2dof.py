@@ -43,15 +43,11 @@ def looped(late=False, **parameters):
     }
     for key, x in inputs.items():
         setattr(parts["gyro"], key, x)
-    wires = [
-        ("gyro.u_x", "about_y.u"),
-        ("about_y.i", "gyro.i_y"),
-        ("gyro.u_y", "about_x.u"),
-        ("about_x.i", "gyro.i_x"),
-    ]
+    wires = [("gyro.u_x", "about_y.u"), ("about_y.i", "gyro.i_y"), ("gyro.u_y", "about_x.u"), ("about_x.i", "gyro.i_x")]
     return Wired(parts, list(parts), wires, late)
 
 
+@pytest.mark.long
 def test_ageing_temperature_and_translation_of_each_channel():
     """Hu 1981, eq. 2-39..2-42 in torque sign (omega_d = -omega_M) for both channels, the y channel in its own axes.
 

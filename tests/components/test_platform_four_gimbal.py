@@ -108,9 +108,9 @@ def test_beyond_90_degrees_of_pitch():
 
 
 @pytest.mark.parametrize(
-    "gain, moved, error, swing",
-    [(SEC, 182.0, 0.32, None), (ONE, 182.0, 1.31, 12.3), (SIGN, 41.0, 0.003, None)],
+    "gain, moved, error, swing", [(SEC, 182.0, 0.32, None), (ONE, 182.0, 1.31, 12.3), (SIGN, 41.0, 0.003, None)]
 )
+@pytest.mark.long
 def test_crossing_pitch_90(gain, moved, error, swing):
     """At 36 deg/s with 1 deg/s of roll and yaw.  With the sign the error is below PLATFORM-4GIMBAL's."""
     out = fly(PART, loop, 10.0, gain=gain, allow_vertical=1)

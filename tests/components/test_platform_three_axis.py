@@ -274,10 +274,7 @@ def test_linearization_around_a_tilted_position():
     "parameters, message",
     [
         ({"I_a": [0.6, 0.0, 0.7]}, r"parameter I_a\[2\] = 0 kg\.m2 must be > 0"),
-        (
-            {"I_f": [0.1, 0.1, 0.5]},
-            "I_f is not of a rigid body: no moment may exceed the sum of the others",
-        ),
+        ({"I_f": [0.1, 0.1, 0.5]}, "I_f is not of a rigid body: no moment may exceed the sum of the others"),
         ({"theta_0": [1.5, 0.0, 0.0]}, r"theta_0\[1\] = 1\.5 rad must be within the pitch stop, \+-1\.48353 rad"),
         ({"pitch_stop": math.pi / 2}, "parameter pitch_stop = 1.5708 rad must be <= 1.5698"),
         ({"L": [4e-3, 1e-3, 0.0]}, "step = 0.001 s must be <= L / R of each motor"),

@@ -136,12 +136,7 @@ def test_gate_is_closed_between_phases_without_settling():
     part = started([{"dwell": 0.1, "window": 0.1}, {"dwell": 0.1, "window": 0.1}])
     track = play(part, 60)
     # open at 3, dwell to 13, closed with phase 2 at 16; open at 19
-    assert changes(track) == [
-        (3, 1.0, 1.0, 0.0),
-        (16, 2.0, 0.0, 0.0),
-        (19, 2.0, 1.0, 0.0),
-        (32, 2.0, 0.0, 1.0),
-    ]
+    assert changes(track) == [(3, 1.0, 1.0, 0.0), (16, 2.0, 0.0, 0.0), (19, 2.0, 1.0, 0.0), (32, 2.0, 0.0, 1.0)]
 
 
 def test_times_are_not_accumulated():
@@ -188,10 +183,7 @@ RATE = {"mode": 2, "target": 0.1, "travel": 6.0, "window": 0.5}
         ),
         ({**RATE, "travel": 0.0, "dwell": 1.0, "target": 0.0}, "phase 2: the table does not turn"),
         ({**OK, "dwell": 0.0}, "phase 2: a hold, index, servo, step phase, or"),
-        (
-            {**OK, "mode": 1, "dwell": -1.0},
-            "phase 2: a hold, index, servo, step phase, or",
-        ),
+        ({**OK, "mode": 1, "dwell": -1.0}, "phase 2: a hold, index, servo, step phase, or"),
         ({**OK, "mode": 4}, "phase 2: a step phase needs a step other than 0 rad"),
         ({**OK, "mode": 2.5}, "phase 2: unknown mode"),
         ({**OK, "window": 0.0}, "phase 2: the window must be above 0"),

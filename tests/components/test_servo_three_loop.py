@@ -54,6 +54,7 @@ def test_open_loops_cross_where_they_should():
     assert phase == pytest.approx(90.0 - math.degrees(math.atan(0.2)), abs=2.0)
 
 
+@pytest.mark.long
 def test_rate_command_and_load():
     """The rate follows the command; against a load the rate loop's integral leaves no rate, i = -load / K_t."""
     w, i, _ = axis(started(), 1.5, command=0.1)

@@ -166,8 +166,7 @@ def test_a_change_at_speed_waits_for_the_stop_unless_it_is_bumpless() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "reason"),
-    [({"pressure": 3e5}, 1), ({"rate": -11.0}, 2), ({"temperature": 350.0}, 3), ({"lost": 1.0}, 4)],
+    ("fault", "reason"), [({"pressure": 3e5}, 1), ({"rate": -11.0}, 2), ({"temperature": 350.0}, 3), ({"lost": 1.0}, 4)]
 )
 def test_interlocks_keep_the_motor_off_and_switch_it_off(fault: dict[str, float], reason: int) -> None:
     mended = {"pressure": 6e5, "rate": 0.0, "temperature": 293.15, "lost": 0.0}

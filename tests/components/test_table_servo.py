@@ -244,10 +244,7 @@ def test_alpha_is_the_derivative_of_omega():
         ({"J": 0.0}, "J = 0 kg.m2 must be > 0"),
         ({"H_g": -0.2}, "H_g = -0.2 N.m.s must be > 0"),
         ({"C_g": -1.0}, "C_g = -1 N.m.s/rad must be >= 0"),
-        (
-            {"C_g": 0.0, "stiffness": 1e5, "capture": 0},
-            "with C_g = 0.* static stiffness is infinite",
-        ),
+        ({"C_g": 0.0, "stiffness": 1e5, "capture": 0}, "with C_g = 0.* static stiffness is infinite"),
         ({"C_g": 0.0, "network": 3}, "stiffness and capture need a damped gyro"),
         ({"polarity": 0}, "polarity must be 1 or -1"),
         ({"network": 0}, "network 0 needs a crossover or a stiffness"),

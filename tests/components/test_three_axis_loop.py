@@ -139,11 +139,7 @@ def test_base_motion_is_isolated():
 
 @pytest.mark.parametrize(
     "theta, without, with_t2",
-    [
-        ((0, 0), (6.2, 6.2), (0.137, 0.137)),
-        ((20, 30), (57, 58), (0.13, 0.15)),
-        ((40, 60), (170, 173), (0.10, 0.18)),
-    ],
+    [((0, 0), (6.2, 6.2), (0.137, 0.137)), ((20, 30), (57, 58), (0.13, 0.15)), ((40, 60), (170, 173), (0.10, 0.18))],
 )
 def test_signal_chain_of_the_83_mil_bench(theta, without, with_t2):
     """F11: gimbal rates -> T1 -> rebalanced gyros (50 Hz, 0.7) -> T2, angles swing by 83 mil about (pitch, azimuth)."""

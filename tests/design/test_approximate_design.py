@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gyrobench.design.approximate_design import (
-    CRITERIA,
-    SingularDesignError,
-    approximate_design,
-    evaluate,
-)
+from gyrobench.design.approximate_design import CRITERIA, SingularDesignError, approximate_design, evaluate
 
 
 def information(X: np.ndarray) -> np.ndarray:

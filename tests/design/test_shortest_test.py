@@ -136,6 +136,7 @@ def test_what_was_wanted_is_reached_and_counted(designed: DesignedTest) -> None:
     assert error == pytest.approx(k2.error, rel=0.55)  # three standard errors of a standard deviation of 16
 
 
+@pytest.mark.long
 def test_the_printed_command_is_the_plan(designed: DesignedTest) -> None:
     words = shlex.split(designed.command)
     assert words[:3] == ["gyrobench", "run", "accelerometer_multipoint"]

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commanding import Command
 from processes import processes_in, unhurried
 
 from gyrobench.commands import cli
@@ -28,7 +29,6 @@ from gyrobench.workflow import run_execution
 
 NAME = "tumble_single_axis"
 TINY = ["--set", "rate=60deg/s", "--set", "windows=6", "--set", "dwell=2s", "--set", "table.index_rate=2"]
-Command = Callable[..., tuple[int, str, str]]
 
 
 def die(*_: Any, **__: Any) -> None:

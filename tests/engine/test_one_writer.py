@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE
@@ -20,7 +21,6 @@ from gyrobench.engine.run_driver import Interrupts
 from gyrobench.files import LOCK, FolderInUseError, FolderLock, sweep
 from gyrobench.record.record import Record
 
-Command = Callable[..., tuple[int, str, str]]
 SHORT = ("fixed_position", "--set", "dwell=16s", "--set", "readings=8", "--set", "settle=1s", "--set", "attitude=E U")
 
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import pytest
 from archives import LAG, write_archive
+from commanding import Command
 from fmpy import platform, platform_tuple
 
 from gyrobench.engine.session import Session, run
@@ -22,7 +23,6 @@ from gyrobench.system.wiring import WiringError
 from gyrobench.workflow.fit_mapping import write_mapping
 
 Foreign = Callable[..., Path]
-Command = Callable[..., tuple[int, str, str]]
 Change = Callable[..., Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 MAPS = {"gyro": FOREIGN / "vendor_gyro.toml"}

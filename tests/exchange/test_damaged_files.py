@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy.io import savemat
 
 from gyrobench import files, reading
@@ -23,7 +23,6 @@ from gyrobench.packaging.compiler import PLATFORMS, this_platform
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
-Command = Callable[..., tuple[int, str, str]]
 HEADER = 30  # bytes before the name of a file in its local header
 
 

@@ -16,6 +16,8 @@ from gyrobench.exchange.ssp_export import prepare, recorded
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.system import load_system
 
+pytestmark = pytest.mark.long
+
 LOOP, SHORT = "stabilizer_sdf", {"time": 2.0, "command": 1e-4}
 
 
@@ -24,7 +26,6 @@ def estimates(run: gb.Run) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.long
 def test_a_stop_time_that_is_no_multiple_of_the_step(tmp_path: Path, fmi: int) -> None:
     """The capture of a table may last 11.05450094... s, the step is 0.1 ms: the last one would be shorter."""
     system = load_system("table_capture")
@@ -39,7 +40,6 @@ def test_a_stop_time_that_is_no_multiple_of_the_step(tmp_path: Path, fmi: int) -
             gb.load("table_capture").reduce_result(found)
 
 
-@pytest.mark.long
 def test_windows_need_no_option(tmp_path: Path) -> None:
     values = {"readings": 8, "dwell": 80.0, "settle": 2.0}
     export_fmu(load_system("fixed_position"), tmp_path / "one.fmu", values=values)
@@ -48,7 +48,6 @@ def test_windows_need_no_option(tmp_path: Path) -> None:
     assert estimates(found) == estimates(test.run(check_step=False))
 
 
-@pytest.mark.long
 def test_a_container_gives_all_that_a_record_needs(tmp_path: Path) -> None:
     """What is wired inside is an output too, with its unit; its order in the structure is that of the variables."""
     if importlib.util.find_spec("fmu_manipulation_toolbox") is None:

@@ -70,6 +70,7 @@ def by_hand(late: int) -> list[float]:
     return values
 
 
+@pytest.mark.long
 def test_fmpy_applies_the_factor_a_step_later(archive: Path) -> None:
     """In parallel coupling the gain takes one step, the wire to it another; its input is 0 in the first one."""
     from fmpy.ssp.simulation import simulate_ssp
@@ -89,6 +90,7 @@ def test_container_is_bit_equal(parts: dict[str, Path], tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["b.y"][1:], own["b.y"][1:])
 
 
+@pytest.mark.long
 def test_gains_become_factors_again(archive: Path, parts: dict[str, Path], tmp_path: Path) -> None:
     own = run(Pair(), parts, values={"a.y0": 20.0}).channels
     system = read_ssp(archive)

@@ -21,6 +21,8 @@ from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System, load_system
 
+pytestmark = pytest.mark.long
+
 GUIDE = standard_folder() / "docs" / "guides" / "run_elsewhere.md"
 SYSTEM, VALUES = "stabilizer_sdf", {"time": 2.0, "command": 1e-4}  # a factor of 12 between its parts; 3,100 steps
 
@@ -43,7 +45,6 @@ def own(system: System) -> dict[str, Any]:
     return {"record": record, "result": result, "scale": scales(result, at_step(SYSTEM, VALUES, noise=True))}
 
 
-@pytest.mark.long
 def test_a_container_gives_the_record_bit_for_bit(system: System, own: dict[str, Any], tmp_path: Path) -> None:
     """So does the one FMU: tests/exchange/test_system_fmu.py."""
     needs("fmu_manipulation_toolbox")
@@ -53,7 +54,6 @@ def test_a_container_gives_the_record_bit_for_bit(system: System, own: dict[str,
     assert same(record, own["record"])
 
 
-@pytest.mark.long
 def test_tools_that_couple_in_parallel(system: System, own: dict[str, Any], tmp_path: Path) -> None:
     """The difference to the bench is that of what the step does to the measures here and there, to first order."""
     needs("libcosimpy")
@@ -77,7 +77,6 @@ def test_tools_that_couple_in_parallel(system: System, own: dict[str, Any], tmp_
             assert off < 0.2, f"{tool}: {name}"  # of u; what the first step with other inputs leaves
 
 
-@pytest.mark.long
 def test_what_a_tool_cannot(tmp_path: Path) -> None:
     """FMPy takes sampler_2.x for a parameter of sampler, and all inputs are 0 in its first step: the guide says so."""
     systems = [s for n in Bench(standard_folder()).systems() if not isinstance(s := load_test(n), Suite)]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from fmpy import simulate_fmu
 from fmpy.util import write_csv
 from scipy.io import savemat
@@ -19,6 +19,8 @@ import gyrobench as gb
 from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.system import load_system
+
+pytestmark = pytest.mark.long
 
 NAME = "tumble_single_axis"
 VALUES: dict[str, Any] = {
@@ -33,7 +35,6 @@ VALUES: dict[str, Any] = {
 }
 SETTINGS = [word for n, v in VALUES.items() for word in ("--set", f"{n}={v}")]
 COARSE = 0.1  # s between the rows: many steps, less than the shortest window
-Command = Callable[..., tuple[int, str, str]]
 Array = np.ndarray[Any, Any]
 
 
@@ -115,7 +116,6 @@ def write(series: Array, form: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("form", ["csv", "npy", "parquet", "mat 5", "mat 4", "mat normal"])
-@pytest.mark.long
 def test_each_format_gives_the_coefficients_of_the_own_run(
     form: str, own: gb.Run, elsewhere: Array, command: Command, tmp_path: Path
 ) -> None:
@@ -181,7 +181,6 @@ def file_observer(folder: Path, **slots: str) -> Any:
     return CosimObserver(CosimObserver._CosimObserver__create_key, pointer)  # the wrapper lacks this one
 
 
-@pytest.mark.long
 def test_libcosim_by_its_csv_files(own: gb.Run, command: Command, tmp_path: Path) -> None:
     """Coupled in parallel, six digits.  The SSP repeats the values of its export, so none is given."""
     pytest.importorskip("libcosimpy")
@@ -256,7 +255,6 @@ def refusals(series: Array) -> dict[str, tuple[Array, str]]:
     }
 
 
-@pytest.mark.long
 def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: Array, tmp_path: Path) -> None:
     test = gb.load(NAME, VALUES)
     for what, (series, words) in refusals(elsewhere).items():
@@ -284,7 +282,6 @@ def test_what_cannot_be_a_run_of_the_system_is_refused(own: gb.Run, elsewhere: A
         test.reduce_result(file)
 
 
-@pytest.mark.long
 def test_files_that_are_none(command: Command, tmp_path: Path) -> None:
     for name, content, words in (
         ("a.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 200, "save it with save"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from archives import LAG, bound, real, write_archive
+from commanding import Command
 
 from gyrobench.engine.session import run
 from gyrobench.exchange.ssp_import import read_ssp
@@ -120,9 +121,7 @@ def test_values_that_are_refused(archive: Callable[..., Path], values: str, word
 
 
 @pytest.mark.long
-def test_a_missing_step_is_asked_for(
-    archive: Callable[..., Path], command: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
+def test_a_missing_step_is_asked_for(archive: Callable[..., Path], command: Command, tmp_path: Path) -> None:
     path = archive(LAG.format("a", ""), values=bound(real("a.y0", 1.0)))
     code, _, err = command("run", path, "--out", tmp_path / "run")
     assert code == 2

@@ -62,6 +62,7 @@ def test_fmpy_gives_the_record_of_the_bench(small: System, write: Write, fmi: in
     np.testing.assert_array_equal(coarse["gyro.u"][:100], own.channels["gyro.u"][:100])
 
 
+@pytest.mark.long
 def test_parameters_and_inputs_that_were_exposed(small: System, write: Write) -> None:
     file = write(small)
     variables = {v.name: v for v in read_model_description(str(file)).modelVariables}

@@ -144,6 +144,7 @@ def test_other_excitations(kind: str) -> None:
     assert found["phase margin"].value == pytest.approx(margins_of(loop, 1.0, 120.0)["phase margin"], abs=0.05)
 
 
+@pytest.mark.long
 def test_dry_friction_is_seen_and_a_linear_loop_is_linear(counted: list[tuple]) -> None:
     """A cubic of the plant's input: lines left out hold what is not noise, and the intervals are wider."""
     assert all(found.linear for _, found in counted)

@@ -57,6 +57,7 @@ def test_parameters_of_random_platforms(platforms: list[tuple]) -> None:
     assert np.mean(np.abs(z) < 1.96) > 0.85 and 0.6 < np.std(z) < 1.4
 
 
+@pytest.mark.long
 def test_noise_of_a_line_does_not_decide_on_its_weight() -> None:
     """200 lines of 15 %, each weighted by its own gain, would make it low by several u; the mean of z is 0 here.
 
@@ -93,6 +94,7 @@ def test_a_wild_line_does_not_pull() -> None:
     assert abs(fits[1].values["J"] - fits[0].values["J"]) < fits[0].u("J") / 3.0
 
 
+@pytest.mark.long
 def test_what_the_model_lacks_is_said(platforms: list[tuple]) -> None:
     loop, record, found = platforms[0]
     fit = fit_plant(record, found.responses["P"], ["J", "viscous", "delay", "held"])  # without the mode

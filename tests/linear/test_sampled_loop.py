@@ -100,6 +100,7 @@ def test_gain_margin_is_where_the_loop_becomes_unstable() -> None:
         assert bool(np.abs(more.poles()).max() < 1.0) == stable
 
 
+@pytest.mark.long
 def test_a_measured_response_gives_the_margins_of_the_plant_that_it_is_of() -> None:
     """2000 points to 20 times the sampling frequency; the sum over the aliases against the exact discretization."""
     num, den = MODE

@@ -15,10 +15,13 @@ from gyrobench.files import temporary_folder, unzip_fmu
 from gyrobench.packaging import build, load_part
 from gyrobench.packaging.instance import Fmu, Instance, Plain, Unzipped
 
+LONG_PARTS = {"gyro_vibratory_carrier"}  # a step has many periods: a hundred times the time of the others
+
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "part" in metafunc.fixturenames:
-        metafunc.parametrize("part", PARTS)
+        marks = {p: (pytest.mark.long,) if p in LONG_PARTS else () for p in PARTS}
+        metafunc.parametrize("part", [pytest.param(p, marks=marks[p]) for p in PARTS])
     if "target" in metafunc.fixturenames:
         metafunc.parametrize("target", TARGETS)
     if "form" in metafunc.fixturenames:

@@ -216,7 +216,7 @@ def test_a_state_of_another_part_is_refused(form: str, instance: Callable) -> No
 
 
 # ---------------------------------------------------------------------------------------- instances
-STEPS = {"optical_tracker": 30}  # until the first image is there
+STEPS = {"optical_tracker": 30, "gyro_vibratory_carrier": 1}  # until the first image is there; many periods a step
 
 
 @pytest.mark.long

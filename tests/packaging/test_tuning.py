@@ -81,7 +81,7 @@ def test_a_change_between_steps_is_a_start_with_the_new_values(part: str, instan
     everything = [s.name for s in cls.layout if s.section != "parameter"]
     changed = started(instance(part, "plain"), r)
     steps(changed, r, range(at), [])
-    values = moved(changed, lambda: steps(changed, r, range(at, min(at + 10, len(r.time))), []))
+    values = moved(changed, lambda: steps(changed, r, range(at, min(at + 6, len(r.time))), []))
     of = {n.partition("[")[0] for n in values}
     assert len(of) >= 0.6 * len(tunable(cls)) - 1, set(tunable(cls)) - of
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from commanding import Command
 from pyarrow import csv as arrow
 from pyarrow import feather, parquet
 
@@ -140,7 +141,6 @@ def write_excel(file: Path) -> None:
 
 
 #: end of the name -> writer, the table that is read (""; the only one), how time and rate are called in the text
-Call = Callable[..., tuple[int, str, str]]
 FORMATS: dict[str, tuple[Callable[[Path], None], str, tuple[str, str]]] = {
     ".parquet": (write_parquet, "", ("time", "rate")),
     ".feather": (write_feather, "", ("time", "rate")),
@@ -216,7 +216,7 @@ def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.long
-def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Call, tmp_path: Path) -> None:
+def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Command, tmp_path: Path) -> None:
     """A drift record of white noise 0.01 °/s at 100 Hz: N = 0.01·60/√100 = 0.06 °/√h, from the table that has rates."""
     import h5py
 
@@ -234,7 +234,7 @@ def test_fit_finds_the_table_and_reduce_reads_it(gyrobench: Call, tmp_path: Path
 
 
 @pytest.mark.long
-def test_columns_of_the_bench_need_no_map(gyrobench: Call, tmp_path: Path) -> None:
+def test_columns_of_the_bench_need_no_map(gyrobench: Command, tmp_path: Path) -> None:
     made = {"time [s]": np.arange(2000) * 0.01, "rate [deg/s]": 0.01 * np.random.default_rng(4).normal(size=2000)}
     parquet.write_table(pa.table(made), tmp_path / "log.parquet")
     code, out, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--json")

@@ -14,6 +14,8 @@ from gyrobench.campaign.execution.store import Campaign
 from gyrobench.commands.cli import app
 from gyrobench.record.record import Record
 
+pytestmark = pytest.mark.long
+
 SETTINGS = ("latitude=45.75deg", "k=17.2deg/h/mA", "attitude=E U -N", "type_b=none")
 
 
@@ -23,7 +25,6 @@ def gyrobench(*words: str) -> str:
     return done.output
 
 
-@pytest.mark.long
 def test_lot_of_one_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two files under one map, in one command: a row each.  One of the 46 readings is 1 mA more in the second, which is
     17.2 deg/h / 46 = 0.37 deg/h of the mean, less where the fit gives it less weight."""
@@ -46,7 +47,6 @@ def test_lot_of_one_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert 0.3 < first - second < 0.4
 
 
-@pytest.mark.long
 def test_two_commands_to_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The map is used as it was proposed.  The row without a value and the last one, whose end is not told, are left
     out and named; the record holds the others, with their ends at the start of the next row, whatever it holds."""
@@ -72,7 +72,6 @@ def test_two_commands_to_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 PROFILE = 'name = "Prüflabor"\naddress = ["Beispielweg 1"]\ncountry = "DE"\n'
 
 
-@pytest.mark.long
 def test_two_commands_to_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The map, and what the file does not say; nothing else."""
     monkeypatch.chdir(tmp_path)
@@ -87,7 +86,6 @@ def test_two_commands_to_the_certificate(tmp_path: Path, monkeypatch: pytest.Mon
     assert "Prüflabor, Beispielweg 1" in page.read_text("utf-8") and "messung.csv" in page.read_text("utf-8")
 
 
-@pytest.mark.long
 def test_twenty_files_to_the_certificate_of_the_lot_in_one_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,7 +108,6 @@ def test_twenty_files_to_the_certificate_of_the_lot_in_one_command(
     assert all(f"kreisel{k:02d}.csv" in shown for k in range(20)), "the file names what has no name"
 
 
-@pytest.mark.long
 def test_a_lot_is_certified_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("lot").mkdir()

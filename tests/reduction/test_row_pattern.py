@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gyrobench.reduction.series.row_pattern import CHANCE, every_second_row
+from gyrobench.reduction.series.row_pattern import CHANCE, every_second_row, rows_of_a_slower_record
 
 
 def test_rows_of_two_instruments() -> None:
@@ -51,3 +51,29 @@ def test_records_without_a_pattern(kind: str) -> None:
             x *= np.linspace(0.3, 3.0, n)
         found = every_second_row(x)
         assert min(found.p_level, found.p_ratio) > CHANCE, (seed, found)
+
+
+@pytest.mark.parametrize(("a", "b", "period"), [(1, 3, 3.0), (2, 5, 2.5), (37.3, 100, 100.0 / 37.3), (3, 4, 4.0)])
+def test_rows_of_a_slower_record(a: float, b: float, period: float) -> None:
+    """a values to b rows.  Held ones change in 2 of 5 rows, at 0, 2 or 3 rows from one another: after 2.5 or after 5
+    rows alike.  Interpolated at 3/4 no three are on a line: not seen.
+    """
+    x = np.cumsum(np.random.default_rng(6).normal(size=3002))
+    at = np.arange(3000) * a / b
+    held = rows_of_a_slower_record(x[np.floor(at).astype(int)])
+    assert min(abs(held / period - 1.0), abs(held / (2.0 * period) - 1.0)) < 1e-3
+    expected = 0.0 if a / b > 0.5 else period
+    assert rows_of_a_slower_record(np.interp(at, np.arange(x.size), x)) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["white", "walk", "heavy", "line", "missing", "machine", "rounded"])
+def test_rows_as_they_were_sampled(kind: str) -> None:
+    """A machine whose noise follows its turns, by 0.9 of its mean square, does not make it vanish."""
+    for seed in range(5):
+        rng = np.random.default_rng([7, seed])
+        x = rng.normal(size=5000)
+        wave = np.sin(2.0 * np.pi * 0.2317 * np.arange(5000))
+        x = {"walk": np.cumsum(x), "heavy": rng.standard_t(3.0, 5000), "line": x + 3.0 * wave,
+             "missing": np.where(rng.random(5000) < 0.1, np.nan, x), "machine": x * np.sqrt(1.0 + 0.9 * wave),
+             "rounded": np.round(x)}.get(kind, x)  # fmt: skip
+        assert rows_of_a_slower_record(x) == 0.0

@@ -64,6 +64,7 @@ def test_schema_knows_every_field_of_a_result():
         assert fields == set(s["$defs"][key]["properties"]), key
 
 
+@pytest.mark.long
 def test_json_holds_what_the_design_names(written):
     for key in ("system", "coefficients", "warnings", "provenance"):
         assert key in written.json

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tumble_2dof as T
+from bad_records import cut, differs, message, put
 
 from gyrobench import drift, frames
 from gyrobench.reduction.drift import harmonic
-from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = T.DPH
 SIMPLE = tuple(n for c in "xy" for n in T.geometry.terms("simple", c))
@@ -23,12 +23,6 @@ NAMES = {"simple": SIMPLE, "nine": NINE}
 def random_truth(seed: int, names: tuple[str, ...] = NINE) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     return dict(zip(names, rng.uniform(0.1, 1.0, len(names)) * rng.choice([-1, 1], len(names)) * DPH, strict=True))
-
-
-def message(windows: Any, setup: Any) -> str:
-    with pytest.raises(ReductionError) as error:
-        T.reduction.reduce(windows, setup)
-    return str(error.value)
 
 
 def deg_per_h(windows: Any, s: Any, channel: str, phase: int) -> Any:
@@ -159,7 +153,7 @@ def test_tilt_of_the_measuring_axes_needs_both_senses() -> None:
             assert c.estimate == pytest.approx(math.degrees(size) * 3600.0, rel=1e-6)
         else:
             assert abs(c.estimate - c.truth) < 1e-9, c.name
-    assert "turns in both senses" in message(T.record(s, truth), both)
+    assert "turns in both senses" in message(T.reduction, T.record(s, truth), both)
 
 
 def test_terms_outside_the_simple_model_shift_it_as_predicted() -> None:
@@ -223,10 +217,6 @@ def test_latitudes() -> None:
 
 
 # ------------------------------------------------------------------------------------------ errata
-def differs(a: float, b: float) -> bool:
-    return abs(a - b) > 1e-6 * max(abs(a), abs(b))
-
-
 def test_corrected_and_printed_simple_model() -> None:
     """[TUM2A, TUM2A-ERR, E24] 3-23, 3-25: every linear term has the opposite sign in print, u_x without sin phi; the
     printed separation would return -u.
@@ -312,7 +302,7 @@ def test_cross_squares_are_refused_without_fold_and_fold_exactly_with_it() -> No
     """[RANK-1g-FOLD] X2 + Y2 + Z2 = gamma2: Dx_yy Y2 and Dy_xx X2 go into the constant and the other squares."""
     truth = {**random_truth(2), "Dx_yy": 0.2 * DPH, "Dy_xx": -0.3 * DPH}
     w = T.record(T.setup(), truth)
-    text = message(w, T.setup(truth=truth))
+    text = message(T.reduction, w, T.setup(truth=truth))
     assert "Dx_yy = 0.2 °/h/g²" in text and "Dy_xx = -0.3 °/h/g²" in text and "set fold" in text
     r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
     g2 = (9.8 / frames.G0) ** 2
@@ -332,15 +322,6 @@ def test_cross_squares_are_refused_without_fold_and_fold_exactly_with_it() -> No
 
 
 # ------------------------------------------------------------------------------------------ refusals
-def put(column: str, row: int, value: float) -> Any:
-    return lambda w: w[column].__setitem__(row, value)
-
-
-def cut(w: dict[str, np.ndarray], keep: np.ndarray) -> None:
-    for name in w:
-        w[name] = w[name][keep]
-
-
 @pytest.mark.parametrize(("change", "text"), [
     (put("mean_y", 7, math.nan), "column mean_y: non-finite number in row 8"),
     (put("angle_end", 3, math.inf), "column angle_end: non-finite number in row 4"),
@@ -357,20 +338,20 @@ def test_bad_records(change: Any, text: str) -> None:
     s = T.setup()
     w = T.record(s, random_truth(1), turn=12, dwell=3)
     change(w)
-    assert re.search(text, message(w, s)), message(w, s)
+    assert re.search(text, message(T.reduction, w, s)), message(T.reduction, w, s)
 
 
 def test_bad_setups() -> None:
     w = T.record(T.setup(), random_truth(1), turn=12, dwell=3)
-    assert "gravity 8 m/s²" in message(w, T.setup(gravity=8.0))
-    assert "scale factor k_y = -1" in message(w, T.setup(k={"x": 1.0, "y": -1.0}))
-    assert "polarity 'left'" in message(w, T.setup(polarity="left"))
-    assert "rank 5 of 9" in message(w, T.setup(0.0))
+    assert "gravity 8 m/s²" in message(T.reduction, w, T.setup(gravity=8.0))
+    assert "scale factor k_y = -1" in message(T.reduction, w, T.setup(k={"x": 1.0, "y": -1.0}))
+    assert "polarity 'left'" in message(T.reduction, w, T.setup(polarity="left"))
+    assert "rank 5 of 9" in message(T.reduction, w, T.setup(0.0))
     one = {p: f for p, f in T.setup().faces.items() if p != 4}
     part = {n: v[w["phase"] != 4] for n, v in w.items()}
-    assert "only one mount" in message(part, T.setup(faces=one))
+    assert "only one mount" in message(T.reduction, part, T.setup(faces=one))
     one = {p: f for p, f in T.setup().faces.items() if p != 3}
     part = {n: v[w["phase"] != 3] for n, v in w.items()}
-    assert "only one dwell with the y axis vertical" in message(part, T.setup(faces=one))
+    assert "only one dwell with the y axis vertical" in message(T.reduction, part, T.setup(faces=one))
     few = T.record(T.setup(), random_truth(1), turn=4, dwell=3)
-    assert "4 windows a turn, at least 5" in message(few, T.setup())
+    assert "4 windows a turn, at least 5" in message(T.reduction, few, T.setup())

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import two_axis as T
+from bad_records import cut, differs, message, put
 
 from gyrobench import drift, frames
-from gyrobench.reduction.setup.window_checks import ReductionError
 
 DPH = T.DPH
 NAMES = drift.terms(9)
@@ -20,12 +20,6 @@ NAMES = drift.terms(9)
 def random_truth(seed: int, names: tuple[str, ...] = NAMES) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     return dict(zip(names, rng.uniform(0.1, 1.0, len(names)) * rng.choice([-1, 1], len(names)) * DPH, strict=True))
-
-
-def message(windows: Any, setup: Any) -> str:
-    with pytest.raises(ReductionError) as error:
-        T.reduction.reduce(windows, setup)
-    return str(error.value)
 
 
 # ------------------------------------------------------------------------------------------ geometry
@@ -89,7 +83,7 @@ def test_equator_needs_least_squares() -> None:
     s = T.setup(0.0, truth=truth)
     r = T.reduction.reduce(T.record(s, truth), s)
     assert all(abs(c.estimate - c.truth) < 1e-9 and c.closed is None for c in r.coefficients)
-    assert "divide by sin φ" in message(T.record(s, truth), T.setup(0.0, harmonic=True))
+    assert "divide by sin φ" in message(T.reduction, T.record(s, truth), T.setup(0.0, harmonic=True))
 
 
 def test_any_positions_will_do_for_least_squares() -> None:
@@ -142,7 +136,7 @@ def test_one_to_one_has_rank_eight(latitude: float) -> None:
     (text,) = T.geometry.refusals(math.radians(latitude), 1, 1, 36)
     assert "rank 8 of 9, not estimable: " in text
     s = T.setup(latitude, m=1, n=1)
-    assert "rank 8" in message(T.record(s, random_truth(1)), s)
+    assert "rank 8" in message(T.reduction, T.record(s, random_truth(1)), s)
 
 
 def test_rank_at_the_pole() -> None:
@@ -155,10 +149,6 @@ def test_rank_at_the_pole() -> None:
 
 
 # ------------------------------------------------------------------------------------------ errata
-def differs(a: float, b: float) -> bool:
-    return abs(a - b) > 1e-6 * max(abs(a), abs(b))
-
-
 @pytest.mark.parametrize(("latitude", "m", "n"), [(41.0, 5, 1), (-25.0, 1, 5)])
 def test_corrected_and_printed_formulas(latitude: float, m: int, n: int) -> None:
     """[TUM2AX-REDUCE, TUM2AX-ERR, E30-E34] amplitudes by hand from a fine Fourier sum, printed forms that fail."""
@@ -215,7 +205,7 @@ def test_consistency_of_the_harmonics_is_shown() -> None:
 def test_d_oo_folds() -> None:
     truth = random_truth(2, drift.NAMES)
     w = T.record(T.setup(), truth)
-    assert "set fold" in message(w, T.setup(truth=truth))
+    assert "set fold" in message(T.reduction, w, T.setup(truth=truth))
     r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
     oo, g2 = truth["D_OO"] / DPH, (9.8 / frames.G0) ** 2
     extra = {"D_F + γ² D_OO": ("D_F", g2), "D_II − D_OO": ("D_II", -1.0), "D_SS − D_OO": ("D_SS", -1.0)}
@@ -248,15 +238,6 @@ def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------ refusals
-def put(column: str, row: int, value: float) -> Any:
-    return lambda w: w[column].__setitem__(row, value)
-
-
-def cut(w: dict[str, np.ndarray], keep: np.ndarray) -> None:
-    for name in w:
-        w[name] = w[name][keep]
-
-
 @pytest.mark.parametrize(("change", "text"), [
     (put("mean", 7, math.nan), "column mean: non-finite number in row 8"),
     (lambda w: w.pop("inner_end"), "column inner_end is missing"),
@@ -271,15 +252,17 @@ def test_bad_records(change: Any, text: str) -> None:
     s = T.setup()
     w = T.record(s, random_truth(1))
     change(w)
-    assert re.search(text, message(w, s)), message(w, s)
+    assert re.search(text, message(T.reduction, w, s)), message(T.reduction, w, s)
 
 
 def test_bad_setups() -> None:
     w = T.record(T.setup(), random_truth(1))
-    assert "gravity 8 m/s²" in message(w, T.setup(gravity=8.0))
-    assert "scale factor k = -1" in message(w, T.setup(k=-1.0))
-    assert "polarity 'left'" in message(w, T.setup(polarity="left"))
-    assert "up to 85°" in message(w, T.setup(86.0)) and "outside −90..90" in message(w, T.setup(100.0))
+    assert "gravity 8 m/s²" in message(T.reduction, w, T.setup(gravity=8.0))
+    assert "scale factor k = -1" in message(T.reduction, w, T.setup(k=-1.0))
+    assert "polarity 'left'" in message(T.reduction, w, T.setup(polarity="left"))
+    assert "up to 85°" in message(T.reduction, w, T.setup(86.0)) and "outside −90..90" in message(
+        T.reduction, w, T.setup(100.0)
+    )
     refuse = T.geometry.refusals
     assert "common divisor 2; 3:1 is the same path" in refuse(0.8, 6, 2, 36)[0]
     assert "8 positions for 9 coefficients" in refuse(0.8, 5, 1, 8)[0]

@@ -40,12 +40,7 @@ def test_first_order() -> None:
     e = 1e-6
     for i in range(4):
         a = ALPHA + e * (error() + ETA[i])
-        aI, aO = (
-            (np.sin(a), np.cos(a)),
-            (np.cos(a), -np.sin(a)),
-            (-np.sin(a), -np.cos(a)),
-            (-np.cos(a), np.sin(a)),
-        )[i]
+        aI, aO = ((np.sin(a), np.cos(a)), (np.cos(a), -np.sin(a)), (-np.sin(a), -np.cos(a)), (-np.cos(a), np.sin(a)))[i]
         exact = e * F[i] + (1 + e * K[i]) * aI + e * (KO[i] * aO + IO[i] * aI * aO + II[i] * aI * aI)
         assert (exact - INPUT[i]) / e == pytest.approx(reading(i) - INPUT[i], abs=1e-3)
 

@@ -26,6 +26,7 @@ def filled(page: Any, fields: dict[str, str], command: str) -> None:
     page.wait_for_function("['done', 'failed'].includes(document.querySelector('[role=status]')?.textContent)")
 
 
+@pytest.mark.long
 def test_a_loop_is_tuned_by_a_form(page: Any, studio: tuple[str, Path]) -> None:
     """What the command prints stands on the page, its figures are one click away."""
     page.goto(base_of(studio) + "/tune?system=platform_single_axis")
@@ -54,6 +55,7 @@ def loop_record(file: Path) -> None:
     np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.9g")
 
 
+@pytest.mark.long
 def test_a_loop_is_identified_from_its_dropped_record(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
     """|K / (J s)| = 1 at 30 rad/s = 4.775 Hz; held for a sample of 1 ms the phase there is -90 - 0.86 deg."""
     loop_record(tmp_path / "loop.csv")
@@ -74,6 +76,7 @@ def test_what_a_command_refuses_is_said(page: Any, studio: tuple[str, Path]) -> 
     assert "beauty" in (page.locator(".printed").text_content() or "")
 
 
+@pytest.mark.long
 def test_a_campaign_is_watched_and_its_site_opened(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/campaign?system=fixed_position")
     fields = {"Varied, all combinations, one a line": "latitude=10deg,50deg", "Seeds at each point": "2",
@@ -86,6 +89,7 @@ def test_a_campaign_is_watched_and_its_site_opened(page: Any, studio: tuple[str,
     opened.value.get_by_text("fixed_position", exact=False).first.wait_for()
 
 
+@pytest.mark.long
 def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, Path], two_runs: list[Path]) -> None:
     page.goto(base_of(studio) + "/laboratory")
     page.get_by_label("Name", exact=True).fill('Labor "Nord"')
@@ -114,6 +118,7 @@ def test_a_profile_is_kept_and_a_certificate_made(page: Any, studio: tuple[str, 
     page.frame_locator("iframe.report").get_by_text("2026-7").first.wait_for()
 
 
+@pytest.mark.long
 def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
     """The proposed mapping is shown, what the vendor's data sheet says is written into it, and the run has the gyro."""
     fmu = foreign_fmus.make("vendor_gyro", tmp_path)

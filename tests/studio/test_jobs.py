@@ -70,6 +70,7 @@ def test_a_job_does_what_its_command_does(jobs: StudioJobs, tmp_path: Path) -> N
     assert json.loads(Path("report/run.json").read_text())["tables"] == digest, "the lines of Python are another run"
 
 
+@pytest.mark.long
 def test_systems_of_other_kinds_run_by_their_shortest_plan(jobs: StudioJobs) -> None:
     """A loop that is captured, an alignment by sights; all the others: tests/benchmarks/studio_systems.py."""
     jobs.most = 2
@@ -84,6 +85,7 @@ def test_systems_of_other_kinds_run_by_their_shortest_plan(jobs: StudioJobs) -> 
     assert set(SHORT_PLANS) <= set(Bench.find().systems())
 
 
+@pytest.mark.long
 def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     first, second = jobs.submit(LONG), jobs.submit(SHORT)
     file = jobs.folder / first / LIVE
@@ -105,6 +107,7 @@ def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     assert until(jobs, again, ended).state == "stopped"
 
 
+@pytest.mark.long
 def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs) -> None:
     """A new object has what a new studio has: the folders alone."""
     key = jobs.submit(LONG)
@@ -126,6 +129,7 @@ def test_a_killed_studio_loses_nothing_and_a_killed_run_goes_on(jobs: StudioJobs
     assert until(new, on.key, ended).state == "stopped"
 
 
+@pytest.mark.long
 def test_a_run_that_a_killed_studio_has_just_started_is_not_lost(jobs: StudioJobs) -> None:
     """A new studio gives it the time to take its lock; one that never began, or was killed, is lost and goes on."""
     jobs.most = 0
@@ -138,6 +142,7 @@ def test_a_run_that_a_killed_studio_has_just_started_is_not_lost(jobs: StudioJob
     assert until(jobs, jobs.resume(key), ended).state == "done", "there is nothing yet to go on from"
 
 
+@pytest.mark.long
 def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:
     failed = until(jobs, jobs.submit(JobRequest("fixed_position", {"latitude": "3 kg"})), ended)
     assert failed.state == "failed" and "latitude" in failed.report.message

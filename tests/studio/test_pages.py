@@ -133,6 +133,7 @@ def test_a_part_shows_its_equations(page: Any, studio: tuple[str, Path]) -> None
     page.get_by_role("alert").get_by_text("cage").wait_for()
 
 
+@pytest.mark.long
 def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("dwell", exact=True).fill("20000000s")
@@ -165,6 +166,7 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.get_by_role("button", name="Resume").wait_for()
 
 
+@pytest.mark.long
 def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str, Path], tmp_path: Path) -> None:
     """The same record as by the two commands, tests/record/test_messy_file.py."""
     data, mean = messy()
@@ -212,7 +214,9 @@ DRAWN = """() => {
 }"""
 
 
-@pytest.mark.parametrize("name", MOVING)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n == "tumble_two_axis" else pytest.mark.long) for n in MOVING]
+)
 def test_what_is_drawn_stands_as_the_record_says(
     page: Any, studio: tuple[str, Path], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -277,6 +281,7 @@ def test_two_runs_are_compared(page: Any, studio: tuple[str, Path], two_runs: li
     assert len({n.partition(", ")[0] for n in page.evaluate(series)}) == 2, "two signals of two runs"
 
 
+@pytest.mark.long
 def test_by_the_keyboard_alone(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("latitude", exact=True).wait_for()
@@ -303,6 +308,7 @@ PAGES = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_every_page_fits_a_telephone_and_shuts_no_one_out(page: Any, studio: tuple[str, Path]) -> None:
     """390 px; axe-core: names of all controls, contrast of all texts in light and dark, the language."""
     from axe_playwright_python.sync_playwright import Axe
@@ -357,6 +363,7 @@ def test_without_the_token_nothing_is_shown(studio: tuple[str, Path]) -> None:
         assert error.value.code == 403
 
 
+@pytest.mark.long
 def test_a_second_studio_of_the_bench_only_looks_on(studio: tuple[str, Path]) -> None:
     command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0"]
     done = subprocess.run(command, cwd=studio[1], capture_output=True, text=True, timeout=1e-3 * LIMIT)
@@ -366,6 +373,7 @@ def test_a_second_studio_of_the_bench_only_looks_on(studio: tuple[str, Path]) ->
     assert remote.returncode == 2 and "--allow-remote" in remote.stderr
 
 
+@pytest.mark.long
 def test_a_lesson_runs_in_its_page(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/learn")
     page.get_by_text("Why 1/cos makes a keyhole").click()

@@ -118,6 +118,7 @@ TEXTS = """() => {
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason=NONE)
+@pytest.mark.long
 def test_no_english_label_on_a_page_in_chinese(page: Any, studio: tuple[str, Path], two_runs: list[Path]) -> None:
     """The switch leads to Chinese and back."""
     base, left = base_of(studio), {}
@@ -146,6 +147,7 @@ def test_no_english_label_on_a_page_in_chinese(page: Any, studio: tuple[str, Pat
     page.wait_for_function("document.documentElement.lang.startsWith('en')")
 
 
+@pytest.mark.long
 def test_a_studio_begins_in_the_language_it_is_asked_for(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0", "--language", "zh"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:

@@ -8,12 +8,7 @@ from pathlib import Path
 
 NAMES = " ".join(
     f'xmlns:{n}="http://ssp-standard.org/SSP1/SystemStructure{what}"'
-    for n, what in {
-        "ssd": "Description",
-        "ssc": "Common",
-        "ssv": "ParameterValues",
-        "ssm": "ParameterMapping",
-    }.items()
+    for n, what in {"ssd": "Description", "ssc": "Common", "ssv": "ParameterValues", "ssm": "ParameterMapping"}.items()
 )
 LAG = '<ssd:Component name="{}" type="application/x-fmu-sharedlibrary" source="resources/lag.fmu">{}</ssd:Component>'
 

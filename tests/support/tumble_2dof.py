@@ -20,10 +20,7 @@ geometry: Any = importlib.import_module(".geometry", _room)
 
 DPH = math.pi / 180.0 / 3600.0
 K = {"x": 17.227 * DPH / 1e-3, "y": 17.18 * DPH / 1e-3}
-PHASES = {
-    "simple": {1: "mount 1", 2: "mount 2"},
-    "nine": {1: "static 3", 2: "mount 1", 3: "static 4", 4: "mount 2"},
-}
+PHASES = {"simple": {1: "mount 1", 2: "mount 2"}, "nine": {1: "static 3", 2: "mount 1", 3: "static 4", 4: "mount 2"}}
 
 
 def setup(latitude: float = 45.75, model: str = "nine", **changes: Any) -> Any:

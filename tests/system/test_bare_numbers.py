@@ -107,16 +107,17 @@ def documented() -> list[tuple[str, dict[str, str], dict[str, str]]]:
     """System, values and parts of every ``gyrobench run`` in the README files and the guides."""
     found = []
     systems = Bench(standard_folder()).systems()
-    for file in (f for pattern in ("*.md", "docs/**/*.md", "*/*/README.md") for f in ROOT.glob(pattern)):
-        for command in re.findall(r"gyrobench run ([^`\n#]+)", file.read_text("utf-8")):
-            words = shlex.split(command.replace("...", ""))
-            pairs = {option: dict[str, str]() for option in ("--set", "--part")}
-            for option, word in pairwise(words):
-                if option in pairs and "=" in word:
-                    name, _, value = word.partition("=")
-                    pairs[option][name] = value
-            if words and words[0] in systems and pairs["--set"]:
-                found.append((words[0], pairs["--set"], pairs["--part"]))
+    files = (f for pattern in ("*.md", "docs/**/*.md", "*/*/README.md") for f in ROOT.glob(pattern))
+    printed = {c.strip() for f in files for c in re.findall(r"gyrobench run ([^`\n#]+)", f.read_text("utf-8"))}
+    for command in sorted(printed):
+        words = shlex.split(command.replace("...", ""))
+        pairs = {option: dict[str, str]() for option in ("--set", "--part")}
+        for option, word in pairwise(words):
+            if option in pairs and "=" in word:
+                name, _, value = word.partition("=")
+                pairs[option][name] = value
+        if words and words[0] in systems and pairs["--set"]:
+            found.append((words[0], pairs["--set"], pairs["--part"]))
     return found
 
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from archives import LAG, bound, real, write_archive
+from commanding import Command
 from masters import run_in
 
 import gyrobench as gb
@@ -21,7 +22,6 @@ from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.system import Slot, System
 
 Foreign = Callable[[str], Path]
-Command = Callable[..., tuple[int, str, str]]
 LAG_SOCKET = Socket("Lag", "a lag", (inp("u", "1", "in", whole=False), out("y", "1", "out")))
 QUICK = {"dwell": 0.2, "turns": 0.02, "table.index_rate": 1.0}
 

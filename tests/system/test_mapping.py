@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from commanding import Command
 from fmpy import read_model_description
 
 from gyrobench.engine.session import Session, run
@@ -198,7 +199,7 @@ def test_proposals(foreign: Foreign) -> None:
 
 
 @pytest.mark.long
-def test_fit_command(foreign: Foreign, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+def test_fit_command(foreign: Foreign, tmp_path: Path, command: Command) -> None:
     file = tmp_path / "gyro.toml"
     arguments = ("fit", foreign("python_gyro"), "--slot", "tumble_single_axis.gyro")
     code, _, err = command(*arguments, "--out", file)

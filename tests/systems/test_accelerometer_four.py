@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from accelerometers_four import ALPHA, ARCSEC, TRUE, N, head, voltages, windows
+from commanding import Command
 from stated import with_sizes
 
 from gyrobench.engine.session import Session
@@ -22,7 +22,6 @@ from gyrobench.system.system import load_system
 from systems.accelerometer_four import chain, geometry
 from systems.accelerometer_four.reduction import FourSetup, Reduction, reduce
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "accelerometer_four"
 D1 = (1.5e-5, -1.9e-6)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,18 +18,8 @@ ARCSEC = math.pi / 648000.0
 ERU = 7.2921159e-5
 
 
-def load() -> System:
-    return load_system(NAME)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 def measured(session: Session, values: dict[str, Any]) -> Any:
-    return load().with_values(values).reduce(session.run(values))
+    return load_system(NAME).with_values(values).reduce(session.run(values))
 
 
 def random_system(seed: int) -> dict[str, Any]:
@@ -57,7 +46,7 @@ def covered(runs: int, first: int = 0) -> dict[str, float]:
     with Session(NAME) as session:
         for k in range(first, first + runs):
             values = random_system(k)
-            result = load().with_values(values).reduce(session.run(values, seed=k))
+            result = load_system(NAME).with_values(values).reduce(session.run(values, seed=k))
             for c in result.coefficients:
                 if c.truth is not None:
                     kind = c.name if not c.name.startswith(("cos", "sin", "ref")) else c.name.split("_")[0]
@@ -125,7 +114,7 @@ def reduce(windows: Any, run: Any) -> Any:
 @pytest.mark.long
 def test_ideal_readings_return_the_harmonics(document: Any) -> None:
     """Orders by hand: 3" sin(t + 0.4) is 3 sin 0.4 in the cosine, 3 cos 0.4 in the sine."""
-    result = reduce(Ideal().windows(load()), document)
+    result = reduce(Ideal().windows(load_system(NAME)), document)
     expected = {
         "cos_1": 3.0 * math.sin(0.4), "sin_1": 3.0 * math.cos(0.4), "cos_2": -0.7, "sin_2": 0.0, "sin_720": 0.2,
         "cos_360": -0.1, "cos_720": 0.0, "sin_1440": 0.0, "ref_cos_1": 1.1, "ref_sin_1": 0.0, "ref_sin_12": 0.5,
@@ -140,7 +129,7 @@ def test_ideal_readings_return_the_harmonics(document: Any) -> None:
 
 
 def test_a_reading_off_by_a_cycle_is_named_and_taken_out(document: Any) -> None:
-    system = load()
+    system = load_system(NAME)
     clean = reduce(Ideal().windows(system), document)
     result = reduce(Ideal(slip_at=(5,)).windows(system), document)
     table = next(t for t in result.tables if t.id == "readings.slipped")
@@ -184,6 +173,7 @@ def test_random_systems_come_back(runs: list[Any]) -> None:
     assert 0.92 < inside < 0.98
 
 
+@pytest.mark.long
 def test_each_rate_is_read_within_its_u(runs: list[Any]) -> None:
     """Deviation of gates and degrees from the rate of the table: that of the clock drawn, within 4 u each."""
     for k, result in enumerate(runs):
@@ -203,6 +193,7 @@ def test_lag_of_type_1_against_type_2(session: Session) -> None:
     assert abs(two.estimate) < 3 * two.u
 
 
+@pytest.mark.long
 def test_stamps_at_the_second_crossing_are_a_quarter_period_late(session: Session) -> None:
     """Half a period at most, all fine angles alike: T_0/4 = 104.17 us at 2.4 kHz; in the middle none."""
     late = measured(session, {"reader.mode": 0, "reader.stamp": 0})["delay"]

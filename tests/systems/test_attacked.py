@@ -78,6 +78,7 @@ def test_no_kind_of_mistake_passes(test: str, benchmark_of: Any) -> None:
     assert said["a meter 2 % off"] == "asked"
 
 
+@pytest.mark.long
 def test_readings_in_steps_larger_than_their_noise_do_not_pass(benchmark_of: Any) -> None:
     """Read to a tenth of their range they all lay on the model: u was 1e-17 of what the steps do, and it passed."""
     kinds = benchmark_of("handling_kinds")

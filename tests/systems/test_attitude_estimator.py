@@ -97,6 +97,7 @@ def test_the_linear_filter_is_consistent_at_small_angles_only() -> None:
     assert any("NEES" in w and "understates" in w for w in large.result.warnings)
 
 
+@pytest.mark.long
 def test_drift_is_found() -> None:
     """5 deg/h before, some 2 deg/h after 7 minutes, as the filter states."""
     r = made(phases=CALM)
@@ -169,6 +170,7 @@ def test_step_does_not_change_the_figures() -> None:
         assert abs(result[name].estimate - 1.0) < 4.0 * result[name].u
 
 
+@pytest.mark.long
 def test_sea_as_motion() -> None:
     test = gb.load(NAME, phases="rest", parts={"motion": "base_motion"}, rest=200.0)
     test.set("motion.preset", 2)

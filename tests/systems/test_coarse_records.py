@@ -82,6 +82,7 @@ def test_a_fine_angle_passes(tmp_path: Path) -> None:
     assert not any("rounded" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_a_rate_that_another_column_explains_leaves_rounding(tmp_path: Path) -> None:
     x = np.random.default_rng(2).normal(size=1500)
     columns = {"time [s]": np.arange(1500.0), "rate [deg/h]": x, "T [degC]": 20.0 + 3.0 * x}

@@ -62,6 +62,7 @@ def test_the_two_filters_are_complementary(quiet: Any) -> None:
     assert any("linear" in c.label for c in r.curves)
 
 
+@pytest.mark.long
 def test_cut_off_is_k_over_two_pi_measured_and_computed(quiet: Any) -> None:
     f_c = quiet["f_c slaving"]
     assert f_c.estimate == pytest.approx(1.0 / (120.0 * math.pi), rel=1e-3)
@@ -79,6 +80,7 @@ def test_time_constant_under_noise() -> None:
     assert all(0.3 < c.u < 4.0 for c in found)
 
 
+@pytest.mark.long
 def test_drift_at_rest_leaves_the_drift_over_k(quiet: Any) -> None:
     """5 deg/h times 60 s: 0.0833 degrees; without correction 5 - 9.667 deg/h: -0.0778."""
     assert quiet["error at rest"].estimate == pytest.approx(5.0 / 60.0, rel=1e-4)
@@ -95,6 +97,7 @@ def test_declination_makes_the_heading_true() -> None:
     assert true.estimate == pytest.approx(5.0 / 60.0, rel=1e-3)
 
 
+@pytest.mark.long
 def test_error_in_the_turn_is_the_gyros_with_cut_off_and_the_limit_without(quiet: Any) -> None:
     """60 s: with cut-off 0.0833 + 5 deg/h 60 s = 0.1667 degrees.  Without, the limit of 2 deg/min follows the magnetic
     heading, whose error turns its sign half way: beyond 1 degree.
@@ -104,6 +107,7 @@ def test_error_in_the_turn_is_the_gyros_with_cut_off_and_the_limit_without(quiet
     assert open_["error in the turn"].estimate > 0.8 > 0.3 > quiet["error after the turn"].estimate
 
 
+@pytest.mark.long
 def test_magnetic_error_in_the_turn_is_that_of_the_tilted_plane(quiet: Any) -> None:
     """Tilted by delta = atan(v w / g): B.x' = -sin psi cos delta + tan I sin delta, B.y' = cos psi, over all psi."""
     delta = math.atan(50.0 * 3 * DEG / 9.80665)

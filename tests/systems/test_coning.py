@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
@@ -19,7 +19,6 @@ from gyrobench.system.system import load_system
 from systems.coning_test.closed import Chain
 from systems.coning_test.reduction import ConingSetup, Reduction
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "coning_test"
 DPH = math.pi / 648000.0
 DEG = math.pi / 180.0
@@ -92,12 +91,6 @@ def test_the_share_that_is_computed() -> None:
         assert Chain(0.01).kappa(f, 1e-4) == pytest.approx(1.0, abs=1e-5)
         assert Chain(0.01, 0.0, 50.0).kappa(f, 1e-4) == pytest.approx(1.0 / (1.0 + (f / 50.0) ** 4), abs=1e-5)
         assert abs(butterworth_gain(f, 50.0, 1e-5)) == pytest.approx((1.0 + (f / 50.0) ** 4) ** -0.5, rel=1e-4)
-
-
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 @pytest.mark.parametrize("seed", range(3))

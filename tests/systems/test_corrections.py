@@ -19,6 +19,8 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
+NAME = "tumble_single_axis"
+
 ARCSEC = math.pi / 648000.0
 GYRO = {"D_F": -0.3, "D_I": -0.9, "D_O": 0.1, "D_S": -0.7, "D_II": -0.05, "D_SS": 0.04}  # deg/h/g^n
 

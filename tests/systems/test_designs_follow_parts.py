@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commanding import Command
 from gimballed import only
 
 from gyrobench.engine.session import Session
@@ -15,7 +16,6 @@ from gyrobench.record.record import Record
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
-Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 FOREIGN = Path(__file__).parents[1] / "foreign"
 ONE, THREE, GIMBAL = "platform_single_axis", "platform_three_axis", "platform_three_gimbal"

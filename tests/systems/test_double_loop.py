@@ -126,6 +126,7 @@ def test_a_part_with_a_tachometer_takes_the_double_loop() -> None:
     assert system["loops"] == "double" and system.crossovers() == {"stabilizer": 10.0}
 
 
+@pytest.mark.long
 def test_noise_is_in_the_largest_angle() -> None:
     """Four runs with noise beside one without: the pickoff moves the platform slowly, within the loop's bandwidth."""
     hold = LoopPhase("drift", "hold", settle=0.5, dwell=4.0)

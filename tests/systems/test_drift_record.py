@@ -6,12 +6,12 @@ import importlib
 import json
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.engine.session import Session
 from gyrobench.record import block_means
@@ -23,7 +23,6 @@ from gyrobench.system.system import System, load_system
 
 NAME = "drift_record"
 DPH = math.pi / 648000.0
-Command = Callable[..., tuple[int, str, str]]
 P: Any = importlib.import_module(".preparation", type(load_system(NAME)).__module__)
 
 
@@ -222,6 +221,7 @@ def test_a_deviation_that_only_falls_bounds_the_least_one_from_above(tmp_path: P
     assert found.no_value and found.interval[0] == 0.0 < found.interval[1] < 0.1 and " at " not in found.meaning
 
 
+@pytest.mark.long
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.
 

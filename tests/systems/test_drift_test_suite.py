@@ -230,6 +230,7 @@ def test_a_wrong_scale_factor_is_one_error_of_all_that_use_it(sessions: dict[str
     assert words.startswith("servo_polar deviates by")  # what an unstated common error does
 
 
+@pytest.mark.long
 def test_two_methods_cannot_tell_which_is_off(sessions: dict[str, Session]) -> None:
     chosen, true = floated(3, "tumble_single_axis servo_polar")
     chosen.set("servo_polar.gyro.D_I", true["D_I"] + 0.5 * DPH)

@@ -7,12 +7,12 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy import stats
 from undiagnosed import reduce_undiagnosed
 
@@ -30,7 +30,6 @@ DPH = math.pi / 648000.0
 KU = DPH / 1e-3
 W = frames.EARTH_RATE
 LIMIT = 1e-6  # deg/h
-Command = Callable[..., tuple[int, str, str]]
 
 #: 112 s; the slowest pole of the loops, -11.3 1/s, leaves exp(-34) of a change of position after 3 s.
 SHORT: dict[str, Any] = {"cycles": 2, "readings": 2, "dwell": 4.0, "settle": 3.0}
@@ -41,12 +40,6 @@ def load() -> System:
 
 
 QUIET = {"nuisances": "none", **{n: 0.0 for n in load().noises}}
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def gyro(rng: np.random.Generator, terms: int = 10) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,12 +23,6 @@ GYRO = {"D_S": 1.5, "D_I": -2.0, "D_IO": 0.0, "D_OS": 0.0, "D_IS": 0.0, "D_SS": 
 PLAN = {"dwell": 1200.0, "readings": 60, "latitude": PHI, "tilting": 20.0 * ARCSEC}
 G = frames.normal_gravity(PHI) / frames.G0
 W = frames.EARTH_RATE / DPH  # deg/h
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def values(session: Session, more: dict[str, Any]) -> dict[str, Any]:

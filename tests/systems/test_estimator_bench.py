@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench import report
 from gyrobench.engine.run_errors import ParameterRefusedError
@@ -20,7 +21,6 @@ from gyrobench.report.comparison_page import comparison
 from gyrobench.system.system import InvalidConfigurationError, load_system
 from gyrobench.system.values import InvalidValueError
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "estimator_bench"
 
 

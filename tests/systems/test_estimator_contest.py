@@ -221,6 +221,7 @@ def test_a_missing_reading_is_held(quiet: Any) -> None:
     assert np.allclose(estimate[inside & (into > 0.0315)], reading[inside & (into > 0.0315)])
 
 
+@pytest.mark.long
 def test_more_noise_is_three_times_the_noise(noisy: Any, quiet: Any) -> None:
     """White: the ripple of the motor grows with the density; 2.2 % of noise in each rms."""
     _, calm = ride(noisy.record, "ride", "stabilizer.v")

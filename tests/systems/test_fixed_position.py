@@ -6,12 +6,12 @@ import importlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy import stats
 
 from gyrobench import drift, frames
@@ -37,12 +37,6 @@ def load() -> System:
 QUIET = {n: 0.0 for n in load().noises}
 PACKAGE = type(load()).__module__
 R: Any = importlib.import_module(".reduction", PACKAGE)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
@@ -217,7 +211,7 @@ def test_trend_is_seen(session: Session) -> None:
 
 
 # ------------------------------------------------------------------------------------------ files and days
-def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+def test_laboratory_file(session: Session, tmp_path: Path, command: Command) -> None:
     values = {**SHORT, "attitude": "U E"}
     record = session.run(values, seed=2)
     expected = load().with_values(values).reduce(record).coefficients[0]

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from gimballed import DEG, STILL, measures
 
 from gyrobench.engine.run_errors import RunError
 from gyrobench.engine.session import Session
 
-Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 NAME = "platform_three_gimbal"
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_platform.toml"
@@ -76,6 +76,7 @@ def test_a_platform_that_takes_no_acceleration_of_the_base_fits(foreign: Foreign
         assert {"BASE_X", "LOAD_Z"} <= wired and not wired & {"BACC_X", "BACC_Y", "BACC_Z"}
 
 
+@pytest.mark.long
 def test_measures_of_the_vendors_platform(both: Any) -> None:
     """The channels follow rate_gain: stiffness drag feedback = 150 40 = 6000 N.m/rad.  There is no linear model of the
     vendor's, which is said, and margins without it."""

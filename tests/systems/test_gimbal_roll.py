@@ -20,6 +20,8 @@ from support.gimbal_rides import ridden, rows
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 
+pytestmark = pytest.mark.long
+
 README = Path(__file__).parents[2] / "systems" / "gimbal_stabilization" / "README.md"
 ASKEW = math.radians(40.0)
 UP_TO = 1.0  # s, of the comparison
@@ -112,7 +114,6 @@ def roll(tmp_path_factory: Any) -> str:
 
 
 @pytest.mark.parametrize(("form", "inner"), [("yaw-pitch", "pitch"), ("pitch-yaw", "yaw")])
-@pytest.mark.long
 def test_a_roll_past_the_bearings_is_rigid_kinematics(form: str, inner: str, roll: str) -> None:
     """About the outer axis the loop alone takes tan 40 degrees of the roll: hundreds of µrad, in both forms.
 
@@ -136,7 +137,6 @@ def test_a_roll_past_the_bearings_is_rigid_kinematics(form: str, inner: str, rol
 
 
 @pytest.mark.parametrize("form", ["yaw-pitch", "pitch-yaw"])
-@pytest.mark.long
 def test_second_order_is_in_the_budget(form: str) -> None:
     """A vehicle four times as rough: the roll times the joint angle rules, 16 times as large; budget within 2 %."""
     result, _ = ridden(form=form, psd_scale=4.0, gyro_noise=0.0, ride=36.0)
@@ -153,7 +153,6 @@ def printed_swaps() -> list[dict[str, str]]:
     return [f for f in found if f]
 
 
-@pytest.mark.long
 def test_printed_swaps_give_a_result() -> None:
     """With sines of the base, which a manoeuvre does not make: the isolation has no value, and the rest stands."""
     swaps = printed_swaps()

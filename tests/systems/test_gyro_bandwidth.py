@@ -134,6 +134,7 @@ def test_set_up_errors_do_what_is_predicted(wrong: Result) -> None:
     assert rows["f_90"][3] == pytest.approx(c["f_90"].estimate - c["f_90"].truth, rel=0.15)
 
 
+@pytest.mark.long
 def test_stated_uncertainties_are_in_u(wrong: Result) -> None:
     c = found(wrong)
     assert c["K"].u == pytest.approx(0.01, rel=0.05) and c["delay"].u == pytest.approx(0.2, rel=0.05)

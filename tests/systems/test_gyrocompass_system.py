@@ -71,6 +71,7 @@ def test_latitude_error(quiet: Any, liquid: Any) -> None:
     near(liquid, "latitude error", 0.0, 2e-4)
 
 
+@pytest.mark.long
 def test_liquid_damps_as_its_cubic(liquid: Any) -> None:
     """z^3 + z^2 + z + 1 - b = 0 with the pair z at the damping ratio 0.33; its damped period is 2 pi/(Omega Im z)."""
     y = liquid["damping ratio"].estimate
@@ -100,6 +101,7 @@ def test_settling_time_is_that_of_the_equations_in_angles() -> None:
     assert any("beyond 30° it does not swing as a linear" in w for w in found.warnings)
 
 
+@pytest.mark.long
 def test_speed_error_is_tan_formula(quiet: Any, liquid: Any) -> None:
     """North at 10 m/s: 1.61 degrees; then 135 degrees: tan = V cos psi/(R w cos L + V sin psi).
 

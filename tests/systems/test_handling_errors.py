@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from test_tumble_measured import laboratory
 from tumbling import NAME, SHORT
 
@@ -22,7 +23,6 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import fit
 from gyrobench.reduction.estimation.quantity import Quantity
 
-Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients."{}"]\nunit = "{}"\nmin = -1e6\nmax = 1e6\n'
 DIAGNOSIS = "handling.diagnosis"
 
@@ -114,6 +114,7 @@ def test_a_refused_record_says_what_would_make_it_one(command: Command, text: st
     assert code in (2, 3) and "the angles in degrees, not in rad: was that mistaken?" in " ".join(err.split())
 
 
+@pytest.mark.long
 def test_exchanged_currents_of_a_torquer(command: Command, tmp_path: Path) -> None:
     """Eight rows, no test of residuals: currents of neighbouring rows exchanged make K_n of twice and half the size."""
     table = (standard_folder() / "systems" / "torquer_scale_factor" / "book_table.csv").read_text("utf-8")

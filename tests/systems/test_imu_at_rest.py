@@ -162,6 +162,7 @@ def test_a_rate_follows_the_change_of_the_temperature(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_arma")
+@pytest.mark.long
 def test_a_change_that_follows_its_temperature_is_left_out(tmp_path: Path) -> None:
     """A warm-up, T = -3 exp(-t/tau): its rate of change is 3/tau exp(-t/tau), the same but for the factor."""
     n = 4096

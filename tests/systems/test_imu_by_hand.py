@@ -154,6 +154,8 @@ SIGNS = {
     "gyros: against the accelerometers the signs of z are reversed; so labelled": lambda g, a: (g * [1, 1, -1], a),
     "the signs of x and y are reversed, or the sign of the accelerometer z is": lambda g, a: (g, a * [1, 1, -1]),
     "accelerometers: at rest they read 0.99": lambda g, a: (g, a / G0),
+    "gyros: readings in °/s were taken for rad/s": lambda g, a: (np.degrees(g), a),
+    "gyros: readings in rad/s were taken for °/s": lambda g, a: (np.radians(g), a),
 }  # fmt: skip
 
 

@@ -78,6 +78,7 @@ def test_what_is_left_is_that_of_plain_numpy() -> None:
             assert left[f"Sa_{a}{b}"] == pytest.approx(own[1 + k, i], abs=1e-12)
 
 
+@pytest.mark.long
 def test_the_same_values_for_other_tools(calibrated: Any, tmp_path: Path) -> None:
     _, run, (toml, document, header) = calibrated
     held = json.loads(document.read_text(encoding="utf-8"))["parameters"]

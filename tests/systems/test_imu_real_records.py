@@ -70,6 +70,7 @@ def test_xsens_against_its_data_sheet(xsens: Any) -> None:
         assert -angles["accelerometers", axes] / 206264.8 == pytest.approx(cosine, abs=0.01)
 
 
+@pytest.mark.long
 def test_xsens_against_the_estimator_of_its_authors(xsens: Any) -> None:
     """Tedaldi 2014, eq. 10, written anew: f = T K (a - b), T upper triangular, minimized over the same positions; both
     have the same sizes, and scale factors that differ by products of misalignments only."""

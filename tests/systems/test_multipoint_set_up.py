@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from multipoint import G0, KS, NAME, estimates, load, module, polynomial, quiet, windows
+from multipoint import G0, KS, estimates, load, module, polynomial, quiet, windows
 from stated import with_sizes
 
 from gyrobench import frames
@@ -20,6 +19,7 @@ from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
 
+NAME = "accelerometer_multipoint"
 ARCSEC = math.pi / 648000.0
 K4, K5 = 8e-3, -12e-3
 VALUES: dict[str, Any] = {
@@ -29,15 +29,9 @@ VALUES: dict[str, Any] = {
 TURN = 2.0 * math.pi * np.arange(24) / 24
 
 
-@pytest.fixture(scope="module")
-def head() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
-def reduced(head: Session, values: dict[str, Any], corrections: str = "") -> Result:
+def reduced(session: Session, values: dict[str, Any], corrections: str = "") -> Result:
     given = {**quiet(load()), "accelerometer.white": 1e-8, **VALUES, **values, "corrections": corrections}
-    return load().with_values(given).reduce(head.run(given, seed=1))
+    return load().with_values(given).reduce(session.run(given, seed=1))
 
 
 def turned(axis: int, angle: float) -> list[list[float]]:
@@ -82,10 +76,10 @@ CASES = [
 
 @pytest.mark.parametrize(("error", "source", "size", "by_hand"), CASES, ids=lambda x: x if isinstance(x, str) else "")
 def test_an_error_is_predicted_and_taken_out(
-    head: Session, error: dict[str, Any], source: str, size: float, by_hand: dict[str, float]
+    session: Session, error: dict[str, Any], source: str, size: float, by_hand: dict[str, float]
 ) -> None:
-    plain, wrong = reduced(head, {}), reduced(head, error)
-    right = reduced(head, error, f"{source} = {size}(0.1) arcsec")
+    plain, wrong = reduced(session, {}), reduced(session, error)
+    right = reduced(session, error, f"{source} = {size}(0.1) arcsec")
     names = [c.name for c in plain.coefficients]
     off, left = ({n: r[n].estimate - plain[n].estimate for n in names} for r in (wrong, right))
     for n, x in by_hand.items():
@@ -100,19 +94,19 @@ def test_an_error_is_predicted_and_taken_out(
         assert shift[n] == pytest.approx(x, rel=0.2), n
 
 
-def test_errors_that_are_not_stated_leave_the_estimates_alone(head: Session) -> None:
+def test_errors_that_are_not_stated_leave_the_estimates_alone(session: Session) -> None:
     with pytest.raises(ReductionError, match="no source 'angle error, once a turn'; meant is perhaps"):
-        reduced(head, {}, "angle error, once a turn = 1(1) arcsec")
+        reduced(session, {}, "angle error, once a turn = 1(1) arcsec")
 
 
 @pytest.mark.long
-def test_stated_errors_of_the_head_are_held(head: Session) -> None:
+def test_stated_errors_of_the_head_are_held(session: Session) -> None:
     """Thirty records of 24 positions in both mounts, noise of 1 ug, each with readings that are off by 2 arcsec once a
     turn (sine, cosine: 9.7 ug/g^2 in k4 and k5): stated, 0.90 or more of the intervals hold; not stated, those of k5
     mostly do not.
     """
     given = {**quiet(load()), **VALUES, "accelerometer.white": 0.0}
-    record = head.run(given, seed=1)
+    record = session.run(given, seed=1)
     windows, gamma = dict(record.windows), load().with_values(given).reduce(record).site["gravity / (m/s²)"] / frames.G0
     rng = np.random.default_rng(3)
     stated = load().with_values({**given, "u_angle1": 2.0 * ARCSEC})
@@ -200,8 +194,8 @@ def test_exchanged_mounts_are_asked_for(tmp_path: Path) -> None:
             assert bool(asked) == (not said) and all("a and b exchanged" in text for text in asked)
 
 
-def test_a_plan_says_before_the_test_what_it_cannot_see(head: Session) -> None:
+def test_a_plan_says_before_the_test_what_it_cannot_see(session: Session) -> None:
     """The mounts exchanged are shown by no position of the head; the zero of the angles in one mount is theta_0."""
     values = {"settle": 0.6, "dwell": 0.2, "accelerometer.k4": K4, "accelerometer.k5": K5}
-    said = mistakes_unshown(load().with_values(values), head.run(values, seed=2))
+    said = mistakes_unshown(load().with_values(values), session.run(values, seed=2))
     assert any(s.startswith("a and b exchanged: no residual of this plan shows it (") for s in said), said

@@ -12,7 +12,7 @@ from gyrobench import units
 from gyrobench.component.blocks.random_drift import INNER, OUTER, RATIO, RELAXATIONS
 from gyrobench.system.system import load_system
 from gyrobench.workflow.instruments import find_instrument, parameters, with_instruments
-from systems.north_finder.after import RandomErrors, heading, in_words, level, reached_after, running, table
+from systems.north_finder.after import RandomErrors, heading, in_words, level, position, reached_after, running, table
 from systems.north_finder.reduction import NorthFinderSetup, Reduction
 
 DEG = math.pi / 180.0
@@ -69,6 +69,38 @@ def test_the_earth_rate_turns_the_errors_of_the_axes_into_each_other() -> None:
     kept = running(white, 0.0, 1e-3, t, 45.0 * DEG) / running(white, 0.0, 1e-3, t)
     assert kept**2 == pytest.approx(0.5 * (1.0 + (math.sin(0.5 * W * t) / (0.5 * W * t)) ** 2), rel=1e-4)
     assert 1.0 > running(walk, 0.0, T, 600.0, 45.0 * DEG) / running(walk, 0.0, T, 600.0) > 0.9995
+
+
+def test_position_by_hand_and_by_integration() -> None:
+    """White noise N of a gyro for a minute after T: g2 N2 (t5/20 + t6/(36 T)), of an accelerometer N2 (t3/3 +
+    t4/(4 T)), the 84 minutes not yet felt.  Then 20 minutes against 3000 paths of x'' = g (theta - x/R) + a,
+    theta' = e.
+    """
+    g, t, T = 9.8, 60.0, 300.0
+    white = RandomErrors(1e-6)
+    tilted = g**2 * 1e-12 * (t**5 / 20.0 + t**6 / (36.0 * T))
+    moved = 1e-6 * (t**3 / 3.0 + t**4 / (4.0 * T))
+    assert position(white, None, g, T, t) ** 2 == pytest.approx(tilted, rel=2e-3)
+    assert position(white, RandomErrors(1e-3), g, T, t) ** 2 == pytest.approx(tilted + moved, rel=2e-3)
+    rng, h, paths = np.random.default_rng(4), 2.0, 3000
+    noise = {
+        "gyro": RandomErrors(1e-6, walk=3e-9), "force": RandomErrors(1e-4, markov=1e-5, markov_tau=100.0),
+    }  # fmt: skip
+    n, begin = round((T + 1200.0) / h), round(T / h)
+    e = 1e-6 * rng.normal(size=(paths, n)) / math.sqrt(h)
+    e += np.cumsum(3e-9 * math.sqrt(h) * rng.normal(size=(paths, n)), axis=1)
+    a, slow, keep = 1e-4 * rng.normal(size=(paths, n)) / math.sqrt(h), rng.normal(size=paths), math.exp(-h / 100.0)
+    for k in range(n):
+        a[:, k] += 1e-5 * slow
+        slow = keep * slow + math.sqrt(1.0 - keep**2) * rng.normal(size=paths)
+    e, a = (x[:, begin:] - x[:, :begin].mean(axis=1)[:, None] for x in (e, a))
+    theta, x, v = np.zeros(paths), np.zeros(paths), np.zeros(paths)
+    for k in range(n - begin):
+        v += h * (g * (theta + 0.5 * h * e[:, k] - x / 6371008.8) + a[:, k])
+        theta += h * e[:, k]
+        x += h * v
+    found = position(noise["gyro"], noise["force"], g, T, 1200.0)
+    assert float(np.sqrt(np.mean(x**2))) == pytest.approx(found, rel=0.07)  # 5/sqrt(6000), and half a step
 
 
 def test_by_hand() -> None:

@@ -6,12 +6,12 @@ import importlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import Session
@@ -19,7 +19,7 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
-from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "open_loop_drift"
 DPH = math.pi / 648000.0
@@ -28,22 +28,12 @@ W = frames.EARTH_RATE
 SHORT: dict[str, Any] = {"pairs": 5, "wait": 6.0, "dwell": 0.1}  # 66 s
 
 
-def load() -> System:
-    return load_system(NAME)
-
-
-QUIET = {n: 0.0 for n in load().noises}
-R: Any = importlib.import_module(".reduction", type(load()).__module__)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
+QUIET = {n: 0.0 for n in load_system(NAME).noises}
+R: Any = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
 
 
 def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
-    result: Result = load().with_values(values).reduce(session.run(values, seed=seed))
+    result: Result = load_system(NAME).with_values(values).reduce(session.run(values, seed=seed))
     return result
 
 
@@ -133,8 +123,8 @@ def test_signs_of_attitude_and_latitude(session: Session) -> None:
     values = {**SHORT, **QUIET, **{f"gyro.{n}": 0.0 for n in drift.terms(9)}, "attitude": "U E", "latitude": phi}
     values |= {"u_latitude": eps, "u_attitude": eps}
     record = session.run(values)
-    plain = load().reduce(record)
-    stated = load().reduce(
+    plain = load_system(NAME).reduce(record)
+    stated = load_system(NAME).reduce(
         Record(record.windows, {}, record.run.replace(options={**record.run.options, "latitude": phi + eps}))
     )
     turned = reduced(session, {**values, "gyro.mount": frames.rotation([0.0, 1.0, 0.0], eps).T.tolist()})
@@ -163,7 +153,7 @@ def test_out_of_range(session: Session) -> None:
     """A drift of 100 deg/h runs the float 34 arcmin off in 20 s: flagged."""
     record = session.run({**SHORT, **QUIET, "gyro.D_F": 100.0 * DPH})
     with pytest.raises(ValueError, match="flagged windows"):
-        load().reduce(record)
+        load_system(NAME).reduce(record)
 
 
 def test_turning_sky_warns(session: Session) -> None:
@@ -194,9 +184,9 @@ def test_refused_records() -> None:
 
 # ------------------------------------------------------------------------------------------ laboratory files
 @pytest.mark.long
-def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+def test_laboratory_file(session: Session, tmp_path: Path, command: Command) -> None:
     record = session.run({**SHORT, "latitude": 0.5}, seed=3)
-    expected = load().reduce(record).coefficients[0]
+    expected = load_system(NAME).reduce(record).coefficients[0]
     code, template, err = command("reduce", NAME, "--template")
     assert code == 0, err
     w = {n: v.tolist() for n, v in record.windows.items()}
@@ -213,7 +203,7 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Callable[...
     assert result["coefficients"][0]["estimate"] == pytest.approx(expected.estimate, abs=2e-3)  # time of moves unknown
     (tmp_path / "bad.csv").write_text(text.replace("# attitude = E U -N\n", ""), encoding="utf-8")
     with pytest.raises(DataError, match="'attitude' is not given"):
-        load().read_measured(tmp_path / "bad.csv", {})
+        load_system(NAME).read_measured(tmp_path / "bad.csv", {})
 
 
 def test_hand_that_nulls(tmp_path: Path) -> None:
@@ -221,6 +211,6 @@ def test_hand_that_nulls(tmp_path: Path) -> None:
     rows = "\n".join(f"{10 * n},{10 * n + 1},{(0.4 - 15.041068732) / 360 * n!r}" for n in range(11))
     text = f"# latitude = 90deg\n# attitude = U E\nt_start [s],t_end [s],angle [arcmin]\n{rows}\n"
     (tmp_path / "hand.csv").write_text(text, encoding="utf-8")
-    result = load().reduce(load().read_measured(tmp_path / "hand.csv", {}))
+    result = load_system(NAME).reduce(load_system(NAME).read_measured(tmp_path / "hand.csv", {}))
     # n steps of (rate / 360) arcmin in 10 s: rate / 360 * 60 arcsec / 10 s = rate / 60 arcsec/s
     assert result.coefficients[0].estimate == pytest.approx((0.4 - 15.041068732) / 60.0 + 15.041068732, abs=1e-6)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,12 +19,6 @@ DPH = ARCSEC = math.pi / 648000.0
 SIZE = 60.0 * ARCSEC  # 2.909e-4 rad
 PHI = math.radians(45.75)
 W = frames.EARTH_RATE / DPH  # 15.041 deg/h
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def values(session: Session, more: dict[str, Any]) -> dict[str, Any]:

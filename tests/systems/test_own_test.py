@@ -8,10 +8,10 @@ import math
 import shutil
 import sys
 import typing
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.bench import Bench, UsageError, standard_folder
 from gyrobench.engine.session import Session
@@ -24,7 +24,6 @@ from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import System, load_system
 from gyrobench.workflow.catalog import init_bench
 
-Command = Callable[..., tuple[int, str, str]]
 EXAMPLE = standard_folder() / "docs" / "guides" / "own_test" / "system.py"
 NAME = "six_position"
 

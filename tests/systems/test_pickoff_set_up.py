@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from pickoffs import DPH, NAME, R, load, made
+from pickoffs import DPH, R, load, made
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.result import Result
 
+NAME = "pickoff_scale_factor"
 ARCSEC = math.pi / 648000.0
 MINUTE = 60.0 * ARCSEC  # 2.909e-4 rad
-
-
-@pytest.fixture(scope="module")
-def stepping() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def reduced(session: Session, values: dict[str, Any], corrections: str = "") -> Result:
@@ -46,11 +40,11 @@ CASES = [
 
 @pytest.mark.parametrize(("error", "source", "by_hand"), CASES, ids=[c[1] for c in CASES])
 def test_an_error_is_predicted_and_taken_out(
-    stepping: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
+    session: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
 ) -> None:
     """By hand to 0.1 % (S relative, drift in deg/h), in the report of the run, and out of the estimates again."""
-    plain, wrong = reduced(stepping, {}), reduced(stepping, error)
-    right = reduced(stepping, error, f"{source} = 60(1) arcsec")
+    plain, wrong = reduced(session, {}), reduced(session, error)
+    right = reduced(session, error, f"{source} = 60(1) arcsec")
     (said,) = [t for t in wrong.tables if t.id == PREDICTED]
     shift = {row[0]: row[-3] for row in said.rows}
     for name, x in by_hand.items():
@@ -63,10 +57,10 @@ def test_an_error_is_predicted_and_taken_out(
         assert math.sqrt(right[name].u ** 2 - right[name].u_a ** 2) / size == pytest.approx(abs(x) / 60.0, rel=0.02)
 
 
-def test_angles_gone_over_once_take_the_earth_for_slope(stepping: Session) -> None:
+def test_angles_gone_over_once_take_the_earth_for_slope(session: Session) -> None:
     """One way, what the axis sees of the Earth looks like the slope: rate times the time of the test over the span."""
-    plain, wrong = (reduced(stepping, {"both_ways": False, **e}) for e in ({}, {"table.tilt[2]": 10.0 * MINUTE}))
-    right = reduced(stepping, {"both_ways": False, "table.tilt[2]": 10.0 * MINUTE},
+    plain, wrong = (reduced(session, {"both_ways": False, **e}) for e in ({}, {"table.tilt[2]": 10.0 * MINUTE}))
+    right = reduced(session, {"both_ways": False, "table.tilt[2]": 10.0 * MINUTE},
                     "table axis towards the pole = 10(0.1) arcmin")  # fmt: skip
     off, left = (r["S"].estimate - plain["S"].estimate for r in (wrong, right))
     assert off > 0.0 and abs(left) < 1e-2 * off

@@ -30,12 +30,6 @@ FIXED = {"coarse_time": 40.0, "fast": 0.04, "fast_time": 60.0, "slow": 0.02, "wa
 
 
 @pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(load_system(NAME)) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def aligned(session: Any) -> Any:
     """One noisy alignment at default values: (record, result)."""
     record = session.run({}, seed=3)
@@ -75,6 +69,7 @@ def test_without_errors_the_heading_is_right(clean: Any) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.long
 def test_a_simulated_error_has_the_sign_and_size_of_its_budget_line(session: Any, clean: Any, name: str) -> None:
     """A known drift that is too small by d leaves the drift d.  Zero: below 2 % of what d/N would be."""
     values, source, expected, part = CASES[name]
@@ -102,6 +97,7 @@ def test_a_wrong_latitude_moves_order_two_and_not_order_three(session: Any, clea
     assert two == pytest.approx(math.sqrt(2.0) * u / w * ratio, rel=0.02)  # 0.30 arcmin
 
 
+@pytest.mark.long
 def test_base_motion_adds_little_to_a_platform_that_holds_still(session: Any, clean: Any) -> None:
     """Bus: 0.01 m/s2 about 5 Hz, whose mean is 0; the gains that rise slowly keep it out: a fifth of sigma at most."""
     system = load_system(NAME)
@@ -125,6 +121,7 @@ def test_base_motion_adds_little_to_a_platform_that_holds_still(session: Any, cl
     assert line.size == pytest.approx(1e3 * told) and line.contribution * 60.0 < 2.0
 
 
+@pytest.mark.long
 def test_two_positions_leave_the_drift_out(session: Any, clean: Any) -> None:
     """0.05 deg/h along x is 16 arcmin in one position."""
     known = clean[0].run.parameters["controller.drift"][0]
@@ -245,6 +242,7 @@ def test_what_is_not_expected_is_told_before_the_run() -> None:
 @pytest.mark.parametrize("latitude", [0.0, 70.0])
 @pytest.mark.parametrize("grade", ["precise", "navigation", "tactical"])
 @pytest.mark.parametrize("positions", [1, 2])
+@pytest.mark.long
 def test_a_looser_heading_is_never_ready_later(latitude: float, grade: str, positions: int) -> None:
     """Predicted times over a grid of wanted standard deviations; two positions were later by up to four minutes."""
     sensors = plans.GRADES[grade]

@@ -24,12 +24,6 @@ QUIET = {
 PERFECT = {**QUIET, "mounting": 0.0, "torquer": 0.0, "residual": 0.0, "quantum": 0.0, "time": 20.0}
 
 
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as s:
-        yield s
-
-
 def drifts(s: Session, **values: Any) -> tuple[np.ndarray, Any]:
     result = s.system.with_values({}).reduce(s.run({**PERFECT, **values}))
     c = {c.name: c for c in result.coefficients}
@@ -102,6 +96,7 @@ def test_each_error_makes_the_drift_of_the_closed_form(session: Session) -> None
     assert found == pytest.approx(np.linalg.solve(rows, w) - w, rel=3e-3, abs=2e-4 * DPH)
 
 
+@pytest.mark.long
 def test_slow_drift_is_in_the_interval(session: Session) -> None:
     """Drift that 20 s cannot tell from a constant: the interval holds the constant one, and is not many times too wide.
 

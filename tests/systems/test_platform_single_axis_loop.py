@@ -56,6 +56,7 @@ def test_commanded_rate_is_reached(quiet):
     assert found["settling"].estimate < 0.3
 
 
+@pytest.mark.long
 def test_isolation_is_that_of_the_friction_and_the_back_emf(quiet):
     """The base drags by (viscous + k_e k_t / R) (omega_b - omega): without both it cannot."""
     _, result, _ = quiet
@@ -103,6 +104,7 @@ def test_every_estimator_runs_in_the_loop(name):
         assert found["platform error"].estimate < 10.0
 
 
+@pytest.mark.long
 def test_servo_with_a_current_loop_swaps_and_isolates_better(quiet):
     """The current loop holds the torque against the back EMF, which is what the base drags by."""
     _, result, found = reduced({"stabilizer": "servo_three_loop"}, **QUIET)
@@ -124,6 +126,7 @@ def test_halving_the_step_moves_the_margin_by_its_delay():
     assert 0.0 < first < 3.6 and second == pytest.approx(first / 2.0, rel=0.2)
 
 
+@pytest.mark.long
 def test_ride_by_a_recorded_profile(tmp_path, quiet):
     """Pitch of 1 degree at 1 Hz as a recording leaves what the exciter's sine of that size leaves, but for its ends."""
     t = np.arange(0.0, 20.0, 0.05)
@@ -136,6 +139,7 @@ def test_ride_by_a_recorded_profile(tmp_path, quiet):
     assert "drift" not in recorded
 
 
+@pytest.mark.long
 def test_no_crossover_out_of_noise():
     """Thirty times the noise at 15 Hz: 58.5 Hz was stated where the linear model has 15.4; now no value, and why."""
     noisy = {"crossover": 15.0, "reading_noise": 3e-3}
@@ -151,6 +155,7 @@ def test_no_crossover_out_of_noise():
         assert any("too noisy at" in w and "do not count" in w for w in result.warnings)
 
 
+@pytest.mark.long
 def test_dry_friction_leaves_no_crossover_and_the_result_says_why():
     _, result, found = reduced(**QUIET, **{"platform.friction": 0.5, "platform.stiction": 0.8})
     for name in ("f_c", "PM"):
@@ -159,6 +164,7 @@ def test_dry_friction_leaves_no_crossover_and_the_result_says_why():
     assert result.verdict != "void"  # the other measures stand
 
 
+@pytest.mark.long
 def test_measured_and_computed_margins_that_differ_are_named_with_the_cause():
     """Little friction: the loop slips and loses phase that the linear model, stuck in the contact, still has."""
     _, result, found = reduced(**QUIET, **{"platform.friction": 0.05})
@@ -167,6 +173,7 @@ def test_measured_and_computed_margins_that_differ_are_named_with_the_cause():
     assert "friction" in said and f"{found['PM'].closed:.3g}°" in said
 
 
+@pytest.mark.long
 def test_margins_read_at_a_limit_do_not_pass():
     """A sine of 1.2 V clipped at 0.3 V comes back with a smaller gain: the crossover falls although no gain changed."""
     small = {"base": 0.0, "load_step": 0.05, "command": 1e-6, "hold": 10.0, "stabilizer.v_max": 0.3}

@@ -13,6 +13,8 @@ from gyrobench.engine.session import Session, run
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.system import load_system
 
+pytestmark = pytest.mark.long
+
 GYROS = ("gyro_x", "gyro_y", "gyro_z")
 TERMS = ("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS", "white", "markov", "pickoff")
 IDEAL = {f"{g}.{n}": 0.0 for g in GYROS for n in TERMS}
@@ -50,7 +52,6 @@ def whole() -> tuple[Any, dict[tuple[str, str], Any]]:
     return ridden(swing(2, 0.7), swing(3, 0.9), COMMANDED, **DRY)
 
 
-@pytest.mark.long
 def test_shares_add_up_and_the_whole_is_what_was_measured(whole: Any) -> None:
     result, rows = whole
     for motion in (BASE_Y, BASE_Z, COMMAND):
@@ -62,7 +63,6 @@ def test_shares_add_up_and_the_whole_is_what_was_measured(whole: Any) -> None:
 
 
 @pytest.mark.parametrize(("source", "name"), [("viscous friction", "viscous"), ("dry friction", "friction")])
-@pytest.mark.long
 def test_friction_switched_off_takes_its_share(whole: Any, source: str, name: str) -> None:
     """What the budget says would be left is what a run without the source measures."""
     _, rows = whole
@@ -72,7 +72,6 @@ def test_friction_switched_off_takes_its_share(whole: Any, source: str, name: st
     assert rows[BASE_Y, "measured"][0] > 1.3 * measured
 
 
-@pytest.mark.long
 def test_reaction_of_the_gimbals_alone(whole: Any) -> None:
     """Without friction it is all that is left of the base about z: tan(pitch) (I_ry + I_fz) heading'' about roll."""
     _, rows = whole
@@ -80,7 +79,6 @@ def test_reaction_of_the_gimbals_alone(whole: Any) -> None:
     assert less[BASE_Z, "measured"][0] == pytest.approx(rows[BASE_Z, "reaction of the gimbals"][0], rel=0.1)
 
 
-@pytest.mark.long
 def test_output_axes_switched_off_take_their_share() -> None:
     """Gyros that do not get the angular acceleration have no output-axis coupling; bearings without friction."""
     free = {f"platform.viscous[{k}]": 0.0 for k in AXES}
@@ -97,7 +95,6 @@ def test_output_axes_switched_off_take_their_share() -> None:
     ("source", "noise", "seeds", "scatter"),
     [("white drift of the gyros", "white", 6, 0.16), ("noise of the pickoffs", "pickoff", 1, 0.1)],
 )
-@pytest.mark.long
 def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float) -> None:
     """A hold of 4 s at rest: the mean square of three axes and six seeds; of a random walk about mean and slope nearly
     all is in a few independent parts an axis, so it scatters by about sqrt(2/(3 6 4)) = 17 %, the rms by 8."""
@@ -109,7 +106,6 @@ def test_noise_of_one_source(source: str, noise: str, seeds: int, scatter: float
     assert rows["drift", source][1] == pytest.approx(100.0)
 
 
-@pytest.mark.long
 def test_budget_of_a_recorded_ride(tmp_path: Path) -> None:
     """Three sines an axis that do not close, with dry friction: computed for Hann's window, as measured."""
     t = np.arange(0.0, 31.0, 0.25)

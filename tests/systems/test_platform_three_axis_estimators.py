@@ -11,6 +11,8 @@ from gyrobench.engine.session import Session
 from gyrobench.reduction.loops import margins
 from gyrobench.system.system import load_system
 
+pytestmark = pytest.mark.long
+
 NAME = "platform_three_axis"
 SHORT = {"sweeps": False, "hold": 5.0, "swing": 0.0}
 AXES = ("pitch", "roll", "azimuth")
@@ -35,7 +37,6 @@ def filtered() -> Any:
     return ride("estimator_kalman_rate")
 
 
-@pytest.mark.long
 def test_no_estimator_in_the_three_slots_is_no_slot(plain: Any) -> None:
     """Bit for bit: the wires from the gyros to the decoupler go through them."""
     through = ride("estimator_none")
@@ -44,7 +45,6 @@ def test_no_estimator_in_the_three_slots_is_no_slot(plain: Any) -> None:
         assert (through.channels[f"estimator_{axis}.estimate"] == through.channels[f"gyro_{axis}.u"]).all(), k
 
 
-@pytest.mark.long
 def test_kalman_filters_quieten_all_three_motors(plain: Any, filtered: Any) -> None:
     """Five times the crossover wide: the noise of the motor voltages at rest falls by more than five, the steps of the
     loads stay as large.
@@ -60,7 +60,6 @@ def test_kalman_filters_quieten_all_three_motors(plain: Any, filtered: Any) -> N
     assert p["estimator_y.Ts"] == 1e-4 and p["estimator_y.R"] == pytest.approx(p["gyro_y.pickoff"] ** 2 / 1e-4)
 
 
-@pytest.mark.long
 def test_one_axis_alone(plain: Any) -> None:
     """Asked for on y.  T2 at an azimuth of 30 degrees gives x and y to pitch and roll in the shares cos, sin: with y
     quiet cos 30 = 0.866 and sin 30 = 0.5 of their noise are left (and a little of y); azimuth has z alone.

@@ -116,6 +116,7 @@ def test_base_motion_is_isolated_by_more_than_40_db(short):
         assert all(found[f"isolation {axis}"].estimate < -40.0 for axis in "xyz")
 
 
+@pytest.mark.long
 def test_isolation_is_that_of_the_continuous_model(short):
     """At the default step within 0.15 dB of platform, gyros, T2 and stabilizers from their equations, small angles.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,6 @@ SHORT: dict[str, Any] = {"cycles": 2, "dwell": 0.6, "settle": 0.3, "table.accele
 QUIET = {"gyro.white": 0.0}
 PACKAGE = type(load_system(NAME)).__module__
 STEPS: Any = importlib.import_module(".steps", PACKAGE)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Any:

@@ -25,12 +25,6 @@ I, F_Q = 3.6 / 17.2, 1e6  # noqa: E741  A, Hz
 ARCSEC = math.pi / 648000.0
 
 
-@pytest.fixture(scope="module")
-def pwm() -> Any:
-    with Session(NAME) as session:
-        yield session
-
-
 def run(session: Session, values: dict[str, Any], seed: int = 1, step: float = 1e-3) -> DriftTestResult:
     record = session.run({**QUICK, **values}, seed, step)
     result = load_system(NAME).reduce(record)
@@ -43,7 +37,7 @@ def value(result: DriftTestResult, name: str) -> float:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_errors_of_the_pulses_come_back(pwm: Session, seed: int) -> None:
+def test_errors_of_the_pulses_come_back(session: Session, seed: int) -> None:
     """Drawn currents and switching times; expected by hand with s_j = dT_j f_s, D = dI_plus + dI_minus:
 
     I_0 = (dI_plus - dI_minus)/2 + (2 I + D) s_1    κ = (D/2 + (2 I + D) s_2)/I    κ_2 at i = 0.95 I: 0.95 (2 + D/I) s_3
@@ -51,7 +45,7 @@ def test_errors_of_the_pulses_come_back(pwm: Session, seed: int) -> None:
     draw = np.random.default_rng(seed).normal
     plus, minus = 2e-3 * I * draw(), 2e-3 * I * draw()
     late = [3e-7 * draw(), 5e-7 * draw(), 5e-7 * draw()]
-    result = run(pwm, {"rebalance.dI_plus": plus, "rebalance.dI_minus": minus, "rebalance.dT": late}, seed)
+    result = run(session, {"rebalance.dI_plus": plus, "rebalance.dI_minus": minus, "rebalance.dT": late}, seed)
     s, both = [x * 1e3 for x in late], plus + minus
     expected = {
         "I_0": ((plus - minus) / 2.0 + (2.0 * I + both) * s[0]) * 1e6,
@@ -67,12 +61,12 @@ def test_errors_of_the_pulses_come_back(pwm: Session, seed: int) -> None:
     assert abs(value(result, "I_0")) > 20.0 * result["I_0"].u and result["I_0"].u < 10.0  # uA: 5e-5 of full scale
 
 
-def test_encoder_error_is_predicted_corrected_and_in_u(pwm: Session) -> None:
+def test_encoder_error_is_predicted_corrected_and_in_u(session: Session) -> None:
     """a sin(θ + f) is read too much.  All ways begin near θ = 0 and are short: there the readings turn too quickly by
     the part a cos f, for 20″ and f = 0.5 rad 9.696e-5 * 0.8776 = 85.1 ppm, and so much too large is κ.
     """
     wrong = {**STILL, "table.encoder_amplitude": [20.0 * ARCSEC, 0.0], "table.encoder_phase": [0.5, 0.0]}
-    plain, off = run(pwm, STILL), run(pwm, wrong)
+    plain, off = run(session, STILL), run(session, wrong)
     shift = value(off, "κ") - value(plain, "κ")
     assert shift == pytest.approx(85.1, rel=0.02)
     predicted = next(t for t in off.tables if t.id == PREDICTED)
@@ -82,29 +76,29 @@ def test_encoder_error_is_predicted_corrected_and_in_u(pwm: Session) -> None:
     sine, cosine = 20.0 * math.cos(0.5), 20.0 * math.sin(0.5)
     text = "; ".join(f"angle error, once a turn ({n}) = {x:.6f}(0.1) arcsec"
                      for n, x in (("sine", sine), ("cosine", cosine)))  # fmt: skip
-    back = run(pwm, {**wrong, "corrections": text})
+    back = run(session, {**wrong, "corrections": text})
     assert value(back, "κ") == pytest.approx(value(plain, "κ"), abs=0.5 * plain["κ"].u)
     assert back["κ"].u == pytest.approx(math.hypot(plain["κ"].u, 0.1 * ARCSEC * 1e6), rel=0.02)
-    stated = run(pwm, {**wrong, "u_angle1": 20.0 * ARCSEC})
+    stated = run(session, {**wrong, "u_angle1": 20.0 * ARCSEC})
     assert abs(stated["κ"].z or 9.0) < 2.0 and stated["κ"].u == pytest.approx(97.0, rel=0.3)
 
 
-def test_tilt_of_the_table_is_a_bias(pwm: Session) -> None:
+def test_tilt_of_the_table_is_a_bias(session: Session) -> None:
     """3000″ about east: the axis sees cos φ sin 3000″ of the Earth rate less, 15.041 * 0.6978 * 0.014544 = 0.15265
     deg/h, over k = 17.2 deg/h/mA 8.875 uA, and so much is in the bias; sin φ (1 - cos) is 0.7 % of it.
     """
-    plain, off = run(pwm, STILL), run(pwm, {**STILL, "table.tilt": [3000.0 * ARCSEC, 0.0]})
+    plain, off = run(session, STILL), run(session, {**STILL, "table.tilt": [3000.0 * ARCSEC, 0.0]})
     shift = value(off, "I_0") - value(plain, "I_0")
     assert abs(shift) == pytest.approx(8.875, rel=0.02)
     predicted = next(t for t in off.tables if t.id == PREDICTED)
     assert shift == pytest.approx(next(r for r in predicted.rows if r[0] == "I_0")[-3], rel=0.02)
 
 
-def test_resolution_is_two_clocks(pwm: Session) -> None:
+def test_resolution_is_two_clocks(session: Session) -> None:
     """2 k I/(f_q T) = 2 deg/s / 1e6 / 0.2 s = 0.036 deg/h (ET17), half of it at half the current."""
     quiet = {"rates": "0.2 0.5 1", "readings": 2, "rest": 60}
-    assert value(run(pwm, quiet), "resolution") == pytest.approx(0.036, rel=1e-9)
-    half = run(pwm, {**quiet, "rebalance.I": I / 2.0, "range": "0.4deg/s"})
+    assert value(run(session, quiet), "resolution") == pytest.approx(0.036, rel=1e-9)
+    half = run(session, {**quiet, "rebalance.I": I / 2.0, "range": "0.4deg/s"})
     assert value(half, "resolution") == pytest.approx(0.018, rel=1e-9)
     # full scale over noise of a reading: 0.0178 deg/h/sqrt(Hz) / sqrt(0.2 s) = 0.04 deg/h at least
     assert 1800.0 / 0.1 < value(half, "dynamic range") < 1800.0 / 0.04
@@ -132,16 +126,17 @@ def ripple(ratio: float, tau: float, full: float) -> float:
     return float(np.std(theta))
 
 
-def test_ripple_in_steps_of_a_fraction_of_the_saw(pwm: Session) -> None:
+def test_ripple_in_steps_of_a_fraction_of_the_saw(session: Session) -> None:
     """Steps of 20 us show the cycle of the saw, 1 ms does not; gyro without noise, H/C = 1, tau = 1 ms, 1 deg/s."""
     noise = {"gyro.pickoff": 0.0, "gyro.white": 0.0, "gyro.markov": 0.0}
     plan = {"gate": 0.05, "rest": 6, "readings": 1, "rates": "0.1 0.2 0.3", "settle": 0.5, "latitude": "0.01deg"}
-    fine = run(pwm, {**noise, **plan}, step=2e-5)
+    fine = run(session, {**noise, **plan}, step=2e-5)
     closed = ripple(1.0, 1e-3, math.radians(1.0)) / ARCSEC
     assert value(fine, "ripple") == pytest.approx(closed, rel=5e-3) and closed > 0.05
-    assert value(run(pwm, {**noise, **plan}), "ripple") < 0.1 * closed
+    assert value(run(session, {**noise, **plan}), "ripple") < 0.1 * closed
 
 
+@pytest.mark.long
 def test_three_loops() -> None:
     """The same asymmetry of the currents: a bias in the binary loop, a scale factor by sign in the one on demand; the
     analog loop has neither, but what its torquer does.
@@ -181,15 +176,15 @@ def test_three_loops() -> None:
         ({"rebalance.K_p": 1300.0, "rebalance.f_s": 5e3}, "τ K_v = 1.08; above 1 the loop needs"),
     ],
 )
-def test_refuses(pwm: Session, values: dict[str, Any], message: str) -> None:
+def test_refuses(session: Session, values: dict[str, Any], message: str) -> None:
     with pytest.raises(GyrobenchError, match=message):
-        pwm.run({**QUICK, **values}, 1)
+        session.run({**QUICK, **values}, 1)
 
 
-def test_measured_record(pwm: Session, command: Any, tmp_path: Any) -> None:
+def test_measured_record(session: Session, command: Any, tmp_path: Any) -> None:
     """The windows of a run as a laboratory writes them, mA and degrees: the same values and no truth."""
     errors = {"rebalance.dI_plus": 2e-4, "rebalance.dT": [0.0, 2e-7, 1e-7]}
-    record = pwm.run({**QUICK, **errors}, 3)
+    record = session.run({**QUICK, **errors}, 3)
     ours = load_system(NAME).reduce(record)
     w, plan = record.windows, {row.phase: row for row in record.run.plan}
     lines = ["# latitude = 45.75deg", "# k = 17.2deg/h/mA", "# range = 0.95deg/s", "# gate = 0.2s", "# type_b = none"]
@@ -245,13 +240,13 @@ def test_record_without_the_optional_column(command: Any, tmp_path: Any) -> None
             assert found[name]["estimate"] == pytest.approx(values["all"][name]["estimate"], abs=0.1 * found[name]["u"])
 
 
-def test_threshold_and_scale_factor_at_each_rate(pwm: Session) -> None:
+def test_threshold_and_scale_factor_at_each_rate(session: Session) -> None:
     """A band d = 0.5 deg/h put into the small rates: sqrt(r2 - d2) passes, half of r at d/sqrt(3/4) = 0.577 deg/h.
 
     Both currents 1e-4 too large: the reading is 100 ppm less than what flows, K - 1 = -100 ppm at every rate.
     """
     small = {"small": "0.2 0.5 0.7 2", "readings": 10}
-    record = pwm.run({**QUICK, **STILL, **small, "rebalance.dI_plus": 1e-4 * I, "rebalance.dI_minus": 1e-4 * I}, 2)
+    record = session.run({**QUICK, **STILL, **small, "rebalance.dI_plus": 1e-4 * I, "rebalance.dI_minus": 1e-4 * I}, 2)
     system = load_system(NAME).with_values(small)
     plain = system.reduce(record)
     assert "below" in plain["threshold"].no_value  # an integrating loop answers any rate
@@ -268,7 +263,7 @@ def test_threshold_and_scale_factor_at_each_rate(pwm: Session) -> None:
     assert found["threshold"].interval == pytest.approx((0.5, 0.7))
     assert found["κ"].estimate == pytest.approx(plain["κ"].estimate, abs=plain["κ"].u)
     with pytest.raises(GyrobenchError, match="small"):
-        pwm.run({**QUICK, "small": "200"}, 1)
+        session.run({**QUICK, "small": "200"}, 1)
 
 
 def test_threshold_of_a_reading_in_steps() -> None:

@@ -1,4 +1,4 @@
-"""Files of a laboratory, from the equations: readings that begin too early, a scale factor that warms up."""
+"""Files of a laboratory, from the equations: readings that begin too early, a scale factor or a room that warms up."""
 
 from __future__ import annotations
 
@@ -113,3 +113,26 @@ def test_readings_that_begin_before_the_table_has_its_rate_are_asked_for(tmp_pat
 def test_a_scale_factor_that_warms_up(tmp_path: Path, warming: float) -> None:
     found = said(tmp_path, "rate_table_test", STATED + rates(0.0, warming))
     assert ("scale.time" in found) == ("residuals.contradict" in found) == (warming > 0.0)
+
+
+def turning_with_the_earth() -> str:
+    """TEST-SERVO-POLAR by route equal: R = 0.3, U_z = 0.9, U_x = -0.7 deg/h, a day in each mount, noise."""
+    rng = np.random.default_rng(8)
+    c, s = math.cos(math.radians(45.75)), math.sin(math.radians(45.75))
+    lines = ["# nuisances = none\n# route = equal\n# phase 1 = polar S\n# phase 2 = polar N\n"]
+    lines.append("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg]\n")
+    for phase, sense in ((1, 1.0), (2, -1.0)):
+        angle = 0.0
+        for k in range(96):
+            middle = math.radians(angle + sense * 900.0 / 480.0)
+            rate = sense * (EARTH - 0.9 * s - 0.7 * c * math.cos(middle)) - 0.3 + 0.003 * float(rng.standard_normal())
+            start, angle, t = angle, angle + rate / 4.0, 86400 * (phase - 1) + 900 * k
+            lines.append(f"{phase},{t},{t + 900},{start!r},{angle!r}\n")
+    return "".join(lines)
+
+
+@pytest.mark.long
+def test_a_drift_by_the_time_of_day_is_asked_for(tmp_path: Path) -> None:
+    """A sidereal day is 4 min shorter: 0.01 deg/h by the time of day moved unbalances by 10 u, and no residual."""
+    text = "# type_b = none\n# latitude = 45.75deg\n" + turning_with_the_earth()
+    assert "a drift by the time of day" in said(tmp_path, "servo_polar", text)["arrangement.unstated"].text

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +20,6 @@ from gyrobench.system.system import load_system
 from systems.sculling_test.closed import ScullingMotion, UnitErrors, VelocityChain
 from systems.sculling_test.reduction import Reduction, ScullingSetup
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "sculling_test"
 DEG, UG = math.pi / 180.0, 1e-6 * G0
 SHORT: dict[str, Any] = {"readings": 2, "cycles": 1, "window": 1.0, "nuisances": "none"}
@@ -97,12 +96,6 @@ def test_what_is_left_by_hand() -> None:
     assert abs(VelocityChain(T).rise(ScullingMotion(20.0, theta, a), same)) < 1e-3 * 0.5 * (125.0 * theta) ** 2 * 0.05
 
 
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 def steady() -> dict[str, Any]:
     """Return an inertial unit without noise, and without gyro drifts, by which the user's vertical would tilt."""
     quiet: dict[str, Any] = dict.fromkeys(load_system(NAME).noises, 0.0)
@@ -173,6 +166,7 @@ def reduced(
     return json.loads((folder / "r" / "result.json").read_text()) if code == 0 else err
 
 
+@pytest.mark.long
 def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     result = reduced(command, tmp_path, rows())
     found = {c["name"]: c for c in result["coefficients"]}

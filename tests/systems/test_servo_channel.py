@@ -7,12 +7,13 @@ equations (GYRO-DYN-2DOF), not from the names that the reduction translates.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from servoing import DAY50, DPH, held, latitude
 
 from gyrobench import drift, frames
@@ -21,7 +22,6 @@ from gyrobench.reduction.drift.channels import errors_in, words
 from gyrobench.system.families.servo_channel import in_channel, own_name
 from gyrobench.system.system import System, load_system
 
-Command = Callable[..., tuple[int, str, str]]
 ARCSEC = math.pi / 648000.0
 KU = 1e3 * DPH
 OTHER = {"x": "y", "y": "x"}

@@ -5,7 +5,6 @@ coefficients move, with sign, by what the formula says, and the error budget of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -30,17 +29,11 @@ H_C = 1.0  # H/C of the gyro
 NORTH = "x down; x up; x north, y up; x north, y down; x north, z up; x north, z down"
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
-def held(bench: Session, **values: Any) -> Result:
+def held(session: Session, **values: Any) -> Result:
     """A gyro without drift, noise off: what is left is the table's."""
     ideal = {**QUIET, **{f"gyro.{n}": 0.0 for n in NAMES}, "dwell": 60.0, "settle": 2.0, "cycles": 1, "tracking": 0.0}
     given = {**ideal, **{k.replace("__", "."): v for k, v in values.items()}}
-    return load_system(NAME).with_values(given).reduce(bench.run(given))
+    return load_system(NAME).with_values(given).reduce(session.run(given))
 
 
 def check(plain: Result, found: Result, expected: dict[str, float], predicted: np.ndarray[Any, Any]) -> None:
@@ -58,12 +51,9 @@ def told(result: Result, source: str) -> np.ndarray[Any, Any]:
 
 @pytest.mark.parametrize(
     ("about", "axis", "expected"),
-    [
-        ("y", 1, {"D_I": -W * C, "D_O": W * C, "D_S": -W * S}),
-        ("z", 2, {"D_O": W * S, "D_S": W * C}),
-    ],
+    [("y", 1, {"D_I": -W * C, "D_O": W * C, "D_S": -W * S}), ("z", 2, {"D_O": W * S, "D_S": W * C})],
 )
-def test_axis_tilt(bench: Session, about: str, axis: int, expected: dict[str, float]) -> None:
+def test_axis_tilt(session: Session, about: str, axis: int, expected: dict[str, float]) -> None:
     """Turned by t about y the table axis is x - t z, about z it is x + t y: the drift taken from the table is wrong by
     t omega_E,z or -t omega_E,y.  With x down or up, y is east and z south or north; with x east, y up or down has z
     south or north, z up or down has y north or south:
@@ -74,14 +64,14 @@ def test_axis_tilt(bench: Session, about: str, axis: int, expected: dict[str, fl
     and D_I, D_O, D_S are half of (down less up) over gamma.  The budget has a row for each phase, set up by itself: the
     same tilt in all of them is the sum of its rows.
     """
-    plain = held(bench, u_axis=TILT * FAINT)
-    found = held(bench, **{f"table.tilt[{axis}]": TILT})
+    plain = held(session, u_axis=TILT * FAINT)
+    found = held(session, **{f"table.tilt[{axis}]": TILT})
     predicted = told(plain, f"table axis about {about}").sum(axis=0)
     check(plain, found, {n: v * TILT / GAMMA for n, v in expected.items()}, predicted)
 
 
 @pytest.mark.parametrize(("axis", "name", "row"), [(1, "D_O", 1), (2, "D_S", 0)])
-def test_unbalance_over_stiffness(bench: Session, axis: int, name: str, row: int) -> None:
+def test_unbalance_over_stiffness(session: Session, axis: int, name: str, row: int) -> None:
     """A mass off the axis along y pulls with M = -b f_z, along z with b f_y; the table gives way by M/K_T.  Held with x
     north it turns against the Earth with -W c, so the angle drifts by b f_y/K_T or b f_z/K_T times that, with f up: -+a
     W c with y (or z) up and down, a = b g/K_T, and D_O (or D_S), half of (down less up) over gamma, takes W c b g0/K_T.
@@ -91,8 +81,8 @@ def test_unbalance_over_stiffness(bench: Session, axis: int, name: str, row: int
     D_SS.  The budget of u_unbalance does not have this part.
     """
     hard = {"attitudes": NORTH, "table.stiffness": STIFFNESS}
-    plain = held(bench, u_unbalance=AT_1G * FAINT, **hard)
-    found = held(bench, **hard, **{f"table.unbalance[{axis}]": UNBALANCE})
+    plain = held(session, u_unbalance=AT_1G * FAINT, **hard)
+    found = held(session, **hard, **{f"table.unbalance[{axis}]": UNBALANCE})
     float_off = {"D_SS": -H_C * AT_1G * W * S / GAMMA} if axis == 1 else {}
     predicted = told(plain, "unbalance over stiffness")[row]
     seen = np.array([float_off.get(c.name, 0.0) for c in plain.coefficients])

@@ -133,6 +133,7 @@ def test_run_recovers_the_loop(drawn):
     assert any("conditionally stable" in w for w in run.result.warnings)
 
 
+@pytest.mark.long
 def test_warnings_of_loads_and_of_a_low_crossover(drawn):
     """K_s below 9 k_w; a gap of 0.2 mm; an undamped gyro whose crossover is below 2 w_gr: said in the report."""
     run, values = drawn
@@ -146,6 +147,7 @@ def test_warnings_of_loads_and_of_a_low_crossover(drawn):
         assert any(text in w for w in warnings), text
 
 
+@pytest.mark.long
 def test_linear_model_of_the_run(drawn):
     """The discrete model, from the parts alone, has the phase margin and the limits of the closed form."""
     run, values = drawn

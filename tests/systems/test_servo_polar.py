@@ -39,6 +39,7 @@ def reduced(record: Any, **options: Any) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.long
 def test_random_gyros_at_random_latitudes(polar: Session, seed: int) -> None:
     """Every window reads what the equation says; every coefficient comes back to 1e-6 deg/h, by both ways."""
     rng = np.random.default_rng(seed)
@@ -171,6 +172,7 @@ def test_large_unbalance(polar: Session) -> None:
         assert abs(c.estimate - c.truth) / 50.0 < 2e-8, c.name
 
 
+@pytest.mark.long
 def test_length_of_the_plan_is_that_of_the_turn(polar: Session) -> None:
     """Each mount lasts as long as drift and Earth rate take for the travel, to a window; D_S = 10 deg/h/g makes that
     16 % more than 2 pi / W: mean of 1 / (1 - r cos theta) is 1 / sqrt(1 - r2), r = 10 0.698 / 15.04 = 0.46.
@@ -391,6 +393,7 @@ def test_delays(day: Any) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_stopped_and_continued(tmp_path: Any) -> None:
     """Stopped while the gyro holds the table, noise and quantum on, and continued: the record is bit-equal."""
     values = {**DAY500, "route": "combination", "mounts": "N", "table.quantum": 0.02 * ARCSEC}

@@ -134,6 +134,7 @@ def test_stopped_too_early_to_be_estimable(live: Any) -> None:
     assert table.rows[0][0].startswith("phase 2 (polar S) has 1 windows: at least 8 are needed; phase 4")
 
 
+@pytest.mark.long
 def test_what_is_not_reached_is_said(live: Any) -> None:
     """may_stop never set in mount N: nothing is saved there, and the summary names it."""
     record, _ = live

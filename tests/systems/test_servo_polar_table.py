@@ -72,10 +72,7 @@ def test_ripple_over_stiffness(
 class Wobbling(type(load_system(NAME))):  # type: ignore[misc]
     """The test with the part axis_wobble between stand and table."""
 
-    slots: ClassVar[dict[str, Slot]] = {
-        **load_system(NAME).slots,
-        "wobble": Slot(WOBBLE, "axis_wobble"),
-    }
+    slots: ClassVar[dict[str, Slot]] = {**load_system(NAME).slots, "wobble": Slot(WOBBLE, "axis_wobble")}
     wires = load_system(NAME).wires.replace(
         "stand -> table: f=f_local omega=omega_local",
         "stand -> wobble: f=f_base omega=omega_base\n    wobble -> table: f=f_local omega=omega_local\n"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -43,16 +42,10 @@ PHI = math.radians(45.75)
 NOISY = day(500.0, **{"gyro.markov_tau": 1.0, "outer.quantum": 0.01 * ARCSEC, "inner.quantum": 0.01 * ARCSEC})
 
 
-@pytest.fixture(scope="module")
-def table() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 # ------------------------------------------------------------------------------------------ recovery
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.long
-def test_random_gyros_at_random_latitudes(table: Session, seed: int) -> None:
+def test_random_gyros_at_random_latitudes(session: Session, seed: int) -> None:
     """A day in fifty: every window reads the equation of Hu 1981 and the effect of the loop's stiffness, to 2e-8 deg/h.
     Every coefficient comes back to 1e-6 deg/h of the truth and what that effect makes of it, by both ways; the effect
     goes with the cube of the Earth rate, so that nothing is left of it in a whole day.
@@ -61,7 +54,7 @@ def test_random_gyros_at_random_latitudes(table: Session, seed: int) -> None:
     latitude = float(math.radians(rng.uniform(15.0, 75.0)) * rng.choice([-1.0, 1.0]))
     _, a, b = refusals.best_pairs(latitude, 86400.0, 9, frames.EARTH_RATE)[int(rng.integers(3))]
     values = {**day(50.0, 432), **QUIET, **gyro(rng), "latitude": latitude, "mounts": f"{a} {b}"}
-    record = table.run(values)
+    record = session.run(values)
     effect = stiffness_effect(record)
     assert np.max(np.abs(left(record) - effect)) < 2e-8 * DPH
     seen, site, _ = held(record)
@@ -78,20 +71,20 @@ def test_random_gyros_at_random_latitudes(table: Session, seed: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def quiet(table: Session) -> Any:
+def quiet(session: Session) -> Any:
     """A noiseless day of the standard gyro at 45.75 degrees, two hundred times as fast."""
-    return table.run({**day(200.0), **QUIET})
+    return session.run({**day(200.0), **QUIET})
 
 
 @pytest.mark.long
-def test_stiffness_is_what_is_left(table: Session, quiet: Any) -> None:
+def test_stiffness_is_what_is_left(session: Session, quiet: Any) -> None:
     """Two hundred times as fast 1e-5 deg/h are left, as predicted to 2 %; twice as stiff (crossover up by 1.41) leaves
     half of it."""
     found, expected = left(quiet), stiffness_effect(quiet)
     for j, size in ((0, 1.1e-5), (1, 4.2e-6)):
         assert np.max(np.abs(found[:, j])) == pytest.approx(size * DPH, rel=0.1)
         assert np.max(np.abs(found - expected)[:, j]) < 0.05 * size * DPH
-    soft = table.run({**day(200.0), **QUIET, "outer.crossover": 100.0 * math.pi / math.sqrt(2.0)})
+    soft = session.run({**day(200.0), **QUIET, "outer.crossover": 100.0 * math.pi / math.sqrt(2.0)})
     ratio = np.max(np.abs(left(soft)[:, 0])) / np.max(np.abs(found[:, 0]))
     assert ratio == pytest.approx(2.0, rel=0.03)  # K_T goes with the square of the crossover, but for the lag
 
@@ -119,16 +112,16 @@ STATED = ("u_angle1", "u_angle2", "u_axis", "u_square", "u_wobble", "u_mount")
 
 
 @pytest.fixture(scope="module")
-def brief(table: Session) -> tuple[np.ndarray[Any, Any], Any]:
+def brief(session: Session) -> tuple[np.ndarray[Any, Any], Any]:
     """The same, five hundred times as fast: estimates, and the result with all errors stated."""
-    record = table.run({**day(500.0), **QUIET})
+    record = session.run({**day(500.0), **QUIET})
     plain = np.array([c.estimate for c in load_system(NAME).reduce(record).coefficients])
     return plain, reduced(record, **dict.fromkeys(STATED, SIZE * FAINT))
 
 
-def shifted(table: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]:
+def shifted(session: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]:
     """(18,) what values change of the estimates of brief."""
-    record = table.run({**day(500.0), **QUIET, **values})
+    record = session.run({**day(500.0), **QUIET, **values})
     return np.array([c.estimate for c in reduced(record).coefficients]) - brief[0]
 
 
@@ -137,11 +130,7 @@ def shifted(table: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]:
     [
         # a sin(x) read with the outer, a cos(2 y) with the inner angle: rows are sine, cosine
         ({"outer.encoder_amplitude[1]": 1.0}, "outer angle error, once", 0),
-        (
-            {"inner.encoder_amplitude[2]": 1.0, "inner.encoder_phase[2]": math.pi / 2},
-            "inner angle error, twice",
-            1,
-        ),
+        ({"inner.encoder_amplitude[2]": 1.0, "inner.encoder_phase[2]": math.pi / 2}, "inner angle error, twice", 1),
         # the outer axis tilted about its table's second axis Z, the same in both mounts: rows are mounts
         ({"outer.tilt[2]": 1.0}, "table set up, about Z", None),
         # the inner axis tilted about its table's first axis Z, out of the right angle with X
@@ -152,32 +141,32 @@ def shifted(table: Session, brief: Any, **values: Any) -> np.ndarray[Any, Any]:
 )
 @pytest.mark.long
 def test_table_effects_as_predicted(
-    table: Session, brief: Any, setting: dict[str, float], source: str, row: Any
+    session: Session, brief: Any, setting: dict[str, float], source: str, row: Any
 ) -> None:
     """An error of 20 arcsec shifts the coefficients as the budget says before the run, with sign, to 3 % of the largest
     shift (five hundred Earth rates make the shifts large)."""
     expected = predicted(brief[1], source, row)
-    shift = shifted(table, brief, **{n: v * (SIZE if "phase" not in n else 1.0) for n, v in setting.items()})
+    shift = shifted(session, brief, **{n: v * (SIZE if "phase" not in n else 1.0) for n, v in setting.items()})
     assert np.max(np.abs(expected)) > 1e-3
     assert np.max(np.abs(shift - expected)) < 0.03 * np.max(np.abs(expected))
 
 
 @pytest.mark.long
-def test_gyro_askew_on_the_plate_as_predicted(table: Session, brief: Any) -> None:
+def test_gyro_askew_on_the_plate_as_predicted(session: Session, brief: Any) -> None:
     """The gyro turned by 20 arcsec about each axis of the plate; about z it mixes the channels of the loops."""
     for k, axis in enumerate("xyz"):
         M = frames.rotation(np.eye(3)[k], SIZE).T  # rows: the gyro's axes
         values = {f"gyro.mount[{i + 1},{j + 1}]": float(M[i, j]) for i in range(3) for j in range(3)}
-        shift = shifted(table, brief, **values)
+        shift = shifted(session, brief, **values)
         expected = predicted(brief[1], f"gyro on the plate, about {axis}")
         assert np.max(np.abs(shift - expected)) < 0.03 * np.max(np.abs(expected)), axis
 
 
 # ------------------------------------------------------------------------------------------ noise
 @pytest.mark.long
-def test_dynamic_against_quasi_static(table: Session) -> None:
+def test_dynamic_against_quasi_static(session: Session) -> None:
     """Angles integrated from the equation alone give the coefficients of the co-simulation, noise on, within its u."""
-    noisy = table.run(NOISY, seed=6)
+    noisy = session.run(NOISY, seed=6)
     _, site, rows = held(noisy)
     p = noisy.run.parameters
     true = {c: np.array([p[f"gyro.{n}"] for n in NAMES[c]]) for c in "xy"}
@@ -225,9 +214,9 @@ def test_dynamic_against_quasi_static(table: Session) -> None:
         ({"inner.polarity": -1}, "inner.polarity = -1"),
     ],
 )
-def test_refused_before_anything_runs(table: Session, values: dict[str, Any], text: str) -> None:
+def test_refused_before_anything_runs(session: Session, values: dict[str, Any], text: str) -> None:
     with pytest.raises((InvalidConfigurationError, InvalidValueError), match=text):
-        table.run(values)
+        session.run(values)
 
 
 def test_single_mount_is_warned_of() -> None:
@@ -241,18 +230,18 @@ def test_single_mount_is_warned_of() -> None:
     assert system.warnings() == []
 
 
-def test_run_ends_before_gimbal_lock(table: Session) -> None:
+def test_run_ends_before_gimbal_lock(session: Session) -> None:
     """The stop of the part: mount 2 goes to 45.75 degrees, cosine 0.698."""
     with pytest.raises(RunError, match=r"gimbal lock: inner angle -?0\.6"):
-        table.run({**day(500.0), **QUIET, "coupling.least": 0.8})
+        session.run({**day(500.0), **QUIET, "coupling.least": 0.8})
 
 
-def test_brushes_are_overcome(table: Session) -> None:
+def test_brushes_are_overcome(session: Session) -> None:
     """Friction of 1400 g.cm on both axes, the base turning: capture comes near enough to null, M / (J w2) = 4.4 arcsec,
     and the fine loop then holds it to M / K_T, 0.09 arcsec, far within the 2 arcsec of Hu 1981.
     """
     brushes = {f"{slot}.friction": 0.137 for slot in BOTH}
-    w = table.run({**day(500.0), **QUIET, **brushes}).windows
+    w = session.run({**day(500.0), **QUIET, **brushes}).windows
     servo = np.isin(w["phase"], [2, 4])
     for a in "xy":
         assert np.max(np.abs(w[f"mean_{a}"][servo])) / 10.0 < 0.15 * ARCSEC

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from servoing_two_axes import DPH, NAME, QUIET, geometry, gyro
 
 from gyrobench import frames
@@ -17,7 +18,6 @@ from gyrobench.engine.session import Session
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 SHORT: dict[str, Any] = {**QUIET, "levelled": True, "mounts": "1 2 8", "time": 24.0, "window": 2.0, "settle": 90.0}
-Command = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +101,7 @@ def test_refusals(session: Session) -> None:
             session.run({**SHORT, **more})
 
 
+@pytest.mark.long
 def test_a_laboratory(run: tuple[dict[str, Any], Any], tmp_path: Path, command: Command) -> None:
     values, record = run
     w, plan = record.windows, {row.phase: row.label for row in record.run.plan if row.mode == "servo"}

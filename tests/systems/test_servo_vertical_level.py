@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,20 +19,14 @@ SHORT: dict[str, Any] = {"dwell": 60.0, "settle": 2.0, "cycles": 1}
 ARCSEC = math.pi / 648000.0
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 @pytest.mark.parametrize("seed", range(4))
-def test_random_gyros_at_random_latitudes(bench: Session, seed: int) -> None:
+def test_random_gyros_at_random_latitudes(session: Session, seed: int) -> None:
     """Every window reads the equation with J/H alpha_O (5e-7 deg/h) in it.  The coefficients are off by that and by
     what D_IO, D_OS, D_IS leave by the sine of the angle, at most 0.2 degrees here.
     """
     rng = np.random.default_rng(seed)
     values = {**SHORT, **QUIET, **gyro(rng), "latitude": latitude(rng)}
-    record = bench.run(values)
+    record = session.run(values)
     windows, _ = held(record)
     assert np.max(np.abs(windows.rate - expected_rate(record))) < 2e-9 * DPH
     result = load_system(NAME).reduce(record)
@@ -41,17 +34,17 @@ def test_random_gyros_at_random_latitudes(bench: Session, seed: int) -> None:
     cross = sum(abs(values[f"gyro.{n}"]) for n in ("D_IO", "D_OS", "D_IS")) / DPH
     for name, error in errors(result, values).items():
         assert abs(error) < 2.0 * cross * worst + 2e-6, name
-    exact = load_system(NAME).reduce(bench.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0}))
+    exact = load_system(NAME).reduce(session.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0}))
     for name, error in errors(exact, values).items():
         assert abs(error) < 2e-6, name  # two rates, each 5e-7 off, over two
     assert [c.name for c in exact.coefficients] == ["D_F", "D_I", "D_S", "D_O", "D_II", "D_SS"]
 
 
-def test_vertical_alone_to_a_millionth(bench: Session) -> None:
+def test_vertical_alone_to_a_millionth(session: Session) -> None:
     """Class 1 sees no angle: D_F + g2 D_II and D_I, off by J/H alpha_O alone, as worked out in servoing."""
     rng = np.random.default_rng(9)
     values = {**SHORT, **QUIET, **gyro(rng), "latitude": latitude(rng), "attitudes": "vertical"}
-    record = bench.run(values)
+    record = session.run(values)
     result = load_system(NAME).reduce(record)
     windows, _ = held(record)
     phi = values["latitude"]
@@ -65,9 +58,9 @@ def test_vertical_alone_to_a_millionth(bench: Session) -> None:
         assert c.closed == pytest.approx(c.estimate, abs=1e-8)
 
 
-def test_three_term_route_says_what_it_holds(bench: Session) -> None:
+def test_three_term_route_says_what_it_holds(session: Session) -> None:
     """D_F + g2 D_II, D_I, D_S - g D_II + g D_SS: in the names of Hu 1981 R + g2 K_zx, U_z, U_x + g (K_zx + K_xz)."""
-    result = load_system(NAME).reduce(bench.run({**SHORT, **QUIET, "attitudes": "three", "gyro.D_O": 0.0}))
+    result = load_system(NAME).reduce(session.run({**SHORT, **QUIET, "attitudes": "three", "gyro.D_O": 0.0}))
     g = frames.normal_gravity(math.radians(45.75)) / frames.G0
     truth = {"D_F + γ² D_II": -0.3 - 0.05 * g * g, "D_I": -0.9, "D_S − γ D_II + γ D_SS": -0.7 + (0.05 + 0.04) * g}
     assert [c.name for c in result.coefficients] == list(truth)
@@ -80,9 +73,9 @@ def test_three_term_route_says_what_it_holds(bench: Session) -> None:
     assert any("tell only combinations" in w for w in result.warnings)
 
 
-def test_all_eighteen_attitudes(bench: Session) -> None:
+def test_all_eighteen_attitudes(session: Session) -> None:
     """Every azimuth gives the same coefficients; the Earth turns the table both ways through level."""
-    record = bench.run({**SHORT, **QUIET, "attitudes": "all", "dwell": 100.0, "windows": 5})
+    record = session.run({**SHORT, **QUIET, "attitudes": "all", "dwell": 100.0, "windows": 5})
     windows, _ = held(record)
     assert (
         np.max(np.abs(windows.rate - expected_rate(record))) < 1e-8 * DPH
@@ -99,10 +92,10 @@ def test_all_eighteen_attitudes(bench: Session) -> None:
 
 
 @pytest.mark.long
-def test_noise_and_composite(bench: Session) -> None:
+def test_noise_and_composite(session: Session) -> None:
     """Truth within four u; ten windows a dwell give composite statistics of every phase."""
     values = {"dwell": 300.0, "windows": 10, "table.quantum": 0.18 * ARCSEC, "gyro.markov_tau": 30.0}
-    result = load_system(NAME).reduce(bench.run(values, seed=5))
+    result = load_system(NAME).reduce(session.run(values, seed=5))
     for c in result.coefficients:
         assert c.z is not None and abs(c.z) < 4.0 and c.u > 1e-4, c.name
     table = next(t for t in result.tables if t.title == "Systematic and random drift rate")
@@ -121,9 +114,9 @@ def test_noise_and_composite(bench: Session) -> None:
         ({"gyro.mount[1,1]": 0.5}, "gyro.mount: rows are not orthonormal"),
     ],
 )
-def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], text: str) -> None:
+def test_refused_before_anything_runs(session: Session, values: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidConfigurationError, match=text):
-        bench.run(values)
+        session.run(values)
 
 
 @pytest.mark.parametrize(
@@ -135,32 +128,32 @@ def test_refused_before_anything_runs(bench: Session, values: dict[str, Any], te
         ({"gyro.D_F": "300deg/h", "dwell": 5.0}, "would not capture the gyro: a drift of 301 °/h .* keep it 14.4″"),
     ],
 )
-def test_drift_that_ends_the_plan_is_foreseen(bench: Session, values: dict[str, Any], text: str) -> None:
+def test_drift_that_ends_the_plan_is_foreseen(session: Session, values: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidConfigurationError, match=text):
-        bench.run({**SHORT, "dwell": 600.0, "settle": 10.0, **values})
+        session.run({**SHORT, "dwell": 600.0, "settle": 10.0, **values})
 
 
 @pytest.mark.long
-def test_ordinary_gyro_of_ten_degrees_an_hour(bench: Session) -> None:
+def test_ordinary_gyro_of_ten_degrees_an_hour(session: Session) -> None:
     """The loop closes above capture_slow; dwells start on the other side of level by what the drift turns the table,
     10 deg/h 305 s = 0.85 deg.  D_OS comes in by the sine of that, at most 0.02 0.015 = 3e-4 deg/h at the ends, and is
     taken for slow noise.
     """
     values = {**QUIET, "cycles": 1, "gyro.D_F": "10deg/h"}
-    record = bench.run(values)
+    record = session.run(values)
     windows, _ = held(record)
     level = windows.axes[:, 0, 2] ** 2 < 0.5
     ends = np.concatenate([windows.angle_start, windows.angle_end])[np.tile(level, 2)]
     assert abs(np.max(ends) + np.min(ends)) < math.radians(0.02) and 0.8 < math.degrees(np.max(ends)) < 0.91
     for c in load_system(NAME).reduce(record).coefficients:
         assert abs(c.estimate - c.truth) < 6e-4, c.name
-    exact = bench.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0})
+    exact = session.run({**values, "gyro.D_OS": 0.0, "gyro.D_IO": 0.0, "gyro.D_IS": 0.0})
     for c in load_system(NAME).reduce(exact).coefficients:
         assert abs(c.estimate - c.truth) < 2e-6, c.name
 
 
-def test_beyond_a_degree_is_refused(bench: Session) -> None:
-    record = bench.run({**SHORT, **QUIET})
+def test_beyond_a_degree_is_refused(session: Session) -> None:
+    record = session.run({**SHORT, **QUIET})
     phase = next(r.phase for r in record.run.plan if r.label == "x east, z up")
     mine = record.windows["phase"] == phase
     windows = {k: v.copy() for k, v in record.windows.items()}
@@ -170,16 +163,16 @@ def test_beyond_a_degree_is_refused(bench: Session) -> None:
         load_system(NAME).reduce(type(record)(windows, {}, record.run))
 
 
-def test_told_of_another_gyro(bench: Session) -> None:
+def test_told_of_another_gyro(session: Session) -> None:
     """Parameters of the gyro that the user sets are told to the table's loop."""
-    record = bench.run({**SHORT, **QUIET, "attitudes": "vertical", "gyro.H": 0.25, "gyro.K_sg": 8.0})
+    record = session.run({**SHORT, **QUIET, "attitudes": "vertical", "gyro.H": 0.25, "gyro.K_sg": 8.0})
     assert record.run.parameters["table.H_g"] == 0.25 and record.run.parameters["table.K_g"] == 8.0
     assert np.max(np.abs(held(record)[0].rate - expected_rate(record))) < 2e-9 * DPH
 
 
-def test_laboratory_file(tmp_path: Any, bench: Session) -> None:
+def test_laboratory_file(tmp_path: Any, session: Session) -> None:
     """The template, filled with a three-term record in degrees and minutes, gives the same coefficients."""
-    record = bench.run({**SHORT, "attitudes": "three"}, seed=2)
+    record = session.run({**SHORT, "attitudes": "three"}, seed=2)
     system = load_system(NAME)
     lines = system.measured_data.template.splitlines()
     header = lines.pop().replace("angle_end [deg]", "angle_end [arcmin]")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commanding import Command
 from tumbling import NAME, SHORT, load
 
 from gyrobench.engine.session import Session
@@ -24,7 +25,6 @@ from gyrobench.system.setup_errors import setup_errors
 from gyrobench.system.system import load_system
 from gyrobench.system.wiring import Assembly, assemble
 
-Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_gyro.toml"
 DEG = 0.017453292519943295

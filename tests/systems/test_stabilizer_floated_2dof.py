@@ -20,7 +20,7 @@ from gyrobench.reduction.estimation.step_effect import step_effects, with_step
 from gyrobench.reduction.loops import margins
 from gyrobench.result import StepCheck
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
-from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "stabilizer_floated_2dof"
 ARCSEC = math.pi / 648000.0
@@ -32,11 +32,7 @@ IDEAL = {**STILL, "viscous": 0.0}
 DEFAULT = {"J": 0.5, "K": 16500.0, "tau1": 0.2, "T1": 2.0, "tau2": 0.03, "T2": 0.003}
 
 
-def load() -> System:
-    return load_system(NAME)
-
-
-MODULE = type(load()).__module__
+MODULE = type(load_system(NAME)).__module__
 closed: Any = importlib.import_module(".closed", MODULE)
 
 
@@ -186,7 +182,7 @@ def test_a_motor_at_its_limit_makes_the_loop_unstable(caplog: pytest.LogCaptureF
 @pytest.mark.long
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, with the gyro's noise."""
-    result = load().reduce(whole)
+    result = load_system(NAME).reduce(whole)
     table = next(t for t in result.tables if t.kind == "margins.agreement")
     (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table.rows
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
@@ -210,8 +206,9 @@ def test_the_step_costs_margin_in_the_first_order(steps: Session) -> None:
         np.testing.assert_allclose(coarse / fine, 2.0, atol=0.08)
 
 
+@pytest.mark.long
 def test_measures_of_the_whole_run(whole: Any) -> None:
-    result = load().reduce(whole, {"PM": (45.0, None)})
+    result = load_system(NAME).reduce(whole, {"PM": (45.0, None)})
     assert "the gain may fall by 27.0791 ± 0.0078 dB (95 %) to an oscillation at 2.04 Hz" in result.summary[0]
     assert any(s.endswith("carried over by viscous friction (100 %).") for s in result.summary)
     c = {c.name: c for c in result.coefficients}
@@ -283,7 +280,7 @@ def test_the_second_channel_is_caged() -> None:
 )
 def test_refuses(values: dict[str, Any], says: str) -> None:
     with pytest.raises(InvalidConfigurationError, match=says):
-        load().with_values(values).refuse()
+        load_system(NAME).with_values(values).refuse()
 
 
 def test_a_poor_network_is_told_and_fails_acceptance(steps: Session, caplog: pytest.LogCaptureFixture) -> None:
@@ -327,7 +324,7 @@ def test_margins_are_those_without_the_communication_step() -> None:
     tones = (6.5, 9.0, 12.0, 15.0, 18.0, 23.0, 30.0)
     phases = sweep("loop", "test", tones, lambda f: 1e-3 * max(1.0, 15.0 / f) ** 1.5, settle=3.0)
     with session(*phases) as s:
-        found, other = (load().with_values(IDEAL).reduce(s.run(IDEAL, step=h)) for h in (1e-4, 2e-4))
+        found, other = (load_system(NAME).with_values(IDEAL).reduce(s.run(IDEAL, step=h)) for h in (1e-4, 2e-4))
     rows = step_effects(found.coefficients, other.coefficients, 2.0)
     r = with_step(found, StepCheck(1e-4, rows, 2e-4))
     w, pm = closed.LagLeadLoop(**DEFAULT).margin()

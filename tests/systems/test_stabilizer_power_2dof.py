@@ -20,7 +20,7 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import System, load_system
+from gyrobench.system.system import load_system
 
 NAME = "stabilizer_power_2dof"
 #: no drift, no noise: what is left is the loop
@@ -31,11 +31,7 @@ DEFAULT = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}
 LIMIT = 1440.0  # (10/0.5 + 2/0.02)(10 + 10 2/10) = 120 12
 
 
-def load() -> System:
-    return load_system(NAME)
-
-
-R: Any = importlib.import_module(".reduction", type(load()).__module__)
+R: Any = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
 
 
 def session(*phases: LoopPhase) -> Session:
@@ -153,7 +149,7 @@ def test_stop_of_the_precession_ends_the_run() -> None:
     ):
         s.run(STILL)
     assert "stop" in str(told.value)
-    assert "its stop is at 5 deg" in load().with_values({"load": 9.0}).check()[0]
+    assert "its stop is at 5 deg" in load_system(NAME).with_values({"load": 9.0}).check()[0]
 
 
 # ------------------------------------------------------------------------------------ linear model and sweep
@@ -169,7 +165,7 @@ def test_poles_of_the_default_set(steps: Session) -> None:
 def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     """Issue: within 1 dB and 3 degrees up to twice the crossover; here far closer, the delay of the step included.  The
     continuous model differs by the delay: half a step of holding and nothing else, 360 f h/2 = 0.048 deg at 2.66 Hz."""
-    result = load().reduce(whole)
+    result = load_system(NAME).reduce(whole)
     table = next(t for t in result.tables if t.kind == "margins.agreement")
     (exact, far, count, db, degrees, _), (smooth, _, _, db_c, degrees_c, _) = table.rows
     assert exact == "linear, with step and delays" and smooth == "linear, continuous"
@@ -180,8 +176,9 @@ def test_margins_of_sweep_and_jacobians_agree(whole: Any) -> None:
     assert "delays of delayed connections: gyro.u_y → stabilizer.u: 0.0001 s" in rows.caption
 
 
+@pytest.mark.long
 def test_measures_of_the_whole_run(whole: Any) -> None:
-    result = load().reduce(whole)
+    result = load_system(NAME).reduce(whole)
     assert result.summary[0].startswith("Crossover 1.3293") and "rise by 23.123 ± 0.019 dB" in result.summary[0]
     assert any(s.endswith("carried over by the damping of the axis (100 %).") for s in result.summary)
     c = {c.name: c for c in result.coefficients}
@@ -241,7 +238,7 @@ def test_isolation_by_hand(whole: Any) -> None:
     A base held over the step, half a step early, would add 1 - e^(s h/2) of it: 0.25 % of a at 0.1 Hz.  The correction
     acts on the angle at the start of the step: half a step late.  Noise leaves 0.03 % at 0.1 Hz.
     """
-    result = load().reduce(whole)
+    result = load_system(NAME).reduce(whole)
     r = next(r for r in result.responses if r.name == "isolation")
     s = 2j * np.pi * np.array(r.x)
     late = np.exp(-s * 0.5e-4)
@@ -262,7 +259,7 @@ def test_recorded_profile_that_cannot_be_played(rows: str, says: str, tmp_path: 
     file = tmp_path / "motion.csv"
     file.write_text("time [s],roll [deg]\n" + rows)
     with pytest.raises(DataError, match=says):
-        system = load().with_values({"profile": str(file)})
+        system = load_system(NAME).with_values({"profile": str(file)})
         system.parameters(PartValues(system))
 
 

@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from gyrobench.engine.session import Session
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "stabilizer_sdf"
@@ -86,12 +85,6 @@ def test_numbers_of_the_method():
 
 
 # ------------------------------------------------------------------------------------------ co-simulation
-@pytest.fixture(scope="module")
-def session():
-    with Session(NAME) as s:
-        yield s
-
-
 def load(record):
     """t, a, b of the load phase from its opening on."""
     inside = record.channels["exciter.gate"] > 0.5
@@ -120,6 +113,7 @@ CASES = [("integrating", 0.0, 0.0, 10.0), ("rate-integrating", C, 0.0, 100.0), (
 
 
 @pytest.mark.parametrize("kind, c, k, time", CASES)
+@pytest.mark.long
 def test_cosimulation_converges_to_the_equations(session, kind, c, k, time):
     """The exchange errs by about M h t/(2 J0) in a and some M h/H in b: half of it at half the step."""
     errors = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +26,6 @@ R: Any = importlib.import_module(".reduction", PACKAGE)
 ARCSEC, DEG = math.pi / 648000.0, math.pi / 180.0
 FITTED = ("about east", "about p × east", "collimation", "trunnion", "circle zero", "inclinometer zero")
 LAT, LONG = 45.75 * DEG, 126.63 * DEG
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 # ------------------------------------------------------------------------------------------------ the star

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,6 @@ NAME = "stand_alignment"
 ARCSEC, DEG = math.pi / 648000.0, math.pi / 180.0
 QUIET = {"theodolite.pointing": 0.0, "theodolite.bubble": 0.0}
 PLAN = {"by": "gyro", "sets": 2, "settle": 2.0, "dwell": 2.0}
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Any:

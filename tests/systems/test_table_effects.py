@@ -5,21 +5,20 @@ what the budget of a run without them says, and entered as corrections they move
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 import two_channels
 from stated import FAINT
-from test_two_axis import DPH, NAMES, SHORT, load, quiet
+from test_two_axis import DPH, NAME, NAMES, SHORT, quiet
 from tumbling import wobbling
 
 from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import Result
-from gyrobench.system.system import System
+from gyrobench.system.system import System, load_system
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 ARCSEC = math.pi / 648000.0
@@ -51,12 +50,6 @@ def check(plain: Result, wrong: Result, right: Result, predicted: Array) -> None
 
 
 # ------------------------------------------------------------------------------------------ two-axis tumble
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session("tumble_two_axis") as prepared:
-        yield prepared
-
-
 VALUES = {**SHORT, **quiet(), **{f"gyro.{n}": GYRO.get(n, 0.0) * DPH for n in NAMES}, "gyro.white": WHITE}
 SOURCES = ("axis", "square", "mount", "angle1", "angle2", "wobble")
 VALUES |= {"nuisances": "none"} | {f"u_{n}": 1e-4 * FAINT for n in SOURCES}
@@ -64,7 +57,7 @@ VALUES |= {"nuisances": "none"} | {f"u_{n}": 1e-4 * FAINT for n in SOURCES}
 
 @pytest.fixture(scope="module")
 def plain(session: Session) -> Result:
-    return load().with_values(VALUES).reduce(session.run(VALUES))
+    return load_system(NAME).with_values(VALUES).reduce(session.run(VALUES))
 
 
 def harmonic(axis: int, order: int, row: int) -> dict[str, Any]:
@@ -92,7 +85,7 @@ def round_a_cone(axis: int, row: int) -> dict[str, Any]:
 )
 def test_two_axis_tumble(session: Session, plain: Result, error: dict[str, Any], source: str, row: int | None) -> None:
     record = session.run({**VALUES, **error})
-    system = load().with_values(VALUES)
+    system = load_system(NAME).with_values(VALUES)
     part = (
         f" ({(('sine', 'cosine') if 'angle error' in source else ('phase 0°', 'phase 90°'))[row]})"
         if row is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,6 @@ DPH = math.pi / 648000.0  # 1 deg/h in rad/s
 ARCSEC = math.pi / 648000.0
 ERU = 7.2921159e-5
 budgets = importlib.import_module(".budgets", type(load_system(NAME)).__module__)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def drawn(rng: np.random.Generator) -> dict[str, Any]:
@@ -114,6 +107,7 @@ def test_leans_add_up_as_rotations() -> None:
     assert found == pytest.approx(11.0 * ERU * math.sin(math.radians(1.2)), rel=1e-12)
 
 
+@pytest.mark.long
 def test_budgets_of_a_report(found: DriftTestResult) -> None:
     """The effect of a cause is its level times the sensitivity found; the total is the root of the squares."""
     table = next(t for t in found.tables if t.id == "budget.surroundings")

@@ -33,6 +33,7 @@ def test_the_drift_is_resolved_by_the_motion_of_the_block(found: DriftTestResult
         assert c.truth is not None and c.z is not None and abs(c.z) < 3.5, c.name
 
 
+@pytest.mark.long
 def test_what_is_left(found: DriftTestResult) -> None:
     """Machines at 20 Hz on 3.5 Hz, damping 0.1: r = 5.714, |T| = sqrt((1 + 1.143^2)/((1 - r^2)^2 + 1.143^2)) = 0.0479.
     In the run 2e-3 m/s2 at 8 Hz and 5e-4 at 0.2 Hz: 210 ug below; the channels are 120 samples of a second."""

@@ -77,6 +77,10 @@ def test_rates_of_a_laboratory(tmp_path: Path) -> None:
         e = 0.3 * np.sin(a + 1.0) + 0.15 * np.sin(2.0 * a)
         variance += (0.1**2 + 0.18**2 / 12.0 + float(np.sum((e - np.polyval(np.polyfit(a, e, 1), a)) ** 2)) / 8.0) / 2.0
     assert clock.u == pytest.approx(math.sqrt(variance) / 0.4061, rel=0.25)  # of 16 degrees of freedom
+    asked = [r for r in result.reasons if r.id == "arrangement.unstated"]  # a log's clock is in no residual
+    assert [r.blocks for r in asked] == [("pass",)] and "the angles wrong by 2 % (time base by" in asked[0].text
+    checked = gb.reduce("table_rate_test", file, arrangement="checked").result
+    assert not [r for r in checked.reasons if r.id == "arrangement.unstated"]
     said = result.summary[0]
     assert "from 4 runs" in said and said.endswith(" ppm (95 %).") and "1e" not in said
     for rate in (20, 500):  # both senses; the fast one over an angle of 125 deg
@@ -254,10 +258,7 @@ def test_angles_of_a_laboratory(tmp_path: Path, reversal: bool, zero: float) -> 
         (("\n2,10,", "\n1,10,"), "phase 1: its rows have several rates or positions"),
         (("method = two_heads", "method = reversal"), "positions with turned = 0 and with turned = 1"),
         (("method = two_heads", "method = three"), "method = three: two_heads or reversal"),
-        (
-            ("reading_2 [deg],", "reading_2 [rad],"),
-            "reading_2: does not follow the position",
-        ),
+        (("reading_2 [deg],", "reading_2 [rad],"), "reading_2: does not follow the position"),
     ],
 )
 def test_errors_of_angles(tmp_path: Path, swap: tuple[str, str], text: str) -> None:

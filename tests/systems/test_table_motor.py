@@ -68,6 +68,7 @@ def test_constants_come_back(run: gb.Run) -> None:
             assert c.u < 0.01 * c.estimate, c.name
 
 
+@pytest.mark.long
 def test_hung_torque_is_the_standard(run: gb.Run) -> None:
     """A stated 1 % of the hung torque is 1 % of all torques and of J, and nothing of the winding or the lag."""
     record = run.record
@@ -233,6 +234,7 @@ def test_an_angle_errs_by_its_rounding_at_least() -> None:
     assert found.angle_error == pytest.approx(10.0 * ANGLE_ERROR)
 
 
+@pytest.mark.long
 def test_terms_that_are_not_there_are_found_by_chance_only(solved: list[Any]) -> None:
     """60 records with nothing left out: p is uniform, the smallest of 120 rarely below 1e-3; one with w |w|."""
     p = [s.p for f in solved for s in f.left_out]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -19,12 +18,6 @@ from gyrobench.system.system import load_system
 
 NAME = "table_supervision"
 reduction = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,14 @@ rows.  Rows that were measured: the tests of each system (laboratory_file, measu
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.system.suite import load_test
 
-Command = Callable[..., tuple[int, str, str]]
 SYSTEMS = sorted(Bench(standard_folder()).systems())
 TAKING = [n for n in SYSTEMS if getattr(load_test(n), "measured_data", None)]
 

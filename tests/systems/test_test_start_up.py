@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -38,12 +37,6 @@ NAMED = {
 #: figure -> its step; the wheel is braked after a test that was broken off, too
 FIGURES = {"t heat": 1, "t wheel": 2, "reference": 3, "null": 4, "torquer": 6, "t close": 7, "loop": 8, "angle": 9}
 SHORT = {"dwell": 6.0}
-
-
-@pytest.fixture(scope="module")
-def session() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
 
 
 def reduced(session: Session, record: Record) -> LoopResult:

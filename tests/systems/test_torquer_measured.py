@@ -5,19 +5,18 @@ from __future__ import annotations
 import importlib
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.bench import Bench
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.system.system import load_system
 from gyrobench.units import DPH
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "torquer_scale_factor"
 
 

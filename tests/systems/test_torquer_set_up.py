@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -28,20 +27,14 @@ def load() -> System:
     return load_system(NAME)
 
 
-@pytest.fixture(scope="module")
-def servo() -> Iterator[Session]:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 def values(more: dict[str, Any]) -> dict[str, Any]:
     still = {f"gyro.{n}": 0.0 for n in drift.terms(9)}  # g coefficients would see the axis lean, too
     return {**SHORT, **dict.fromkeys(load().noises, 0.0), **still, "gyro.white": 1e-10, **more}
 
 
-def reduced(servo: Session, more: dict[str, Any], corrections: str = "") -> Result:
+def reduced(session: Session, more: dict[str, Any], corrections: str = "") -> Result:
     given = values({**more, "corrections": corrections})
-    return load().with_values(given).reduce(servo.run(given, seed=1))
+    return load().with_values(given).reduce(session.run(given, seed=1))
 
 
 def turned(axis: int) -> list[list[float]]:
@@ -63,11 +56,11 @@ CASES = [
 @pytest.mark.parametrize(("error", "source", "by_hand"), CASES, ids=[c[1] for c in CASES])
 @pytest.mark.long
 def test_an_error_is_predicted_and_taken_out(
-    servo: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
+    session: Session, error: dict[str, Any], source: str, by_hand: dict[str, float]
 ) -> None:
     """By hand to 1 % (K relative, drift in deg/h), in the report of the run, and out of the estimates again."""
-    plain, wrong = reduced(servo, {}), reduced(servo, error)
-    right = reduced(servo, error, f"{source} = 20(1) arcsec")
+    plain, wrong = reduced(session, {}), reduced(session, error)
+    right = reduced(session, error, f"{source} = 20(1) arcsec")
     (said,) = [t for t in wrong.tables if t.id == PREDICTED]
     shift = {row[0]: row[-3] for row in said.rows}
     for name, x in by_hand.items():
@@ -80,12 +73,12 @@ def test_an_error_is_predicted_and_taken_out(
     assert {b.source for b in right.budget if b.coefficient in by_hand} >= {source}
 
 
-def test_ammeter_and_time_base_by_hand(servo: Session) -> None:
+def test_ammeter_and_time_base_by_hand(session: Session) -> None:
     """An ammeter that shows too much by 1e-3 makes K small by as much, one whose zero is 0.1 mA too high is a drift of
     -17.2 deg/h/mA 0.1 mA; seconds read 1e-4 too long make all rates 1e-4 too small.
     """
     given = values({"u_current": 1e-3, "u_zero": 1e-4, "u_time": 1e-4})
-    r = load().with_values(given).reduce(servo.run(given, seed=1))
+    r = load().with_values(given).reduce(session.run(given, seed=1))
     part = {(b.source, b.coefficient): (b.sensitivity, b.contribution) for b in r.budget}
     K = r["K"].estimate
     assert part["ammeter", "K"] == pytest.approx((-K, 1e-3 * K), rel=1e-6)
@@ -96,11 +89,11 @@ def test_ammeter_and_time_base_by_hand(servo: Session) -> None:
 
 
 @pytest.mark.long
-def test_stated_errors_of_the_encoder_are_held(servo: Session) -> None:
+def test_stated_errors_of_the_encoder_are_held(session: Session) -> None:
     """Thirty records whose angles are read with 20 arcsec once a turn: stated, 0.86 or more of the intervals of K, K_1
     and K_LS hold; not stated, less than half of those of K_LS.
     """
-    record = servo.run(values({"gyro.white": 1e-8}), seed=1)
+    record = session.run(values({"gyro.white": 1e-8}), seed=1)
     rng, held = np.random.default_rng(2), np.zeros((2, 3))
     for seed in range(30):
         a, b = SIZE * rng.normal(size=2)

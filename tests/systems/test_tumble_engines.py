@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from tumbling import DPH, NAME, SHORT, drift_in, gyro, load, quiet
 
 from gyrobench import frames
@@ -16,8 +16,6 @@ from gyrobench.engine.reference_engine import initial_state, initialize
 from gyrobench.engine.session import Session, run
 from gyrobench.system.parameters import resolve
 from gyrobench.system.wire_text import parse_wires
-
-Command = Callable[..., tuple[int, str, str]]
 
 #: A tumble of some 13,000 steps, for the slow engine: turns of 2.1 s, six windows each.
 HASTY = {"rate": 3.0, "windows": 6, "dwell": 0.6, "settle": 0.3, "table.acceleration": 20.0}

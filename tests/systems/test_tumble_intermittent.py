@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tumble as T
+from commanding import Command
 from tumbling import DPH, STOPPING, errors, gyro, latitude, load, quiet
 
 from gyrobench.engine.session import Session
@@ -18,7 +18,7 @@ from gyrobench.reduction.estimation import noise
 from gyrobench.result import Result
 from gyrobench.workflow.saved_run import lacking_phases
 
-Command = Callable[..., tuple[int, str, str]]
+NAME = "tumble_single_axis"
 
 
 def reduced_run(session: Session, values: dict[str, Any], seed: int = 1) -> Result:

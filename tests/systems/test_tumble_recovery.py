@@ -14,6 +14,8 @@ from gyrobench import frames
 from gyrobench.engine.session import Session
 from gyrobench.result import Result
 
+NAME = "tumble_single_axis"
+
 LIMIT = 1e-6  # deg/h per g^n
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from tumbling import DPH, NAME, NAMES, SHORT, gyro, lag, load, quiet
 
 from gyrobench.record.record import Record
 
-Command = Callable[..., tuple[int, str, str]]
 Foreign = Callable[[str], Path]
 MAPPING = Path(__file__).parents[1] / "foreign" / "vendor_gyro.toml"
 

@@ -11,6 +11,8 @@ from tumbling import DPH, NAMES, RATE, SHORT, load, quiet
 from gyrobench import frames
 from gyrobench.engine.session import Session
 
+NAME = "tumble_single_axis"
+
 W = frames.EARTH_RATE / DPH  # 15.041 deg/h
 PHI = math.radians(45.75)
 GAMMA = frames.normal_gravity(PHI) / frames.G0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
@@ -20,7 +20,6 @@ from systems.turn_on_repeatability import components
 from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
 from systems.turn_on_repeatability.warming import Kind, Warming, fitted, means
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "turn_on_repeatability"
 DPH = math.pi / 648000.0
 
@@ -123,6 +122,7 @@ def test_time_constants_are_found() -> None:
     assert fitted(noise, own, since, length, [Kind(np.ones_like(y), 1, True)]).tau[0].size == 1
 
 
+@pytest.mark.long
 def test_a_second_exponential_that_is_hardly_seen() -> None:
     """Records written from the equation, 2 exp(-t/20) + 0.7 exp(-t/80) in noise of 0.2 deg/h: most fits find one
     exponential, about 2.4 at the turn-on for 2.7.  Intervals must hold what is there; 12 of 12 are held by 0.95 with

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commanding import Command
 from two_channels import NAME, SHORT, load
 
 from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
-
-Command = Callable[..., tuple[int, str, str]]
 
 RUNS: list[tuple[list[str], list[str]]] = [
     (["latitude=0deg"], ["latitude 0°", "10° to 80°", "x channel: rank 5 of 9", "y channel: rank 5 of 9"]),
@@ -36,13 +35,8 @@ RUNS: list[tuple[list[str], list[str]]] = [
 
 
 @pytest.mark.parametrize(("values", "words"), RUNS, ids=[" ".join(v) for v, _ in RUNS])
-def test_run_is_refused(command: Command, tmp_path: Path, values: list[str], words: list[str]) -> None:
-    code, out, err = command("run", NAME, *(w for v in values for w in ("--set", v)), "--out", tmp_path / "run")
-    assert code == 2, err
-    assert out == "" and "Traceback" not in err
-    for word in words:
-        assert word in err, err
-    assert not (tmp_path / "run" / "run.json").exists()
+def test_run_is_refused(refused: Callable[..., None], values: list[str], words: list[str]) -> None:
+    refused(NAME, values, words)
 
 
 @pytest.fixture(scope="module")
@@ -111,17 +105,6 @@ def test_what_a_laboratory_forgets(
     file.write_text(text, encoding="utf-8")
     code, out, err = command("reduce", NAME, "--data", file, "--out", tmp_path / "out")
     assert code == 2 and out == "" and word in err, err
-
-
-def test_template_is_read_back(command: Command, tmp_path: Path) -> None:
-    code, template, err = command("reduce", NAME, "--template")
-    assert code == 0, err
-    file = tmp_path / "empty.csv"
-    file.write_text(template, encoding="utf-8")
-    code, _, err = command("reduce", NAME, "--data", file)
-    assert code == 2 and "no rows below the header" in err
-    header = template.splitlines()[-1]
-    assert header.startswith("phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean_x [mA],mean_y [mA]")
 
 
 @pytest.mark.long

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from commanding import Command
 from test_tumble_measured import laboratory
 from tumbling import NAME, SHORT, load
 
@@ -15,7 +15,6 @@ from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.result import NO_VERDICT
 
-Command = Callable[..., tuple[int, str, str]]
 LIMITS = '[coefficients.D_I]\nunit = "deg/h/g"\nmin = -2.0\nmax = 0.0\n'  # D_I is -0.9 deg/h/g
 FAR = LIMITS.replace("0.0", "-1.5")
 

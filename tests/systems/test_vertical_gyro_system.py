@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.run_errors import ParameterRefusedError, RunError
-from gyrobench.engine.session import Session
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "vertical_gyro"
@@ -16,12 +15,6 @@ SYSTEM = load_system(NAME)
 reduction = importlib.import_module(type(SYSTEM).__module__ + ".reduction")
 DEG, ARCMIN = math.pi / 180.0, math.pi / 10800.0
 STILL = {"earth_rate": 0.0}
-
-
-@pytest.fixture(scope="module")
-def session():
-    with Session(NAME) as s:
-        yield s
 
 
 def found(session, **values):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 
 from gyrobench.component import ComponentError
 from gyrobench.engine.session import Session
@@ -18,7 +18,6 @@ from gyrobench.reduction.toolkit import ReductionError
 from gyrobench.system.system import load_system
 from systems.vibration_rectification.reduction import Reduction, VibrationSetup
 
-Command = Callable[..., tuple[int, str, str]]
 NAME = "vibration_rectification"
 DPH = math.pi / 648000.0
 G0 = 9.80665
@@ -57,12 +56,6 @@ def test_frequencies_that_fall_together_are_refused() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ runs
-@pytest.fixture(scope="module")
-def session() -> Any:
-    with Session(NAME) as prepared:
-        yield prepared
-
-
 @pytest.mark.parametrize("axis", "xyz")
 def test_random_instruments_come_back(session: Session, axis: str) -> None:
     """Noise off; coefficients by chance, those across the vibration too; by hand from the parameters."""

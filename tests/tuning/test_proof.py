@@ -84,6 +84,7 @@ def test_sines_lost_on_one_side_bound_that_side_alone() -> None:
     assert none.bound and abs(none.value / 17.94 - 1.0) < 1e-3
 
 
+@pytest.mark.long
 def test_a_promised_gain_margin_is_where_the_simulation_becomes_unstable() -> None:
     """Conditionally stable loop of a platform whose own test begins with a flight: the base rests in the proof.
 

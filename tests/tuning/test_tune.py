@@ -122,6 +122,7 @@ def test_what_is_promised_holds_between_the_points_and_in_another_model(tuned) -
     assert least["disk"] == pytest.approx(promised["disk margin"], rel=0.005)
 
 
+@pytest.mark.long
 def test_the_proof_measured_what_the_model_says(tuned) -> None:
     for proof in tuned.proofs:
         assert proof.counted > 15 and proof.holds
@@ -256,6 +257,7 @@ def test_spreads_of_parts_refused(over: str, message: str) -> None:
         tune(load_system(NAMES[0]), ["bandwidth>1Hz"], parts={"stabilizer": "servo_three_loop"})
 
 
+@pytest.mark.long
 def test_a_wish_beyond_the_communication_step_is_refused() -> None:
     """A step of 0.5 ms: up to 800 Hz."""
     with pytest.raises(UsageError, match=r"S at 900Hz: the communication step of 0\.0005 s reaches up to 800 Hz"):

@@ -49,10 +49,7 @@ def sobol_indices(measures: CampaignMeasures) -> Json:
     if not sampled:
         return _factorial(measures, [codes for _, codes in coded])
     if len(rows) < MIN_RUNS:
-        return {
-            "word": f"No Sobol' indices: {len(rows)} runs of a sampled design; {MIN_RUNS} are needed.",
-            "rows": [],
-        }
+        return {"word": f"No Sobol' indices: {len(rows)} runs of a sampled design; {MIN_RUNS} are needed.", "rows": []}
     return _given_data(measures, columns)
 
 

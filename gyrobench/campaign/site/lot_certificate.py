@@ -15,7 +15,7 @@ from gyrobench.campaign.site.site_figures import control_lines
 from gyrobench.report.certificate_page import Certified, chosen
 from gyrobench.report.laboratory import Laboratory
 from gyrobench.report.page_model import Picture, Text, pictures
-from gyrobench.report.style import BLUE, HALF, VERMILION, axis_label, figure, styled, svg
+from gyrobench.report.style import BLUE, HALF, VERMILION, axis_label, chart, styled, svg
 from gyrobench.result import Limit
 from gyrobench.workflow.certificate import write_certificate
 
@@ -58,8 +58,7 @@ def _chart(
     key: str, name: str, unit: str, y: Any, half: Any, found: tuple[float, float, float], limit: Limit | None
 ) -> Picture:
     centre, low, high = found
-    fig, axes = figure(HALF, 45)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 45)
     control_lines(ax, {"centre": centre, "low": low, "high": high})
     ax.errorbar(np.arange(1, len(y) + 1), y, yerr=half, fmt="o", color=BLUE, markersize=2.8, elinewidth=0.8)
     bottom, top = ax.get_ylim()

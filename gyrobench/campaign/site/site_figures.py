@@ -13,7 +13,20 @@ from gyrobench.campaign.analysis.lots import all_dated, in_order
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, normalized_error, numbers
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import Picture
-from gyrobench.report.style import BLUE, GREEN, HALF, INK, MUTED, ORANGE, VERMILION, axis_label, figure, svg, zero_line
+from gyrobench.report.style import (
+    BLUE,
+    GREEN,
+    HALF,
+    INK,
+    MUTED,
+    ORANGE,
+    VERMILION,
+    axis_label,
+    chart,
+    figure,
+    svg,
+    zero_line,
+)
 
 MAX_BARS = 40
 FAR = 6.0  # quartile distances from the quartiles; what is farther off leaves no room for the rest
@@ -29,8 +42,7 @@ def distributions(measures: CampaignMeasures) -> list[Picture]:
         x = x[np.isfinite(x)]
         if len(x) < 5 or np.ptp(x) <= 1e-12 * np.abs(x).max():
             continue
-        fig, axes = figure(HALF, 45)
-        ax = axes[0, 0]
+        fig, ax = chart(HALF, 45)
         beyond = _histogram(ax, x)
         ax.set_xlabel(axis_label(name, measures.unit(name)))
         ax.locator_params(axis="x", nbins=5)
@@ -61,8 +73,7 @@ def normalized_errors(measures: CampaignMeasures, covered: Sequence[Json]) -> li
         e = e[np.isfinite(e)]
         if len(e) < 20:
             continue
-        fig, axes = figure(HALF, 45)
-        ax = axes[0, 0]
+        fig, ax = chart(HALF, 45)
         ax.axvspan(-1.0, 1.0, color=GREEN, alpha=0.2, linewidth=0, zorder=0)
         shown = np.clip(e, -3.0, 3.0)  # what is farther off stands in the last bar
         counts, edges = np.histogram(shown, bins=int(np.clip(2.0 * len(e) ** (1 / 3), 10, MAX_BARS)), range=(-3.0, 3.0))
@@ -87,8 +98,7 @@ def coverage_strip(covered: Sequence[Mapping[str, Any]]) -> list[Picture]:
     """Return the coverage of each measure with its bounds, 0.95 dashed."""
     if not covered:
         return []
-    fig, axes = figure(HALF, 16 + 5.5 * len(covered))
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 16 + 5.5 * len(covered))
     ax.axvline(0.95, color=MUTED, linestyle="--", linewidth=0.9)
     for i, c in enumerate(covered):
         colour, marker = (BLUE, "o") if c["consistent"] else (VERMILION, "D")
@@ -169,8 +179,7 @@ def indices(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
     pictures = []
     for i, (name, quantity) in enumerate(dict.fromkeys((r["name"], r["quantity"]) for r in rows)):
         shown = [r for r in rows if (r["name"], r["quantity"]) == (name, quantity)]
-        fig, axes = figure(HALF, 16 + 7.0 * len(shown))
-        ax = axes[0, 0]
+        fig, ax = chart(HALF, 16 + 7.0 * len(shown))
         ax.axvline(0.0, color=MUTED, linewidth=0.8)
         for k, r in enumerate(shown):
             for key, low, high, shift, colour, marker in (
@@ -207,8 +216,7 @@ def control_charts(measures: CampaignMeasures, lot: Json) -> list[Picture]:
         y = np.where(done, numbers(rows, f"{name}.estimate"), np.nan)
         if limits is None:
             continue
-        fig, axes = figure(HALF, 50)
-        ax = axes[0, 0]
+        fig, ax = chart(HALF, 50)
         if entry["low"] is not None:
             ax.axhspan(entry["low"], entry["high"], color=GREEN, alpha=0.18, linewidth=0, zorder=0)
         control_lines(ax, limits)
@@ -257,8 +265,7 @@ def distances(lot: Json) -> list[Picture]:
     found = [(k, i["distance"], i["outlier"]) for k, i in enumerate(lot["instruments"], 1) if i["distance"] is not None]
     if not found or lot["outliers"] is None:
         return []
-    fig, axes = figure(HALF, 50)
-    ax = axes[0, 0]
+    fig, ax = chart(HALF, 50)
     for flag, colour, marker in ((False, BLUE, "o"), (True, VERMILION, "D")):
         here = [(k, d) for k, d, o in found if o is flag]
         ax.plot([k for k, _ in here], [d for _, d in here], marker, color=colour, markersize=3.5, markeredgewidth=0)

@@ -125,7 +125,7 @@ class FilteredRateGyro(RateGyro):
     rate = y within +-range_max, sampled every `period`, in steps of `resolution`
     """
 
-    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
     sampling = "period"
 
     bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)

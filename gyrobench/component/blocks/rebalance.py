@@ -18,7 +18,7 @@ class AnalogRebalance(Component):
     reading against the table angle (read as i it is one step early).  [LOOP-REBALANCE, REBAL-ANALOG]
     """
 
-    smooth: ClassVar[dict[str, float]] = {"resolution": 0.0}
+    unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     K_p = Parameter(119.92139898087, "A/V", "proportional gain", min=0.0)

@@ -41,7 +41,8 @@ async function run() {
   if (count > 1) before = { data: table().slice(0, count * width), count, letters: lesson && lesson.letters };
   if (lesson) lesson.letters = letters();
   engine.renew(instance);
-  content.parameters.forEach((p) => engine.set(instance, p.reference, p.value * p.factor));
+  const changed = content.parameters.filter((p) => p.value !== p.start); // there and back a unit may cost a last digit
+  changed.forEach((p) => engine.set(instance, p.reference, p.value * p.factor));
   count = 0;
   document.body.dataset.run = "on";
   if (engine.start(instance, rows)) return finish(text(engine.reason(instance)), true);

@@ -57,11 +57,12 @@ from gyrobench.units import DEG
 ARRANGEMENT = f"arrangement{UNSTATED}"
 SCALES = {"k": "u_scale_factor", "k_x": "u_scale_factor", "k_y": "u_scale_factor", "scale": "u_scale"}
 OFF, TOO_LARGE = DEG, 1.02  # an angle or a latitude, a scale factor
-EARLY = 0.01  # of the time of a reading
+EARLY, DAY = 0.01, 86400.0  # of the time of a reading; s
 #: scales that nobody states, what begins their columns, and what states an uncertainty of them
 FORCES = ("f_x", "f_y")  # of the accelerometers of a north finder
 #: columns that stand beside each other in a table, and are of one kind
 NEIGHBOURS = (("mean_x", "mean"), FORCES, ("drift_x", "drift_y"), ("drift_y", "drift_z"), ("drift_x", "drift_z"))
+GYROS = (("mean_gx", "mean_gy"), ("mean_gy", "mean_gz"), ("mean_gx", "mean_gz"))  # where no angles show the axes
 METERS = (
     ("the readings", READINGS, ("u_voltage",)),
     ("the currents", ("current",), ("u_current",)),
@@ -77,13 +78,13 @@ UNITY = 1.0  # u, least change of an estimate that counts
 def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     """Yield the record with each mistake made: attitudes exchanged, two pairs of them at once, signs of rotation and
     readings reversed, latitude, scale factors, scales of meters and the zero of the angles in an attitude off, readings
-    begun too early - but for what a standard uncertainty is stated of.
+    begun too early, a drift by the time of day - but for what a standard uncertainty is stated of.
     """
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
     yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
     yield from reversed_columns(record, [n for n in record.windows if n.startswith(READINGS)], "the reading", False)
-    for a, b in NEIGHBOURS:
+    for a, b in (*NEIGHBOURS, *(GYROS if "outer_start" not in record.windows else ())):
         yield from exchanged_columns(record, [(a, b)], f"the columns {a} and {b} exchanged")
     forces = [n for n in FORCES if n in record.windows]
     if forces:
@@ -100,6 +101,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _meters(record)
+    yield from _daily(record)
     if "mean" in record.windows and len(rate := np.asarray(record.windows.get("rate", ()), dtype=float)) > 1:
         mean = np.array(record.windows["mean"], dtype=float)
         turned = np.concatenate([[False], np.diff(rate) != 0.0])
@@ -122,6 +124,29 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         columns = {n: np.where(here, record.windows[n] + OFF, record.windows[n]) for n in ANGLES}
         yield HandlingCandidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
+
+
+def _daily(record: Record) -> Iterator[HandlingCandidate]:
+    """A drift that goes with the time of day, its amplitude the scatter of a window, where a gyro that holds its table
+    turns with the Earth for half a day or more: unbalances have the period of a sidereal day.
+    """
+    w = record.windows
+    held = [row.phase for row in record.run.plan if row.mode == "servo"]
+    if not held or not all(n in w for n in ANGLES):
+        return
+    t0, t1, a0, a1 = (np.asarray(w[n], dtype=float) for n in ("t_start", "t_end", *ANGLES))
+    phase = np.asarray(w["phase"]).astype(int)
+    longest = max((p for p in held if np.any(phase == p)), key=lambda p: float(np.ptp(t0[phase == p])), default=None)
+    rate = ((a1 - a0) / (t1 - t0))[phase == longest]
+    if rate.size < 3 or np.ptp(t0[phase == longest]) < DAY / 2.0:
+        return
+    turned = float(np.std(np.diff(rate, 2))) / math.sqrt(6.0) * DAY / (2.0 * math.pi)  # amplitude of the angle
+    columns = {
+        n: a - turned * np.cos(2.0 * math.pi * t / DAY) for n, a, t in zip(ANGLES, (a0, a1), (t0, t1), strict=True)
+    }
+    yield HandlingCandidate(
+        "a drift by the time of day as large as the scatter of a window", changed(record, **columns)
+    )
 
 
 def _meters(record: Record) -> Iterator[HandlingCandidate]:

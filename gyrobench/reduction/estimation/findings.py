@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import known_errors, noise_mixture_fit, nuisances
+from gyrobench.reduction.estimation import known_errors, normal_equations, nuisances
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation import residual_series as series
 from gyrobench.reduction.estimation.mixture import equivalent_dof
@@ -367,7 +367,7 @@ class Findings:
             tau, share, reading, weight = e.noise.models.T
             grid, n = noise_model.NoiseGrid(tau, share, weight, reading), self.y.size
             every = np.column_stack([columns[:, :-1], e.likeliest.known, columns[:, -1]])
-            moments = noise_mixture_fit.moments(self.t_start, self.t_end, every, grid)
+            moments = normal_equations.moments(self.t_start, self.t_end, every, grid)
             found = known_errors.absorb(moments, columns.shape[1] - 1, n, e.likeliest.variance)
             return found.square, found.own, found.data
         Z = columns if self.weights is None else columns * np.sqrt(self.weights)[:, None]

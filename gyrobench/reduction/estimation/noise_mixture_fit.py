@@ -31,7 +31,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
 from gyrobench.reduction.estimation.noise_estimate import Evidence, Likeliest, NoiseEstimate, NoiseSummary
-from gyrobench.reduction.estimation.normal_equations import NormalEquations
+from gyrobench.reduction.estimation.normal_equations import NormalEquations, moments
 from gyrobench.reduction.estimation.nuisance_evidence import evidence_of, repeated
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock, NuisanceState
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
@@ -320,8 +320,7 @@ def _all_in(problem: Problem) -> tuple[NormalEquations, Array, float]:
     rss = np.maximum(rss, 1e-300)
     m = n - p - single.size
     ll = np.log(problem.grid.prior) - 0.5 * (absorbed.logdet + determinant + m * np.log(rss))
-    likely = np.exp(ll - ll.max())
-    likely /= likely.sum()
+    likely = _normalized(ll)
     return equations, likely, math.exp(0.5 * float(likely @ np.log(rss / m)))
 
 
@@ -390,17 +389,3 @@ def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = N
     total = np.cumsum(w[order]) / w.sum()
     low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.05, 0.95))
     return float(values[k]), low, high
-
-
-def moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
-    """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model."""
-    models, c = grid.tau.size, columns.shape[1]
-    square, logdet = np.zeros((models, c, c)), np.zeros(models)
-    for alike in (grid.reading == 0.0, grid.reading > 0.0):  # without reading errors it is quicker
-        g = np.flatnonzero(alike)
-        if g.size:
-            for _, Z, part in noise.whitened_blocks(t0, t1, columns, grid.tau[g], grid.share[g], grid.reading[g]):
-                zt = np.ascontiguousarray(Z.transpose(2, 1, 0))
-                square[g] += zt @ zt.transpose(0, 2, 1)
-                logdet[g] += part
-    return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1], logdet

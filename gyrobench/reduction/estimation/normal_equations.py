@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation import noise
 
 
 @dataclass(frozen=True)
@@ -91,3 +92,17 @@ class NormalEquations:
             out[:, (p + e)[:, None], p + e] = own
             out[:, p + e, :p] = -side.transpose(0, 2, 1)
         return out
+
+
+def moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tuple[Array, Array, Array, Array]:
+    """X'X, X'y, y'y of the whitened columns (y the last) and log determinants, model by model."""
+    models, c = grid.tau.size, columns.shape[1]
+    square, logdet = np.zeros((models, c, c)), np.zeros(models)
+    for alike in (grid.reading == 0.0, grid.reading > 0.0):  # without reading errors it is quicker
+        g = np.flatnonzero(alike)
+        if g.size:
+            for _, Z, part in noise.whitened_blocks(t0, t1, columns, grid.tau[g], grid.share[g], grid.reading[g]):
+                zt = np.ascontiguousarray(Z.transpose(2, 1, 0))
+                square[g] += zt @ zt.transpose(0, 2, 1)
+                logdet[g] += part
+    return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1], logdet

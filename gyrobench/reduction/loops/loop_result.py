@@ -149,7 +149,7 @@ class LoopFindings(MeasureFindings):
         key = "" if loop == "stabilizer" else f" {loop}"
         self.excluded[loop] = [p.f for p, c in zip(points, counts, strict=True) if not c]
         values = m.measured_values(sure, self.excluded[loop])
-        closest = _beside(computed.get("discrete"), values)
+        closest = m.beside(computed.get("discrete"), values)
         twin = None
         if "phase" in values and models.discrete is not None:
             twin = Twin.of(models.discrete, computed["discrete"], sure, values["crossover"][0])
@@ -158,15 +158,7 @@ class LoopFindings(MeasureFindings):
             widened["crossover"], widened["phase"] = twin.widened(values["crossover"], values["phase"])
         before = len(self.coefficients)
         none = "" if "phase" in values or self.unstable else why_no_crossover(sure, len(points), self.record.run)
-        for name, what, unit, value, closed in (
-            (f"f_c{key}", "gain crossover frequency", "Hz", widened.get("crossover", (None,)), closest[0]),
-            (f"PM{key}", "phase margin", "°", widened.get("phase", (None,)), closest[1]),
-        ):
-            self.measure(name, what, unit, *value, closed=closed, no_value=none)
-        if "phase" in values:
-            crosses = values["crossover"][0]
-            self.modelled(f"f_c{key}", loop, lambda limits: limits.near(crosses)[0])
-            self.modelled(f"PM{key}", loop, lambda limits: limits.near(crosses)[1])
+        self._crossover(loop, key, widened, closest, none)
         self._gain_margins(loop, key, values, sure, models.discrete)
         self._limited(title, sines, [c.name for c in self.coefficients[before:]])
         noisy = "" if self.unstable else excluded_words(title, points, counts)
@@ -177,6 +169,20 @@ class LoopFindings(MeasureFindings):
             causes = self._causes(sines, noisy)
             self.warn("loop.disagrees", disagreement(title, values["crossover"], values["phase"], twin, causes))
         return sure
+
+    def _crossover(
+        self, loop: str, key: str, values: Mapping[str, Any], closest: tuple[float | None, float | None], none: str
+    ) -> None:
+        """Add crossover and phase margin, with what the linear models have there; none: why there is no value."""
+        for name, what, unit, value, closed in (
+            (f"f_c{key}", "gain crossover frequency", "Hz", values.get("crossover", (None,)), closest[0]),
+            (f"PM{key}", "phase margin", "°", values.get("phase", (None,)), closest[1]),
+        ):
+            self.measure(name, what, unit, *value, closed=closed, no_value=none)
+        if "phase" in values:
+            crosses = values["crossover"][0]
+            self.modelled(f"f_c{key}", loop, lambda limits: limits.near(crosses)[0])
+            self.modelled(f"PM{key}", loop, lambda limits: limits.near(crosses)[1])
 
     def _gain_margins(
         self, loop: str, key: str, values: Mapping[str, tuple[float, float]], points: Sequence[Point],
@@ -376,17 +382,8 @@ class LoopFindings(MeasureFindings):
         return super().result(replace(account, reasons=()), summary, ranked_by)
 
 
-def _beside(model: m.Margins | None, values: Mapping[str, tuple[float, float]]) -> tuple[float | None, float | None]:
-    """Return crossover and phase margin of the model; of several crossovers the one next to the measured."""
-    if model is None:
-        return None, None
-    return model.near(values["crossover"][0]) if "crossover" in values else (model.crossover, model.phase)
-
-
 def _margin_note(run: RunDocument) -> str:
     cuts = ", ".join(f"{w.replace('->', '→')}: {s:g} s" for w, s in run.delays.items()) or "none"
     delays = f" Communication step: {run.step:g} s; delays of delayed connections: {cuts}." if run.step else ""
-    return (
-        "Gain margin and gain-reduction margin: changes of the gain that bring the loop to its stability "
-        f"limit.{delays}"
-    )
+    meaning = "Gain margin and gain-reduction margin: changes of the gain that bring the loop to its stability limit."
+    return meaning + delays

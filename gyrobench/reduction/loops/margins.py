@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -221,6 +221,13 @@ def measured_values(points: Sequence[Point], excluded: Sequence[float] = ()) -> 
             values[name] = factor, math.hypot(u_factor, same[1] - factor)
             values[f"f_{name}"] = at, math.hypot(u_f, same[0] - at)
     return values
+
+
+def beside(model: Margins | None, values: Mapping[str, tuple[float, float]]) -> tuple[float | None, float | None]:
+    """Return crossover and phase margin of the model; of several crossovers the one next to the measured."""
+    if model is None:
+        return None, None
+    return model.near(values["crossover"][0]) if "crossover" in values else (model.crossover, model.phase)
 
 
 def _propagated(points: Sequence[Point], f: Array, at: float, factor: float) -> tuple[float, float]:

@@ -22,26 +22,23 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
-from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
+from gyrobench.reduction.noise_model.agreement import DeviationAgreement
+from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, filtered, joined, spectrum, split
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
-from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
-from gyrobench.reduction.series.deviations import Deviation, deviations
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models with flicker, or of those without, from which on N holds for them too
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
-SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 STEPS = 5
-TRIED_MODELS, TRIED = 12, 200  # maxima and draws of each model that are held against the deviation
-DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no model of the record
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
@@ -50,12 +47,19 @@ SAMPLE = 250  # draws of the ramp and the minimum
 
 
 @dataclass(frozen=True)
-class _Scaled:
-    """Deviations of the record as it was and as it was cleaned, tau in samples, in units of ``size``."""
+class _Fit:
+    """A treated record with the models of what is left, their draws, the one that is reported, and the ramp."""
 
-    own: Deviation
-    clean: Deviation
-    removed: Array
+    treated: Treated
+    found: ModelSearch
+    clouds: list[Cloud]
+    at: Fitted
+    ramp: Estimate
+    agreements: tuple[DeviationAgreement, DeviationAgreement]
+
+    @property
+    def agrees(self) -> bool:
+        return all(a.holds for a in self.agreements) and self.treated.settled
 
 
 def fit_noise(
@@ -77,14 +81,14 @@ def fit_noise(
     rate = np.asarray(rate, dtype=float)
     scale = scale_of(rate, tau0, means)
     raw = rate if raw is None else np.asarray(raw, dtype=float)
-    treated = treat((rate - scale.level) / scale.size, remove_lines, find_wild)
-    treated, found = _without_steps(treated, means)
-    clouds = posterior.draw(found)
-    judge = _Judge(found, _deviations(raw / scale.size, treated), treated)
-    at = judge.choose(clouds)
-    ramp = _ramp(found, clouds)
-    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
-    whole, clean = judge.both(allan(at.model, at.p, judge.own.tau, means) + slow)
+    rate, raw = (rate - scale.level) / scale.size, raw / scale.size
+    fitted = _fit(treat(rate, remove_lines, find_wild), raw, means)
+    if not fitted.agrees and not all(x.steady for x in fitted.treated.lines):
+        # two lines for one that wanders leave holes in what may be a narrow band of noise
+        again = _fit(treat(rate, remove_lines, find_wild, wandering=False), raw, means)
+        fitted = again if again.agrees else fitted
+    treated, found, clouds, at, ramp = fitted.treated, fitted.found, fitted.clouds, fitted.at, fitted.ramp
+    whole, clean = fitted.agreements
     of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
     return NoiseModel(
         scale=scale,
@@ -96,8 +100,19 @@ def fit_noise(
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
-        filtered=_filtered(clouds),
+        filtered=filter_probability(clouds),
     )
+
+
+def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
+    """Return the model of a treated record; raw (n,): as it was, in its unit."""
+    treated, found = _without_steps(treated, means)
+    clouds = posterior.draw(found)
+    judge = Judge(found, deviations_of(raw, treated), treated)
+    at = judge.near_the_record(judge.choose(clouds), clouds)
+    ramp = _ramp(found, clouds)
+    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
+    return _Fit(treated, found, clouds, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means) + slow))
 
 
 # ------------------------------------------------------------------ steps
@@ -150,99 +165,11 @@ def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> A
     few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
     grid = Grid(math.pi * few / n, means)
     S = spectrum(*joined(parts), grid)
-    for term, p in parts:  # a stretch leaks into the zeros of a mean
-        if term.filter.startswith(("mean", "average")):
+    for term, p in parts:  # a stretch leaks into the zeros of a mean, and into what a digital low-pass holds back
+        if term.filter.startswith(("mean", "average", *DIGITAL)):
             own = term.spectrum(p, grid)
             S = np.maximum(S, LEAK * float(np.trapezoid(own, few)) / n**2)
     return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])
-
-
-# ------------------------------------------------------------------ the model that is reported
-def _deviations(raw: Array, treated: Treated) -> _Scaled:
-    clean = treated.cleaned()
-    removed = raw - np.where(np.isfinite(clean), clean, 0.0)
-    for s in treated.stretches:  # of a wild sample what it exceeds its neighbours' word by
-        at = s.start + s.done.wild
-        removed[at] = raw[at] - s.done.x[s.done.wild]
-    off = removed - np.nanmean(removed)
-    own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
-    quiet = float(np.nanmax(np.abs(off))) < 1e-9
-    out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), fine=True)["allan"].deviation ** 2
-    return _Scaled(own, deviations(clean, 1.0, ("allan",), fine=True)["allan"], np.resize(out, own.tau.size))
-
-
-class _Judge:
-    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
-
-    def __init__(self, found: ModelSearch, scaled: _Scaled, treated: Treated) -> None:
-        self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
-        terms, p = found.whole
-        self.own, self.clean = (with_spectrum(d, terms, p, treated.spread) for d in (scaled.own, scaled.clean))
-        self.removed = scaled.removed
-        self.below = treated.below / self.own.tau  # is in the samples and not in the model
-        peaks = found.resonances
-        self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
-
-    def both(self, variance: Array) -> tuple[DeviationAgreement, DeviationAgreement]:
-        """Return the agreements of an Allan variance (k,) of the broadband terms, with a ramp if there is one."""
-        whole = np.maximum(variance + self.peaks + self.below, 0.0)
-        return (compare(self.own, np.sqrt(whole + self.removed), self.samples),
-                compare(self.clean, np.sqrt(whole[: self.clean.tau.size]), self.samples))  # fmt: skip
-
-    def share(self, variance: Array) -> float:
-        """Return the least share of averaging times that agree; 1 where enough do."""
-        both = self.both(variance)
-        return 1.0 if all(a.holds_at_octaves for a in both) else min(min(a.share, a.octaves) for a in both)
-
-    def choose(self, clouds: Sequence[Cloud]) -> Fitted:
-        """Return the model to be reported: of greatest evidence, terms paid for, of those that agree with the record.
-
-        Where no maximum agrees the draws are tried, the most probable ones first; where none does, the closest one.
-        """
-        tau = self.own.tau
-
-        def worth(f: Fitted) -> float:
-            return f.evidence - SIMPLER * len(f.model)
-
-        ranked = sorted(self.found.seen.values(), key=worth, reverse=True)
-        near = [f for f in ranked if worth(f) > worth(ranked[0]) - posterior.WINDOW][:TRIED_MODELS]
-        tried = [(self.share(allan(f.model, f.p, tau, self.means)), f) for f in near]
-        agree = [f for share, f in tried if share == 1.0]
-        if _filtered(clouds) < 1.0 - ABSENT:  # one that is not determined is not reported
-            agree = [f for f in agree if not filtered(f.model)] or agree
-        if agree:
-            return _middle([f for f in agree if worth(f) > worth(agree[0]) - SIMPLER], clouds)
-        for cloud in sorted(clouds, key=lambda c: -float(c.weight.sum())):
-            order = np.argsort(-cloud.log)[:TRIED]
-            order = order[cloud.log[order] > np.max(cloud.log) - DEEP]
-            for p, variance in zip(cloud.p[order], allan(cloud.model, cloud.p[order], tau, self.means), strict=True):
-                share = self.share(variance)
-                if share > max(t[0] for t in tried):
-                    tried.append((share, replace(self.found.seen[cloud.model], p=p)))
-                    if share == 1.0:
-                        return tried[-1][1]
-        best = max(tried, key=lambda t: t[0])
-        return best[1] if best[0] > tried[0][0] + 0.05 else tried[0][1]
-
-
-def _filtered(clouds: Sequence[Cloud]) -> float:
-    """Return the probability that the white noise has passed a filter."""
-    return sum(float(c.weight.sum()) for c in clouds if filtered(c.model))
-
-
-def _middle(models: Sequence[Fitted], clouds: Sequence[Cloud]) -> Fitted:
-    """Return the first of models that are worth the same, or, if its N is not in the middle half of all draws, the one
-    whose N is nearest to their median.
-    """
-    figure = size_of("white")
-    values, weights = weighted(clouds, figure)
-    if len(models) == 1 or not values.size:
-        return models[0]
-    low, median, high = (quantile(values, weights, q) for q in (0.25, 0.5, 0.75))
-    own = [math.inf if (v := figure(f.model, f.p[None])) is None else float(v[0]) for f in models]
-    if low <= own[0] <= high or math.isinf(own[0]):
-        return models[0]
-    return models[int(np.argmin(np.abs(np.array(own) - median)))]
 
 
 # ------------------------------------------------------------------ figures of the draws

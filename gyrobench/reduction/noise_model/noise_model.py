@@ -191,12 +191,21 @@ def _filter_words(name: str, p: Array, tau0: float) -> str:
         return (
             f"low-pass of second order, {math.exp(p[0]) / (2.0 * math.pi * tau0):.3g} Hz, damping {math.exp(p[1]):.2g}"
         )
+    if name == "butterworth":
+        return f"digital low-pass, {_cutoff(p[0], tau0):.3g} Hz, order {math.exp(p[1]):.2g}"
+    if name == "cascade":
+        return f"{math.exp(p[1]):.2g} digital low-passes in a row of {_cutoff(p[0], tau0):.3g} Hz each"
     if name == "average":
         return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
     if name.startswith("mean"):
         return f"mean over {name[4:]} samples"
     level = float(np.exp(-2.0 * np.sum(p[::2])))
     return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+
+
+def _cutoff(log_t: float, tau0: float) -> float:
+    """Return the frequency, Hz, at which tan(omega/2) is t."""
+    return math.atan(math.exp(log_t)) / (math.pi * tau0)
 
 
 def _seconds(t: float) -> str:

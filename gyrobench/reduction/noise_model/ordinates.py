@@ -27,7 +27,15 @@ from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import smooth_spectrum
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm, markov_parts
+from gyrobench.reduction.noise_model.terms import (
+    DIGITAL,
+    SLOW,
+    Grid,
+    NoiseTerm,
+    allan_of_spectrum,
+    covariance_grid,
+    markov_parts,
+)
 from gyrobench.reduction.series.noise_spectra import flicker
 
 LOW = 16  # first ordinates of each parity that are kept singly
@@ -189,8 +197,10 @@ class Ordinates:
         shape = p.shape[:-1]
         S = np.broadcast_to(self.fixed, (*shape, self.fixed.size)).copy()
         low = np.zeros((*shape, *self.low_omega.shape, LOW))
+        passes = passed(model, p, self.grid)
         for term, q in split(model, p):
             s = term.spectrum(q, self.grid)
+            s = s * passes if passes is not None and term.name in SLOW else s
             S += s
             if term.name in ("flicker", "gauss_markov"):
                 low += self.low_covariance(term, q, s[..., self.b :].reshape(*shape, *self.low_omega.shape))
@@ -248,9 +258,15 @@ class Ordinates:
         low = np.zeros((*self.low_omega.shape, LOW))
         dlow = np.zeros((p.size, *low.shape))
         shape, at = self.low_omega.shape, 0
+        passes, slow, filter_rows = passed(model, p, self.grid), np.zeros(S.size), slice(0)
         for term, q in split(model, p):
             steps = np.concatenate([q[None], *((q + h * e)[None] for e in np.eye(q.size)[1:] for h in (1e-4, -1e-4))])
             s = term.spectrum(steps, self.grid)
+            if passes is not None and term.name in SLOW:
+                s = s * passes
+                slow += s[0]
+            elif term.name == "white":
+                white, filter_rows = s[0], slice(at + 1, at + q.size)
             S += s[0]
             dS[at] = s[0]
             dS[at + 1 : at + q.size] = (s[1::2] - s[2::2]) / 2e-4
@@ -260,6 +276,8 @@ class Ordinates:
                 dlow[at] = extra[0]
                 dlow[at + 1 : at + q.size] = (extra[1::2] - extra[2::2]) / 2e-4
             at += q.size
+        if passes is not None:
+            dS[filter_rows] *= 1.0 + slow / white
         diagonal = np.arange(LOW)
         low[..., diagonal, diagonal] += S[self.b :].reshape(shape) + FLOOR
         dlow[..., diagonal, diagonal] += dS[:, self.b :].reshape(-1, *shape)
@@ -319,11 +337,30 @@ def filtered(model: Model) -> bool:
     return any(term.filter != "none" for term in model)
 
 
+def passed(model: Model, p: Array, grid: Grid) -> Array | None:
+    """Return what the digital low-pass of a model passes of the power (..., b), None where it has none."""
+    for term, q in split(model, p):
+        if term.filter in DIGITAL:
+            return term.unit(q[..., 1:], grid)
+    return None
+
+
 def spectrum(model: Model, p: Array, grid: Grid) -> Array:
     """Return S (..., b) of a model."""
-    return np.asarray(np.sum([term.spectrum(q, grid) for term, q in split(model, p)], axis=0))
+    passes = passed(model, p, grid)
+    each = [term.spectrum(q, grid) * (passes if passes is not None and term.name in SLOW else 1.0)
+            for term, q in split(model, p)]  # fmt: skip
+    return np.asarray(np.sum(each, axis=0))
 
 
 def allan(model: Model, p: Array, m: Array, means: bool = False) -> Array:
     """Return the Allan variance (..., k) of means over m samples, of the terms of a model."""
-    return np.asarray(np.sum([term.allan(q, m, means) for term, q in split(model, p)], axis=0))
+    out = np.asarray(np.sum([term.allan(q, m, means) for term, q in split(model, p)], axis=0))
+    grid = covariance_grid(means)
+    passes = passed(model, p, grid)
+    slow = [term.spectrum(q, grid) for term, q in split(model, p) if term.name in SLOW]
+    if passes is None or not slow:
+        return out
+    # what the low-pass holds back of slow noise has a short memory
+    least = 1e-6 * out
+    return np.maximum(out - allan_of_spectrum(np.sum(slow, axis=0) * (1.0 - passes), m), least)

@@ -10,9 +10,10 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
-from gyrobench.reduction.noise_model.terms import PEAKS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import PEAKS, SLOW, Grid, NoiseTerm
 
 GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum is smoothed
+HELD_BACK = 0.1  # of a spectrum that falls by f^-2
 FEWEST = 12.0  # ordinates of a group
 SHORTEST_TAU = 6.0  # samples, of a Gauss-Markov process: what is faster is the filter
 LONGEST_MEAN = 64.0  # samples, of a filter
@@ -22,6 +23,8 @@ FILTERS = {
     "first": [(0.05, 30.0)],
     "second": [(0.03, 6.0), (0.1, 5.0)],
     "average": [(1.05, LONGEST_MEAN)],
+    "butterworth": [(0.02, 30.0), (0.5, 12.0)],
+    "cascade": [(0.02, 30.0), (0.5, 12.0)],
 }
 HARD = 1e3  # slope of the walls, of the square of what is beyond
 
@@ -49,6 +52,9 @@ class Prior:
         self.count = np.add.reduceat(count, starts)
         self.level = np.maximum(np.add.reduceat(power, starts) / self.count, 1e-13)
         self.grid = Grid(np.exp(np.add.reduceat(count * np.log(omega), starts) / self.count), data.grid.means)
+        # slow noise falls by f^-2 at most: what is far below that has passed a low-pass, and slow noise with it
+        fall = np.maximum.accumulate(self.level * self.grid.omega**2) / self.grid.omega**2
+        self.before = np.where(self.level < HELD_BACK * fall, fall, self.level)
         self.longest, self.samples = math.log(float(np.max(data.n))), data.samples
         self.taus = np.linspace(math.log(SHORTEST_TAU), self.longest, 40)
         self.markov = np.array([self._range(NoiseTerm("gauss_markov"), np.array([t])) for t in self.taus])
@@ -58,8 +64,9 @@ class Prior:
     def _range(self, term: NoiseTerm, rest: Array) -> Array:
         """Return log v0, log vmax of a term with the other parameters given."""
         unit = term.unit(rest, self.grid)
-        v0 = (0.5 * float(np.sum(self.count * (unit / self.level) ** 2))) ** -0.5
-        ratio = self.level / np.maximum(unit, 1e-300)  # a filter hides what is white before it
+        level = self.before if term.name in SLOW else self.level
+        v0 = (0.5 * float(np.sum(self.count * (unit / level) ** 2))) ** -0.5
+        ratio = level / np.maximum(unit, 1e-300)  # a filter hides what is white before it
         most = 10.0 * float(np.max(ratio) if term.name == "white" else np.min(ratio))
         return np.array([math.log(v0), math.log(max(most, v0))])
 

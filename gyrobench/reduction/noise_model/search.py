@@ -10,9 +10,9 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import PEAKS, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, NoiseTerm
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
@@ -29,8 +29,11 @@ STARTS: dict[str, list[list[float]]] = {
     "first": [[math.log(0.5)], [math.log(5.0)]],
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
+    "butterworth": [[math.log(t), math.log(2.0)] for t in (0.15, 0.6, 2.5)],
+    "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
     "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
+HELD_BACK = 0.3  # of the spectrum, just below half the sampling rate: what a digital low-pass passes there at most
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
@@ -165,8 +168,9 @@ class ModelSearch:
         S, excess = self.excess(at)
         scan = np.linspace(math.log(SHORTEST_TAU) + 0.1, self.prior.longest, 20)
         found = list[tuple[float, Array]]()
+        passes = passed(at.model, at.p, data.grid) if term.name in SLOW else None
         for rest in [np.array([t]) for t in scan] if term == GM else [np.empty(0)]:
-            unit = term.unit(rest, data.grid) / S
+            unit = term.unit(rest, data.grid) / S * (1.0 if passes is None else passes)
             info, score = float(data.all_count @ unit**2), float(unit @ excess)
             v = max(score / info, 0.7 * info**-0.5)
             found.append((max(score, 0.0) ** 2 / info, np.array([math.log(v), *rest])))
@@ -216,8 +220,10 @@ class ModelSearch:
             if name == term.filter or (name == "none" and W in at.model):
                 continue
             new = NoiseTerm("white", name)
+            least = [(W, np.array([math.log(float(np.min(self.prior.level)))]))]  # shows in a stop band
+            others = rest + least if name in DIGITAL and W not in at.model else rest
             for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
-                made = joined([(new, np.append(q[0], guess)), *rest])
+                made = joined([(new, np.append(q[0], guess)), *others])
                 yield made[0], [made[1]]
 
     def climb(self, at: Fitted, names: tuple[str, ...]) -> Fitted:
@@ -236,6 +242,18 @@ class ModelSearch:
                             self.fit(model, start)
             at = self.best
         return at
+
+    def try_digital(self) -> None:
+        """Try digital low-passes in place of the best filter where the spectrum falls; they stay if one is better."""
+        level, before = self.prior.level, dict(self.seen)
+        if level[-1] > HELD_BACK * np.median(level):
+            return
+        for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL) for s in starts]:
+            self.fit(model, start)
+        if any(t.filter in DIGITAL for t in self.best.model):
+            self.climb(self.best, SIMPLE + DIGITAL)
+        else:
+            self.seen = before
 
     # ------------------------------------------------------------------ resonances
     def peak(self, at: Fitted, vain: Sequence[Array] = (), clear: float = CLEAR) -> Array | None:
@@ -285,7 +303,7 @@ class ModelSearch:
                 continue
             self._freeze(found)
             settled = False
-        for _ in range(len(self.resonances) if len(self.resonances) > 1 else 0):  # each again, with the others there
+        for _ in range(len(self.resonances)):  # each again, with the others and the broadband terms as they are now
             term, p = self.resonances.pop(0)
             self.data.hold(self.resonances)
             at = self.best
@@ -373,6 +391,7 @@ def search(data: Ordinates) -> ModelSearch:
     found = ModelSearch(data, Prior(data))
     found.fit((N,), np.array([math.log(float(np.median(found.prior.level)))]))
     found.climb(found.best, SIMPLE)
+    found.try_digital()
     found.add_resonances()
     found.climb(found.best, SIMPLE + SHAPES)
     if found.resonances:

@@ -16,7 +16,9 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
 
 Filters, "mean4+first" of two in a row:
 "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them; "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+"mean4" over 4 of them; digital low-passes with zeros at half the sampling rate (bilinear transform), "butterworth" of
+any order and a "cascade" of equal ones of first order (of means over two samples, too); "shape",
+|H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
 [DRIFT-NOISE-MODEL; own derivation]
@@ -37,10 +39,13 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.series.noise_spectra import folded
 
 PEAKS = ("resonance", "band")
+SLOW = ("gauss_markov", "flicker", "walk")
+DIGITAL = ("butterworth", "cascade")  # filters that slow noise passes too, as they hold back what it has above them
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
 FASTEST = 1e-300  # pole
+LEAST_PASSED = 1e12  # of the power, what a digital low-pass holds back at most
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
 
@@ -64,6 +69,11 @@ class Grid:
     def sine(self) -> Array:
         """4 sin^2(omega/2)."""
         return 4.0 * np.sin(0.5 * self.omega) ** 2
+
+    @functools.cached_property
+    def tangent(self) -> Array:
+        """tan(omega/2)."""
+        return np.tan(0.5 * np.minimum(self.omega, math.pi - NEARLY_ZERO))
 
     @functools.cached_property
     def flicker(self) -> Array:
@@ -150,6 +160,18 @@ def _mean(count: int) -> Callable[[Array, Grid], Array]:
     return mean
 
 
+def _butterworth(p: Array, grid: Grid) -> Array:
+    """1/(1 + (tan(omega/2)/t)^(2 n)), p: log t, log n."""
+    x = 2.0 * np.exp(p[..., 1:2]) * (np.log(grid.tangent) - p[..., 0:1])
+    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(x, math.log(LEAST_PASSED)))))
+
+
+def _cascade(p: Array, grid: Grid) -> Array:
+    """(1 + (tan(omega/2)/t)^2)^-k, p: log t, log k."""
+    x = np.exp(p[..., 1:2]) * np.log1p((grid.tangent * np.exp(-p[..., 0:1])) ** 2)
+    return np.asarray(np.exp(-np.minimum(x, math.log(LEAST_PASSED))))
+
+
 def _shape(p: Array, grid: Grid) -> Array:
     waves = np.array([np.cos((j + 1) * grid.omega) - 1.0 for j in range(p.shape[-1])])
     out: Array = np.exp(np.clip(p @ waves, -40.0, 40.0))
@@ -161,6 +183,8 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
     "first": (_first, 1),
     "second": (_second, 2),
     "average": (_average, 1),
+    "butterworth": (_butterworth, 2),
+    "cascade": (_cascade, 2),
 }
 
 
@@ -321,9 +345,18 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         gamma = lower * np.maximum(1.0 - lag / k, 0.0) + upper * np.maximum(1.0 - lag / (k + 1.0), 0.0)
         gamma = gamma / (lower * k + upper * (k + 1.0))
     else:
-        S = filter_of(name)[0](p, Grid(np.pi * np.maximum(np.arange(LAGS + 1), NEARLY_ZERO) / LAGS))
-        gamma = np.fft.irfft(S, axis=-1)[..., : LAGS // 2]
+        return allan_of_spectrum(filter_of(name)[0](p, covariance_grid()), m)
     return _allan_covariance(gamma, m)
+
+
+def covariance_grid(means: bool = False) -> Grid:
+    """Return the frequencies whose spectrum gives the covariance at LAGS/2 lags."""
+    return Grid(np.pi * np.maximum(np.arange(LAGS + 1), NEARLY_ZERO) / LAGS, means)
+
+
+def allan_of_spectrum(S: Array, m: Array) -> Array:
+    """Return the Allan variance (..., k) of noise of short memory, of its spectrum at :func:`covariance_grid`."""
+    return _allan_covariance(np.fft.irfft(S, axis=-1)[..., : LAGS // 2], m)
 
 
 def _allan_covariance(gamma: Array, m: Array) -> Array:

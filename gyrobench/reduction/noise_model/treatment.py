@@ -142,8 +142,9 @@ def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
     return sorted(sorted(found, key=lambda s: s.start - s.stop)[:MOST], key=lambda s: s.start)
 
 
-def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Treated:
-    """Return a rate (n,), NaN where a sample is missing, ready for its model.
+def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True, wandering: bool = True) -> Treated:
+    """Return a rate (n,), NaN where a sample is missing, ready for its model; wandering: lines that wander are taken
+    out too.
 
     Raises SeriesError for fewer samples than LEAST in stretches without long gaps, and for a constant record.
     """
@@ -159,7 +160,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True) -> Tre
     own = [rate[s].copy() for s in parts]
     if remove_lines:
         found = find_lines(done[longest].drawn, 1.0)
-        lines, full = found.lines, found.complete
+        lines, full = tuple(x for x in found.lines if x.steady or wandering), found.complete
     if lines:
         frequencies = np.array([x.frequency for x in lines])
         for y, d in zip(own, done, strict=True):

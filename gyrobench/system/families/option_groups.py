@@ -23,31 +23,27 @@ SITE = {
 VERTICAL_AXIS = {
     "latitude": Option(
         "45.75deg", "rad", "latitude; the table axis is vertical", -math.pi / 2, math.pi / 2, sets="site.latitude"
-    ),
+    )
 }
 #: of a vehicle that moves on the turning Earth
 MOVING = {
     "latitude": Option("40deg", "rad", "geographic latitude", -90 * DEG, 90 * DEG, sets="motion.latitude"),
     "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
 }
-TORQUER = {
-    "k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0),
-}
+TORQUER = {"k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0)}
 NUISANCES = {
     "nuisances": Option("auto", str, "set-up effects (trend, temperature ...): weighed by the data (auto), or none"),
     "robust": Option(False, bool, "show a robust fit beside the plain one"),
 }
 TILT = {
-    "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)"),
+    "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)")
 }
 CORRECTIONS = {
-    "corrections": Option("", str, "measured set-up errors, names as in the budget: SOURCE = VALUE(U) UNIT; ..."),
+    "corrections": Option("", str, "measured set-up errors, names as in the budget: SOURCE = VALUE(U) UNIT; ...")
 }
 FOLD = {"fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS")}
 SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 0.0)}
-ATTITUDE = {
-    "attitude": Option("E U", str, "I and O (and S) axes: E, N, U, P, Q or minus these, or a matrix of rows"),
-}
+ATTITUDE = {"attitude": Option("E U", str, "I and O (and S) axes: E, N, U, P, Q or minus these, or a matrix of rows")}
 
 
 def type_b(*sources: str | Source | ModuleType, **meanings: str) -> dict[str, Option]:
@@ -68,5 +64,5 @@ def type_b(*sources: str | Source | ModuleType, **meanings: str) -> dict[str, Op
 SUPPLY = {
     "supply_terms": Option(
         "", str, "what supplies do to the gyro (D_pickoff=0.1deg/h, D_US=1deg/h/g ...); empty: as set"
-    ),
+    )
 } | type_b("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")

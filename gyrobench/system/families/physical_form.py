@@ -16,7 +16,7 @@ from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import System
 
 PHYSICAL_FORM = {
-    "physical": Option("", str, "mass, mass centre and compliances (m=0.25kg, l_S=0.3um ...) that set the drift"),
+    "physical": Option("", str, "mass, mass centre and compliances (m=0.25kg, l_S=0.3um ...) that set the drift")
 }
 _UNITS = {"m": "kg", "outer": "kg.m", "M": "N.m", "l": "m", "K": "m/N"}
 

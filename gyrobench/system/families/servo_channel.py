@@ -27,7 +27,7 @@ OTHER = {"x": "y", "y": "x"}
 CHANNEL = {
     "channel": Option(
         "", str, "of a two-degree-of-freedom gyro: the axis along the table axis, x or y; empty: a floated gyro"
-    ),
+    )
 }
 LOCKED = "locked"  # the sampler of the current that locks the other axis
 #: gyro axes x, y, z (rows) in table axes, for the channel along the table axis

@@ -52,9 +52,7 @@ INDEX_RATE = 5e-3  # rad/s: the cage holds the float up to 8.3e-3
 #: rad/s (8 Hz): brushes hold a turning table M / (J capture_rate2) from null, and must let it within capture_angle
 CAPTURE_RATE = 50.0
 SITE_AND_STAND = SITE | {"latitude": replace(SITE["latitude"], sets="site.latitude stand.latitude")}
-TRACKING = {
-    "tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0),
-}
+TRACKING = {"tracking": Option("2arcsec", "rad", "largest angle of the table against the gyro; 0: not judged", 0.0)}
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,7 @@ def install(wheel: Path, folder: Path) -> Installed:
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONDONTWRITEBYTECODE")}
     environment = {
         **kept, "HOME": str(folder / "home"), "MPLCONFIGDIR": matplotlib.get_cachedir(), "SHELL": "/bin/bash",
+        "ZIG_GLOBAL_CACHE_DIR": kept.get("ZIG_GLOBAL_CACHE_DIR", str(Path.home() / ".cache" / "zig")),
         "PATH": f"{python.parent}{os.pathsep}{kept.get('PATH', '')}",
     }  # fmt: skip
     where = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
