@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -122,11 +123,7 @@ class Linear:
                 self.sampled[s] = model
             if slow is not None:
                 self.multirate[s] = slow
-        self.undelayed = {
-            s: undelayed_of(parts[s], self.blocks[s].inputs, self.blocks[s].outputs, step)
-            for s, model in self.sampled.items()
-            if not model.within
-        }
+        self._parts = parts
         self.inputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].inputs]
         self.outputs = [f"{s}.{v}" for s in self.order for v in self.blocks[s].outputs]
         self.states = [f"{s}.{v}" for s in self.order for v in self.blocks[s].states]
@@ -139,6 +136,15 @@ class Linear:
             else:
                 self.k[row, self.outputs.index(source)] = c.gain
         self.cut = [n for n in self.outputs if any(self._late(c, n) for c in self.connections)]
+
+    @cached_property
+    def undelayed(self) -> dict[str, Any]:
+        """Return the continuous models of parts that work in samples, slot -> its matrices, or None without one."""
+        return {
+            s: undelayed_of(self._parts[s], self.blocks[s].inputs, self.blocks[s].outputs, self.step)
+            for s, model in self.sampled.items()
+            if not model.within
+        }
 
     @staticmethod
     def _has(parts: Mapping[str, Component], name: str) -> bool:

@@ -10,6 +10,8 @@ Opened at c it is what comes back by the controller, at u by all other ways; the
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gyrobench.arrays import Array
@@ -45,7 +47,7 @@ def opened_inside(one: Linear, two: Linear, slot: str, port: str, gain: float) -
     row = one.inputs.index(f"{slot}.{port}")
     last = row - k + len(inputs)
     one.inputs.insert(last, f"{slot}.{COPY}")
-    inputs.append(COPY)
+    one.blocks[slot] = replace(one.blocks[slot], inputs=[*inputs, COPY])  # what there is may be shared
     one.w = np.insert(one.w, last, 0.0, axis=0)
     wired = np.insert(one.k, last, one.k[row], axis=0)
     models = []

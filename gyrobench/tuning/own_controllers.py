@@ -36,6 +36,7 @@ class OwnController:
     unit: ClassVar[str] = "N·m"
     own: ClassVar[tuple[str, ...]] = ()  # parameters that no spread may have; (): all of the part
     inner: ClassVar[bool] = False
+    started: ClassVar[int] = 0  # steps after which one step of the part is like the next
 
     def small(self, q: Values) -> float:
         """Return a gain with which an inner controller without dynamics may run, and with twice as much."""
@@ -104,6 +105,7 @@ class TableNetworks(OwnController):
     has = "three networks: lag and lead, joined by +, at most three"
     own = ("network", "zeros", "poles", "stiffness", "crossover", "H_g", "J_g", "C_g", "K_g", "polarity")
     inner = True
+    started = 3  # mode, capture, fine
     COUNT = 3
     SLOW = 0.1  # of what is slowest in the plant: its crossover with a small gain
     IDLE = 1e3  # rad/s: of a network that does nothing

@@ -105,7 +105,10 @@ def _opened(
 
     def linear(**changed: Any) -> Linear:
         other = {**parameters, **{f"{slot}.{n}": v for n, v in changed.items()}}
-        return Linear(assembly, operating_point(assembly, other, part_of), step)
+        parts = operating_point(assembly, other, part_of)
+        for k in range(own.started if own else 0):
+            parts[slot].do_step(k * step, step)
+        return Linear(assembly, parts, step)
 
     if own is None:
         return _matrices(without_controller(linear(), slot, {("v", "u"): -1.0}).discrete(ports.opened))
