@@ -16,7 +16,7 @@ class Reduction(SightReduction):
         for gate in found.of("torque", shape="step"):
             self.load(gate)
         for axis, k in AXES.items():
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": (0.0, 0.0)})
+            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": 0.0})
         self.isolation()
         ride = self.ride()
         self.cause = self.jitter(ride) if ride is not None else ""

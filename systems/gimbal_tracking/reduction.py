@@ -33,7 +33,7 @@ class Reduction(TrackingMeasures, SightReduction):
         for gate in found.of("torque", shape="step"):
             self.load(gate)
         for axis, k in AXES.items():
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": (0.0, 0.0)})
+            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": 0.0})
         self.loops()
         self.isolation()
         self.cause, ride = "", self.ride()

@@ -60,5 +60,6 @@ def _of_phases(record: Record) -> Points:
     shaken = [g for g in gates(record) if g.kind == "motion"]
     over = tuple(g.f for g in shaken if np.any(g["gyro.saturated"] > 0.5))
     r = line_ratios(shaken, TABLE, GYRO)
-    late = lead_of(record, {"gyro": (0.0, 0.5 * record.run.step)})  # a sample is held until the next one
+    held = float(record.run.parameters.get("gyro.period") or 0.0) > record.run.step
+    late = lead_of(record, {"gyro": 0.0}) + 0.5 * record.run.step * held  # a sample is held until the next one
     return Points(r.f, r.value * np.exp(-2j * np.pi * r.f * late), r.u, r.x, True, over)

@@ -41,7 +41,7 @@ class Reduction(LoopReduction):
         quiet = next(iter(found.of("hold")), None)
         for gate in found.of("command", shape="step"):
             command_step(found, gate, RATE, SETTLING, y_name="rate", quiet=quiet, restless=True)
-        found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]", held={"estimator": (0.0, 0.0)})
+        found.open_loop("stabilizer", "stabilizer.e", "exciter.test[1]", held={"estimator": 0.0})
         # the closed loop leaves little of the rate in the ride: the estimator is asked at the test sines
         lag(found, found.ratio(
             "estimate over reading", "test", 1, "estimator.estimate", "rebalance.i_read",

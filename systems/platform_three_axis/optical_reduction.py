@@ -6,7 +6,7 @@ from gyrobench.reduction.loops.loop_toolkit import Account, margins, told
 from gyrobench.reduction.loops.tracking_measures import SIGHT, TrackingMeasures
 
 AXES = ("pitch", "roll", "azimuth")
-HELD = {f"estimator_{axis}": (0.0, 0.0) for axis in "xyz"}  # where they are fitted
+HELD = {f"estimator_{axis}": 0.0 for axis in "xyz"}  # where they are fitted
 
 
 class OpticalReduction(TrackingMeasures):

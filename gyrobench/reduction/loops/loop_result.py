@@ -95,23 +95,22 @@ class LoopFindings(MeasureFindings):
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
         self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test",
-        held: Mapping[str, tuple[float, float]] | None = None,
+        held: Mapping[str, float] | None = None, late: float = 0.0,
     ) -> list[Point]:  # fmt: skip
         """Return the open loop L = -(inside - test) / inside of the sines of a kind on an axis, with margins.
 
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
         test: what was added there.  held: slot that holds what comes back from sample to sample -> when its first
-        one is there, and by how much samples at each communication step lead its linear model, s; the last of them
-        counts.  Adds the Bode plot, a table of margins (measured, and of both linear
-        models), the agreement up to ``up_to`` crossovers, and the coefficients crossover and phase margin.  Returns
-        the points that count.
+        one is there, s; the last of them counts.  late: as open_loop_point.  Adds the Bode plot, a table of margins
+        (measured, and of both linear models), the agreement up to ``up_to`` crossovers, and the coefficients crossover
+        and phase margin.  Returns the points that count.
         """
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
         if not sines:
             return []
         lead = lead_of(self.record, held or {})
         points, counts = map(
-            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours, lead) for g in sines), strict=True)
+            list, zip(*(open_loop_point(g, inside, test, self.by_neighbours, lead, late) for g in sines), strict=True)
         )
         counts = [c and not self.unstable for c in counts]
         sure = [p for p, c in zip(points, counts, strict=True) if c]

@@ -45,17 +45,17 @@ def coherence_limit(segments: int) -> float:
 
 
 def open_loop_point(
-    gate: Gate, inside: str, test: str, by_neighbours: bool = False, lead: float = 0.0
+    gate: Gate, inside: str, test: str, by_neighbours: bool = False, lead: float = 0.0, late: float = 0.0
 ) -> tuple[Point, bool]:
     """Return L = (r - e)/e at the sine of a phase, and whether it counts.  by_neighbours: as loop_measures.response.
 
     u is that of S = e/r, which is linear in the noise: |dL/L| = |dS| / |S (1 - S)|.  coherence: the smaller one
     of those of e and of r - e with r.  lead: s, by which samples of r - e show it too early on average.
-    Raises as loop_measures.response.
+    late: s, by which the loop itself is to be later.  Raises as loop_measures.response.
     """
     t, e, r = gate.t, gate[inside], gate[test]
     loop = response(t, e, r - e, gate.f)
-    true = unled(loop.value, gate.f, lead)
+    true = unled(loop.value, gate.f, lead) * cmath.exp(-2j * math.pi * gate.f * late)
     if loop.u is None:
         return replace(loop, value=true), True
     rs, es = segment_phasors(t, gate.f, r, e)
@@ -75,18 +75,18 @@ def unled(L: complex, f: float, lead: float) -> complex:
     return L / (p + (p - 1.0) * L)
 
 
-def lead_of(record: Record, held: Mapping[str, tuple[float, float]]) -> float:
-    """Return by how much samples of a record show a held signal earlier than a model of it does, s; 0 where none is.
+def lead_of(record: Record, held: Mapping[str, float]) -> float:
+    """Return by how much samples of a record show a held signal earlier, on average, than those at each communication
+    step do, s; 0 where none is held.
 
-    held: slot -> time at which its first sample is there, and lead of samples at each communication step before the
-    model, s; the last slot with a sampling period counts.
+    held: slot -> time at which its first sample is there, s; the last slot with a sampling period counts.
     """
     p, h, t = record.run.parameters, record.run.step, record.channels["time"]
     found = 0.0
-    for slot, (first, ahead) in held.items():
+    for slot, first in held.items():
         period = float(p.get(f"{slot}.period") or p.get(f"{slot}.Ts") or 0.0)
         if period > 1.5 * h:
-            found = ahead + h * held_lead(round(period / h), round(first / h), round(float(t[1] - t[0]) / h))
+            found = h * held_lead(round(period / h), round(first / h), round(float(t[1] - t[0]) / h))
     return found
 
 

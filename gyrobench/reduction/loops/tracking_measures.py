@@ -46,22 +46,23 @@ class TrackingMeasures(LoopReduction):
 
     def loops(self) -> None:
         """Measure the tracking loops and the steps of the wanted direction."""
-        held = self.held()
+        held, late = self.held()
         for axis, k in SIGHT.items():
             self.found.open_loop(
-                f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command", held=held
+                f"track {axis}", f"track_{axis}.e", f"exciter.command[{k}]", k, kind="command", held=held, late=late
             )
         for gate in self.found.of("command", shape="step"):
             self.acquire(gate)
 
-    def held(self) -> dict[str, tuple[float, float]]:
-        """Return when the first error of the tracker is there, s; {} where a prediction makes it continuous.
+    def held(self) -> tuple[dict[str, float], float]:
+        """Return when the first error of the tracker is there, and by how much the steps take from its delay, s.
 
-        The linear model of the tracker holds for half a period, samples at each step h show the half less h/2.
+        The linear model holds an error for half a period; in steps of h, from one to the next, the loop has h/2 less of
+        it.  A prediction makes the error continuous.
         """
         p, h = self.run.parameters, self.run.step
         exposure, processing, order = (float(p.get(f"tracker.{n}") or 0.0) for n in TRACKER)
-        return {} if order else {"tracker": (max(exposure, h) + processing, 0.5 * h)}
+        return ({}, 0.0) if order else ({"tracker": max(exposure, h) + processing}, 0.5 * h)
 
     def inside(self) -> list[str]:
         """Return for which share of the time the error is inside the accuracy."""
