@@ -27,7 +27,7 @@ NOT_RUN = {
     r"^python3 -m venv|pip install|pre-commit": "installs from a package index: the wheel is installed before",
     r"^gyrobench sweep \.\.\.": "stands for any sweep",
     r"; \.\.\.'$": "the shortened end of an output: checks.shown_output",
-    r"benchmarks/data_sheets\.py": "minutes, in a checkout: it writes the page that prints it",
+    r"benchmarks/(data_sheets|instrument_mistakes)\.py": "minutes, in a checkout: it writes the page that prints it",
     r"reports/heading_after\.py": "in a checkout: it writes the page that prints it",
     r"real_(?:records|curves)\.py FOLDER": "records of others, which are no part of the bench",
     r"^dask |tcp://HOST": "a cluster; tests/campaign runs one on this machine",
