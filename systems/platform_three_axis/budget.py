@@ -265,7 +265,8 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
                 continue  # hardly coupled: what is left is of large angles
             text = (
                 f"No error budget by source for {name}: the linear model gives {math.sqrt(square) / ARCSEC:.3g}″, "
-                f"measured are {measured / ARCSEC:.3g}″ (a limit, unbalance, stiction, or a motion beyond it)."
+                f"measured are {measured / ARCSEC:.3g}″ (a limit, unbalance, stiction, rounding, or a motion beyond "
+                "it)."
             )
             found.warn(f"budget.not_linear:{name}", text)
             continue
