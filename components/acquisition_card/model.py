@@ -24,7 +24,7 @@ class AcquisitionCard(Component):
 
     version = "1.0.0"
     unrounded: ClassVar[dict[str, float]] = {"bits": 0.0}
-    sampling = "period"
+    sampling_parameter = "period"
 
     f_c = Parameter(720.0, "Hz", "corner of the RC filter; 0: none", min=0.0)
     gain = Parameter(1.0, "1", "volts at the converter per unit of z", above=0.0)

@@ -86,7 +86,7 @@ class Component:
     rk4_substeps: ClassVar[int] = 20  # of one internal step
     nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
     unrounded: ClassVar[dict[str, float]] = {}  # parameters of its linear model: those without its rounding
-    sampling: ClassVar[str] = "Ts"  # parameter with its sampling period, of a part that has one
+    sampling_parameter: ClassVar[str] = "Ts"  # parameter with its sampling period, of a part that has one
     declarations: ClassVar[dict[str, Declaration]] = {}
     placed: ClassVar[dict[str, Placed]] = {}  # blocks by name
     pieces: ClassVar[dict[str, list[Piece]]] = {}  # equations by kind

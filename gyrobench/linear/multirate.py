@@ -1,4 +1,4 @@
-"""The linear model of a part that samples every n communication steps (its parameter Component.sampling).
+"""The linear model of a part that samples every n communication steps (its parameter Component.sampling_parameter).
 
 Its step repeats after n, x+ = A_i x + B_i u, y = C_i x+ + D_i u in phase i.  Two models follow.
 
@@ -55,7 +55,7 @@ def multirate_step(part: Component, inputs: list[str], outputs: list[str], step:
     Raises ValueError (the text says why) for a part whose steps do not repeat after it.
     """
     known = {s.name for s in part.layout if s.section == "parameter"}
-    n = round(float(part.get(part.sampling)) / step) if part.sampling in known else 0
+    n = round(float(part.get(part.sampling_parameter)) / step) if part.sampling_parameter in known else 0
     if n < 2 or not inputs:
         return None
     if n > MOST:

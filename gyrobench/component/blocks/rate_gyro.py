@@ -126,7 +126,7 @@ class FilteredRateGyro(RateGyro):
     """
 
     unrounded: ClassVar[dict[str, float]] = {"resolution": 0.0}
-    sampling = "period"
+    sampling_parameter = "period"
 
     bandwidth = Parameter(50.0, "Hz", "frequency at which the filter has 3 dB", above=0.0)
     range_max = Parameter(300.0 * DEG, "rad/s", "largest rate (300 deg/s); 0: no limit", min=0.0)
