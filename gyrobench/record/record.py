@@ -276,11 +276,20 @@ def _check_tables(folder: Path, run: RunDocument) -> None:
 
 
 def rows_to_columns(rows: list[AnyArray], names: list[str], time: bool) -> dict[str, AnyArray]:
-    """Return blocks of rows [t, columns...] as named columns; with ``time`` the first one is kept as "time"."""
+    """Return blocks of rows [t, columns...] as named columns; with ``time`` the first one is kept as "time".
+
+    A block is turned while it is in the processor's cache: a column of the whole would fetch the whole.
+    """
     blocks = [r if r.ndim == 2 else r[None, :] for r in rows]
-    table = np.concatenate(blocks) if blocks else np.empty((0, 1 + len(names)))
-    columns = {"time": np.ascontiguousarray(table[:, 0])} if time else {}
-    for k, name in enumerate(names, 1):
-        column = np.ascontiguousarray(table[:, k])
+    if len(blocks) > 1 and max(len(b) for b in blocks) == 1:  # of the reference engine
+        blocks = [np.concatenate(blocks)]
+    table = [np.empty(sum(len(b) for b in blocks)) for _ in range(1 + len(names))]
+    at = 0
+    for block in blocks:
+        for k, column in enumerate(table):
+            column[at : at + len(block)] = block[:, k]
+        at += len(block)
+    columns: dict[str, AnyArray] = {"time": table[0]} if time else {}
+    for name, column in zip(names, table[1:], strict=True):
         columns[name] = column.astype(np.int64) if name in WHOLE and not time else column
     return columns
