@@ -291,7 +291,7 @@ static EF_VALUE double f_exp(double x) {
     return y * power_of_two(k);
 }
 
-static EF_VALUE double f_log(double x) {
+static EF_ALWAYS double logarithm(double x) {
     double m, c, mh, a, b, r, error, whole, s, inner, rest;
     const double *row;
     int e, k = 0;
@@ -318,6 +318,8 @@ static EF_VALUE double f_log(double x) {
     rest = (r - (s - whole)) + ((error + (k * EF_LN2_2 + row[2])) + (r * r) * (-0.5 + r * inner));
     return s + rest;
 }
+
+static EF_VALUE double f_log(double x) { return logarithm(x); }
 
 static inline doubled beside(double high, double r, double rest, double one) { /* high + r + rest + one */
     const double a = high + one, b = one - (a - high), s = a + r, t = s - a;

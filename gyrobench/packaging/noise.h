@@ -74,7 +74,8 @@ static inline void quantiles(const double p[AHEAD], double out[AHEAD]) {
     }
     for (i = 0; i < n; i++) {
         const double below = p[rare[i]], above = 1.0 - below;
-        root[i] = sqrt(-f_log(below < above ? below : above));
+        /* logarithm, not f_log: a call from code for newer processors into other code stops some of them, 50 ns */
+        root[i] = sqrt(-logarithm(below < above ? below : above));
     }
     for (; i % LANES != 0; i++) root[i] = 2.0; /* no one reads these */
     for (i = 0; i < n; i += LANES) {
