@@ -6,9 +6,16 @@ from gyrobench.component.math import Number, Vector, cos, floor, index, log, pi,
 
 DEG = pi / 180.0
 LINES = 8  # sines of a preset, for each angle and for the heave
+TURNS = 64.0  # steps in which they turn before they are made anew
 GOLDEN = 0.6180339887498949
 ZEROS = [0.0, 0.0, 0.0]
+FOUR = [0.0] * 4
 PROFILE = 9.0  # preset
+
+
+def four(x: Vector) -> Number:
+    """Return the sum of four numbers."""
+    return (x[0] + x[2]) + (x[1] + x[3])
 
 
 class BaseMotion(Component):
@@ -28,7 +35,8 @@ class BaseMotion(Component):
     Presets 1 sea state 3, 2 sea state 5, 3 sea state 6, 4 aircraft in light turbulence, 5 in moderate turbulence: each
     angle is a sum of 8 sines of equal power, at the octiles' middles of the spectrum S(w) ~ w^-5 exp(-1.25 (wm/w)^4)
     (shape of Pierson and Moskowitz, w_k = wm (1.25 / -ln((k - 1/2)/8))^(1/4)), phases fixed, so that a run repeats.
-    Its rms and modal periods are our own assumptions of a typical size (see the README), from no source.
+    Its rms and modal periods are our own assumptions of a typical size (see the README), from no source.  These
+    sines are pointers that turn by w h a step and are made anew every 64th, which keeps their rounding below 1e-13.
 
     Preset 9: a recorded profile, `points` instants with three angles.  Between them the quintic that has at each
     point the slope and curvature of the parabola through it and its neighbours: angle, rate and acceleration are
@@ -38,6 +46,7 @@ class BaseMotion(Component):
     """
 
     version = "1.0.0"
+    long_loops = True
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
     latitude = Parameter(0.7, "rad", "geographic latitude (for the Earth rate)", min=-1.5708, max=1.5708)
@@ -65,6 +74,12 @@ class BaseMotion(Component):
     line_a = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: amplitudes")
     line_w = Discrete([[0.0] * 8] * 4, "rad/s", "sines of the preset: frequencies")
     line_p = Discrete([[0.0] * 8] * 4, "rad", "sines of the preset: phases")
+    x = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: their values")
+    y = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: a quarter of a period ahead")
+    turn_c = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: cosine of what they turn in a step")
+    turn_s = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: sine of it")
+    h_turned = Discrete(0.0, "s", "step of turn_c and turn_s")
+    turned = Discrete(0.0, "1", "steps since the sines were made anew")
     own = Discrete(0.0, "1", "1 while there are sines of the user's own")
     lines = Discrete(0.0, "1", "1 while there is a preset of sines")
     piece = Discrete(0.0, "1", "point of the profile that was passed last, from 0; -1 before the first")
@@ -104,6 +119,7 @@ class BaseMotion(Component):
                     mode = 2.0 * pi / period[index(self.preset - 1.0)][i]
                     self.line_w[i][k] = mode * sqrt(sqrt(-1.25 / log(power)))
                     self.line_p[i][k] = 2.0 * pi * (shift - floor(shift))
+        self.make()
         self.piece = -1.0
         if self.preset == PROFILE:
             self.refuse(self.points < 3.0, "a recorded profile needs 3 points or more, points = {points}")
@@ -117,8 +133,36 @@ class BaseMotion(Component):
                 if self.profile_t[k] <= self.t:
                     self.piece = k
 
+    def make(self) -> None:
+        """Make the sines of the preset for the present instant."""
+        self.turned = 0.0
+        for i in range(4):
+            for k in range(LINES):
+                self.x[i][k] = sin(self.line_w[i][k] * self.t + self.line_p[i][k])
+                self.y[i][k] = cos(self.line_w[i][k] * self.t + self.line_p[i][k])
+
+    def turn(self) -> None:
+        """Turn the sines of the preset by the step."""
+        if self.h != self.h_turned:
+            self.h_turned = self.h
+            for i in range(4):
+                for k in range(LINES):
+                    self.turn_c[i][k] = cos(self.line_w[i][k] * self.h)
+                    self.turn_s[i][k] = sin(self.line_w[i][k] * self.h)
+        self.turned = self.turned + 1.0
+        for i in range(4):
+            for k in range(LINES):
+                x = self.x[i][k]
+                self.x[i][k] = x * self.turn_c[i][k] + self.y[i][k] * self.turn_s[i][k]
+                self.y[i][k] = self.y[i][k] * self.turn_c[i][k] - x * self.turn_s[i][k]
+
     @sampled(every=1)
     def tick(self) -> None:
+        if self.lines > 0.0:
+            if self.turned < TURNS:
+                self.turn()
+            else:
+                self.make()
         between = self.preset == PROFILE and self.piece < self.points - 1.0
         if between and self.t >= self.profile_t[index(self.piece + 1.0)]:
             for k in range(index(self.points)):
@@ -140,6 +184,22 @@ class BaseMotion(Component):
         s = amplitude * sin(rate * self.t + phase)
         return vector([s, rate * (amplitude * cos(rate * self.t + phase)), -(rate * rate * s)])
 
+    def waves(self, i: Number) -> Vector:
+        """Return the sum of the sines of the preset in one angle or the heave, and its two derivatives."""
+        value = vector(FOUR)  # of two sines each
+        slope = vector(FOUR)
+        curve = vector(FOUR)
+        for k in range(4):
+            first = self.line_a[index(i)][k] * self.x[index(i)][k]
+            last = self.line_a[index(i)][k + 4] * self.x[index(i)][k + 4]
+            value[k] = first + last
+            w1 = self.line_w[index(i)][k]
+            w2 = self.line_w[index(i)][k + 4]
+            rate = w1 * (self.line_a[index(i)][k] * self.y[index(i)][k])
+            slope[k] = rate + w2 * (self.line_a[index(i)][k + 4] * self.y[index(i)][k + 4])
+            curve[k] = -(w1 * (w1 * first) + w2 * (w2 * last))
+        return vector([four(value), four(slope), four(curve)])
+
     def outputs(self) -> None:
         q = vector(ZEROS)  # pitch, roll, heading; rates; accelerations
         v = vector(ZEROS)
@@ -159,14 +219,13 @@ class BaseMotion(Component):
                 for k in range(4):
                     y = y + self.wave(self.amplitude[i][k], 2.0 * pi * self.frequency[i][k], self.phase[i][k])
             if self.lines > 0.0:
-                for k in range(LINES):
-                    y = y + self.wave(self.line_a[i][k], self.line_w[i][k], self.line_p[i][k])
+                y = y + self.waves(i)
             q[i] = self.motion_angle[i] + w * y[0]
             v[i] = self.motion_rate[i] + wv * y[0] + w * y[1]
             a[i] = self.motion_acceleration[i] + wa * y[0] + 2.0 * wv * y[1] + w * y[2]
         if self.lines > 0.0:
-            for k in range(LINES):
-                heave = heave + w * self.line_a[3][k] * sin(self.line_w[3][k] * self.t + self.line_p[3][k])
+            swell = self.waves(3.0)
+            heave = w * swell[0]
         if self.preset == PROFILE:
             if self.piece < 0.0 or self.piece >= self.points - 1.0:
                 end = self.piece if self.piece >= 0.0 else 0.0

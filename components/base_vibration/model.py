@@ -9,6 +9,7 @@ PARTS = 8  # of a line's band, over which its power is summed
 GOLDEN = 0.6180339887498949
 REST = [0.0] * (POINTS - 2)
 NONE = [0.0, 0.0, 0.0]
+HALF = [0.0] * 24
 
 
 class BaseVibration(Component):
@@ -29,6 +30,7 @@ class BaseVibration(Component):
     """
 
     version = "1.0.0"
+    long_loops = True
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
     points = Parameter(2, int, "points of the spectra; 0: no vibration", min=0, max=POINTS)
@@ -114,16 +116,24 @@ class BaseVibration(Component):
         return found
 
     def add(self) -> None:
-        """Sum the sines at the present instant."""
+        """Sum the sines at the present instant: both halves together, then the halves of that, then four."""
+        value = vector(HALF)
+        slope = vector(HALF)
         for n in range(6):
-            total = 0.0
-            slope = 0.0
+            self.sums[n] = 0.0
+            self.slopes[n] = 0.0
             if self.active[n] > 0.0:
-                for k in range(LINES):
-                    total = total + self.x[n][k]
-                    slope = slope - self.w[n][k] * self.y[n][k]
-            self.sums[n] = total
-            self.slopes[n] = slope
+                for k in range(24):
+                    value[k] = self.x[n][k] + self.x[n][k + 24]
+                    slope[k] = self.w[n][k] * self.y[n][k] + self.w[n][k + 24] * self.y[n][k + 24]
+                for k in range(12):
+                    value[k] = value[k] + value[k + 12]
+                    slope[k] = slope[k] + slope[k + 12]
+                for k in range(4):
+                    value[k] = value[k] + value[k + 4] + value[k + 8]
+                    slope[k] = slope[k] + slope[k + 4] + slope[k + 8]
+                self.sums[n] = (value[0] + value[2]) + (value[1] + value[3])
+                self.slopes[n] = -((slope[0] + slope[2]) + (slope[1] + slope[3]))
 
     @sampled(every=1)
     def tick(self) -> None:

@@ -85,6 +85,7 @@ class Component:
     integrator: ClassVar[str] = "exponential"  # or "midpoint", "rk4"
     rk4_substeps: ClassVar[int] = 20  # of one internal step
     nonlinear: ClassVar[bool | str] = False  # True: A is taken anew at each internal step; a name: while that is not 0
+    long_loops: ClassVar[bool] = False  # True: of elements that do not wait for one another: worth vector code
     unrounded: ClassVar[dict[str, float]] = {}  # parameters of its linear model: those without its rounding
     sampling_parameter: ClassVar[str] = "Ts"  # parameter with its sampling period, of a part that has one
     declarations: ClassVar[dict[str, Declaration]] = {}

@@ -18,6 +18,16 @@ from gyrobench.packaging.translation import Translation
 from gyrobench.packaging.tuning import tuning
 
 HERE = Path(__file__).parent
+#: before and after model.c of a part with long loops; elsewhere vector code costs more than it saves (compiler.py)
+VECTOR_CODE = (
+    """#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("tree-loop-vectorize")
+#endif""",
+    """#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif""",
+)
 PER = {"start": 0, "step": 1, "second": 2}
 
 
@@ -144,6 +154,8 @@ def c_source(cls: type[Component], guid: str) -> str:
         '#include "core.h"',
         Translation(source).text,
     ]
+    if cls.long_loops:
+        parts = [VECTOR_CODE[0], *parts, VECTOR_CODE[1]]
     return "\n\n".join(parts) + "\n"
 
 
