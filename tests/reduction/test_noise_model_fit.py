@@ -11,11 +11,13 @@ import pytest
 from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model.agreement import compare, with_spectrum
-from gyrobench.reduction.noise_model.fit import about, fit_noise
+from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
+from gyrobench.reduction.noise_model.noise_model import Scale
 from gyrobench.reduction.noise_model.ordinates import Ordinates, allan
+from gyrobench.reduction.noise_model.posterior import Cloud
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import maximize
+from gyrobench.reduction.noise_model.search import Fitted, maximize
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import deviations
@@ -35,6 +37,28 @@ def test_a_value_outside_the_draws_is_not_the_end_of_its_interval() -> None:
     assert about(2.0, 1.0, 3.0) == (1.0, 3.0)
     assert about(4.0, 1.0, 2.0) == (1.0, 16.0)  # 4 is 4 times the lower end, so the upper one is 4 times 4
     assert about(1.0, 2.0, 4.0) == (0.25, 4.0)
+
+
+def test_a_process_that_stands_for_two_has_the_interval_of_both() -> None:
+    """Draws with log tau of 3 +- 0.1 (one process) and, a quarter of the weight, of 2 and 5 +- 0.1 (two).
+
+    The nearest of the two to 3 is that of 2: the lower end is 2 - 1.96 * 0.1, the upper one 3 + 1.96 * 0.1.  All draws
+    together have a lower end of 2 + 0.1 * z, of the tenth of that quarter (0.025/0.25), z = -1.28.
+    """
+    rng, white, gm = np.random.default_rng(3), NoiseTerm("white"), NoiseTerm("gauss_markov")
+    scale, log = Scale(1.0, 1.0, 0.0, False), np.zeros(8000)
+
+    def cloud(share: float, *taus: float) -> Cloud:
+        columns = [np.zeros(8000)]
+        for t in taus:
+            columns += [np.zeros(8000), t + 0.1 * rng.normal(size=8000)]
+        return Cloud((white, *(gm for _ in taus)), np.stack(columns, axis=1), np.full(8000, share / 8000), log)
+
+    at = Fitted((white, gm), np.array([0.0, 0.0, 3.0]), np.eye(3), 0.0, 0.0)
+    tau = _process(0, at, [cloud(0.75, 3.0), cloud(0.25, 2.0, 5.0)], scale).tau
+    assert np.log([tau.low, tau.value, tau.high]) == pytest.approx([2.0 - 0.196, 3.0, 3.196], abs=0.01)
+    tau = _process(0, at, [cloud(0.98, 3.0), cloud(0.02, 2.0, 5.0)], scale).tau  # not likely: of all draws
+    assert math.log(tau.low) == pytest.approx(3.0 - 0.1 * 2.57, abs=0.02)  # 0.005/0.98 of the first
 
 
 @pytest.mark.parametrize(

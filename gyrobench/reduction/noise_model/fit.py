@@ -29,13 +29,13 @@ from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, j
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
-from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
-LIKELY = 0.03  # part of the posterior of models with flicker, or of those without, from which on N holds for them too
+LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 STEPS = 5
@@ -210,48 +210,73 @@ def about(value: float, low: float, high: float) -> tuple[float, float]:
     return low, high
 
 
+def _likely(clouds: Sequence[Cloud], kind: Callable[[Model], object]) -> list[list[Cloud]]:
+    """Return the models of each kind that the record leaves likely: an interval that depends on the kind must hold for
+    each of them.
+    """
+    groups = [[c for c in clouds if kind(c.model) == k] for k in dict.fromkeys(kind(c.model) for c in clouds)]
+    weights = [sum(float(c.weight.sum()) for c in g) for g in groups]
+    return [g for g, w in zip(groups, weights, strict=True) if w > LIKELY * sum(weights)]
+
+
+def _has_flicker(model: Model) -> bool:
+    return any(t.name == "flicker" for t in model)
+
+
+def _slow_terms(model: Model) -> tuple[str, ...]:
+    return tuple(t.name for t in model if t.name in SLOW)
+
+
 def _beside_any_drift(
     figure: Callable[[Model, Array], Array | None], clouds: Sequence[Cloud], low: float, high: float
 ) -> tuple[float, float]:
     """Return the interval of N, wide enough for that of the models with flicker and that of those without: flicker
     reaches to the highest frequencies, Gauss-Markov drift does not, and a short record does not tell them apart.
     """
-    total = sum(float(c.weight.sum()) for c in clouds)
-    for with_flicker in (True, False):
-        some = [c for c in clouds if any(t.name == "flicker" for t in c.model) == with_flicker]
+    for some in _likely(clouds, _has_flicker):
         values, weights = weighted(some, figure)
-        if values.size and float(weights.sum()) > LIKELY * total:
+        if values.size:
             ends = [math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975)]
             low, high = min(low, ends[0]), max(high, ends[1])
     return low, high
 
 
 def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:
-    """Return the i-th Gauss-Markov process of a model; intervals are of those in the draws that are nearest to it."""
-    own = np.array([q for t, q in split(at.model, at.p) if t.name == "gauss_markov"])
-    sigma, tau, weight = [np.empty(0)], [np.empty(0)], [np.empty(0)]
+    """Return the i-th Gauss-Markov process of a model; intervals are of those in the draws that are nearest to it, and
+    hold for every likely combination of slow terms.
+
+    Where fewer terms stand for more, the tau of one is between those of two: draws of that model alone reach neither.
+    """
+    own = np.array([q for t, q in split(at.model, at.p) if t == GM])
+    low = high = own[i]
+    for some in (clouds, *_likely(clouds, _slow_terms)):
+        q, weight = _nearest(own[:, 1], i, some)
+        if float(weight.sum()) > LIKELY:
+            ends = [[quantile(x, weight, share) for x in q.T] for share in (0.025, 0.975)]
+            low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
+    present = float(_nearest(own[:, 1], i, clouds)[1].sum())
+    ends = np.exp([0.5, 1.0] * np.array([own[i], low, high])).T.tolist()
+    sigma, tau = (Estimate(value, down, up, present > 1.0 - ABSENT) for value, down, up in ends)
+    return Process(times(sigma, scale.size), times(tau, scale.tau0), present)
+
+
+def _nearest(taus: Array, i: int, clouds: Sequence[Cloud]) -> tuple[Array, Array]:
+    """Return parameters (M, 2) and weights of the processes of the draws whose log tau is nearest to the i-th of taus
+    (k,), one of each draw at most.
+    """
+    parameters, weights = [np.empty((0, 2))], [np.empty(0)]
     for c in clouds:
-        each = [q for t, q in split(c.model, c.p) if t.name == "gauss_markov"]
+        each = [q for t, q in split(c.model, c.p) if t == GM]
         if not each:
             continue
         q = np.stack(each, axis=1)  # (M, g, 2)
-        off = np.abs(q[:, :, 1:] - own[None, None, :, 1])  # (M, g, processes)
-        mine = np.argmin(off, axis=2) == i
-        distance = np.where(mine, off[:, :, i], np.inf)
+        off = np.abs(q[:, :, 1:] - taus)  # (M, g, k)
+        distance = np.where(np.argmin(off, axis=2) == i, off[:, :, i], np.inf)
         k = np.argmin(distance, axis=1)
         rows = np.flatnonzero(np.isfinite(distance[np.arange(k.size), k]))
-        sigma.append(q[rows, k[rows], 0])
-        tau.append(q[rows, k[rows], 1])
-        weight.append(c.weight[rows])
-    v, t, w = (np.concatenate(x) for x in (sigma, tau, weight))
-    present = float(w.sum())
-    ends = [[math.exp(f * quantile(x, w, q)) for q in (0.025, 0.975)] if w.size else [0.0, math.inf]
-            for x, f in ((v, 0.5), (t, 1.0))]  # fmt: skip
-    value = math.exp(0.5 * own[i, 0]), math.exp(own[i, 1])
-    estimates = [
-        Estimate(x, min(e[0], x), max(e[1], x), present > 1.0 - ABSENT) for x, e in zip(value, ends, strict=True)
-    ]
-    return Process(times(estimates[0], scale.size), times(estimates[1], scale.tau0), present)
+        parameters.append(q[rows, k[rows]])
+        weights.append(c.weight[rows])
+    return np.concatenate(parameters), np.concatenate(weights)
 
 
 def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
