@@ -36,6 +36,6 @@ class Acquisition:
     longest: tuple[float, float] = (0.0, 0.0)  # gap: its beginning and its length
     resets: dict[str, int] = field(default_factory=dict)
     wraps: dict[str, int] = field(default_factory=dict)
-    stuck: dict[str, int] = field(default_factory=dict)  # samples at the largest or smallest value of the file
+    stuck: dict[str, int] = field(default_factory=dict)  # samples at the limit of a converter, 0: at none
     frozen: dict[str, tuple[int, float]] = field(default_factory=dict)  # samples of a run of one value, its time
     repeated: int = 0  # rows that are those before

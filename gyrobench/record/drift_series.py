@@ -30,6 +30,7 @@ from gyrobench.record.csv_reader import DataError
 from gyrobench.record.drift_columns import DIRECT, FLAG, TIME, DriftTable, Signal, columns_of
 from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
 from gyrobench.record.frozen import EqualSamples
+from gyrobench.record.range_ends import RangeEnds
 
 GAP = 1.5  # steps
 CHUNK = 200  # samples whose median step is held against the usual one
@@ -117,7 +118,7 @@ class DriftReader:
         self.last_other = dict.fromkeys(self.others, math.nan)
         self.regular = [0, 0.0, 0.0]  # steps, their sum, squares of their deviation in steps
         self.beginning = {s.name: np.empty(0) for s in signals}  # first values, rad/s, or increments, rad
-        self.extremes = {s.name: [math.inf, -math.inf, 0, 0] for s in signals}
+        self.ends = {s.name: RangeEnds() for s in signals}
         self.steps = {name: [math.inf, -math.inf, 0.0] for name in self.angles}  # least, largest; largest angle
 
     def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
@@ -248,7 +249,7 @@ class DriftReader:
         return np.full(t.size, about.step) if about.rounded else d
 
     def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
-        self._extreme(s, value)
+        self.ends[s.name].add(value)
         value = value * s.factor if s.factor != 1.0 else value
         if s.kind in (*DIRECT, PER_SAMPLE):
             self._begin(s, value)
@@ -264,17 +265,6 @@ class DriftReader:
     def _begin(self, s: Signal, value: Array) -> None:
         if (kept := self.beginning[s.name]).size < BEGINNING:
             self.beginning[s.name] = np.append(kept, value[np.isfinite(value)])[:BEGINNING]
-
-    def _extreme(self, s: Signal, value: Array) -> None:
-        """Count samples that stay at the largest or smallest value: a converter at its limit."""
-        e = self.extremes[s.name]
-        for k, end in enumerate((float(value.min()), float(value.max()))):
-            sign = (1.0, -1.0)[k]
-            if sign * end < sign * e[k]:
-                e[k], e[k + 2] = end, 0
-            if end == e[k]:
-                at = value == end
-                e[k + 2] += int(np.sum(at[1:] & at[:-1]))
 
     def _put(
         self,
@@ -350,16 +340,15 @@ class DriftReader:
             about.step = mean
         about.last = self.before if self.timed else about.step * (self.position - 1 + self.cut)
         for s in self.signals:
-            e = self.extremes[s.name]
-            about.stuck[s.name] = max(int(e[2]), int(e[3])) if e[0] < e[1] else 0
-            if e[0] == e[1]:
-                raise DataError(
-                    self.table.source, [f"column '{s.name}': all its values are {e[0] * s.factor:.6g} (SI)"]
-                )
-            if max(-e[0], e[1]) > LARGEST or e[1] - e[0] < 1.0 / LARGEST:
+            ends = self.ends[s.name]
+            low, high = ends.low, ends.high
+            about.stuck[s.name] = ends.limited(about.samples)
+            if low == high:
+                raise DataError(self.table.source, [f"column '{s.name}': all its values are {low * s.factor:.6g} (SI)"])
+            if max(-low, high) > LARGEST or high - low < 1.0 / LARGEST:
                 raise DataError(
                     self.table.source,
-                    [f"column '{s.name}': values from {e[0]:.6g} to {e[1]:.6g} (SI): squares of them are beyond the "
+                    [f"column '{s.name}': values from {low:.6g} to {high:.6g} (SI): squares of them are beyond the "
                      "numbers of the computer; is the unit right?"],
                 )  # fmt: skip
         for name, (low, high, size) in self.steps.items():
