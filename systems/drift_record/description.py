@@ -195,14 +195,14 @@ def explained_text(p: Prepared) -> str:
 
 
 def saturated_text(p: Prepared, run: RunDocument) -> str:
-    """Return that values stay at an end of the range; "" where they do not."""
+    """Return that values are at an end of the range; "" where they are not."""
     about: Mapping[str, Any] = run.series["acquisition"] if run.series else {}
     column: Mapping[str, Any] = run.series["columns"][p.name] if run.series else {}
     ends = about["stuck"].get(p.name, 0) if about and column["kind"] != ANGLE and column["white"] else 0
-    if ends <= max(10, 1e-4 * about.get("samples", 0)):
+    if not ends:
         return ""
     return (
-        f"{ends} samples stay at the largest or smallest value of the file: the converter may have been at its limit. "
+        f"{ends} samples are at the largest or smallest value of the file: the converter may have been at its limit. "
         "The coefficients are too small then. Use a larger range."
     )
 
@@ -226,14 +226,13 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
 
     noise = p.noise
     if not noise.agrees:
-        say(
-            "misfit",
-            f"{noise_tables.agreement_text(noise)} No coefficient is stated. See the figures; look for lines that "
-            "wander, steps, or noise that changes with time.",
-        )
+        look = "See the figures; look for lines that wander, steps, or noise that changes with time."
+        look = "Take the record as it was sampled." if noise.slower else look
+        say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
-             "level": noise_tables.levels_text(noise), "rows": rows_text(p, run)}  # fmt: skip
+             "level": noise_tables.levels_text(noise), "changes": noise_tables.over_time_text(noise),
+             "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():
         if text:
             say(id, text)
@@ -273,7 +272,8 @@ def in_short(p: Prepared, run: RunDocument) -> str:
     said += ["frozen"] if p.name in about.get("frozen", {}) else []
     said += ["at its range"] if saturated_text(p, run) else []
     said += ["coarse"] if coarse_text(p.name, run) else []
-    said += ["level changes"] if noise_tables.levels_text(p.noise) else []
+    changes = noise_tables.levels_text(p.noise) or noise_tables.over_time_text(p.noise)
+    said += ["level changes"] if changes else []
     return ", ".join(said)
 
 
@@ -305,12 +305,6 @@ def rows_text(p: Prepared, run: RunDocument) -> str:
             f"Every second row is {number(abs(found.level) / p.units.si)} {p.units.unit} off the rows between: rows of "
             "two instruments in one column, a multiplexer, or a line at half the sampling rate. The coefficients are "
             "those of the mixture; take one row of two."
-        )
-    if p.returns:
-        return (
-            f"The changes between rows vanish and come back after {number(p.returns)} rows: values of a slower record "
-            "that were held or interpolated. Spectrum, filter and Q are those of that; take the record as it was "
-            "sampled."
         )
     return ""
 

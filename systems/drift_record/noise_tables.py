@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import ENOUGH
+from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -14,6 +17,8 @@ from gyrobench.report.numbers import write_number, write_p
 from gyrobench.result import Table
 
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
+OF_TIME = {"white": "N", "readout": "white noise of the reading", "quantization": "Q", "flicker": "B", "walk": "K",
+           "gauss_markov": "σ of the Gauss-Markov drift"}  # fmt: skip
 SHOWN = 6  # wild samples or steps that are listed
 NAMES = {
     "white": "white noise", "readout": "white noise of the reading", "quantization": "angle noise of a reading",
@@ -47,6 +52,11 @@ def contradicted(noise: NoiseModel) -> str:
 
 
 def _disagreement(noise: NoiseModel) -> str:
+    if noise.slower:
+        return (
+            f"the changes between rows vanish and come back after {number(noise.slower)} rows, values of a slower "
+            "record that were held or interpolated"
+        )
     a = min(noise.agreements, key=lambda a: a.share)
     if a.holds:
         return (
@@ -195,7 +205,7 @@ def wild_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
 def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     """Return the steps of the level that were taken out."""
     found = noise.steps
-    if not found:
+    if not found or noise.slower:
         return ""
     sizes = [(time[min(s.at, time.size - 1)], s.size / units.si, s.u / units.si) for s in found]
     said = ", ".join(f"{number(size, u)} {units.unit} at {number(t)} s" for t, size, u in sorted(sizes))
@@ -216,4 +226,21 @@ def levels_text(noise: NoiseModel) -> str:
         f"The level of the noise changes: its rms is {low:.2f} to {high:.2f} of that of all in {t.levels.size} parts "
         f"of the record (p {p if p.startswith('<') else f'= {p}'}). The coefficients are those of the mean; reduce the "
         "parts one by one."
+    )
+
+
+def over_time_text(noise: NoiseModel) -> str:
+    """Return which terms of the model change along the record; "" where none does, or no coefficient is stated."""
+    found = changing(noise.over_time) if noise.agrees else []
+    if not found:
+        return ""
+    said = []
+    for t in found:
+        of = f"band at {number(t.frequency / noise.scale.tau0)} Hz" if t.frequency else OF_TIME[t.term.name]
+        each = ", ".join(number(v, u) for v, u in zip(t.rms, t.u, strict=True))
+        said.append(f"{of} {each}, each ± {number(float(np.max(t.u)))}")
+    return (
+        f"The noise is not the same all along the record: over its mean, in the four quarters, {'; '.join(said)}. The "
+        "coefficients are those of the mean over this record, and another record is off by more than their intervals. "
+        "Look for a warm-up or for what else ran, or reduce the parts one by one."
     )

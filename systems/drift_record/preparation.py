@@ -18,7 +18,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, 
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
-from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row, rows_of_a_slower_record
+from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.setup.setups import attitude_of
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -66,11 +66,6 @@ class Prepared:
     def rows(self) -> RowPattern:
         """How even and odd samples differ."""
         return every_second_row(self.rate, self.clean)
-
-    @cached_property
-    def returns(self) -> float:
-        """After how many samples their changes vanish and come back; 0 where they do not."""
-        return rows_of_a_slower_record(self.clean)
 
     @cached_property
     def _longest(self) -> tuple[int, Array]:

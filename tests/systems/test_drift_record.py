@@ -312,15 +312,19 @@ def test_what_is_refused(
 def test_what_is_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A wild value, rounding coarser than the noise, aliasing, a converter at its limit: read, and said."""
     description = importlib.import_module(".description", type(load()).__module__)
-    n = 2000
+    n = 4000
     t, x = np.arange(n) * 0.1, np.random.default_rng(8).normal(size=n)
     files = {
         "wild": (np.where(t == 50.0, 3.0e4, x), "", "A sample is wild, beyond what the noise around makes, at 50 s"),
         "rounded": (10.0 * np.round(x / 25.0 + (t > 100.0)), "", "rounded to 10 °/h, more than twice the noise"),
         "folded": (x, "# bandwidth = 100Hz", "N² is up to 14 dB too large. Sample every 0.004 s"),
         "step": (x + 5.0 * (t > 120.0), "", "a step, which no noise of the rest makes"),
-        "limit": (np.clip(x, -0.5, 0.5), "", "stay at the largest or smallest value"),
-    }
+        "limit": (np.clip(x, -0.5, 0.5), "", "are at the largest or smallest value"),
+        "one-sided": (np.minimum(x, 1.5), "", "are at the largest or smallest value"),
+        "held": (np.repeat(np.random.default_rng(9).normal(size=3000), 3)[: t.size], "",
+                 " rows, values of a slower record that were held or interpolated. No coeffic"),
+        "quarter": (np.where(t < 0.25 * t[-1], 0.7, 1.0) * x, "", "The noise is not the same all along the record"),
+    }  # fmt: skip
     monkeypatch.setattr(P, "describe", lambda x, step: None)  # of the warnings nothing needs the models
     for name, (values, head, words) in files.items():
         file = write(tmp_path / "r.csv", {"time [s]": t, "rate [deg/h]": values}, head)

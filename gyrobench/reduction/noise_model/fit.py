@@ -6,6 +6,7 @@
     model.minimum                            least Allan deviation and where
     model.allan(tau), model.spectrum(f)      what the whole model implies
     model.agreement                          that beside the record's own deviation
+    model.over_time                          terms in the quarters of the record
     model.treatment                          wild and missing samples, steps, lines, change of the noise level
 
 The model is the one of greatest evidence whose deviation agrees with the record's own; intervals are of draws from the
@@ -24,6 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
+from gyrobench.reduction.noise_model.constancy import over_time
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
@@ -32,6 +34,7 @@ from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
 from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
+from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
@@ -90,9 +93,10 @@ def fit_noise(
     treated, found, clouds, at, ramp = fitted.treated, fitted.found, fitted.clouds, fitted.at, fitted.ramp
     whole, clean = fitted.agreements
     of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
+    shape = joined([*split(at.model, at.p), *found.resonances])
     return NoiseModel(
         scale=scale,
-        shape=joined([*split(at.model, at.p), *found.resonances]),
+        shape=shape,
         coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
         processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
         minimum=_minimum(at, clouds, ramp, treated.samples, scale),
@@ -101,6 +105,8 @@ def fit_noise(
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
         filtered=filter_probability(clouds),
+        over_time=over_time(treated, shape, means),
+        slower=rows_of_a_slower_record(treated.cleaned()),
     )
 
 
@@ -110,6 +116,7 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
     clouds = posterior.draw(found)
     judge = Judge(found, deviations_of(raw, treated), treated)
     at = judge.near_the_record(judge.choose(clouds), clouds)
+    clouds = posterior.beside_free_bands(clouds, found)
     ramp = _ramp(found, clouds)
     slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
     return _Fit(treated, found, clouds, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means) + slow))

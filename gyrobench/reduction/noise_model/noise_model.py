@@ -9,6 +9,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
+from gyrobench.reduction.noise_model.constancy import TermOverTime
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.steps import LevelStep
 from gyrobench.reduction.noise_model.terms import PEAKS, Grid, filter_of
@@ -87,7 +88,8 @@ class NoiseModel:
     coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
-    filtered: probability that the white noise has passed a filter.
+    filtered: probability that the white noise has passed a filter.  over_time: terms in the quarters of the record.
+    slower: rows after which changes vanish and come back: those of a slower record, held or interpolated; 0: of none.
     """
 
     scale: Scale
@@ -100,6 +102,8 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
     filtered: float
+    over_time: tuple[TermOverTime, ...]
+    slower: float
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -111,10 +115,10 @@ class NoiseModel:
 
     @property
     def agrees(self) -> bool:
-        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned, and
-        what stands for missing and wild samples came to an end.
+        """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned, what
+        stands for missing and wild samples came to an end, and no rows are those of a slower record.
         """
-        return all(a.holds for a in self.agreements) and self.treatment.settled
+        return all(a.holds for a in self.agreements) and self.treatment.settled and not self.slower
 
     @property
     def cleaned(self) -> Array:

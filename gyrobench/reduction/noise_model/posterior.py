@@ -2,7 +2,8 @@
 
 Of every model worth its weight a t distribution about its maximum, weighted by the posterior over it (importance
 sampling); models are weighted by their evidence.  A figure that depends on several parameters or on the choice of the
-model - the minimum of the deviation, a coefficient beside other terms - is computed from the same draws.
+model - the minimum of the deviation, a coefficient beside other terms - is computed from the same draws.  Bands are
+frozen in them; what their parameters leave open is added to all draws alike.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
 from gyrobench.reduction.noise_model.prior import Prior
 from gyrobench.reduction.noise_model.search import WIDEST, B, Fitted, K, ModelSearch, Q, volume
 
@@ -89,6 +90,30 @@ def draw(search: ModelSearch) -> list[Cloud]:
     top = max(e for _, e in rows)
     total = sum(math.exp(e - top) for _, e in rows)
     return [replace(cloud, weight=cloud.weight * math.exp(e - top) / total) for cloud, e in rows]
+
+
+def beside_free_bands(clouds: Sequence[Cloud], found: ModelSearch) -> list[Cloud]:
+    """Return the draws with what the bands leave open, beside which as they are they were drawn.
+
+    Of bands b off by e the other parameters are off by -H^-1 C e, H their information, C that of them and b: with e
+    of the covariance (J - C'H^-1 C)^-1, J the information of b, the draws have that of all parameters together.
+    """
+    if not found.resonances:
+        return list(clouds)
+    rng, data = np.random.default_rng(SEED), found.data
+    data.hold([])
+    out = []
+    for c in clouds:
+        at = found.seen[c.model]
+        whole, p = joined([*split(at.model, at.p), *found.resonances])
+        info, k = 0.5 * data.scoring(whole, p)[2], at.p.size
+        H, C, J = at.information + WIDEST * np.eye(k), info[:k, k:], info[k:, k:] + WIDEST * np.eye(p.size - k)
+        pulled = np.linalg.solve(H, C)
+        values, vectors = np.linalg.eigh(J - C.T @ pulled)
+        e = rng.standard_normal((c.p.shape[0], values.size)) / np.sqrt(np.maximum(values, WIDEST)) @ vectors.T
+        out.append(replace(c, p=c.p - e @ pulled.T))
+    data.hold(found.resonances)
+    return out
 
 
 def weighted(clouds: Sequence[Cloud], figure: Callable[[Model, Array], Array | None]) -> tuple[Array, Array]:
