@@ -17,7 +17,7 @@ from gyrobench.report.numbers import write_number, write_p
 from gyrobench.result import Table
 
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
-OF_TIME = {"white": "N", "readout": "white noise of the reading", "quantization": "Q", "flicker": "B", "walk": "K",
+CHANGED = {"white": "white noise behind its filter", "readout": "white noise of the reading",
            "gauss_markov": "σ of the Gauss-Markov drift"}  # fmt: skip
 SHOWN = 6  # wild samples or steps that are listed
 NAMES = {
@@ -236,7 +236,8 @@ def over_time_text(noise: NoiseModel) -> str:
         return ""
     said = []
     for t in found:
-        of = f"band at {number(t.frequency / noise.scale.tau0)} Hz" if t.frequency else OF_TIME[t.term.name]
+        band = f"band at {number(t.frequency / noise.scale.tau0)} Hz"
+        of = band if t.frequency else t.coefficient or CHANGED[t.term.name]
         each = ", ".join(number(v, u) for v, u in zip(t.rms, t.u, strict=True))
         said.append(f"{of} {each}, each ± {number(float(np.max(t.u)))}")
     return (

@@ -20,8 +20,10 @@ import quoted
 from quoted import figures
 
 from gyrobench import units
+from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.noise_model.terms import PEAKS
 from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.report.numbers import write_number
@@ -33,7 +35,7 @@ UNITS = {"adis16405": ("deg/s", "g"), "adi_mems": ("deg/s", "m/s2"), "ln100": ("
          "mpu6050": ("deg/s", "g"), "mtig": ("rad/s", "m/s2")}  # fmt: skip
 #: beginning of a channel -> published N in the unit of the table, its source
 PUBLISHED = {"adis16405 gyro": "2.0 (sheet)", "mpu6050 gyro": "0.30 (sheet)"}
-HEAD = ("τ / s", "inside / %", "stated", "N", "N, published", "remarks")
+HEAD = ("τ / s", "inside / %", "stated", "N", "N, published", "remarks", "changes over the quarters")
 
 
 def unit_of(name: str, channel: str) -> str:
@@ -50,6 +52,10 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
     low, high = (write_number(v / si, (N.high - N.low) / (4.0 * si)).text for v in (N.low, N.high))
     white = f"{write_number(N.value / si, (N.high - N.low) / (4.0 * si)).text} ({low} to {high}) {unit}"
     counts = ((t.wild.size, "wild"), (len(t.steps), "steps"), (len(t.lines), "lines"))
+    changes = [f"{c.coefficient or c.term.name.replace('_', '-')} {c.rms.min():.3f} to {c.rms.max():.3f}"
+               for c in changing(model.over_time) if c.term.name not in PEAKS]  # fmt: skip
+    bands = sum(c.term.name in PEAKS for c in changing(model.over_time))
+    changes += [f"{bands} band{'s' if bands > 1 else ''}"] if bands else []
     tau = " to ".join(write_number(x, significant=2).text for x in (whole.tau[0], whole.tau[-1]))
     return {
         "τ / s": tau,
@@ -58,6 +64,7 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
         "N": "–" if not model.agrees else white if N.determined else f"below {high} {unit}",
         "N, published": published or "–",
         "remarks": ", ".join(f"{n} {word}" for n, word in counts if n) or "–",
+        "changes over the quarters": ", ".join(changes) or "–",
     }
 
 

@@ -41,6 +41,14 @@ class TermOverTime:
     u: Array
     p: float
 
+    @property
+    def coefficient(self) -> str:
+        """Return the coefficient whose change it is, "" of a band and of white noise of a free shape: that may be the
+        power at other frequencies than N is of.
+        """
+        free = "shape" in self.term.filter
+        return "" if free else {"white": "N", "quantization": "Q", "flicker": "B", "walk": "K"}.get(self.term.name, "")
+
 
 def over_time(treated: Treated, shape: tuple[Model, Array], means: bool) -> tuple[TermOverTime, ...]:
     """Return the terms that every quarter of the longest stretch tells, in the order of the model."""
