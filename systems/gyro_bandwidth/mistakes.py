@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from gyrobench.reduction.diagnosis.scale_mistakes import AMPLITUDES, factor_sentence
+from gyrobench.reduction.loops.response_errors import ROUNDING
 from gyrobench.result import Reason
 
-from .response import Figures, GyroResponse, curves, fitted, logarithm
+from .response import Figures, GyroResponse, curves, fitted
 
 FAR = 0.1  # error of the gain at low frequency from which on something else than the gyro is meant
 STEEP = 0.2  # of a slope of 1 or -1, and of a right angle, rad
@@ -64,25 +66,25 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
 
 def _in_radians(r: GyroResponse, found: Figures) -> bool:
     """Return whether gain and phase are of one curve, as they are not as given, where the phases are larger by 57.3."""
-    left = np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)
+    left = np.vstack([r.gain, r.phase]) - found.curve.at(r.f)
     if float(np.sqrt(np.mean(left * left))) < ROUGH:
         return False
-    again = curves(GyroResponse(r.f, r.gain, np.degrees(r.phase), r.u))
+    again = curves(replace(r, phase=np.degrees(r.phase)))
     return any(c.chi2 < BETTER * found.curve.chi2 for c in again)
 
 
 def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:
     """Name two rows that are exchanged, or a point that is far off."""
-    left = (np.vstack([r.gain, r.phase]) - logarithm(found.curve.p, r.f)) / r.u
+    left = (np.vstack([r.gain, r.phase]) - found.curve.at(r.f)) / r.u
     spread = max(SCATTER, 1.4826 * float(np.median(np.abs(left))))
     off = np.hypot(*left) / spread
     worst = np.argsort(off)[::-1][:4]
-    if off[worst[0]] < OFF:
+    if off[worst[0]] < OFF or off[worst[0]] * spread * r.u[worst[0]] < ROUNDING:
         return
     for i, j in ((a, b) for k, a in enumerate(worst) for b in worst[k + 1 :]):
         gain, phase = r.gain.copy(), r.phase.copy()
         gain[[i, j]], phase[[i, j]] = gain[[j, i]], phase[[j, i]]
-        again = fitted(GyroResponse(r.f, gain, phase, r.u), found.curve.poles)
+        again = fitted(replace(r, gain=gain, phase=phase), found.curve.poles)
         if again is not None and again.chi2 < BETTER * found.curve.chi2:
             a, b = sorted((float(r.f[i]), float(r.f[j])))
             text = f"The points at {a:.4g} Hz and {b:.4g} Hz seem exchanged: the curve then fits. Check these rows."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.loop_measures import gates
-from gyrobench.reduction.loops.open_loop import lead_of
+from gyrobench.reduction.loops.loop_measures import Gate, gates
 from gyrobench.reduction.loops.response_errors import line_ratios
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = 8  # frequencies
 TABLE, GYRO = "table.rate_read", "gyro.rate[1]"
+IMAGE = 2.0  # lines of the record from a sine to its image, at least
 UNKNOWN = 1e-3  # of the points of a record that states none: any, the scatter about the curve takes its place
 
 
@@ -30,6 +30,8 @@ class Points:
     table: Array
     known: bool = True
     saturated: tuple[float, ...] = ()  # frequencies at which the gyro was beyond its range
+    folded: tuple[float, ...] = ()  # left out: near a multiple of half the output rate
+    held: float = 0.0  # s, time between two samples of the gyro, of which value is at their own times
 
 
 def points_of(record: Record) -> Points:
@@ -42,7 +44,9 @@ def points_of(record: Record) -> Points:
     if not (np.all(found.f > 0.0) and np.all(np.abs(found.value) > 0.0) and np.all(np.isfinite(found.value))):
         raise ReductionError("frequencies and amplitudes must be above 0")
     order = np.argsort(found.f)
-    return Points(found.f[order], found.value[order], found.u[order], found.table[order], found.known, found.saturated)
+    return replace(
+        found, f=found.f[order], value=found.value[order], u=found.u[order], table=found.table[order],
+    )  # fmt: skip
 
 
 def _of_rows(record: Record) -> Points:
@@ -57,9 +61,30 @@ def _of_rows(record: Record) -> Points:
 
 
 def _of_phases(record: Record) -> Points:
+    period, step = float(record.run.parameters.get("gyro.period") or 0.0), float(record.run.step or 0.0)
+    held = period > 1.5 * step
     shaken = [g for g in gates(record) if g.kind == "motion"]
     over = tuple(g.f for g in shaken if np.any(g["gyro.saturated"] > 0.5))
-    r = line_ratios(shaken, TABLE, GYRO)
-    held = float(record.run.parameters.get("gyro.period") or 0.0) > record.run.step
-    late = lead_of(record, {"gyro": 0.0}) + 0.5 * record.run.step * held  # a sample is held until the next one
-    return Points(r.f, r.value * np.exp(-2j * np.pi * r.f * late), r.u, r.x, True, over)
+    lost = [g for g in shaken if held and _folded(g, period)]
+    shaken = [g for g in shaken if g not in lost]
+    r = line_ratios(shaken, TABLE, GYRO, [taken(g, period, step) for g in shaken] if held else None)
+    return Points(r.f, r.value, r.u, r.x, True, over, tuple(g.f for g in lost), period if held else 0.0)
+
+
+def taken(gate: Gate, period: float, step: float) -> Gate:
+    """Return the samples of a gyro that gives one each period (s), once each, at the times at which they were taken.
+
+    Rows between two samples show the last one.  A sine through all rows would meet the images f_s - f, f_s + f ... of
+    the held signal, which the rows, themselves samples, fold onto f where both rates have a common divisor.
+    """
+    number = np.floor(gate.t / period + 1e-6)
+    times = np.ceil(number * period / step - 1e-3) * step
+    rows = np.flatnonzero(np.diff(number, prepend=number[0] - 1.0))
+    rows = rows[times[rows] > gate.t[0] - 0.5 * step]
+    return replace(gate, t=times[rows], inside=slice(None), before=slice(0), channels={GYRO: gate[GYRO][rows]})
+
+
+def _folded(gate: Gate, period: float) -> bool:
+    """Return whether the image of a sampled sine is too near it: its sampling shows one phase only."""
+    off = 2.0 * gate.f * period
+    return abs(off - round(off)) / period < IMAGE / float(gate.t[-1] - gate.t[0]) and round(off) > 0

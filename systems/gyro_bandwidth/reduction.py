@@ -20,7 +20,7 @@ from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG,
 from gyrobench.units import DEG
 
 from .mistakes import mistakes
-from .points import points_of
+from .points import Points, points_of
 from .response import GyroResponse, figures, logarithm
 from .truth import true_values
 
@@ -45,7 +45,7 @@ class Reduction(MeasureReduction):
 
     def measure(self) -> Account:
         points = points_of(self.record)
-        response = GyroResponse.of(points.f, points.value, points.u)
+        response = GyroResponse.of(points.f, points.value, points.u, points.held)
         found = figures(response)
         if found is None:
             raise ReductionError("no curve fits these points; more frequencies are needed")
@@ -65,6 +65,7 @@ class Reduction(MeasureReduction):
                 "Gain and phase: rate indicated over rate of the table as read; a lag is negative.",
                 f"Curve: {found.curve.poles} poles and a delay, of the least Bayesian information criterion.",
                 f"Table rate: amplitude {least:.4g} to {most:.4g} °/s.",
+                *_sampled(points),
             ],
             reasons=list(mistakes(response, found)),
         )
@@ -79,7 +80,7 @@ class Reduction(MeasureReduction):
 
     # ------------------------------------------------------------------ figures and their budget
     def _report(self) -> None:
-        found, points, curve_of = self.found, self.points, self.figures.curve
+        found, points, response, curve_of = self.found, self.points, self.response, self.figures.curve
         highest = float(points.f[-1])
         truth = true_values(self.run, highest)
         by = self._sensitivities()
@@ -100,19 +101,19 @@ class Reduction(MeasureReduction):
         found.reasons += not_stated(self.run, by, own)
         self._doubts()
         span = np.geomspace(points.f[0], highest, 200)
-        fitted = logarithm(curve_of.p, span)
+        fitted = curve_of.at(span)
         shown = curve(f"{curve_of.poles} poles and a delay", span, np.exp(fitted[0] + 1j * fitted[1]))
         measured = [Point(float(f), complex(v), float(u), 1.0) for f, v, u in
-                    zip(points.f, points.value, self.response.u, strict=True)]  # fmt: skip
+                    zip(points.f, response.value, response.u, strict=True)]  # fmt: skip
         caption = (
             "Gain and phase of the gyro against the table. Points: measured, with 95 % error bars; line: fitted curve."
         )
-        response = bode("frequency response", "loop", caption, measured, [shown], "gain", "1")
-        found.responses.append(replace(response, coherence=[]))  # u of a point is by its periods
+        drawn = bode("frequency response", "loop", caption, measured, [shown], "gain", "1")
+        found.responses.append(replace(drawn, coherence=[]))  # u of a point is by its periods
         found.tables.append(self._table())
 
     def _table(self) -> Table:
-        r, fitted = self.response, logarithm(self.figures.curve.p, self.response.f)
+        r, fitted = self.response, self.figures.curve.at(self.response.f)
         db = 20.0 / math.log(10.0)
         rows = [
             [float(f), float(a), db * float(dg), math.degrees(dp)]
@@ -150,7 +151,7 @@ class Reduction(MeasureReduction):
         r, c = self.response, self.figures.curve
 
         def of(p: Array) -> Array:
-            out: Array = logarithm(p, r.f) / r.u
+            out: Array = logarithm(p, r.f, r.held) / r.u
             return out
 
         size = np.array([1.0, 1.0 / c.highest, *np.ones(c.poles)])
@@ -180,3 +181,17 @@ class Reduction(MeasureReduction):
             rise = 20.0 * peak / math.log(10.0)
             more = "Measure more frequencies there."
             found.warn("response.resonance", f"The gain rises to {rise:.3g} dB at {top:.3g} Hz: a resonance. {more}")
+
+
+def _sampled(points: Points) -> list[str]:
+    """Return what is taken of a gyro that gives samples, and which frequencies are left out."""
+    if not points.held:
+        return []
+    found = [
+        f"The gyro gives a sample each {points.held * 1e3:.4g} ms; sines are fitted to the samples at their own times, "
+        "and the curve is times that of a sample held until the next one."
+    ]
+    if points.folded:
+        at = ", ".join(f"{f:.4g} Hz" for f in points.folded)
+        found.append(f"Left out: {at}, near a multiple of half the output rate, where a sine and its image are one.")
+    return found

@@ -2,7 +2,8 @@
 
     H(s) = K exp(-s T) / [(1 + s/a) ... (1 + 2 z s/b + (s/b)2) ...]                      0 to 5 poles
 
-by weighted least squares of ln H; the number of poles by the least Bayesian information criterion.  The figures are
+by weighted least squares of ln H; the number of poles by the least Bayesian information criterion.  Of a gyro that
+holds a sample for the time P it is times sinc(f P) exp(-s P/2), which is known and which no poles are.  The figures are
 those of this curve: the first frequency with |H| = K/sqrt(2), the first with arg H = -90 degrees, the delay -d arg H /
 d w at frequency zero, the order -2 d ln |H| / d ln f at -3 dB, which is n of a Butterworth low-pass of order n.
 
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,30 +35,46 @@ WIDE = 1e3  # of the highest frequency: slower and faster poles than this are no
 
 @dataclass(frozen=True)
 class GyroResponse:
-    """Frequencies f (Hz, rising), natural logarithm of the gain, unwrapped phase (rad), u of both (n,)."""
+    """Frequencies f (Hz, rising), natural logarithm of the gain, unwrapped phase (rad), u of both (n,); time for which
+    the gyro holds a sample (s).
+    """
 
     f: Array
     gain: Array
     phase: Array
     u: Array
+    held: float = 0.0
 
     @classmethod
-    def of(cls, f: Array, value: Complex, u: Array) -> GyroResponse:
-        """Return the response of complex points; the phase is continuous, that of the lowest within half a turn."""
+    def of(cls, f: Array, value: Complex, u: Array, held: float = 0.0) -> GyroResponse:
+        """Return the response of complex points, of samples at their own times where they are held; the phase is
+        continuous, that of the lowest within half a turn.
+        """
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
-        return cls(f, np.log(np.abs(value)), np.unwrap(np.angle(value)), u)
+        gain, phase = np.vstack([np.log(np.abs(value)), np.unwrap(np.angle(value))]) + hold(f, held)
+        return cls(f, gain, phase, u, held)
 
     def moved(self, change: Complex) -> GyroResponse:
         """Return the response times exp(change), change complex (n,)."""
-        return GyroResponse(self.f, self.gain + change.real, self.phase + change.imag, self.u)
+        return replace(self, gain=self.gain + change.real, phase=self.phase + change.imag)
+
+    @property
+    def value(self) -> Complex:
+        out: Complex = np.exp(self.gain + 1j * self.phase)
+        return out
 
     def at(self, factor: float) -> GyroResponse:
         """Return the response with all frequencies times a factor."""
-        return GyroResponse(self.f * factor, self.gain, self.phase, self.u)
+        return replace(self, f=self.f * factor, held=self.held / factor)
 
 
-def logarithm(p: Array, f: Array) -> Array:
+def hold(f: Array, time: float) -> Array:
+    """Return ln |H| and arg H, rows (2, n), of a signal that is held for a time, s, from sample to sample."""
+    return np.vstack([np.log(np.abs(np.sinc(f * time))), -np.pi * f * time])
+
+
+def logarithm(p: Array, f: Array, held: float = 0.0) -> Array:
     """Return ln |H| and arg H, rows (2, n), continuous in f.  p: ln K, T, then of each pair of poles ln b and ln z, and
     ln a of a single one.
     """
@@ -71,7 +88,8 @@ def logarithm(p: Array, f: Array) -> Array:
     if rest.size % 2:
         factor = 1.0 + s / np.exp(rest[-1])
         gain, phase = gain - np.log(np.abs(factor)), phase - np.angle(factor)
-    return np.vstack([gain, phase])
+    out: Array = np.vstack([gain, phase]) + hold(f, held)
+    return out
 
 
 Logarithm = Callable[[Array], Array]  # frequencies (n,), Hz -> ln |H| and arg H, rows (2, n), continuous
@@ -112,10 +130,15 @@ class PoleCurve:
     dof: int
     criterion: float
     highest: float  # Hz
+    held: float = 0.0  # s
+
+    def at(self, f: Array) -> Array:
+        """Return ln |H| and arg H, rows (2, n)."""
+        return logarithm(self.p, f, self.held)
 
     def values(self, p: Array) -> Array:
         """Return K, f3, f90, delay, order of parameters p."""
-        return read_off(lambda f: logarithm(p, f), self.highest)
+        return read_off(lambda f: logarithm(p, f, self.held), self.highest)
 
     def variances(self) -> Array:
         """Return the variances of the values by those of the points, to first order."""
@@ -145,7 +168,7 @@ def fitted(r: GyroResponse, poles: int) -> PoleCurve | None:
 
     def off(x: Array) -> Array:
         p = np.array([x[0], x[1] / top, *x[2:]])
-        return ((logarithm(p, f) - measured) / u).ravel()
+        return ((logarithm(p, f, r.held) - measured) / u).ravel()
 
     best = None
     for spread in (0.3, -0.3, 1.0):
@@ -171,7 +194,14 @@ def fitted(r: GyroResponse, poles: int) -> PoleCurve | None:
     units = np.array([1.0, 1.0 / top, *np.ones(poles)])
     chi2 = 2.0 * float(best.cost)
     return PoleCurve(
-        poles, best.x * units, cov * np.outer(units, units), chi2, dof, chi2 + free * math.log(2 * f.size), top
+        poles,
+        best.x * units,
+        cov * np.outer(units, units),
+        chi2,
+        dof,
+        chi2 + free * math.log(2 * f.size),
+        top,
+        r.held,
     )
 
 

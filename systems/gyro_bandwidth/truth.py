@@ -16,7 +16,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 
-from .response import Logarithm, read_off
+from .response import Logarithm, hold, read_off
 
 MEANS = ("GyroRate", "GyroFog", "GyroLaser")
 FILTERED = ("GyroMems", "GyroVibratory", "GyroVibratoryCarrier")
@@ -46,7 +46,7 @@ def response_of(run: RunDocument) -> Logarithm | None:
         s = 2j * np.pi * f
         out = np.vstack([np.full(f.size, scale) + np.log(np.sinc(f * h)), np.zeros(f.size)])
         if h < T:  # a sample is held
-            out += np.vstack([np.log(np.abs(np.sinc(f * T))), -np.pi * f * T])
+            out += hold(f, T)
         if name in MEANS:
             out[1] -= np.pi * f * h
             return out

@@ -2,9 +2,9 @@
 
     python tests/benchmarks/bandwidth_coverage.py [--runs 300] [--seed 1] [--unstated]
 
-Each run draws filter, loop, split and scale factor, white noise of gyro and reading and, in half of the runs each,
-flicker, a random walk, stated errors of gain and lag of the reading, runs the whole co-simulation on a shortened plan
-and reduces it.  --unstated: the errors of the reading are simulated, but nobody states them.
+Each run draws filter, loop, split, output rate and scale factor, white noise of gyro and reading and, in half of the
+runs each, flicker, a random walk, stated errors of gain and lag of the reading, runs the whole co-simulation on a
+shortened plan and reduces it.  --unstated: the errors of the reading are simulated, but nobody states them.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ def drawn(rng: np.random.Generator, part: str) -> dict[str, object]:
     if part == "gyro_fog":
         return {**values, "gyro.optical": 0.0, "gyro.electronics": white}
     values |= {"gyro.white": white, "gyro.bandwidth": rng.uniform(25.0, 90.0)}
+    values["gyro.period"] = rng.uniform(5e-4, 4e-3) * rng.integers(2)
     if part == "gyro_vibratory":
         values |= {"gyro.loop": rng.uniform(30.0, 150.0), "gyro.split": rng.uniform(-200.0, 200.0)}
     return values

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import signal
+from scipy import optimize, signal
 from wired import Native
 
 from gyrobench.engine.session import Session
@@ -42,14 +42,25 @@ def butterworth(f: np.ndarray, order: int, bandwidth: float) -> np.ndarray:
 
 
 @pytest.mark.long
-def test_samples_that_are_held() -> None:
-    """A sample each millisecond, held, is half of it late and sinc(f T) smaller; the record, one each 0.4 ms, meets it
-    at ages of 0 to 0.8 ms in steps of 0.2, 0.1 ms too early on average.
+@pytest.mark.parametrize("period", [1e-3, 1.23e-3, 4e-3])
+def test_samples_that_are_held(period: float) -> None:
+    """A sample each period T, held: sinc(f T) exp(-s T/2) times the two poles of 50 Hz, so T/2 later.
+
+    1 ms against the record's 0.6 ms: images f_s - f fold onto 100 Hz; 1.23 ms are no whole steps; of 4 ms 125 Hz is
+    half the rate.  Steps h of 0.1 ms: sinc(f h) twice, of table and gyro.
     """
-    own, held = (found(reduced("gyro_mems", SHORT | QUIET | {"gyro.period": T})) for T in (0.0, 1e-3))
-    assert held["delay"].estimate == pytest.approx(own["delay"].estimate + 0.5, abs=5e-3)
-    for name in ("f_3dB", "f_90"):
-        assert held[name].estimate == pytest.approx(held[name].truth, rel=2e-3)
+    options = SHORT | QUIET | {"highest": 125.0, "gyro.period": period}
+    result = reduced("gyro_mems", options)
+    c = found(result)
+    assert c["delay"].estimate == pytest.approx(1e3 * (math.sqrt(2.0) / (100.0 * math.pi) + 0.5 * period), abs=1e-3)
+
+    def fallen(f: float) -> float:
+        gain = np.sinc(f * period) * np.sinc(f * 1e-4) ** 2 / math.sqrt(1.0 + (f / 50.0) ** 4)
+        return float(gain) - math.sqrt(0.5)
+
+    assert c["f_3dB"].estimate == pytest.approx(optimize.brentq(fallen, 20.0, 60.0), rel=2e-5)
+    assert not [r.id for r in result.reasons if r.id.startswith(("response.", "truth."))]
+    assert ("Left out: 125 Hz" in " ".join(result.conventions)) == (period == 4e-3)
 
 
 # ------------------------------------------------------------------------------------------------ figures of a curve

@@ -20,7 +20,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT, TOO_LARGE
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor, response
+from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor
 from gyrobench.reduction.setup.conditions import TYPE_B_UNSTATED
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.sources import READING_GAIN, TIME_BASE, Source
@@ -44,24 +44,37 @@ class LineRatios:
     x: Array
 
 
-def line_ratios(gates: Sequence[Gate], x: str, y: str) -> LineRatios:
+def line_ratios(gates: Sequence[Gate], x: str, y: str, of_y: Sequence[Gate] | None = None) -> LineRatios:
     """Return channel y over channel x at the frequencies of gates, with the noise beside their lines.
 
+    of_y: the same phases with the times at which y was taken, where these are not those of x.
     The noise of a channel over frequency is smooth: a polynomial through the logarithms of what each gate shows of it,
     of 12 numbers, has many more.  Weights from 12 numbers each would make u a fifth too small.
+    Raises ReductionError for samples of x too coarse for a frequency, and for an x without its sine.
     """
     f = np.array([g.f for g in gates])
     time = np.array([g.t[-1] - g.t[0] for g in gates])
-    sizes = np.array([[abs(phasor(g.t, g[c], g.f)) for c in (x, y)] for g in gates])
-    value = np.array([response(g.t, g[x], g[y], g.f).value for g in gates])
-    noise = np.array([[_noise(g, c) for c in (x, y)] for g in gates])
+    pairs = [((g, x), (other, y)) for g, other in zip(gates, of_y or gates, strict=True)]
+    lines = np.array([[phasor(g.t, g[c], g.f) for g, c in pair] for pair in pairs])
+    sizes = np.abs(lines)
+    for g, size in zip(gates, sizes[:, 0], strict=True):
+        _seen(g, x, size)
+    noise = np.array([[_noise(g, c) for g, c in pair] for pair in pairs])
     few = float(special.stdtrit(LINES, 0.975)) / NORMAL  # many points together: no allowance for few numbers
     shown = np.maximum(noise / few, 1e-3 * ROUNDING * sizes) * np.sqrt(time)[:, None]
     at = np.log(f / f.mean())
     degree = min(BEND, max(0, f.size // 3 - 1))
     smooth = np.column_stack([np.exp(np.polyval(np.polyfit(at, c, degree), at)) for c in np.log(shown).T])
     u = np.linalg.norm(ROOT_POWER * smooth / np.sqrt(time)[:, None] / sizes, axis=1)
-    return LineRatios(f, value, np.maximum(u, ROUNDING), sizes[:, 0])
+    return LineRatios(f, lines[:, 1] / lines[:, 0], np.maximum(u, ROUNDING), sizes[:, 0])
+
+
+def _seen(gate: Gate, x: str, size: float) -> None:
+    step = float(gate.t[1] - gate.t[0])
+    if gate.f * step > 0.25:
+        raise ReductionError(f"{gate.f:g} Hz: a sample every {step:g} s is too coarse; record at least 4 a period")
+    if not size > 1e-12 * float(np.max(np.abs(gate[x])) or 1.0):
+        raise ReductionError(f"{gate.f:g} Hz: the reference signal has no component at this frequency")
 
 
 def _noise(gate: Gate, channel: str) -> float:
