@@ -20,6 +20,8 @@ AXES = ("#d03030", "#1f8f3a", "#2f6fd0")  # x, y, z of every body
 ALONG = ((0.0, 0.0, -np.pi / 2.0), (0.0, 0.0, 0.0), (np.pi / 2.0, 0.0, 0.0))  # turns a rod, which lies along y
 THICK = 0.014
 SHADES = ("#9aa7b4", "#b9a37c", "#8fae8b", "#a58fb0", "#7c9cb9")
+#: of names, which lie over lines and bodies
+NAMED = "color: var(--soft); font-size: 13px; text-shadow: 0 0 2px var(--panel), 0 0 4px var(--panel)"
 SIZE = 2.6  # of the outermost body; each that stands on it is smaller
 FRAMES = 400  # of a whole record while it plays
 TICK = 0.1  # s between two frames
@@ -45,6 +47,7 @@ TURN = """(() => {
 })()"""
 
 
+BREADTH = 1.3  # width / height of a view that holds the names at the ends of east and north
 #: the front end draws 20 frames a second whatever there is to see: those that show the same, or nothing, are left out
 CALM = """(() => {
   const calm = left => {
@@ -52,12 +55,19 @@ CALM = """(() => {
     if (!draws.every(Boolean)) { if (left > 0) setTimeout(() => calm(left - 1), 50); return; }
     let last = '', changed = 0;
     place.framesDrawn = 0;
+    draws[0].setClearAlpha(0);  // the ground is that of the page
     const draw = draws.map(d => d.render.bind(d));
     draws[0].render = (scene, camera) => {
-      if (!place.$el.offsetParent) return;
+      const { offsetParent, clientWidth, clientHeight } = place.$el;
+      if (!offsetParent) return;
+      camera.zoom = Math.min(1, clientWidth / clientHeight / %g);
+      camera.updateProjectionMatrix();
       camera.updateMatrixWorld();
-      const now = [place.$el.clientWidth, ...camera.matrixWorld.elements, ...camera.projectionMatrix.elements];
-      scene.traverse(o => now.push(...o.position.toArray(), ...o.quaternion.toArray(), ...o.scale.toArray()));
+      const now = [clientWidth, ...camera.matrixWorld.elements, ...camera.projectionMatrix.elements];
+      scene.traverse(o => {
+        now.push(...o.position.toArray(), ...o.quaternion.toArray(), ...o.scale.toArray());
+        if (o.material?.opacity < 1) Object.assign(o, { renderOrder: 1 }).material.depthWrite = false;  // hides nothing
+      });
       if (last !== (last = now.join())) changed = performance.now();
       if (performance.now() > changed + 1000) return;  // colours and texts come a little later
       draw.forEach(d => d(scene, camera));
@@ -80,7 +90,7 @@ class MovingPicture:
     Axes of the scene: east, north, up.  Nothing is to scale, and all bodies stand in one place.
     """
 
-    def __init__(self, record: Record, bodies: list[MovingBody], dark: bool | None) -> None:
+    def __init__(self, record: Record, bodies: list[MovingBody]) -> None:
         self.record, self.bodies = record, bodies
         self.time = np.asarray(record.channels["time"], dtype=float)
         found = attitudes(bodies, record, np.arange(1))
@@ -95,18 +105,18 @@ class MovingPicture:
             self.slider = ui.slider(min=0, max=last, value=0, step=1).classes("time")
             self.slider.props(spoken("time"))
             self.label = ui.label().classes("soft")
-        self.scene = ui.scene(width=900, height=520, grid=False, background_color="#20262d" if dark else "#f2f4f6")
+        self.scene = ui.scene(width=900, height=520, grid=False)
         self.scene.classes("scene").props("role=img").props(spoken("Moving picture"))
         with self.scene:
             self._ground(record.run.parameters)
             for depth, name in enumerate(self.names):
                 self.groups[name] = self._body(depth, name)
-        self.scene.move_camera(x=1.7, y=-2.2, z=1.3, look_at_z=0.0, duration=0.0)
+        self.scene.move_camera(x=1.8, y=-2.25, z=1.35, look_at_z=0.2, duration=0.0)
         ui.label(say(LEGEND)).classes("soft")
         self.slider.on_value_change(lambda e: self.show(int(e.value)))
         self.timer = ui.timer(TICK, self._step, active=False)
         self.seen = PageSeen()
-        ui.run_javascript(CALM % self.scene.id)
+        ui.run_javascript(CALM % (self.scene.id, BREADTH))
         self.show(0)
 
     def attitudes(self, row: int) -> Mapping[str, Array]:
@@ -136,14 +146,14 @@ class MovingPicture:
         scene = self.scene
         for end, name in (([2.0, 0, 0], "E"), ([0, 2.0, 0], "N"), ([0, 0, 1.9], "U")):
             scene.line([0, 0, 0], end).material("#8a939c")
-            scene.text(name, "color: #7a838c; font-size: 14px").move(*[1.05 * x for x in end])
+            scene.text(name, NAMED).move(*[1.05 * x for x in end])
         latitude = parameters.get("site.latitude", parameters.get("motion.latitude"))
         if isinstance(latitude, int | float):
             end = (1.9 * pole(float(latitude))).tolist()
             scene.line([0, 0, 0], end).material("#c09000")
-            scene.text(say("pole"), "color: #b08000; font-size: 14px").move(*[1.05 * x for x in end])
+            scene.text(say("pole"), f"{NAMED}; color: var(--warn)").move(*[1.12 * x for x in end])
         scene.line([0, 0, 0], [0, 0, -1.5]).material("#777777")
-        scene.text("g", "color: #888888; font-size: 14px").move(0, 0, -1.6)
+        scene.text("g", NAMED).move(0, 0, -1.6)
 
     def _body(self, depth: int, name: str) -> Any:
         """Add a body: a plate or a ring, with its three axes; return the group that turns."""
@@ -151,13 +161,13 @@ class MovingPicture:
         with self.scene.group() as group:
             shade = SHADES[depth % len(SHADES)]
             if depth == len(self.names) - 1:
-                self.scene.box(0.5 * size, 0.32 * size, 0.24 * size).material(shade, 0.9)
+                self.scene.box(0.5 * size, 0.32 * size, 0.24 * size).material(shade)
             elif depth == 0:  # a plate in its x-y plane
                 self.scene.cylinder(0.4 * size, 0.4 * size, 0.04 * size, 48).rotate(np.pi / 2, 0, 0).material(
                     shade, 0.5
                 )
             else:
-                self.scene.ring(0.36 * size, 0.42 * size, 48).material(shade, 0.8, "both")
+                self.scene.ring(0.36 * size, 0.42 * size, 48).material(shade, side="both")
             length = 0.62 * size
             for k, colour in enumerate(AXES):
                 middle, tip = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
@@ -165,6 +175,7 @@ class MovingPicture:
                 self.scene.cylinder(THICK, THICK, length, 8).rotate(*ALONG[k]).move(*middle).material(colour)
                 self.scene.cylinder(0.0, 3.0 * THICK, 8.0 * THICK, 12).rotate(*ALONG[k]).move(*tip).material(colour)
             place = [0.0, 0.0, 0.0]
-            place[depth % 3] = 1.16 * length  # on another axis than the name of the body before
-            self.scene.text(name, "font-size: 13px; color: #6a737c").move(*place)
+            place[depth % 3] = 1.16 * length if depth < 3 else -length  # where no other body has its name
+            named = say("body: " + name).removeprefix("body: ")
+            self.scene.text(named, NAMED).move(*place)
         return group.with_name(f"body {name}")

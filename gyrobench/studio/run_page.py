@@ -171,7 +171,7 @@ def _add_run_page(studio: Studio) -> None:
                         await _signals(folder, document)
                 if tabs.value == "Moving picture":
                     with moving:
-                        await _picture(studio, folder, document)
+                        await _picture(folder, document)
 
             tabs.on_value_change(opened)
 
@@ -219,13 +219,13 @@ async def _signals(folder: Path, document: RunDocument) -> None:
     await _chosen({folder.name: signals}, signals.names, first)
 
 
-async def _picture(studio: Studio, folder: Path, document: RunDocument) -> None:
+async def _picture(folder: Path, document: RunDocument) -> None:
     signals = await asyncio.to_thread(signals_of, folder)
     try:
         bodies = parse_bodies(getattr(load_test(document.system), "bodies", ""))
     except Exception:  # a run of a system that is not there any more
         bodies = []
-    shown = MovingPicture(signals.record, bodies, studio.dark) if len(signals.time) else None
+    shown = MovingPicture(signals.record, bodies) if len(signals.time) else None
     if shown is None or not shown.names:
         ui.label(say("The record holds no angle of a body that moves.")).classes("soft")
 

@@ -24,6 +24,7 @@ from gyrobench.studio.frame import DARK, PAGES
 from gyrobench.studio.jobs import ENDED
 from gyrobench.studio.picture import LEGEND
 from gyrobench.studio.run_page import HOW
+from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.workflow.gallery import PURPOSES, entry
 from gyrobench.workflow.inputs import load_test
 
@@ -87,9 +88,10 @@ def test_every_label_has_its_line(chinese: None) -> None:
 
 @pytest.mark.parametrize("name", Bench(standard_folder()).systems())
 def test_every_system_is_said_in_chinese(chinese: None, name: str) -> None:
-    """Title, summary, options: of one system in its zh.toml, of several in that of the studio."""
-    shown = entry(Bench(standard_folder()), name)
-    texts = [shown.title, shown.summary, *(o.doc for o in load_test(name).options.values())]
+    """Title, summary, options: of one system in its zh.toml, of several in that of the studio, as bodies that move."""
+    shown, system = entry(Bench(standard_folder()), name), load_test(name)
+    texts = [shown.title, shown.summary, *(o.doc for o in system.options.values())]
+    texts += [f"body: {b.name}" for b in parse_bodies(getattr(system, "bodies", ""))]
     assert [text for text in texts if words.say.find(text, name) is None] == []
 
 
