@@ -10,7 +10,8 @@ Noise: by default drawn from the population that the reduction takes for granted
 white alone, Gauss-Markov alone, or both, with a correlation time from 0.3 windows to half the record; where data are
 differences of readings, with errors of the readings too.  Windows are shortened, so the sizes are scaled: the parts get
 the densities that give a window the drawn shares.  ``--noise`` takes one instrument instead, a corner of the
-population; there intervals may hold the truth more or less often than 95 %.  README.md here has the figures.
+population, or flicker, alone or with as much white noise; there intervals may hold the truth more or less often than
+95 %.  README.md here has the figures.
 
 Each count is a campaign, on all cores; campaigns/*.toml are the same in files, which keep their rows and go on where
 they were:
@@ -97,7 +98,7 @@ def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> l
             noisy = Noise(*noise.sample_instrument(rng, t0, t1, readings), window)
         else:
             tau, share, reading = CORNERS[corner]
-            noisy = Noise(tau * window, share, reading, window)
+            noisy = Noise(tau * window if tau > 0.0 else tau, share, reading, window)
         drawn = case.drawn(rng)
         found.append({**drawn, **case.noise(noisy, drawn), "seed": seed * 1_000_000 + run})
     return found

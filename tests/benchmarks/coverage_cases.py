@@ -28,11 +28,25 @@ class Noise:
     reading: float
     window: float
 
+    @property
+    def flickers(self) -> bool:
+        return self.tau < 0.0
+
+    def flicker(self, size: float) -> float:
+        """B of flicker that scatters a window of 1/LASTING of its longest correlation time by ``size``: the mean over T
+        has the variance (B^2/pi) (ln(3.17 tau/T) + 3/2 - 0.5772) (docs/methods/north-finders.md).
+        """
+        if not self.flickers:
+            return 0.0
+        return size * math.sqrt((1.0 - self.reading) * self.share * math.pi / (math.log(3.17 * LASTING) + 0.9228))
+
     def white(self, size: float) -> float:
         """Density (unit/sqrt(Hz)) of the white part where a window scatters by ``size``."""
         return size * math.sqrt((1.0 - self.reading) * (1.0 - self.share) * self.window)
 
     def markov(self, size: float) -> float:
+        if self.flickers:
+            return 0.0
         v = float(mean_variance(np.array(self.window / self.tau)))
         return size * math.sqrt((1.0 - self.reading) * self.share / v)
 
@@ -41,7 +55,8 @@ class Noise:
         return size * self.window * math.sqrt(self.reading / 2.0)
 
 
-#: Corners of the population: correlation time in windows, share, reading.
+LASTING = 200.0  # windows: longest correlation time of flicker
+#: Corners of the population: correlation time in windows (-1: flicker in its place), share, reading.
 CORNERS = {
     "white": (1.0, 0.0, 0.0),
     "markov-1": (1.0, 1.0, 0.0),
@@ -51,6 +66,8 @@ CORNERS = {
     "slow-8": (8.0, 1.0, 0.0),
     "slow-20": (20.0, 0.5, 0.0),
     "slow-1000": (1000.0, 1.0, 0.0),
+    "flicker": (-1.0, 1.0, 0.0),
+    "flicker-white": (-1.0, 0.5, 0.0),
 }
 
 
@@ -155,19 +172,28 @@ def supplied(length: float, way: str = "ramp") -> Callable[[Rng], Values]:
 
 
 # ---------------------------------------------------------------------------------------------- noise of the parts
+def lasting(n: Noise, sizes: Values) -> Values:
+    """Return the sizes with the correlation time of the drift that there is."""
+    if n.flickers:
+        return {**sizes, "flicker_tau": LASTING * n.window}
+    return {**{k: v for k, v in sizes.items() if not k.startswith("flicker")}, "markov_tau": n.tau}
+
+
 def of_gyro(n: Noise, _: Values, size: float = 0.02 * DPH) -> Values:
-    return {"gyro.white": n.white(size), "gyro.markov": n.markov(size), "gyro.markov_tau": n.tau, "gyro.pickoff": 5e-9}
+    own = {"white": n.white(size), "markov": n.markov(size), "pickoff": 5e-9, "flicker": n.flicker(size)}
+    return {f"gyro.{k}": v for k, v in lasting(n, own).items()}
 
 
 def of_two_channels(n: Noise, _: Values) -> Values:
     size = 0.02 * DPH
-    each = {"white": n.white(size), "markov": n.markov(size), "pickoff": 5e-9}
-    return {"gyro.markov_tau": n.tau, **{f"gyro.{k}_{c}": v for k, v in each.items() for c in "xy"}}
+    each = {"white": n.white(size), "markov": n.markov(size), "pickoff": 5e-9, "flicker": n.flicker(size)}
+    found = lasting(n, {f"{k}_{c}": v for k, v in each.items() for c in "xy"})
+    return {f"gyro.{k}": v for k, v in found.items()}
 
 
 def of_accelerometer(n: Noise, _: Values) -> Values:
     size = 20e-6 * G0
-    own = {"white": n.white(size), "markov": n.markov(size), "markov_tau": n.tau}
+    own = lasting(n, {"white": n.white(size), "markov": n.markov(size)})
     return {f"accelerometer.{k}": v for k, v in own.items()}
 
 

@@ -105,9 +105,11 @@ def test_candidates_are_a_probability() -> None:
     c = noise.noise_grid(t0, t1)
     assert c.prior.sum() == pytest.approx(1.0) and np.all(c.prior > 0)
     assert np.all((c.share >= 0) & (c.share <= 1)) and c.share[0] == 0.0
-    assert c.tau.size == 1 + 9 + 9 * 6  # white alone, Gauss-Markov alone, both
-    assert c.prior[0] == 0.25 and c.prior[1:10].sum() == pytest.approx(0.25)
-    assert c.tau[1:].min() > 0.3 * mc.WINDOW and c.tau.max() < 0.5 * (t1[-1] - t0[0])
+    # white alone, Gauss-Markov alone, both; one in five has a power law of two slopes, alone and with white noise
+    assert c.tau.size == 1 + 9 + 9 * 6 + 2 * (1 + 4)
+    assert c.prior[0] == 0.8 * 0.25 and c.prior[1:10].sum() == pytest.approx(0.8 * 0.25)
+    assert c.prior[c.tau < 0.0].sum() == pytest.approx(0.2)
+    assert c.tau[1:64].min() > 0.3 * mc.WINDOW and c.tau.max() < 0.5 * (t1[-1] - t0[0])
 
 
 def test_population_by_hand() -> None:
@@ -158,9 +160,10 @@ def test_white_noise_gives_nearly_the_ordinary_answer() -> None:
     t0, t1, X = mc.plan(72, 10)
     y = X @ np.ones(9) + next(mc.samples(t0, t1, 0.0, 0.0, 1, 4))
     e, o = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1), least_squares(X, y, drift.terms(9))
-    assert e.noise.white > 0.5  # a quarter beforehand
+    assert e.noise.white > 0.5  # a fifth beforehand
     np.testing.assert_allclose(e.beta, o.beta, atol=0.1 * o.u.max())
-    assert np.all((e.u / o.u > 0.9) & (e.u / o.u < 1.5))
+    # what the record does not exclude widens intervals; of D_O, of which only the dwells tell, by a half
+    assert np.all((e.u / o.u > 0.9) & (e.u / o.u < 1.6)) and np.median(e.u / o.u) < 1.25
     assert e.noise.density[0] == pytest.approx(o.s * math.sqrt(mc.WINDOW), rel=0.05)
 
 
@@ -180,7 +183,9 @@ def test_parameters_of_the_noise_are_found() -> None:
 def test_unbounded_correlation_time_is_said() -> None:
     t0, t1, X = mc.plan(36, 5)
     y = next(mc.samples(t0, t1, 500.0, 1.0, 1, 3))
-    e = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1)
+    e = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1)  # a random walk as far as the record shows
+    assert "rises towards low frequencies as that of flicker noise or faster" in e.noise.unbounded
+    e = noise_mixture_fit.fit(np.ones((30, 1)), y[:30], ["mean"], t0[:30], t1[:30])  # too short to weigh power laws
     assert "not bounded by this record" in e.noise.unbounded
 
 

@@ -248,8 +248,8 @@ class Findings:
         if self.white:
             parameters: dict[str, Any] = {"model": "none (ideal data)" if self.ideal else "white (assumed)"}
             return {**parameters, f"standard deviation / ({unit})": self.residual_std}
-        share = e.best[1]
-        model = "white" if share == 0.0 else "Gauss-Markov" if share == 1.0 else "white and Gauss-Markov"
+        share, drift = e.best[1], "power-law drift" if e.slope else "Gauss-Markov"
+        model = "white" if share == 0.0 else drift if share == 1.0 else f"white and {drift}"
         model += " with reading errors" if e.best[2] > 0.0 else ""
         parameters = {
             "model": "none (ideal data)" if self.ideal else model,
@@ -259,10 +259,15 @@ class Findings:
             f"Gauss-Markov rms / ({unit})": e.sigma[0] / scale,
             f"Gauss-Markov rms, 90 % range / ({unit})": [v / scale for v in e.sigma[1:]],
         }
+        if e.slope:
+            del parameters[f"Gauss-Markov rms / ({unit})"], parameters[f"Gauss-Markov rms, 90 % range / ({unit})"]
+            parameters["exponent a of the spectrum 1/fᵃ"] = e.slope
+            parameters[f"power-law drift of a window, rms / ({unit})"] = e.law[0] / scale
+            parameters[f"power-law drift of a window, rms, 90 % range / ({unit})"] = [v / scale for v in e.law[1:]]
         if e.sigma_reading[2] > 0.0:
             parameters[f"reading error, standard deviation / ({unit}·s)"] = e.sigma_reading[0] / scale
             parameters[f"reading error, 90 % range / ({unit}·s)"] = [v / scale for v in e.sigma_reading[1:]]
-        if e.white < 0.5 and (share > 0.0 or e.best[2] == 0.0) and not self.ideal:
+        if e.white < 0.5 and (share > 0.0 or e.best[2] == 0.0) and not self.ideal and not e.slope:
             parameters["correlation time / s"] = e.tau[0]
             parameters["correlation time, 90 % range / s"] = list(e.tau[1:])
         return parameters
@@ -277,6 +282,8 @@ class Findings:
         if self.est.noise.best[1] == 0.0:
             reading_errors = " and reading errors" if self.est.noise.best[2] > 0.0 else ""
             return text + f", compatible with white noise{reading_errors}."
+        if slope := self.est.noise.slope:
+            return text + f"; spectrum of the drift about 1/f^{slope:g}, included in the coverage intervals."
         return text + f"; correlation time about {self.est.noise.tau[0]:.3g} s, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests

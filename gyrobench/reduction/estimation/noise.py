@@ -1,4 +1,4 @@
-"""Noise of averaged data: white rate noise plus a Gauss-Markov process, seen through averaging windows.
+"""Noise of averaged data: white rate noise plus a Gauss-Markov process or a power law, through averaging windows.
 
 Data are means over windows [t0_i, t1_i] with gaps between them.  The noise is
 
@@ -12,7 +12,9 @@ exactly, whatever the window lengths.  A constant (turn-on bias) is no noise her
 
 Data that are differences of readings, (angle_i - angle_{i-1}) / T_i, also carry the errors n of the readings, white and
 shared by neighbours: var += 2 s^2 / T^2, cov of neighbours -= s^2 / (T_i T_{i+1})  [RED-RATE: lag-1 correlation -1/2].
-Not modelled: flicker noise, random walk, quanta that are no white error.  [RED-GLS; own derivation, proved by tests]
+In place of the Gauss-Markov process there may be flicker, or a spectrum between that and random walk (power_law).  Not
+modelled: drift that goes on below the reciprocal of the record, quanta that are no white error.  [RED-GLS; own
+derivation, proved by tests]
 """
 
 from __future__ import annotations
@@ -24,30 +26,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-
-
-def mean_gain(r: Array) -> Array:
-    """a(r): the window mean expected from the process value at the start of the window."""
-    out: Array = -np.expm1(-r) / r
-    return out
-
-
-def mean_variance(r: Array) -> Array:
-    """v(r): variance of a window mean over that of the process, r = T/tau (series below 1e-3)."""
-    r = np.asarray(r, dtype=float)
-    big = np.maximum(r, 1e-3)
-    out: Array = np.where(r < 1e-3, 1.0 - r / 3.0 + r * r / 12.0, 2.0 * (big + np.expm1(-big)) / big**2)
-    return out
-
-
-def process_covariance(t0: Array, t1: Array, tau: float) -> Array:
-    """Covariance (n, n) of window means of a unit Gauss-Markov process with correlation time ``tau`` (s)."""
-    length = t1 - t0
-    a = mean_gain(length / tau)
-    gap = t0[None, :] - t1[:, None]
-    upper = np.triu(np.outer(a, a) * np.exp(-np.maximum(gap, 0.0) / tau), 1)
-    out: Array = upper + upper.T + np.diag(mean_variance(length / tau))
-    return out
+from gyrobench.reduction.estimation import power_law
+from gyrobench.reduction.estimation.window_means import mean_gain as mean_gain
+from gyrobench.reduction.estimation.window_means import mean_variance as mean_variance
+from gyrobench.reduction.estimation.window_means import middles
+from gyrobench.reduction.estimation.window_means import process_covariance as process_covariance
 
 
 def relative_variance(t0: Array, t1: Array, model: tuple[float, float, float]) -> Array:
@@ -55,7 +38,10 @@ def relative_variance(t0: Array, t1: Array, model: tuple[float, float, float]) -
     tau, share, reading = model
     length = t1 - t0
     window = float(np.median(length))
-    slow = share * mean_variance(length / tau) / float(mean_variance(np.array(window / tau)))
+    if tau < 0.0:
+        slow = share * power_law.variance(t0, t1, -tau, length) / float(power_law.variance(t0, t1, -tau, window))
+    else:
+        slow = share * mean_variance(length / tau) / float(mean_variance(np.array(window / tau)))
     out: Array = (1.0 - reading) * (slow + (1.0 - share) * window / length) + reading * (window / length) ** 2
     return out
 
@@ -68,16 +54,18 @@ class NoiseGrid:
     its whole variance.
     """
 
-    tau: Array  # s, (G,)
+    tau: Array  # (G,), s; where negative, the exponent of a power law instead: a spectrum f^tau
     share: Array  # (G,)
     prior: Array  # (G,), sums to 1
     reading: Array  # (G,)
 
 
-#: The population of instrument noise that intervals are made for; candidates are a quadrature over it,
-#: sample_instrument() samples it.  One in four instruments has white noise alone, one in four Gauss-Markov drift
-#: alone, two have both.
+#: The population of instrument noise that intervals are made for; candidates are a quadrature over it.  One in four
+#: instruments has white noise alone, one in four Gauss-Markov drift alone, two have both (sample_instrument()).
 FAMILIES = (0.25, 0.25, 0.5)
+#: Of all instruments one in five has a power law instead (power_law).  It is weighed where the record is longer than
+#: BROAD windows: over a narrower band white noise and a Gauss-Markov process make up such a spectrum.
+POWER_LAWS, BROAD = 0.2, 50.0
 #: Correlation time, log-uniform: from SHORTEST windows to LONGEST of the record (of slower drift a record holds no
 #: more than a constant and a trend).
 SHORTEST, LONGEST = 0.3, 0.5
@@ -102,24 +90,21 @@ def _least_odds(window: float, tau: Array) -> Array:
     return out
 
 
-def _middles(low: Array | float, high: float, n: int) -> Array:
-    """n middles (n,) or (n, k) of equal steps of the logarithm."""
-    step = (np.arange(n) + 0.5) / n
-    out: Array = np.exp(np.log(low) + np.multiply.outer(step, np.log(high / np.asarray(low))))
-    return out
-
-
 def noise_grid(t0: Array, t1: Array, readings: bool = False) -> NoiseGrid:
     """Return the grid of candidate models for windows [t0, t1] (s); readings: of differences of readings."""
     window, shortest, longest = _taus(t0, t1)
-    tau = _middles(shortest, longest, TAUS)
-    odds = _middles(_least_odds(window, tau), STRONGEST, ODDS).ravel()
+    tau = middles(shortest, longest, TAUS)
+    odds = middles(_least_odds(window, tau), STRONGEST, ODDS).ravel()
     every = np.concatenate([[window], tau, np.tile(tau, ODDS)])
     share = np.concatenate([[0.0], np.ones(TAUS), odds / (1.0 + odds)])
     prior = np.repeat(np.array(FAMILIES) / (1, TAUS, TAUS * ODDS), (1, TAUS, TAUS * ODDS))
+    if float(t1[-1] - t0[0]) > BROAD * window:
+        slope, part, weight = power_law.candidates(t0, t1)
+        every, share = np.concatenate([every, -slope]), np.concatenate([share, part])
+        prior = np.concatenate([(1.0 - POWER_LAWS) * prior, POWER_LAWS * weight])
     if not readings:
         return NoiseGrid(every, share, prior, np.zeros_like(every))
-    part = _middles(*READING, READINGS)
+    part = middles(*READING, READINGS)
     size = np.concatenate([[0.0], part / (1.0 + part)])
     weight = np.concatenate([[NO_READING], np.full(READINGS, (1.0 - NO_READING) / READINGS)])
     n = size.size
@@ -327,6 +312,9 @@ def whitened_blocks(
 
     As :func:`whiten`, some windows at a time: the memory does not grow with the record.
     """
+    if tau[0] < 0.0:
+        yield from power_law.whitened_blocks(t0, t1, columns, -tau, share, reading)
+        return
     c = columns.shape[1]
     x, before, scratch = np.zeros((3, c, tau.size))
     for w in _filters(t0, t1, tau, share, reading, _rows(tau.size, c)):
@@ -376,6 +364,8 @@ def whiten_transposed(t0: Array, t1: Array, columns: Array, model: tuple[float, 
 
     With z = W x it is R^-1 x.  The recursion of :class:`_Filter` run backwards, O(n).
     """
+    if model[0] < 0.0:
+        return power_law.whiten_transposed(t0, t1, columns, -model[0], *model[1:])
     tau, share, reading = (np.array([v]) for v in model)
     (w,) = _filters(t0, t1, tau, share, reading, len(columns))
     out = columns / np.sqrt(w.s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.mixture import Mixture
@@ -13,6 +14,19 @@ from gyrobench.reduction.estimation.regression import Design
 
 JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
 Range = tuple[float, float, float]  # of the likeliest model, 5 % and 95 % point over all
+
+
+def spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = None) -> Range:
+    """Return the value of the likeliest model with the 5 % and 95 % points over all (``where``) models."""
+    if where is not None:
+        w = np.where(where, w, 0.0)
+        k = k if where[k] else int(np.argmax(w))
+    if not w.sum() > 0.0:
+        return 0.0, 0.0, 0.0
+    order = np.argsort(values)
+    total = np.cumsum(w[order]) / w.sum()
+    low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.05, 0.95))
+    return float(values[k]), low, high
 
 
 @dataclass(frozen=True)
@@ -45,19 +59,25 @@ class NoiseSummary:
     """Noise models that count: share of those without correlation, and what they are, in the unit of the data and s."""
 
     white: float = 1.0  # 0..1
-    tau: Range = (0.0, 0.0, 0.0)  # correlation time
-    sigma: Range = (0.0, 0.0, 0.0)  # rms of the Gauss-Markov part
+    tau: Range = (0.0, 0.0, 0.0)  # correlation time, of the models with one
+    sigma: Range = (0.0, 0.0, 0.0)  # rms of the Gauss-Markov part, of the models without a power law
     density: Range = (0.0, 0.0, 0.0)  # N of the white part, unit sqrt(s)
     sigma_reading: Range = (0.0, 0.0, 0.0)  # of one reading
-    #: (g, 4): tau, share, reading and weight of the models that count, the most likely one first
+    law: Range = (0.0, 0.0, 0.0)  # rms of the drift with a power law in a window
+    #: (g, 4): tau, share, reading and weight of the models that count, the most likely one first; noise.NoiseGrid
     models: Array = field(default_factory=lambda: np.array([[1.0, 0.0, 0.0, 1.0]]))
     unbounded: str = ""  # that the record does not bound the correlation time, as a sentence
 
     @property
     def best(self) -> tuple[float, float, float]:
-        """Return tau, share of the Gauss-Markov part and of reading errors of the most likely model."""
+        """Return tau, share of the correlated part and of reading errors of the most likely model."""
         tau, share, reading, _ = self.models[0].tolist()
         return tau, share, reading
+
+    @property
+    def slope(self) -> float:
+        """Return a of the most likely model's spectrum f^-a; 0 of a model without a power law."""
+        return max(-self.best[0], 0.0)
 
 
 @dataclass(frozen=True)

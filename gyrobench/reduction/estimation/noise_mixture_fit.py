@@ -1,4 +1,4 @@
-"""Least squares whose noise - white, Gauss-Markov or both - is estimated from the same data, with honest intervals.
+"""Least squares whose noise - white, with or without drift - is estimated from the same data, with honest intervals.
 
 Each candidate noise model (:func:`gyrobench.reduction.estimation.noise.noise_grid`) gives a generalized least squares
 estimate, its covariance and a restricted likelihood (REML, the scale integrated out):
@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation import known_errors, noise, nuisance_states
+from gyrobench.reduction.estimation import known_errors, noise, nuisance_states, power_law
 from gyrobench.reduction.estimation.mixture import LIGHT, RESOLVED, Mixture, equivalent_dof
-from gyrobench.reduction.estimation.noise_estimate import Evidence, Likeliest, NoiseEstimate, NoiseSummary
+from gyrobench.reduction.estimation.noise_estimate import Evidence, Likeliest, NoiseEstimate, NoiseSummary, spread
 from gyrobench.reduction.estimation.normal_equations import NormalEquations, moments
 from gyrobench.reduction.estimation.nuisance_evidence import evidence_of, repeated
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock, NuisanceState
@@ -249,13 +249,20 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     """Return the noise models as they are reported; models (G,): their weights."""
     (best, k), grid = weighed.best, problem.grid
     window = float(np.median(problem.t1 - problem.t0))
-    v = noise.mean_variance(window / grid.tau)
+    v = noise.mean_variance(window / np.abs(grid.tau))
+    markov, law = (grid.share > 0.0) & (grid.tau > 0.0), grid.tau < 0.0
     s2 = weighed.s2[best]
     without_reading = s2 * (1.0 - grid.reading)
-    tau = _spread(models, grid.tau, k, grid.share > 0.0)
+    tau = spread(models, grid.tau, k, markov)
     record = float(problem.t1[-1] - problem.t0[0])
     unbounded = ""
-    if float(models[grid.share == 0.0].sum()) < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
+    if float(models[law].sum()) > 0.5:
+        unbounded = (
+            f"Over this record of {record:.4g} s the spectrum of the drift rises towards low frequencies as that of "
+            "flicker noise or faster. Slower drift is confounded with the constant term, whose interval is valid for "
+            "this record only."
+        )
+    elif float(models[grid.share == 0.0].sum()) < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
         unbounded = (
             f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
             f"{tau[2]:.0f} s). Slower drift is confounded with the constant term, whose interval is valid for this "
@@ -264,9 +271,10 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     return NoiseSummary(
         white=float(models[problem.white_only].sum()),
         tau=tau,
-        sigma=_spread(models, np.sqrt(without_reading * grid.share / v), k),
-        density=_spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), k),
-        sigma_reading=_spread(models, np.sqrt(s2 * grid.reading / 2.0) * window, k),
+        sigma=spread(models, np.sqrt(without_reading * np.where(law, 0.0, grid.share) / v), k, ~law),
+        density=spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), k),
+        sigma_reading=spread(models, np.sqrt(s2 * grid.reading / 2.0) * window, k),
+        law=spread(models, np.sqrt(without_reading * grid.share), k, law),
         models=_listed(grid, models, counted),
         unbounded=unbounded,
     )
@@ -280,13 +288,17 @@ def _normalized(log_weight: Array) -> Array:
 
 
 def _slow(grid: noise.NoiseGrid, t0: Array, t1: Array) -> NDArray[np.bool_]:
-    """Return which models (G,) have drift slower than SLOW that moves the mean of the record more than the rest of the
-    noise does: share v(T/tau)/v(w/tau) > (1 - share)/n.  Fainter drift is as good as white noise; with it, what is
-    asked for if the drift is slow would mostly be the intervals of white noise.
+    """Return which models (G,) have drift slower than SLOW, as power laws have, that moves the mean of the record more
+    than the rest of the noise does: share v(T)/v(w) > (1 - share)/n.  Fainter drift is as good as white noise; with it,
+    what is asked for if the drift is slow would mostly be the intervals of white noise.
     """
     record, window = float(t1[-1] - t0[0]), float(np.median(t1 - t0))
-    mean = grid.share * noise.mean_variance(record / grid.tau) / noise.mean_variance(window / grid.tau)
-    out: NDArray[np.bool_] = (grid.tau > SLOW * record) & (mean > (1.0 - grid.share) / t0.size)
+    tau = np.abs(grid.tau)
+    mean = grid.share * noise.mean_variance(record / tau) / noise.mean_variance(window / tau)
+    if np.any(law := grid.tau < 0.0):
+        part = [power_law.variance(t0, t1, tau[law], length) for length in (record, window)]
+        mean[law] = grid.share[law] * part[0] / part[1]
+    out: NDArray[np.bool_] = (law | (tau > SLOW * record)) & (mean > (1.0 - grid.share) / t0.size)
     return out
 
 
@@ -376,16 +388,3 @@ def check_windows(t0: Array, t1: Array) -> None:
         raise RegressionError("every window needs a finite positive length")
     if np.any(t0[1:] - t1[:-1] < -1e-6 * length.min()):
         raise RegressionError("windows overlap or are out of order")
-
-
-def _spread(w: Array, values: Array, k: int, where: NDArray[np.bool_] | None = None) -> tuple[float, float, float]:
-    """Return the value of the likeliest model with the 5 % and 95 % points over all (``where``) models."""
-    if where is not None:
-        w = np.where(where, w, 0.0)
-        k = k if where[k] else int(np.argmax(w))
-    if not w.sum() > 0.0:
-        return 0.0, 0.0, 0.0
-    order = np.argsort(values)
-    total = np.cumsum(w[order]) / w.sum()
-    low, high = (float(values[order][min(int(np.searchsorted(total, q)), order.size - 1)]) for q in (0.05, 0.95))
-    return float(values[k]), low, high

@@ -40,8 +40,9 @@ DECISION_RULE = (
     "in place of a pass of measured data without a statement of type B."
 )
 SLOW_RULE = (
-    "A pass or a fail holds, too, if the noise is slow drift (correlation time above an eighth of the record) that the "
-    "record does not exclude (probability of 5 % or more); otherwise inconclusive."
+    "A pass or a fail holds, too, if the noise is slow drift (correlation time above an eighth of the record, or a "
+    "spectrum as that of flicker noise or steeper) that the record does not exclude (probability of 5 % or more); "
+    "otherwise inconclusive."
 )
 
 
