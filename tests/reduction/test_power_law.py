@@ -18,9 +18,10 @@ T1 = np.array([10.0, 20.0, 30.0, 40.0, 65.0, 71.0, 81.0, 95.0])
 
 def dense(slope: float, share: float, reading: float) -> np.ndarray:
     """Covariance process by process, with differences of the readings at the ends of the windows."""
-    tau, part = power_law.processes(T0, T1, slope)
+    slopes = np.array([slope])
+    tau, (part,) = power_law.processes(T0, T1, slopes)
     law = sum(p * noise.process_covariance(T0, T1, t) for p, t in zip(part, tau, strict=True))
-    rate = share * law / float(power_law.variance(T0, T1, slope, 10.0)) + (1.0 - share) * np.diag(10.0 / (T1 - T0))
+    rate = share * law / power_law.variance(T0, T1, slopes, 10.0)[0] + (1.0 - share) * np.diag(10.0 / (T1 - T0))
     points = np.unique(np.concatenate([T0, T1])).tolist()
     D = np.zeros((T0.size, len(points)))
     for row, a, b in zip(D, T0, T1, strict=True):
@@ -53,7 +54,7 @@ def test_flicker_falls_as_its_frequency() -> None:
     more from the ends of the correlation times, where a process that is missing would be felt: 1/(w tau) of a tenth.
     """
     t0 = 10.0 * np.arange(3000)
-    tau, part = power_law.processes(t0, t0 + 10.0, 1.0)
+    tau, (part,) = power_law.processes(t0, t0 + 10.0, np.array([1.0]))
     h = math.log(tau[1] / tau[0])
     w = np.geomspace(30.0 / tau[-1], 1.0 / (30.0 * tau[0]), 200)
     power = w * np.sum(part * 2.0 * tau / (1.0 + np.multiply.outer(w, tau) ** 2), axis=1) * tau.size
@@ -71,11 +72,10 @@ def test_candidates_are_between_white_noise_and_the_law_alone() -> None:
     t0 = 10.0 * np.arange(200)
     slope, share, prior = power_law.candidates(t0, t0 + 10.0)
     assert prior.sum() == pytest.approx(1.0) and prior[share == 1.0].sum() == pytest.approx(0.75)
+    ends = np.array([2.0 * math.pi / 2000.0, math.pi / 10.0])
     for a in power_law.SLOPES:
         odds = (share / np.maximum(1.0 - share, 1e-300))[(slope == a) & (share < 1.0)]
-        first, last = (
-            power_law.relative_density(t0, t0 + 10.0, a, w) for w in (2.0 * math.pi / 2000.0, math.pi / 10.0)
-        )
+        first, last = power_law.relative_density(t0, t0 + 10.0, np.array([a]), ends)[:, 0]
         low, high = math.log(power_law.FAINTEST / first), math.log(power_law.LOUDEST / last)
         np.testing.assert_allclose(np.log(odds), low + (high - low) * np.array([1, 3, 5, 7]) / 8.0)
 

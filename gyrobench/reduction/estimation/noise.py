@@ -39,7 +39,8 @@ def relative_variance(t0: Array, t1: Array, model: tuple[float, float, float]) -
     length = t1 - t0
     window = float(np.median(length))
     if tau < 0.0:
-        slow = share * power_law.variance(t0, t1, -tau, length) / float(power_law.variance(t0, t1, -tau, window))
+        law, one = (power_law.variance(t0, t1, np.array([-tau]), n)[..., 0] for n in (length, window))
+        slow = share * law / one
     else:
         slow = share * mean_variance(length / tau) / float(mean_variance(np.array(window / tau)))
     out: Array = (1.0 - reading) * (slow + (1.0 - share) * window / length) + reading * (window / length) ** 2

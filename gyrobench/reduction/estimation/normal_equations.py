@@ -99,7 +99,7 @@ def moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tupl
     models, c = grid.tau.size, columns.shape[1]
     square, logdet = np.zeros((models, c, c)), np.zeros(models)
     law, read = grid.tau < 0.0, grid.reading > 0.0  # without reading errors it is quicker
-    for alike in (~law & ~read, ~law & read, law & ~read, law & read):
+    for alike in (~law & ~read, ~law & read, law):
         g = np.flatnonzero(alike)
         if g.size:
             for _, Z, part in noise.whitened_blocks(t0, t1, columns, grid.tau[g], grid.share[g], grid.reading[g]):

@@ -38,38 +38,44 @@ FAINTEST, LOUDEST, ODDS = 0.1, 10.0, 4
 NUMBERS = 1 << 16  # held of gains and whitened data at a time
 
 
-def processes(t0: Array, t1: Array, slope: Array | float) -> tuple[Array, Array]:
-    """Return correlation times (k,), s, and variances (..., k), sum 1, of the processes that stand for S ~ f^-slope."""
-    shortest = SHORTEST * float(np.median(t1 - t0))
-    longest = LONGEST * float(t1[-1] - t0[0])
+@functools.lru_cache(maxsize=64)
+def _processes(window: float, record: float, slopes: tuple[float, ...]) -> tuple[Array, Array]:
+    shortest, longest = SHORTEST * window, LONGEST * record
     tau = np.geomspace(shortest, longest, 1 + math.ceil(math.log(longest / shortest, DECADE)))
-    part = (tau / longest) ** (np.asarray(slope)[..., None] - 1.0)
-    return tau, part / part.sum(axis=-1, keepdims=True)
+    part = (tau / longest) ** (np.array(slopes)[:, None] - 1.0)
+    return tau, part / part.sum(axis=1, keepdims=True)
 
 
-def variance(t0: Array, t1: Array, slope: Array | float, length: Array | float) -> Array:
-    """Return the variance of means over ``length`` (s) of such noise of unit variance in the record of the windows."""
-    tau, part = processes(t0, t1, slope)
-    out: Array = np.sum(part * mean_variance(np.divide.outer(length, tau)), axis=-1)
+def processes(t0: Array, t1: Array, slopes: Array) -> tuple[Array, Array]:
+    """Return correlation times (k,), s, and variances (m, k), sum 1, of the processes that stand for S ~ f^-slope, in
+    windows [t0, t1], for slopes (m,).
+    """
+    return _processes(float(np.median(t1 - t0)), float(t1[-1] - t0[0]), tuple(slopes.tolist()))
+
+
+def variance(t0: Array, t1: Array, slopes: Array, length: Array | float) -> Array:
+    """Return the variance (..., m) of means over ``length`` (s) of such noise of unit variance."""
+    tau, part = processes(t0, t1, slopes)
+    out: Array = mean_variance(np.divide.outer(length, tau)) @ part.T
     return out
 
 
 def candidates(t0: Array, t1: Array) -> tuple[Array, Array, Array]:
     """Return slopes, shares of the variance of a window, and prior (sum 1) of the candidates, as noise.NoiseGrid."""
-    low, high = 2.0 * math.pi / float(t1[-1] - t0[0]), math.pi / float(np.median(t1 - t0))
-    shares = []
-    for slope in SLOPES:
-        first, last = (relative_density(t0, t1, slope, w) for w in (low, high))
-        odds = middles(FAINTEST / first, LOUDEST / last, ODDS)
-        shares += [1.0, *(odds / (1.0 + odds))]
-    prior = np.tile([ALONE, *[(1.0 - ALONE) / ODDS] * ODDS], len(SLOPES)) / len(SLOPES)
-    return np.repeat(SLOPES, 1 + ODDS), np.array(shares), prior
+    slopes, window = np.array(SLOPES), float(np.median(t1 - t0))
+    ends = np.array([2.0 * math.pi / float(t1[-1] - t0[0]), math.pi / window])
+    first, last = relative_density(t0, t1, slopes, ends)
+    odds = middles(FAINTEST / first, LOUDEST / last, ODDS).T
+    share = np.column_stack([np.ones_like(slopes), odds / (1.0 + odds)])
+    prior = np.tile([ALONE, *[(1.0 - ALONE) / ODDS] * ODDS], slopes.size) / slopes.size
+    return np.repeat(slopes, 1 + ODDS), share.ravel(), prior
 
 
-def relative_density(t0: Array, t1: Array, slope: float, w: float) -> float:
-    """Return the density at w (rad/s) over that of white noise, where both have the same variance in a window."""
-    (tau, part), window = processes(t0, t1, slope), float(np.median(t1 - t0))
-    return float(np.sum(part * 2.0 * tau / (1.0 + (w * tau) ** 2)) / (variance(t0, t1, slope, window) * window))
+def relative_density(t0: Array, t1: Array, slopes: Array, w: Array) -> Array:
+    """Return the densities (n, m) at w (n,), rad/s, over that of white noise of the same variance in a window."""
+    (tau, part), window = processes(t0, t1, slopes), float(np.median(t1 - t0))
+    out: Array = (2.0 * tau / (1.0 + np.multiply.outer(w, tau) ** 2)) @ part.T
+    return out / (variance(t0, t1, slopes, window) * window)
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ def _all_gains(
     t0: Array, t1: Array, slope: Array, share: Array, reading: Array | None, columns: int
 ) -> Iterable[_Gains]:
     """Return the recursion some windows at a time; of short records it is kept, as those of noise._filters."""
-    states = processes(t0, t1, 1.0)[0].size + (reading is not None)
+    states = processes(t0, t1, slope)[0].size + (reading is not None)
     rows = max(1, NUMBERS // (share.size * states * columns))
     if t0.size * share.size * states > NUMBERS:
         return _recursion(t0, t1, slope, share, reading, rows)
@@ -161,6 +167,7 @@ def whitened_blocks(
 ) -> Iterator[tuple[slice, Array, Array]]:
     """As :func:`gyrobench.reduction.estimation.noise.whitened_blocks`, of models with a power law."""
     c, models = columns.shape[1], share.size
+    reading = reading if reading is not None and np.any(reading > 0.0) else None
     x = None
     for w in _all_gains(t0, t1, slope, share, reading, c):
         states = w.a.shape[1]

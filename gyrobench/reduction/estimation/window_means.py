@@ -31,8 +31,8 @@ def process_covariance(t0: Array, t1: Array, tau: float) -> Array:
     return out
 
 
-def middles(low: Array | float, high: float, n: int) -> Array:
+def middles(low: Array | float, high: Array | float, n: int) -> Array:
     """Return n middles (n,) or (n, k) of equal steps of the logarithm."""
     step = (np.arange(n) + 0.5) / n
-    out: Array = np.exp(np.log(low) + np.multiply.outer(step, np.log(high / np.asarray(low))))
+    out: Array = np.exp(np.log(low) + np.multiply.outer(step, np.log(np.asarray(high) / low)))
     return out
