@@ -11,6 +11,7 @@ see gyrobench.linear.multirate).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.component import Component, ComponentError
 from gyrobench.linear.part_linearization import jacobians
+from gyrobench.packaging.dependencies import moved
+from gyrobench.packaging.source import PartCode
 
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
@@ -31,7 +34,7 @@ MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the 
 
 @dataclass
 class SampledStep:
-    """One step; names: of states and discrete values, in the order of the columns of A and C.
+    """One step; names: of states and of the discrete values that inputs or states move, the columns of A and C.
 
     within: the discrete values carry inputs through the step only (a part that follows an input between its values); at
     the instants themselves nothing depends on them, and the part's Jacobians are its continuous model.
@@ -55,12 +58,11 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
 
     Raises ValueError (the text says why) for a part whose step is not the same one step later.
     """
-    discrete = [s.name for s in part.layout if s.section == "discrete"]
-    if not part.pieces["sampled"] or not discrete or not inputs:
+    if not part.pieces["sampled"] or not inputs:
         return None
     twin = type(part)(part.instance)
     twin.set_state(part.get_state())
-    reached = _reached(twin, inputs, discrete, step)
+    discrete, reached = _moved(twin, inputs, step)
     if not reached.any():
         return None
     if len(discrete) > MAX_DISCRETE:
@@ -100,17 +102,17 @@ def undelayed(
     Values d that are handed on, d+ = N d + K x + L u with a nilpotent N, are (I - N)^-1 (K x + L u) as the step goes to
     zero.
     """
-    discrete = [s.name for s in part.layout if s.section == "discrete"]
     n = len(part.states)
     try:
         twin = type(part)(part.instance)
         twin.set_state(part.get_state())
         if sampled_step(part, inputs, outputs, 0.5 * step) is None:
             return None
+        discrete, reached = _moved(part, inputs, step)
         whole, fine = (differences(twin, inputs, outputs, h, discrete) for h in (step, FINE * step))
     except (ComponentError, ValueError):
         return None
-    there = _handed_on(whole, n, _reached(part, inputs, discrete, step))
+    there = _handed_on(whole, n, reached)
     rows = n + np.flatnonzero(there)
     kept = whole.a[np.ix_(rows, rows)]
     if np.any(np.abs(np.linalg.matrix_power(kept, len(rows))) > DELTA):
@@ -133,8 +135,13 @@ def _handed_on(step: SampledStep, n: int, reached: NDArray[np.bool_]) -> NDArray
     return reached
 
 
-def _reached(part: Component, inputs: list[str], discrete: list[str], step: float) -> NDArray[np.bool_]:
-    """Return which discrete values depend after two steps on the inputs, or on the previous states."""
+def _moved(part: Component, inputs: list[str], step: float) -> tuple[list[str], NDArray[np.bool_]]:
+    """Return the discrete values that inputs or states move, and which depend after two steps on the inputs, or on
+    the previous states.
+
+    The others (constants, noise) would be columns of nothing, a step in Python each.
+    """
+    discrete = [s for s in part.layout if s.section == "discrete"]
     values = []
     for size in (0.0, DELTA):
         twin = type(part)(part.instance)
@@ -143,8 +150,16 @@ def _reached(part: Component, inputs: list[str], discrete: list[str], step: floa
             twin.set(n, twin.get(n) + size)
         for k in range(2):
             twin.do_step(k * step, step)
-        values.append(np.array([twin.get(n) for n in discrete]))
-    return np.asarray(values[0] != values[1])
+        values.append(np.array([twin.get(s.name) for s in discrete]))
+    reached = values[0] != values[1]
+    follow = _following(type(part))
+    kept = [k for k, s in enumerate(discrete) if reached[k] or s.decl.name in follow]
+    return [discrete[k].name for k in kept], reached[kept]
+
+
+@functools.lru_cache(maxsize=256)
+def _following(part: type[Component]) -> set[str]:
+    return moved(PartCode(part))
 
 
 def differences(
@@ -164,7 +179,6 @@ def differences(
             if move:
                 part.do_step(part.t, step)
             shifted.append(np.array(after()))
-        part.set_state(kept)
         return np.asarray((shifted[0] - shifted[1]) / (2.0 * size))
 
     def state() -> list[float]:
@@ -177,10 +191,12 @@ def differences(
     def matrix(columns: list[str], after: Callable[[], list[float]], move: bool, rows: int) -> Array:
         return np.column_stack([column(n, after, move) for n in columns]) if columns else np.zeros((rows, 0))
 
-    return SampledStep(
+    found = SampledStep(
         names,
         matrix(names, state, True, len(names)),
         matrix(inputs, state, True, len(names)),
         matrix(names, output, False, len(outputs)),
         matrix(inputs, output, False, len(outputs)),
     )
+    part.set_state(kept)
+    return found

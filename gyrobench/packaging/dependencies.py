@@ -185,6 +185,12 @@ def written(source: PartCode) -> set[str]:
     return {n for n in names if isinstance(source.cls.declarations.get(n), Discrete)}
 
 
+def moved(source: PartCode) -> set[str]:
+    """Return the discretes that follow inputs or states while the part steps."""
+    reach = Dependencies(source, ["flow", "outputs", "sampled"], _declared(source, Input, State)).reach
+    return {n for n in written(source) if reach.get(n)}
+
+
 def followed(source: PartCode) -> list[str] | None:
     """Return the inputs and changing discretes that ``outputs`` reads, discretes first; none: the outputs stay.
 
