@@ -114,6 +114,14 @@ def _resident(process: int) -> int:
     return 0
 
 
+def _waited(process: int) -> float:
+    """Return how long a process has waited for a processor that others had, s; 0 where the system does not say."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            return 1e-9 * int(Path(f"/proc/{process}/schedstat").read_text().split()[1])
+    return 0.0
+
+
 def supervise(
     job: Job,
     fmus: dict[str, tuple[Any, Path]],
@@ -124,7 +132,7 @@ def supervise(
     """Run a job in a child process and return how it ended.
 
     fmus: slot -> model description and folder of its files.  folder: for files of the run.  timeout: s, for one call of
-    an FMU.
+    an FMU; what other processes of a busy machine take from it does not count.
     """
     return _Supervisor(job, fmus, RunFiles(folder), progress, timeout).run()
 
@@ -150,6 +158,7 @@ class _Supervisor:
         self.end: int | None = None  # readable when the process has ended
         self.killed = ""  # why, in words
         self.began = self.looked = self.moved = time.monotonic()
+        self.waited = 0.0  # for a processor, when it last moved
         self.seen: tuple[int, ...] = ()
         self.reported = (self.began, 0)  # time and steps
         self.given = 0  # rows of the channels that were shown
@@ -185,9 +194,10 @@ class _Supervisor:
         now, s = time.monotonic(), self.status
         seen = (s.k, s.part, s.call, s.channel_rows, s.window_rows)
         if seen != self.seen or now - self.looked > ASLEEP:
-            self.seen, self.moved = seen, now
+            self.seen, self.moved, self.waited = seen, now, _waited(self.process.pid)
         elif (s.call or s.k < 0) and now - self.moved > (patience := self._patience()):
-            self._kill(f"no answer within {patience:g} s; its process was stopped")
+            if now - self.moved - (_waited(self.process.pid) - self.waited) > patience:
+                self._kill(f"no answer within {patience:g} s; its process was stopped")
         self.looked = now
         if self.progress is not None and s.k >= 0 and not s.stop and now >= self.due:
             self._report(now)

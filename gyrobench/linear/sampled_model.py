@@ -152,7 +152,7 @@ def _moved(part: Component, inputs: list[str], step: float) -> tuple[list[str], 
             twin.do_step(k * step, step)
         values.append(np.array([twin.get(s.name) for s in discrete]))
     reached = values[0] != values[1]
-    follow = _following(type(part))
+    follow: set[str] = _following(type(part))  # type: ignore[arg-type]  # mypy takes the hash of an instance
     kept = [k for k, s in enumerate(discrete) if reached[k] or s.decl.name in follow]
     return [discrete[k].name for k in kept], reached[kept]
 

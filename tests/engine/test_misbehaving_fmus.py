@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -240,3 +242,32 @@ def test_error_with_message_in_process(small: System, foreign: Foreign, engine: 
 def test_undeclared_dependencies_make_an_algebraic_loop(small: System, foreign: Foreign) -> None:
     with pytest.raises(AlgebraicLoopError, match=r"gyro\.u -> rebalance\.u -> rebalance\.i -> gyro\.i -> gyro\.u"):
         run(small, parts={"gyro": foreign("loose")})
+
+
+def test_time_that_others_took_on_a_busy_machine_is_no_silence(
+    small: System, foreign: Foreign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a process that has waited half of the time for a processor, half a second of silence is a second."""
+    monkeypatch.setattr(supervision, "_waited", lambda _: 0.5 * time.monotonic())
+    values = {"gyro.fault": FAULTS["HANG"], "gyro.at": 150, **QUIET}
+    began = time.monotonic()
+    with pytest.raises(RunError, match="no answer within 0.5 s"):
+        run(small, {"gyro": foreign("faulty")}, values=values, child=True, timeout=0.5)
+    assert time.monotonic() - began > 1.0
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not say who waits")
+def test_two_on_one_processor_wait_for_each_other() -> None:
+    one = min(os.sched_getaffinity(0))
+    busy = f"import os; os.sched_setaffinity(0, [{one}])\nwhile True: pass"
+    pair = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(2)]
+    try:
+        end = time.monotonic() + 30.0
+        while not all(supervision._waited(p.pid) > 0.05 for p in pair) and time.monotonic() < end:
+            time.sleep(0.01)
+        assert all(supervision._waited(p.pid) > 0.05 for p in pair)
+        assert supervision._waited(0) == 0.0
+    finally:
+        for p in pair:
+            p.kill()
+            p.wait()
