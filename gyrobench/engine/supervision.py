@@ -195,9 +195,8 @@ class _Supervisor:
         seen = (s.k, s.part, s.call, s.channel_rows, s.window_rows)
         if seen != self.seen or now - self.looked > ASLEEP:
             self.seen, self.moved, self.waited = seen, now, _waited(self.process.pid)
-        elif (s.call or s.k < 0) and now - self.moved > (patience := self._patience()):
-            if now - self.moved - (_waited(self.process.pid) - self.waited) > patience:
-                self._kill(f"no answer within {patience:g} s; its process was stopped")
+        elif (s.call or s.k < 0) and self._silent(now) > (patience := self._patience()):
+            self._kill(f"no answer within {patience:g} s; its process was stopped")
         self.looked = now
         if self.progress is not None and s.k >= 0 and not s.stop and now >= self.due:
             self._report(now)
@@ -213,6 +212,10 @@ class _Supervisor:
         with contextlib.suppress(OSError):
             if printed.stat().st_size > PRINTED:
                 os.truncate(printed, 0)
+
+    def _silent(self, now: float) -> float:
+        """Return how long the child has not moved though it had a processor, s."""
+        return now - self.moved - (_waited(self.process.pid) - self.waited)
 
     def _patience(self) -> float:
         if self.status.stop or self.files.file("ending").exists():
