@@ -64,3 +64,24 @@ def read_profile(file: Path, slot: str = "motion") -> dict[str, Any]:
         f"{slot}.profile_t": (t - t[0]).tolist(),
         f"{slot}.profile": table.tolist(),
     }
+
+
+def profile_rates(t_points: Array, angles: Array, t: Array) -> Array:
+    """Return the rates about the axes of the base, rad/s, (3, times), as base_motion makes them of a recording.
+
+    t_points, angles (points, 3): of the recording; before and after it the base rests.
+    """
+    from scipy.interpolate import BPoly
+
+    before, after = np.diff(t_points)[:-1, None], np.diff(t_points)[1:, None]
+    slopes = np.diff(angles, axis=0) / np.diff(t_points)[:, None]
+    ends = np.zeros((1, 3))
+    slope = np.vstack([ends, (slopes[:-1] * after + slopes[1:] * before) / (before + after), ends])
+    curve = np.vstack([ends, 2.0 * np.diff(slopes, axis=0) / (before + after), ends])
+    motion = BPoly.from_derivatives(t_points, np.stack([angles, slope, curve], axis=1))
+    p, r, _ = motion(np.clip(t, t_points[0], t_points[-1])).T
+    inside = (t > t_points[0]) & (t < t_points[-1])
+    dp, dr, dh = np.where(inside, motion.derivative()(np.clip(t, t_points[0], t_points[-1])).T, 0.0)
+    return np.array([
+        np.cos(r) * dp - np.sin(r) * np.cos(p) * dh, dr + np.sin(p) * dh, np.sin(r) * dp + np.cos(r) * np.cos(p) * dh
+    ])  # fmt: skip

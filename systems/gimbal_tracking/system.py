@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.record.target_path import TargetPath, read_path
-from gyrobench.reduction.loops.jitter import spectra
 from gyrobench.system.families import loop_test as loop
-from gyrobench.system.families.sight_test import AXES, SightTest
+from gyrobench.system.families.sight_test import AXES, MOVED_STEP, SightTest
 from gyrobench.system.line_of_sight import Density, LineOfSight, SightSource
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
@@ -32,7 +30,6 @@ TIMES = ("period", "exposure", "processing")
 ODD = 1e-3  # of a time: less than that it is changed without a word
 SAMPLES = 10.0  # images in a period of the crossover, or more
 KEPT = 0.05  # of the wanted accuracy: a recorded path is off by it at most
-TARGET_STEP = 2e-3  # s, of its path for the density of its rates
 SLOWER = 0.25  # of the rate loop's crossover: that of the tracking loop
 
 
@@ -196,25 +193,19 @@ class GimbalTracking(SightTest):
             for name, sigma in image_noises(p["image_noise"], p["pixel"]).items()
         ]
         ride = self.ride()
-        t = np.arange(0.0, ride.settle + ride.dwell, TARGET_STEP)
+        t = np.arange(0.0, ride.settle + ride.dwell, MOVED_STEP)
         rates = target_rates(parameters, t)
         inside = t >= ride.settle
         # u = (-b, 1, a): a turn about x is its third element, one about z its first
         for element, rate in zip((3, 1), rates, strict=True):
             more.append(SightSource(TARGET, "direction", element, self.moved(rate[inside])))
-        turned = np.array([self["pitch"], self["yaw"]])[:, None] + np.cumsum(rates, axis=1) * TARGET_STEP
+        turned = np.array([self["pitch"], self["yaw"]])[:, None] + np.cumsum(rates, axis=1) * MOVED_STEP
         about = np.sqrt(np.mean(turned[:, inside] ** 2, axis=1)) * np.sign(turned[:, inside].mean(axis=1))
         angles = {loop: f"tracker.miss[{AXES[loop.split()[-1]][0]}]" for loop in self.loops}
         return replace(
             of_gimbal, sources=[*of_gimbal.sources, *more], angles=angles, moved_by=("target",), lost="tracker.lost",
             riding={"platform.theta_0": about.tolist()},
         )  # fmt: skip
-
-    def moved(self, rate: Array) -> Density:
-        """Return the density of a direction, rad2/Hz, from its rate in the ride: rad/s, every TARGET_STEP."""
-        made = spectra(TARGET_STEP, rate, self["jitter_from"])
-        assert made is not None  # a ride is as long as its jitter takes
-        return lambda f: np.interp(f, made.f, made.mean, right=0.0) / (2.0 * np.pi * f) ** 2
 
     def moves(self) -> dict[str, Any]:
         """Return the parameters of the moving target.  Raises DataError and OSError, of a recorded path."""

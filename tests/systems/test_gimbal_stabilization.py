@@ -154,6 +154,6 @@ def test_a_file_with_spectra(tmp_path: Path) -> None:
     file = tmp_path / "mast.csv"
     file.write_text("frequency [Hz],rate_x [deg2/s2/Hz]\n2,0.01\n8,0.01\n")
     result, record = ridden(psd=str(file), gyro_noise=0.0, ride=36.0)
-    assert next(iter(rows(result))) == "vibration about x" and "vibration about z" not in rows(result)
+    assert next(iter(rows(result))) == "motion of the base about x" and "motion of the base about z" not in rows(result)
     omega = record.channels["vibration.omega[1]"][-30000:]
     assert float((omega**2).mean()) == pytest.approx(math.radians(1.0) ** 2 * 0.06, rel=0.05)

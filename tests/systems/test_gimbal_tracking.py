@@ -11,12 +11,15 @@ import pytest
 from scipy.linalg import expm
 
 from gyrobench.engine.session import Session
+from gyrobench.packaging import load_part
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.margins import grid, margins
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.loop_plan import sweep
 from gyrobench.system.system import load_system
+from gyrobench.tuning.loop_ports import loops_of
+from gyrobench.tuning.sight_jitter import sight_models
 
 RIDE = {"sweeps": False, "base": 0.0, "load_step": 0.0, "acquire": 0.0, "ride": 8.0, "jitter_from": 5.0}
 QUIET = {"psd": "none", "gyro_noise": 0.0, "image_noise": 0.0, "pixel": 0.0}
@@ -36,10 +39,10 @@ def tracked(parameters: dict[str, Any] | None = None, **options: Any) -> tuple[A
     return system.reduce(record), record
 
 
-def rate_loop() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def rate_loop(viscous: float = 0.01) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return A, B, C of the closed rate loop about yaw of a rigid gimbal: command in, rate out; 0.4 N.m/A, 1 Ohm.
 
-    J w' = 0.4 v - 0.01 w,  y'' = b2 (w - y) - sqrt(2) b y',  v = -K (e + w_i int e),  e = y - command
+    J w' = 0.4 v - viscous w,  y'' = b2 (w - y) - sqrt(2) b y',  v = -K (e + w_i int e),  e = y - command
     """
     b, wc = 2 * math.pi * BAND, 2 * math.pi * FC
     wi = wc / 8.0
@@ -48,7 +51,7 @@ def rate_loop() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     K = 1.0 / abs(0.4 / (J * s) * gyro * (1.0 + wi / s))
     # states: w, y, y', integral of e
     A = np.array([
-        [-0.01 / J, -0.4 * K / J, 0.0, -0.4 * K * wi / J],
+        [-viscous / J, -0.4 * K / J, 0.0, -0.4 * K * wi / J],
         [0.0, 0.0, 1.0, 0.0],
         [b * b, -b * b, -math.sqrt(2.0) * b, 0.0],
         [0.0, 1.0, 0.0, 0.0],
@@ -173,6 +176,66 @@ def test_margins_of_a_loop_with_delay(prediction: str) -> None:
     assert got.crossover == pytest.approx(own.crossover, rel=5e-3)
     assert got.phase == pytest.approx(own.phase, abs=0.3)
     assert 20 * math.log10(got.upper / own.upper) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.long
+def test_a_recorded_ride_of_the_base_is_in_error_budget_and_wanted_jitter(tmp_path: Path) -> None:
+    """Viscous joints drag the line of sight along: J w' = 0.4 v - c (w - w_base), then as in_scipy, still target.
+
+    The rates of the base are those of the record.  The same rms by the budget of the run, and by the density from which
+    tune has its jitter: of all sources alone, about yaw.
+    """
+    t = np.arange(0.0, 23.5, 1 / 17.0)
+    heading = 0.05 * np.sin(2 * np.pi * 3.3 * t) + 0.03 * np.sin(2 * np.pi * 4.4 * t + 1.0)
+    file = tmp_path / "ride.csv"
+    rows = [f"{a:.5f},{b:.8f}" for a, b in zip(t, heading, strict=True)]
+    file.write_text("\n".join(["time [s],heading [deg]", *rows]) + "\n", encoding="utf-8")
+    viscous = 0.5
+    values = {**DRIFTLESS, "platform.viscous": [viscous, viscous]}
+    options = {**QUIET, "target": "rest", "profile": str(file), "bending": 0.0, "type": 1, "ride": 18.0,
+               "jitter_from": 2.0}  # fmt: skip
+    result, record = tracked(values, **options)
+    inside = record.channels["exciter.gate"] > 0.5
+    at, base = record.channels["time"], record.channels["vibration.omega[3]"]
+
+    h = 1e-3
+    A, B, C = rate_loop(viscous)
+    K = gains(1.5, 1)[0]
+    n = 5  # 4 of the rate loop, line of sight; then the held error and the rate of the base
+    M = np.zeros((n + 2, n + 2))
+    M[:4, :4], M[4, :4], M[:4, n], M[0, n + 1] = A, C, B * K, viscous / J
+    step, x, held, coming, seen, exposed = expm(M * h), np.zeros(n), 0.0, {}, [], []
+    frame, long, wait = round(FRAME / h), round(EXPOSURE / h), round(PROCESSING / h)
+    for k in range(round(at[-1] / h)):
+        seen.append(-x[4])
+        exposed = [] if k % frame == 0 else exposed
+        if k % frame <= long:
+            exposed.append(-x[4])
+        if k % frame == long:
+            coming[k + wait] = float(np.trapezoid(exposed)) / long
+        held = coming.pop(k, held)
+        x = (step @ np.append(x, [held, np.interp((k + 0.5) * h, at, base)]))[:n]
+    error = np.interp(at[inside], np.arange(len(seen)) * h, seen)
+    measured = record.channels["tracker.miss[2]"][inside]
+    assert np.abs(measured - error).max() < 0.03 * np.abs(error).max()
+    rms = 1e6 * float(np.std(error))
+    jitter = result["jitter yaw"]
+    assert jitter.estimate == pytest.approx(rms, rel=0.02) and jitter.closed == pytest.approx(rms, rel=0.03)
+    rows = next(t for t in result.tables if t.id == "budget.sources").rows
+    assert rows[0][0] == "motion of the base about z" and rows[0][3] > 99.0
+
+    system: Any = load_system("gimbal_tracking")
+    for name, value in (RIDE | options | values).items():
+        system.set(name, value)
+    ports = loops_of(system)["track yaw"]
+    with Session(system, child=True) as session:
+        now, _, document = session.prepare()
+        q, parts = document.parameters, lambda slot: load_part(session.names[slot])
+        sources = now.line_of_sight(q)
+        sight = sight_models(session.assembly, q, parts, now.step, [{}], ports, sources)[0]
+    f = np.geomspace(0.05, 1000.0, 3000)
+    ways = sight.at(f)
+    assert 1e6 * ways.rms(K * np.ones(f.size, complex)) == pytest.approx(rms, rel=0.05)
 
 
 @pytest.mark.long

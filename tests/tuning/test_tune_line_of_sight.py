@@ -86,7 +86,7 @@ def test_jitter_by_hand() -> None:
     use = F >= 1.0
     by_hand = math.sqrt(np.trapezoid(density[use], F[use]))
     assert sight.at(F).rms(G) == pytest.approx(by_hand, rel=0.02)
-    assert set(sight.at(F).sources(G)) == {f"vibration about {a}" for a in "xyz"} | {"noise of the gyro"}
+    assert set(sight.at(F).sources(G)) == {f"motion of the base about {a}" for a in "xyz"} | {"noise of the gyro"}
 
 
 @pytest.mark.long
@@ -120,7 +120,7 @@ def test_a_jitter_that_friction_forbids_says_so() -> None:
     found = tune(gimbal(stiction=0.05, jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="yaw")
     assert not found.had and not found.proven
     text = str(found)
-    assert "cannot be had" in text and "the jitter is of vibration about z" in text
+    assert "cannot be had" in text and "the jitter is of motion of the base about z" in text
     assert "dry friction slips in the ride" in text
 
 

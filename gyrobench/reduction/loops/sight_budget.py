@@ -3,7 +3,7 @@
 Every way to the line of sight is a response of the closed linear model: of the base's angle, of a torque at a motor, of
 a test signal where a loop is opened.
 
-    vibration of the base     T_base / s       on the rates of the base that were recorded
+    motion of the base        T_base / s       on its rates that were recorded: vibration, a recorded ride
     acceleration              T_torque u x     on its acceleration; unbalance u, at the mean joint angles
     dry friction, cogging     T_torque         on the torques that the recorded joint angles make
     roll times joint angle    S / s, T_torque  on the rate and the torque of second order (sight_roll)
@@ -242,7 +242,7 @@ def by_source(
         moved[name] = moved.get(name, np.zeros((), complex)) + way.T[:, None, :] * signal[None, :, use]
 
     for k, axis in enumerate("xyz"):
-        add(f"vibration about {axis}", ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
+        add(f"motion of the base about {axis}", ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
     lever = by_unbalance(p, ride.angles)
     for k in range(3) if np.any(lever) else ():
         add("acceleration by unbalance", (ways.torque * at_the_body(p, f)[:, None, :]) @ lever[:, k], ride.force[k])

@@ -8,16 +8,18 @@ class Mine(SightTest):
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.record.motion_profile import RECORDED, profile_rates, read_profile
 from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
-from gyrobench.reduction.loops.jitter import shortest
+from gyrobench.reduction.loops.jitter import shortest, spectra
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.base_spectra import SPECTRA
 from gyrobench.system.families.loop_test import LoopTest
@@ -35,6 +37,7 @@ NOTCH = (0.1, 0.7)  # damping of its zeros and of its poles
 TONES = (0.3, 0.6, 0.85, 1.0, 1.2, 1.6, 2.2, 2.6, 3.0, 3.6)  # of the crossover
 SWINGS = {1.0: 40.0, 3.0: 16.0, 8.0: 16.0}  # sines of the base, Hz, and how long the gyro's noise lets each take, s
 NEVER = 100  # number of a phase that no plan has
+MOVED_STEP = 2e-3  # s, of what moves in the ride, for the density of its rates
 
 
 class SightTest(LoopTest):
@@ -160,9 +163,15 @@ class SightTest(LoopTest):
     def line_of_sight(self, parameters: Mapping[str, Any]) -> LineOfSight:
         """Return what makes the line of sight jitter, for a jitter that is wanted of a loop."""
         spectrum, scale = self.spectrum(), float(parameters.get("vibration.scale", 1.0)) ** 2
+        recorded = self.recorded_rates(parameters)
+        moved = [] if recorded is None else [self.moved(rate) for rate in recorded]
 
         def angle(axis: int) -> Density:
-            return lambda f: scale * spectrum.density("rate", axis, f) / (2.0 * np.pi * f) ** 2 if spectrum else 0.0 * f
+            def of(f: Array) -> Array:
+                vibration = scale * spectrum.density("rate", axis, f) / (2.0 * np.pi * f) ** 2 if spectrum else 0.0 * f
+                return vibration + moved[axis](f) if moved else vibration
+
+            return of
 
         white = 2.0 * float(parameters.get("gyro.white", 0.0)) ** 2
         band, K = float(parameters.get("gyro.bandwidth", np.inf)), float(parameters.get("decoupler.K", 1.0))
@@ -171,23 +180,42 @@ class SightTest(LoopTest):
             gain = K if axis == self.inner else K / math.cos(self[self.inner])
             return lambda f: white * gain**2 / (1.0 + (f / band) ** 4)
 
-        free, slipping = self.slips(parameters, spectrum, math.sqrt(scale)) if spectrum else ({}, {})
-        base = [SightSource(f"vibration about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
+        squares = [np.zeros(3), np.zeros(3)]  # of rates and angles of the base
+        if spectrum:
+            f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
+            density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale
+            squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
+        if recorded is not None:
+            turned = np.cumsum(recorded, axis=1) * MOVED_STEP
+            squares = [old + np.var(new, axis=1) for old, new in zip(squares, (recorded, turned), strict=True)]
+        free, slipping = self.slips(parameters, squares) if np.any(squares[0]) else ({}, {})
+        base = [SightSource(f"motion of the base about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
         gyro = [SightSource("noise of the gyro", "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
         return LineOfSight(self["jitter_from"], [*base, *gyro], free=free, slipping=slipping)
 
-    def slips(
-        self, parameters: Mapping[str, Any], spectrum: VibrationSpectrum, scale: float
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    def recorded_rates(self, parameters: Mapping[str, Any]) -> Array | None:
+        """Return the rates of the base by its recorded motion in the ride, rad/s, (3, times); None: there is none."""
+        if int(parameters.get("motion.preset", 0)) != RECORDED:
+            return None
+        points, ride = int(parameters["motion.points"]), self.ride()
+        t_points, angles = (np.asarray(parameters[f"motion.{n}"], float)[:points] for n in ("profile_t", "profile"))
+        t = np.arange(ride.settle, ride.settle + ride.dwell, MOVED_STEP)
+        return profile_rates(t_points - t_points[0], float(parameters.get("motion.scale", 1.0)) * angles, t)
+
+    def moved(self, rate: Array) -> Density:
+        """Return the density of an angle, rad2/Hz, from its rate in the ride: rad/s, every MOVED_STEP."""
+        made = spectra(MOVED_STEP, rate, self["jitter_from"])
+        assert made is not None  # a ride is as long as its jitter takes
+        return lambda f: np.interp(f, made.f, made.mean, right=0.0) / (2.0 * np.pi * f) ** 2
+
+    def slips(self, parameters: Mapping[str, Any], squares: Sequence[Array]) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the gimbal without dry friction, and with viscous friction for it; {}, {} where the joints stick.
 
-        A line of sight at rest leaves the base's rate to the joints, v rms.  Friction M that slips makes torques of M
-        rms, as viscous friction M / v does; they slip where the angle exceeds presliding.
+        squares: of the base's rates and angles about x, y, z.  A line of sight at rest leaves the base's rate to the
+        joints, v rms.  Friction M that slips makes torques of M rms, as viscous friction M / v does; they slip where
+        the angle exceeds presliding.
         """
         most = np.maximum(parameters["platform.friction"], parameters["platform.stiction"])
-        f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
-        density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale**2
-        squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
         k_in, k_out = (0, 2) if self.inner == "pitch" else (2, 0)
         c, s = (fun(self["yaw" if self.inner == "pitch" else "pitch"]) ** 2 for fun in (math.cos, math.sin))
         rate, angle = (np.sqrt([
@@ -216,6 +244,10 @@ class SightTest(LoopTest):
             **(spectrum.parameters() if spectrum else {"vibration.points?": 0}),
             "vibration.first?": next((k for k, p in enumerate(self.plan().phases, 1) if p.label == "ride"), NEVER),
         }
+        if self.values.get("profile"):  # begins with the ride
+            ahead = itertools.takewhile(lambda p: p.label != "ride", self.plan().phases)
+            began, profile = sum(p.duration() for p in ahead), read_profile(Path(self.values["profile"]))
+            found["motion.profile_t"] = [began + t for t in profile["motion.profile_t"]]
         for k, axis in enumerate(AXES):
             found |= self.controller(axis, k, parts)
         return found
