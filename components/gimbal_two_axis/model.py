@@ -18,10 +18,25 @@ from gyrobench.component.blocks.platform import (
     moved_base,
     with_unbalance,
 )
-from gyrobench.component.math import Vector, atan2, cos, fabs, index, pi, sin, sqrt, vector
+from gyrobench.component.math import Number, Vector, atan2, cos, fabs, pi, sin, sqrt, vector
 
 PAIR = [0.0, 0.0]
 DEG = pi / 180.0
+
+
+def inner(form: Number, x: Vector) -> Number:
+    """Return what belongs to the inner joint, of pitch and yaw."""
+    return x[0] if form == 0.0 else x[1]
+
+
+def outer(form: Number, x: Vector) -> Number:
+    """Return what belongs to the outer joint, of pitch and yaw."""
+    return x[1] if form == 0.0 else x[0]
+
+
+def placed(form: Number, of_inner: Number, of_outer: Number) -> Vector:
+    """Return of pitch and yaw what belongs to the inner and to the outer joint."""
+    return vector([of_inner if form == 0.0 else of_outer, of_outer if form == 0.0 else of_inner])
 
 
 class GimbalTwoAxis(Component):
@@ -119,6 +134,7 @@ class GimbalTwoAxis(Component):
     anchor = Discrete(PAIR, "rad", "where a contact is free of torque")
     slipping = Discrete(PAIR, "1", "0 sticking, else the sense of slip")
     heavy = Discrete(0.0, "1", "1: there is unbalance")
+    cos_keyhole = Discrete(0.0, "1", "cosine of keyhole_angle")
     rate_before = Discrete(NONE, "rad/s", "omega_b at the end of the communication step before")
     rise_before = Discrete(NONE, "rad/s2", "alpha_b then")
     f_before = Discrete(NONE, "m/s2", "f_b then")
@@ -135,6 +151,7 @@ class GimbalTwoAxis(Component):
         self.A = ordered_matrix(self.form, self.I_outer)
         self.B = ordered_matrix(self.form, self.I_inner)
         self.heavy = 0.0
+        self.cos_keyhole = cos(self.keyhole_angle)
         for n in range(2):
             self.u[n] = ordered(self.form, self.unbalance[n])
             for k in range(3):
@@ -195,12 +212,15 @@ class GimbalTwoAxis(Component):
         self.der.q = self.dq
         self.der.p = self.dp
         t = self.driven()
-        i = self.form  # of the inner joint, and of the outer one
-        o = 1.0 - self.form
-        c3 = cos(self.q[index(o)])
-        s3 = sin(self.q[index(o)])
-        c1 = cos(self.q[index(i)])
-        s1 = sin(self.q[index(i)])
+        # 1: of the inner joint, 3: of the outer one
+        dq1 = inner(self.form, self.dq)
+        dq3 = outer(self.form, self.dq)
+        q1 = inner(self.form, self.q)
+        q3 = outer(self.form, self.q)
+        c3 = cos(q3)
+        s3 = sin(q3)
+        c1 = cos(q1)
+        s1 = sin(q1)
         wb = vector(self.omega_b)
         ab = vector(self.alpha_b)
         y = left(self.t, self.step_start, self.step_end)
@@ -212,44 +232,49 @@ class GimbalTwoAxis(Component):
                 ab[k] = m[1]
         ab = ordered(self.form, ab)
         # rates (row 0) and, with q'' = 0, accelerations (row 1) of both gimbals, then the torques they need
-        a = gimbal_z(c3, s3, self.dq[index(o)], 0.0, ordered(self.form, wb), ab)
-        b = gimbal_x(c1, s1, self.dq[index(i)], 0.0, a[0], a[1])
+        a = gimbal_z(c3, s3, dq3, 0.0, ordered(self.form, wb), ab)
+        b = gimbal_x(c1, s1, dq1, 0.0, a[0], a[1])
         nb = body_torque(self.B, b[1], b[0])
         na = body_torque(self.A, a[1], a[0])
         if self.heavy == 1.0:
             fa = about_z(c3, s3, ordered(self.form, self.f_b - y * (self.f_b - self.f_before)))
             na = with_unbalance(na, self.u[0], fa)
             nb = with_unbalance(nb, self.u[1], about_x(c1, s1, fa))
-        b3 = na[Z] + s1 * nb[Y] + c1 * nb[Z] - self.J_motor[index(i)] * (a[0][X] + self.dp[index(i)]) * a[0][Y]
+        dp1 = inner(self.form, self.dp)
+        J1 = inner(self.form, self.J_motor)
+        J3 = outer(self.form, self.J_motor)
+        b3 = na[Z] + s1 * nb[Y] + c1 * nb[Z] - J1 * (a[0][X] + dp1) * a[0][Y]
         m11 = self.B[X][X]
         m13 = s1 * self.B[X][Y] + c1 * self.B[X][Z]
         m33 = self.A[Z][Z] + s1 * s1 * self.B[Y][Y] + 2.0 * s1 * c1 * self.B[Y][Z] + c1 * c1 * self.B[Z][Z]
-        t1 = t[index(i)]
-        t3 = t[index(o)]
-        if self.stiff[index(i)] > 0.0:
-            t1 = self.stiff[index(i)] * (self.p[index(i)] - self.q[index(i)]) + self.soft[index(i)] * (
-                self.dp[index(i)] - self.dq[index(i)]
-            )
-            self.der.dp[index(i)] = (t[index(i)] - t1) / self.J_motor[index(i)] - a[1][X]
+        t1 = inner(self.form, t)
+        t3 = outer(self.form, t)
+        k1 = inner(self.form, self.stiff)
+        k3 = outer(self.form, self.stiff)
+        ddp1 = 0.0
+        ddp3 = 0.0
+        if k1 > 0.0:
+            spring = k1 * (inner(self.form, self.p) - q1) + inner(self.form, self.soft) * (dp1 - dq1)
+            ddp1 = (t1 - spring) / J1 - a[1][X]
+            t1 = spring
         else:
-            t1 = t1 - self.J_motor[index(i)] * a[1][X]
-            m11 = m11 + self.J_motor[index(i)]
-        if self.stiff[index(o)] > 0.0:
-            t3 = self.stiff[index(o)] * (self.p[index(o)] - self.q[index(o)]) + self.soft[index(o)] * (
-                self.dp[index(o)] - self.dq[index(o)]
-            )
-            self.der.dp[index(o)] = (t[index(o)] - t3) / self.J_motor[index(o)] - ab[Z]
+            t1 = t1 - J1 * a[1][X]
+            m11 = m11 + J1
+        if k3 > 0.0:
+            dp3 = outer(self.form, self.dp)
+            spring = k3 * (outer(self.form, self.p) - q3) + outer(self.form, self.soft) * (dp3 - dq3)
+            ddp3 = (t3 - spring) / J3 - ab[Z]
+            t3 = spring
         else:
-            t3 = t3 - self.J_motor[index(o)] * ab[Z]
-            m33 = m33 + self.J_motor[index(o)]
+            t3 = t3 - J3 * ab[Z]
+            m33 = m33 + J3
         t1 = t1 - nb[X]
         t3 = t3 - b3
         det = m11 * m33 - m13 * m13
-        self.der.dq[index(i)] = (m33 * t1 - m13 * t3) / det
-        self.der.dq[index(o)] = (m11 * t3 - m13 * t1) / det
-        for k in range(2):
-            if self.stiff[k] == 0.0:
-                self.der.dp[k] = self.der.dq[k]
+        ddq1 = (m33 * t1 - m13 * t3) / det
+        ddq3 = (m11 * t3 - m13 * t1) / det
+        self.der.dq = placed(self.form, ddq1, ddq3)
+        self.der.dp = placed(self.form, ddp1 if k1 > 0.0 else ddq1, ddp3 if k3 > 0.0 else ddq3)
         w = ordered(self.form, b[0])
         self.der.star[X] = self.star[Y] * w[Z] - self.star[Z] * w[Y]
         self.der.star[Y] = self.star[Z] * w[X] - self.star[X] * w[Z]
@@ -278,16 +303,17 @@ class GimbalTwoAxis(Component):
             self.i_motor[k] = amps
             if fabs(self.v[k]) > self.v_max[k] or fabs(amps) >= self.i_max[k]:
                 self.saturated = 1.0
-        i = self.form
-        o = 1.0 - self.form
-        self.keyhole = 1.0 if cos(self.q[index(i)]) < cos(self.keyhole_angle) else 0.0
-        c3 = cos(self.q[index(o)])
-        s3 = sin(self.q[index(o)])
-        c1 = cos(self.q[index(i)])
-        s1 = sin(self.q[index(i)])
+        q1 = inner(self.form, self.q)
+        q3 = outer(self.form, self.q)
+        c3 = cos(q3)
+        s3 = sin(q3)
+        c1 = cos(q1)
+        s1 = sin(q1)
+        self.keyhole = 1.0 if c1 < self.cos_keyhole else 0.0
         wb = ordered(self.form, self.omega_b)
-        a = gimbal_z(c3, s3, self.dq[index(o)], self.der.dq[index(o)], wb, ordered(self.form, self.alpha_b))
-        b = gimbal_x(c1, s1, self.dq[index(i)], self.der.dq[index(i)], a[0], a[1])
+        ddq3 = outer(self.form, self.der.dq)
+        a = gimbal_z(c3, s3, outer(self.form, self.dq), ddq3, wb, ordered(self.form, self.alpha_b))
+        b = gimbal_x(c1, s1, inner(self.form, self.dq), inner(self.form, self.der.dq), a[0], a[1])
         self.omega = ordered(self.form, b[0])
         self.alpha = ordered(self.form, b[1])
         self.f = ordered(self.form, about_x(c1, s1, about_z(c3, s3, ordered(self.form, self.f_b))))
