@@ -215,13 +215,26 @@ with Session("platform_three_axis", engine=sys.argv[1]) as s:
     print(sum(os.times()[:4]) - began, record.run.steps)
 """
 
+GIMBAL = """
+import os, sys
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan
+from gyrobench.engine.session import Session
+with Session("gimbal_stabilization", engine=sys.argv[1]) as s:
+    type(s.system).plan = lambda self: LoopPlan([LoopPhase("ride", "hold", dwell=float(sys.argv[2]))])
+    began = sum(os.times()[:4])
+    record = s.run(step=1e-4)
+    print(sum(os.times()[:4]) - began, record.run.steps)
+"""
+
 
 def platform(quick: bool) -> None:
-    """The three-axis platform in a seaway, against the same FMUs stepped by a loop on FMPy's API in Python."""
+    """The three-axis platform in a seaway, against the same FMUs stepped by a loop on FMPy's API in Python; the gimbal
+    of two axes on a vehicle.
+    """
     print("\nThree-axis platform, three gyros, T2, three loops (11 FMUs), 0.1 ms, noise on")
 
-    def cost(engine: str, seconds: float) -> tuple[float, float]:
-        command = [sys.executable, "-c", PLATFORM, engine, str(seconds)]
+    def cost(engine: str, seconds: float, script: str = PLATFORM) -> tuple[float, float]:
+        command = [sys.executable, "-c", script, engine, str(seconds)]
         found = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
         return float(found[0]), float(found[1])
 
@@ -231,6 +244,10 @@ def platform(quick: bool) -> None:
     row(f"{60 if quick else 600} s of platform, CPU time", f"{cpu:.1f} s", "0.5 s" if quick else "5 s")
     QUOTED.append(("speed.platform", f"{cpu:.1f}", "s of CPU, 600 s of platform_three_axis at 0.1 ms, linked form"))
     row("  a step, CPU time", f"{1e6 * cpu / steps:.2f} us", "", ratio)
+    cpu, steps = cost("linked", 60.0 if quick else 600.0, GIMBAL)
+    row(f"{60 if quick else 600} s of gimbal, 9 FMUs, CPU time", f"{cpu:.1f} s", "0.5 s" if quick else "5 s")
+    QUOTED.append(("speed.gimbal", f"{cpu:.1f}", "s of CPU, 600 s of gimbal_stabilization at 0.1 ms, linked form"))
+    row("  a step, CPU time", f"{1e6 * cpu / steps:.2f} us", "")
 
 
 def builds() -> None:
