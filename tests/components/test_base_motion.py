@@ -10,6 +10,7 @@ from wired import BENCH, Native
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
+from gyrobench.record.motion_profile import profile_rates
 
 BaseMotion = load_part("base_motion", BENCH)
 W_E, LATITUDE, H = 0.05, 0.7, 1e-4  # an Earth that turns fast, so that its share shows
@@ -77,6 +78,19 @@ def test_profile_passes_its_points_and_rests_outside():
         assert seen[round(t / H)] == pytest.approx(angles, abs=1e-12)
     assert seen[1] == ANGLES[0] and seen[20000] == ANGLES[-1]
     assert [part.get(f"omega[{i}]") for i in (1, 2, 3)] == [0.0, 0.0, 0.0]
+
+
+def test_rates_of_a_recording_without_the_part():
+    """profile_rates, from which a wanted jitter has its density, against the part; both rest before and after."""
+    part = Native("base_motion", **recorded(earth_rate=0.0))
+    part.initialize()
+    t, seen = np.arange(1, 200) * 0.01, []
+    for k in range(t.size):
+        part.do_step(k * 0.01, 0.01)
+        seen.append(part.omega)
+    rates = profile_rates(np.array(T), np.array(ANGLES), t)
+    np.testing.assert_allclose(np.array(seen).T, rates, atol=1e-12)
+    assert not rates[:, t < T[0]].any() and not rates[:, t > T[-1]].any()
 
 
 def test_profile_follows_a_parabola_exactly_inside():

@@ -13,6 +13,7 @@ from gyrobench.packaging import load_part
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.plant import HeldController, plants
+from gyrobench.tuning.proof import loop_plan
 from gyrobench.tuning.sight_jitter import FINER, MovedSight, SightWays, finer, sight_models
 from gyrobench.tuning.structures import rounded
 from gyrobench.tuning.tune_loop import tune
@@ -57,6 +58,22 @@ def test_the_loops_of_a_gimbal() -> None:
         "pitch": LoopPorts("pitch", "pitch", 1, "platform.los[1]"),
         "yaw": LoopPorts("yaw", "yaw", 3, "platform.los[2]"),
     }
+
+
+def test_a_recorded_ride_begins_with_the_ride_of_a_proof(tmp_path) -> None:
+    """Not at the start, where the test sines of the proof would meet it and the ride would find it over."""
+    file = tmp_path / "ride.csv"
+    file.write_text("time [s],pitch [deg]\n" + "".join(f"{k},{k % 2}\n" for k in range(90)), encoding="utf-8")
+    system = gimbal(profile=str(file))
+    with Session(system, bench=Bench.find().folder, child=True) as session:
+        alone = session.prepare()[2].parameters["motion.profile_t"][:3]
+        plan, _ = loop_plan(session.system, [3.0, 6.0], lambda f: 0.1, ride="ride")
+        vars(session.system).update(plan=lambda: plan)
+        behind = session.prepare()[2].parameters["motion.profile_t"][:3]
+    *ahead, ride = plan.phases
+    began = sum(p.duration() for p in ahead)
+    assert ride.label == "ride" and [p.amplitude for p in ahead if p.shape == "sine"] == [0.1, 0.1]
+    assert list(alone) == [0.0, 1.0, 2.0] and list(behind) == pytest.approx([began, began + 1.0, began + 2.0])
 
 
 @pytest.mark.parametrize("axis", ["pitch", "yaw"])
