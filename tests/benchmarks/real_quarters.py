@@ -4,8 +4,8 @@
 
 Each quarter of a channel (see real_records.py) is a record of its own.  chi2: sum of the squares of the logarithms less
 their weighted mean, over the u of each, a quarter of its interval's logarithm.  What is scattered more than chance
-makes is no fault of an interval where the noise itself changes: beside it stands what the model of the whole record
-says of its quarters.
+makes is no fault of an interval where the noise itself changes: docs/real_records.md has what the model of the whole
+record says of its quarters.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from real_records import MOVED, unit_of
 from scipy import special
 
 from gyrobench import units
-from gyrobench.reduction.noise_model.constancy import PARTS, changing
+from gyrobench.reduction.noise_model.constancy import PARTS
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
@@ -37,7 +37,7 @@ def scatter(found: list[Estimate]) -> tuple[float, int, str]:
 
 
 def main(folder: Path, parts: list[str]) -> None:
-    rare = {term: [0, 0, 0] for term in TERMS}  # channels, those that scatter, those of them whose change is named
+    rare = {term: [0, 0] for term in TERMS}  # channels, those that scatter
     for file in sorted(folder.glob("*.parquet")):
         if MOVED in file.name or (parts and not any(p in file.name for p in parts)):
             continue
@@ -45,24 +45,17 @@ def main(folder: Path, parts: list[str]) -> None:
         for name in (n for n in table.schema.names if n.startswith(("gyro", "acc"))):
             x = units.unit(unit_of(file.stem, name)).factor * table[name].to_numpy().astype(float)
             quarters = [m for m in (fit_noise(y, 1.0, means=False) for y in np.array_split(x, PARTS)) if m.agrees]
-            named = changing(fit_noise(x, 1.0, means=False).over_time)
             for term in TERMS:
                 stated = [m[term] for m in quarters if m[term].determined and m[term].low > 0.0]
                 if len(stated) < 2:
                     continue
                 chi2, freedom, said = scatter(stated)
                 p = float(special.chdtrc(freedom, chi2))
-                own = [" ".join(f"{v:.3f}" for v in t.rms) for t in named if t.coefficient == term]
                 rare[term][0] += 1
-                if p < RARE:
-                    rare[term][1] += 1
-                    rare[term][2] += bool(named)
-                print(f"| {file.stem} {name} | {term} | {chi2:.1f} of {freedom}, p {p:.2g} | {said} | "
-                      f"{own[0] if own else f'{len(named)} others' if named else '–'} |", flush=True)  # fmt: skip
-    for term, (channels, scattered, named_of) in rare.items():
-        print(
-            f"{term}: of {channels} channels {scattered} scatter (p < {RARE}), {named_of} of them with a change named"
-        )
+                rare[term][1] += p < RARE
+                print(f"| {file.stem} {name} | {term} | {chi2:.1f} of {freedom}, p {p:.2g} | {said} |", flush=True)
+    for term, (channels, scattered) in rare.items():
+        print(f"{term}: of {channels} channels {scattered} scatter (p < {RARE})")
 
 
 if __name__ == "__main__":
