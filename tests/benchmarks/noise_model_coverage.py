@@ -32,6 +32,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
     "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
+    "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
     "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
 }
 
