@@ -15,9 +15,9 @@ from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
 from gyrobench.reduction.noise_model.noise_model import Scale
 from gyrobench.reduction.noise_model.ordinates import Ordinates, allan
-from gyrobench.reduction.noise_model.posterior import Cloud
+from gyrobench.reduction.noise_model.posterior import Cloud, beside_free_bands
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import Fitted, maximize
+from gyrobench.reduction.noise_model.search import Fitted, ModelSearch, maximize
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import deviations
@@ -59,6 +59,36 @@ def test_a_process_that_stands_for_two_has_the_interval_of_both() -> None:
     assert np.log([tau.low, tau.value, tau.high]) == pytest.approx([2.0 - 0.196, 3.0, 3.196], abs=0.01)
     tau = _process(0, at, [cloud(0.98, 3.0), cloud(0.02, 2.0, 5.0)], scale).tau  # not likely: of all draws
     assert math.log(tau.low) == pytest.approx(3.0 - 0.1 * 2.57, abs=0.02)  # 0.005/0.98 of the first
+
+
+def test_draws_have_the_covariance_of_bands_that_are_free() -> None:
+    """White noise beside a broad band: log N^2 of the draws has the variance of the inverse of J_ij = 1/2 sum over the
+    ordinates of dlog S/dp_i dlog S/dp_j, all four parameters free, not 1/J_00, 0.6 of that.
+    """
+    n, white, band, rng = 4096, NoiseTerm("white"), NoiseTerm("band"), np.random.default_rng(4)
+    p = np.array([0.0, 0.0, 1.0, 0.4])  # variance 1, tau 2.7 samples, 1.5 rad/sample
+    omega = np.pi * np.arange(1, n) / n
+    grid = Grid(omega)
+
+    def log_S(p: np.ndarray) -> np.ndarray:
+        return np.log(white.spectrum(p[:1], grid) + band.spectrum(p[1:], grid))
+
+    slope = np.array([(log_S(p + 1e-4 * e) - log_S(p - 1e-4 * e)) / 2e-4 for e in np.eye(4)])
+    J = 0.5 * slope @ slope.T
+    full = rng.normal(size=2 * n) + np.fft.irfft(
+        np.fft.rfft(rng.normal(size=2 * n)) * np.sqrt(band.spectrum(p[1:], Grid(np.pi * np.arange(n + 1) / n))), 2 * n
+    )
+    data = Ordinates([full[:n]])
+    found = ModelSearch(data, Prior(data), resonances=[(band, p[1:])])
+    data.hold(found.resonances)
+    at = found.fit((white,), p[:1])
+    alone = Cloud(
+        (white,), at.p + rng.normal(size=(20_000, 1)) / J[0, 0] ** 0.5, np.full(20_000, 5e-5), np.zeros(20_000)
+    )
+    (free,) = beside_free_bands([alone], found)
+    assert np.var(free.p) == pytest.approx(np.linalg.inv(J)[0, 0], rel=0.05)
+    assert np.var(alone.p) < 0.7 * np.var(free.p)
+    assert beside_free_bands([alone], ModelSearch(data, found.prior)) == [alone]
 
 
 @pytest.mark.parametrize(
