@@ -25,7 +25,7 @@ PARTS, LEAST = 4, 512  # quarters, and samples of one
 STEPS = 6  # of the scoring
 TOLD = 0.3  # standard deviation of a log variance above which a part does not tell the term
 COHERENT = {"resonance": 1.0, "band": math.sqrt(math.pi)}  # variance of the power over tau/n
-CHANCE = 1e-4  # of a change of any term in a record of even noise
+CHANCE = 1e-3  # of a change of any term in a record of even noise
 
 
 @dataclass(frozen=True)
