@@ -4,7 +4,7 @@
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
-rate, of a Butterworth filter that white noise and flicker B pass, before a readout of 0.003.
+rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place), before a readout of 0.003.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 
@@ -33,6 +33,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
     "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
     "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
+    "all noise through a mean of 3, flicker": {"N": 1.0, "B": 0.12, "all": 3},
     "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
 }
 
@@ -53,6 +54,8 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         k = np.arange(1.0, 2.0 * n)
         half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
         x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
+    if count := truth.get("all", 0):
+        x = lfilter(np.full(count, 1.0 / count), [1.0], x)
     if "digital" in truth:
         x = lfilter(*butter(*truth["digital"]), x) + 0.003 * rng.normal(size=n + 500)
     x = x[500:]

@@ -34,6 +34,7 @@ def test_powers_are_those_of_the_filters() -> None:
         ((BUTTERWORTH,), [0.0, -0.3, 0.7]),
         ((CASCADE, W), [0.0, 0.0, 1.4, -6.0]),
         ((BUTTERWORTH, GM), [0.0, -1.5, 0.7, 1.0, 2.5]),
+        ((NoiseTerm("white", "boxcar5"), GM), [0.0, 1.0, 2.5]),
     ],
 )
 def test_the_deviation_is_that_of_the_spectrum(model: tuple[NoiseTerm, ...], p: list[float]) -> None:
@@ -72,6 +73,26 @@ def test_a_sensor_behind_a_butterworth_filter(seed: int) -> None:
     assert term == BUTTERWORTH and math.exp(p[1]) == pytest.approx(math.tan(0.2 * math.pi), rel=0.02)
     assert model.filter_words().startswith("digital low-pass") and math.exp(p[2]) == pytest.approx(2.0, rel=0.02)
     assert not model.peaks() and not model.steps
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("flicker", [0.06, 0.2])
+def test_a_mean_of_flicker_too(flicker: float) -> None:
+    """White noise of 1 and flicker, the sum averaged over three samples: its zeros hold neither.
+
+    With a mean that flicker does not pass its upper end was 0.012 of a true 0.06, and N 1.045 (1.021 to 1.074).
+    Flicker by half a difference: spectrum B^2/(2 sin(omega/2)), which is B^2/omega towards 0.
+    """
+    rng = np.random.default_rng(61)
+    k = np.arange(1.0, 20_000.0)
+    half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
+    slow = signal.fftconvolve(rng.normal(size=30_000), half)[20_000:30_000]
+    x = signal.lfilter(np.full(3, 1.0 / 3.0), [1.0], rng.normal(size=10_000) + flicker * slow)[3:]
+    model = fit_noise(x, 1.0, means=False)
+    assert model.agrees and model["N"].low < 1.0 < model["N"].high < 1.06
+    assert model["B"].low <= flicker <= model["B"].high < 2.5 * flicker
+    if flicker > 0.1:
+        assert model.filter_words() == "mean over 3 samples, which slow noise passes too"
 
 
 @pytest.mark.long

@@ -13,11 +13,12 @@ from scipy.signal import lfilter
 from gyrobench.reduction.noise_model.agreement import compare, with_spectrum
 from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
+from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import Scale
 from gyrobench.reduction.noise_model.ordinates import Ordinates, allan
 from gyrobench.reduction.noise_model.posterior import Cloud, beside_free_bands
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import Fitted, ModelSearch, maximize
+from gyrobench.reduction.noise_model.search import ModelSearch
 from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import deviations

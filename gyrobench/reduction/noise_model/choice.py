@@ -11,10 +11,11 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
+from gyrobench.reduction.noise_model.maximum import Fitted
 from gyrobench.reduction.noise_model.noise_model import ABSENT
 from gyrobench.reduction.noise_model.ordinates import allan, filtered
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
-from gyrobench.reduction.noise_model.search import Fitted, ModelSearch
+from gyrobench.reduction.noise_model.search import ModelSearch
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.deviations import Deviation, deviations
 

@@ -26,12 +26,13 @@ from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
 from gyrobench.reduction.noise_model.constancy import over_time
+from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
-from gyrobench.reduction.noise_model.search import GM, Fitted, ModelSearch, maximize, search, search_again
+from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
-from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
@@ -173,7 +174,7 @@ def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> A
     grid = Grid(math.pi * few / n, means)
     S = spectrum(*joined(parts), grid)
     for term, p in parts:  # a stretch leaks into the zeros of a mean, and into what a digital low-pass holds back
-        if term.filter.startswith(("mean", "average", *DIGITAL)):
+        if term.filter.startswith((*MEANS, "average", *DIGITAL)):
             own = term.spectrum(p, grid)
             S = np.maximum(S, LEAK * float(np.trapezoid(own, few)) / n**2)
     return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])

@@ -28,13 +28,13 @@ from scipy import fft, ndimage
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import smooth_spectrum
 from gyrobench.reduction.noise_model.terms import (
-    DIGITAL,
     SLOW,
     Grid,
     NoiseTerm,
     allan_of_spectrum,
     covariance_grid,
     markov_parts,
+    passes_slow,
 )
 from gyrobench.reduction.series.noise_spectra import flicker
 
@@ -338,9 +338,9 @@ def filtered(model: Model) -> bool:
 
 
 def passed(model: Model, p: Array, grid: Grid) -> Array | None:
-    """Return what the digital low-pass of a model passes of the power (..., b), None where it has none."""
+    """Return what a filter that slow noise passes too passes of the power (..., b), None where there is none."""
     for term, q in split(model, p):
-        if term.filter in DIGITAL:
+        if passes_slow(term.filter):
             return term.unit(q[..., 1:], grid)
     return None
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.maximum import WIDEST, Fitted
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import WIDEST, B, Fitted, K, ModelSearch, Q, volume
+from gyrobench.reduction.noise_model.search import B, K, ModelSearch, Q
 
 WINDOW = 6.0  # of the logarithm of the evidence: models below the best by more are left out
 MOST = 10  # models
@@ -160,4 +161,4 @@ def size_of(term: str) -> Callable[[Model, Array], Array | None]:
     return figure
 
 
-__all__ = ["Cloud", "draw", "quantile", "resampled", "size_of", "volume", "weighted"]
+__all__ = ["Cloud", "draw", "quantile", "resampled", "size_of", "weighted"]

@@ -1,4 +1,4 @@
-"""Search of the noise model: maximum of the posterior of a model, its evidence, and the models worth averaging."""
+"""Search of the noise model: the models worth averaging."""
 
 from __future__ import annotations
 
@@ -10,15 +10,13 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, NoiseTerm, passes_slow, samples_of
 
-STEPS = 40  # of the search for a maximum
-PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
-FLAT = 1e-2  # information of a parameter below which the search leaves it where it is
-WIDEST = 0.25  # information of a parameter that the record does not tell: its volume is the prior's, some 5
 MOST_MARKOV, MOST_RESONANCES = 3, 24
+NEARLY = 6.0  # of the logarithm of the evidence
 MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 BEHIND = ("first", "shape3")
@@ -38,74 +36,6 @@ COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
 WEAK = 2  # bands that may be, though nothing shows them
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """Maximum of the posterior of a model: parameters p (q,), information (q, q), -2 log likelihood, log evidence."""
-
-    model: Model
-    p: Array
-    information: Array
-    value: float
-    evidence: float
-
-
-def maximize(data: Ordinates, prior: Prior, model: Model, start: Array) -> Fitted:
-    """Return the maximum of the posterior near ``start`` (q,), by scoring steps."""
-    low, high = prior.bounds(model)
-    p, h, q = np.clip(start, low, high), 1e-3, start.size
-    signs = np.concatenate([np.zeros((1, q)), h * np.eye(q), -h * np.eye(q)])
-
-    def at(p: Array) -> tuple[float, Array, Array]:
-        """Return -2 log posterior, its gradient and curvature."""
-        value, gradient, info = data.scoring(model, p)
-        v = -2.0 * prior.log(model, p + signs)
-        up, down = v[1 : 1 + q], v[1 + q :]
-        curve = np.maximum((up + down - 2.0 * v[0]) / h**2, 0.0)
-        return value + float(v[0]), gradient + (up - down) / (2.0 * h), info + np.diag(curve)
-
-    f, g, H = at(p)
-    damp = 1e-4
-    for _ in range(STEPS):
-        # what the record does not tell of a parameter is rounding: it must not make the steps of the others small
-        size = np.sqrt(np.diag(H) + FLAT)
-        step = -np.linalg.solve((H + FLAT * np.eye(q)) / np.outer(size, size) + damp * np.eye(q), g / size) / size
-        step *= min(1.0, 2.0 / max(float(np.max(np.abs(step))), 1e-12))
-        trial = np.clip(p + step, low, high)
-        gain = -float(g @ (trial - p))
-        if gain < 1e-2:
-            break
-        f2, g2, H2 = at(trial)
-        if np.isfinite(f2) and f2 < f:
-            done = f - f2 < 3e-3
-            p, f, g, H = trial, f2, g2, H2
-            damp = max(0.1 * damp, 1e-7)
-            if done:
-                break
-        else:
-            damp = max(10.0 * damp, 1e-2)
-            if damp > 1e6:
-                break
-    information = 0.5 * H
-    evidence = -0.5 * f + volume(model, information)
-    return Fitted(model, p, information, f + 2.0 * float(prior.log(model, p[None])[0]), evidence)
-
-
-def volume(model: Model, information: Array) -> float:
-    """Return the logarithm of the volume of the posterior over the parameters of the terms; each of a filter or
-    a resonance costs PRICE.
-
-    Their prior is known to nobody: how sharply the record shows their parameters is no argument against them.
-    """
-    filters = np.concatenate([(np.arange(t.size) * (t.name == "white") > 0) | (t.name in PEAKS) for t in model])
-    H = information + WIDEST * np.eye(filters.size)
-    logdet = float(np.linalg.slogdet(H)[1])
-    count = int(filters.sum())
-    if count:
-        logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
-    whole = sum(t.filter.startswith("mean") for t in model)  # its number of samples was sought as that of any mean
-    return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * (count + whole)
 
 
 def canonical(model: Model, p: Array) -> tuple[Model, Array]:
@@ -207,6 +137,10 @@ class ModelSearch:
             return
         (term, q), rest = parts[0], parts[1:]
         first, _, behind = term.filter.partition("+")
+        count = samples_of(first) if first.startswith("mean") else round(math.exp(q[1])) if first == "average" else 1
+        if count > 1:  # of slow noise too, which fills its zeros otherwise
+            made = joined([(NoiseTerm("white", f"boxcar{count}"), q[:1]), *rest])
+            yield made[0], [made[1]]
         if first == "average" and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02 and whole > 1:
             new = NoiseTerm("white", f"mean{whole}+{behind}" if behind else f"mean{whole}")
             made = joined([(new, np.delete(q, 1)), *rest])
@@ -254,6 +188,21 @@ class ModelSearch:
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
             self.seen = before
+
+    def grow_boxcar(self) -> None:
+        """Try slow terms beside a mean that they pass too, where it is nearly as likely as the best model: other
+        filters, of more parameters, hide its zeros, and each slow term that passes none fills them.
+        """
+        at: Fitted | None = None
+        while likely := [f for f in self.seen.values() if any(passes_slow(t.filter) for t in f.model)
+                         and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
+            top = max(likely, key=lambda f: f.evidence)
+            if at is not None and top.model == at.model:
+                break
+            at = top
+            for model, start in [(m, s) for m, starts in self.neighbours(at) for s in starts]:
+                if canonical(model, start)[0] not in self.seen:
+                    self.fit(model, start)
 
     # ------------------------------------------------------------------ resonances
     def peak(self, at: Fitted, vain: Sequence[Array] = (), clear: float = CLEAR) -> Array | None:
@@ -383,6 +332,7 @@ def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
     for f in before.ranked[:3]:
         found.fit(f.model, f.p)
     found.climb(found.best, SIMPLE + SHAPES)
+    found.grow_boxcar()
     return found
 
 
@@ -397,4 +347,5 @@ def search(data: Ordinates) -> ModelSearch:
     if found.resonances:
         found.add_resonances()
         found.climb(found.best, SIMPLE + SHAPES)
+    found.grow_boxcar()
     return found

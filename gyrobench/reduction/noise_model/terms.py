@@ -16,9 +16,9 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
 
 Filters, "mean4+first" of two in a row:
 "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them; digital low-passes with zeros at half the sampling rate (bilinear transform), "butterworth" of
-any order and a "cascade" of equal ones of first order (of means over two samples, too); "shape",
-|H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+"mean4" over 4 of them, "boxcar4" of slow noise too; digital low-passes with zeros at half the sampling rate (bilinear
+transform), "butterworth" of any order and a "cascade" of equal ones of first order (of means over two samples, too);
+"shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
 [DRIFT-NOISE-MODEL; own derivation]
@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import functools
 import math
+import string
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -41,6 +42,7 @@ from gyrobench.reduction.series.noise_spectra import folded
 PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")
 DIGITAL = ("butterworth", "cascade")  # filters that slow noise passes too, as they hold back what it has above them
+MEANS = ("mean", "boxcar")  # over a whole number of samples, with zeros; slow noise passes a boxcar too
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
@@ -188,6 +190,16 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
 }
 
 
+def samples_of(name: str) -> int:
+    """Return the samples that a filter of MEANS is over."""
+    return int(name.lstrip(string.ascii_lowercase))
+
+
+def passes_slow(name: str) -> bool:
+    """Return whether slow noise passes a filter too."""
+    return name in DIGITAL or name.startswith("boxcar")
+
+
 def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
     """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none.
 
@@ -196,8 +208,8 @@ def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
     if "+" in name:
         (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
         return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
-    if name.startswith("mean"):
-        return _mean(int(name[4:])), 0
+    if name.startswith(MEANS):
+        return _mean(samples_of(name)), 0
     return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
 
 
@@ -335,8 +347,8 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         z1, z2, share = _second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
         return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
-    if name.startswith("mean") and "+" not in name:
-        count = int(name[4:])
+    if name.startswith(MEANS) and "+" not in name:
+        count = samples_of(name)
         lag = np.arange(count + 1.0)
         return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
     if name == "average":
