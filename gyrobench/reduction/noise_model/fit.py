@@ -32,7 +32,7 @@ from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, j
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
@@ -218,32 +218,17 @@ def about(value: float, low: float, high: float) -> tuple[float, float]:
     return low, high
 
 
-def _likely(clouds: Sequence[Cloud], kind: Callable[[Model], object]) -> list[list[Cloud]]:
-    """Return the models of each kind that the record leaves likely: an interval that depends on the kind must hold for
-    each of them.
-    """
-    groups = [[c for c in clouds if kind(c.model) == k] for k in dict.fromkeys(kind(c.model) for c in clouds)]
-    weights = [sum(float(c.weight.sum()) for c in g) for g in groups]
-    return [g for g, w in zip(groups, weights, strict=True) if w > LIKELY * sum(weights)]
-
-
-def _has_flicker(model: Model) -> bool:
-    return any(t.name == "flicker" for t in model)
-
-
-def _slow_terms(model: Model) -> tuple[str, ...]:
-    return tuple(t.name for t in model if t.name in SLOW)
-
-
 def _beside_any_drift(
     figure: Callable[[Model, Array], Array | None], clouds: Sequence[Cloud], low: float, high: float
 ) -> tuple[float, float]:
     """Return the interval of N, wide enough for that of the models with flicker and that of those without: flicker
     reaches to the highest frequencies, Gauss-Markov drift does not, and a short record does not tell them apart.
     """
-    for some in _likely(clouds, _has_flicker):
+    total = sum(float(c.weight.sum()) for c in clouds)
+    for with_flicker in (True, False):
+        some = [c for c in clouds if any(t.name == "flicker" for t in c.model) == with_flicker]
         values, weights = weighted(some, figure)
-        if values.size:
+        if values.size and float(weights.sum()) > LIKELY * total:
             ends = [math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975)]
             low, high = min(low, ends[0]), max(high, ends[1])
     return low, high
@@ -251,13 +236,13 @@ def _beside_any_drift(
 
 def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:
     """Return the i-th Gauss-Markov process of a model; intervals are of those in the draws that are nearest to it, and
-    hold for every likely combination of slow terms.
+    hold for every likely model.
 
     Where fewer terms stand for more, the tau of one is between those of two: draws of that model alone reach neither.
     """
     own = np.array([q for t, q in split(at.model, at.p) if t == GM])
     low = high = own[i]
-    for some in (clouds, *_likely(clouds, _slow_terms)):
+    for some in (clouds, *([c] for c in clouds)):
         q, weight = _nearest(own[:, 1], i, some)
         if float(weight.sum()) > LIKELY:
             ends = [[quantile(x, weight, share) for x in q.T] for share in (0.025, 0.975)]
