@@ -1,4 +1,4 @@
-"""How often the 95 % intervals of imu_positions contain the true value: random units, sites, noise, six ways.
+"""How often the 95 % intervals of imu_positions contain the true value: random units, sites, noise, eight ways.
 
     python tests/benchmarks/imu_positions.py [WAY ...] [--runs 300] [--seed 1]
 
@@ -7,7 +7,8 @@ The records are made in plain numpy and scipy (tests/support/imu_world.py), whic
 table    12 positions and turns about three axes; noise of window means white, Gauss-Markov (correlation time from 0.3
          windows to half the record) or both
 set_up   the same on a table and in a mount that are off by what is stated, or is not (set_up_unstated)
-thermal  six positions and turns, six times, while the temperature goes 40 K up and down; white noise
+thermal  six positions and turns, six times, while the temperature goes 40 K up and down; the same noise, or white
+         noise alone (thermal_white)
 unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; white noise of a small unit, of its
          gyros white, Gauss-Markov (0.3 positions to half the record) or both
 up_down  an axis up and down, 120 s each at 20 Hz; the same noise of the gyros
@@ -54,14 +55,32 @@ def correlated(t0: Any, t1: Any, tau: float) -> Any:
     return np.diag(own) + upper + upper.T
 
 
-def noise_of(rng: Rng, t0: Any, t1: Any, size: float) -> Any:
-    """Noise (n,) of window means of standard deviation ``size`` for the usual window."""
-    length, usual = t1 - t0, float(np.median(t1 - t0))
+def noise_of(rng: Rng, t0: Any, t1: Any, size: float, own: Any = slice(None)) -> Any:
+    """Noise (n,) of window means of standard deviation ``size`` for the usual window; own: those that the instrument's
+    record has, up to half of whose length the correlation time goes.
+    """
+    length, usual = t1 - t0, float(np.median((t1 - t0)[own]))
     share = float(rng.choice([0.0, 1.0, rng.uniform()]))
-    tau = math.exp(rng.uniform(math.log(0.3 * usual), math.log(0.5 * float(t1[-1] - t0[0]))))
-    own = float(correlated(t0[:1], t0[:1] + usual, tau)[0, 0])
-    covariance = size**2 * ((1.0 - share) * np.diag(usual / length) + share / own * correlated(t0, t1, tau))
+    tau = math.exp(rng.uniform(math.log(0.3 * usual), math.log(0.5 * float(t1[own][-1] - t0[own][0]))))
+    one = float(correlated(np.zeros(1), np.array([usual]), tau)[0, 0])
+    covariance = size**2 * ((1.0 - share) * np.diag(usual / length) + share / one * correlated(t0, t1, tau))
     return np.linalg.cholesky(covariance) @ rng.normal(size=t0.size)
+
+
+def triads(rng: Rng, moving: Any, gyro: float = 0.15 * DPH, accelerometer: float = 1.3e-4) -> Any:
+    """Noise of three gyros and three accelerometers, which are read where the case does not move."""
+    rest = np.flatnonzero(~moving)
+
+    def noise(t0: Any, t1: Any) -> Any:
+        each = ((gyro, slice(None)), (accelerometer, rest))
+        return tuple(np.column_stack([noise_of(rng, t0, t1, size, own) for _ in "xyz"]) for size, own in each)
+
+    return noise
+
+
+def moving_in(phases: Any) -> Any:
+    """Whether the case moves in each window of a plan."""
+    return np.concatenate([np.full(count, bool(rx or ry)) for _, _, rx, ry, _, count in phases])
 
 
 def series_of(rng: Rng, n: int, step: float, window: float, size: float) -> Any:
@@ -80,11 +99,8 @@ def series_of(rng: Rng, n: int, step: float, window: float, size: float) -> Any:
 
 def of_table(rng: Rng) -> tuple[Any, dict[str, float]]:
     world, unit = World(rng.uniform(-1.2, 1.2)), Unit.drawn(rng)
-
-    def noise(t0: Any, t1: Any) -> Any:
-        return tuple(np.column_stack([noise_of(rng, t0, t1, s) for _ in "xyz"]) for s in (0.15 * DPH, 1.3e-4))
-
-    windows = world.windows(plan(FACES + EDGES), unit, noise)
+    places = plan(FACES + EDGES)
+    windows = world.windows(places, unit, triads(rng, moving_in(places)))
     said = budget.ImuSetup(latitude=world.latitude, gravity=world.gravity, earth_rate=EARTH)
     return reduction.reduce(windows, said), unit.coefficients()
 
@@ -109,11 +125,8 @@ def of_set_up(rng: Rng, stated: bool = True) -> tuple[Any, dict[str, float]]:
     off = rng.normal() * 3e-4
     table = Rotation.from_rotvec([0.0, level, azimuth])
     world, unit = World(latitude, gravity + off, case, table, float(square)), Unit.drawn(rng)
-
-    def noise(t0: Any, t1: Any) -> Any:
-        return tuple(np.column_stack([noise_of(rng, t0, t1, s) for _ in "xyz"]) for s in (0.15 * DPH, 1.3e-4))
-
-    windows = world.windows(plan(FACES + EDGES), unit, noise)
+    places = plan(FACES + EDGES)
+    windows = world.windows(places, unit, triads(rng, moving_in(places)))
     sizes = {"u_axis": size, "u_square": size, "u_mount": size, "u_gravity": 3e-4} if stated else {}
     said = budget.ImuSetup(latitude=latitude, gravity=gravity, earth_rate=EARTH, sizes=sizes)
     return reduction.reduce(windows, said), unit.coefficients()
@@ -125,7 +138,16 @@ def of_set_up_unstated(rng: Rng) -> tuple[Any, dict[str, float]]:
 
 
 def of_thermal(rng: Rng) -> tuple[Any, dict[str, float]]:
-    """Six positions and turns, six times, 40 K up and down; white noise of a small unit."""
+    """Six positions and turns, six times, 40 K up and down; noise of a small unit, as that of the table."""
+    from test_imu_thermal import CYCLE, heated, setup
+
+    noise = triads(rng, np.tile(moving_in(CYCLE), 6), 3e-5 / math.sqrt(6.3), 5e-3 / math.sqrt(20.0))
+    windows, truth = heated(int(rng.integers(1 << 30)), noise=noise)
+    return reduction.reduce(windows, setup()), truth
+
+
+def of_thermal_white(rng: Rng) -> tuple[Any, dict[str, float]]:
+    """The same with white noise alone."""
     from test_imu_thermal import heated, setup, white
 
     windows, truth = heated(int(rng.integers(1 << 30)), noise=white(int(rng.integers(1 << 30))))
@@ -158,7 +180,7 @@ def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
 
 WAYS: dict[str, Callable[[Rng], tuple[Any, dict[str, float]]]] = {
     "table": of_table, "set_up": of_set_up, "set_up_unstated": of_set_up_unstated, "thermal": of_thermal,
-    "unknown": of_hand, "up_down": of_up_down,
+    "thermal_white": of_thermal_white, "unknown": of_hand, "up_down": of_up_down,
 }  # fmt: skip
 
 
