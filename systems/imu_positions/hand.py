@@ -148,7 +148,7 @@ class HandTurns(HandChannel):
         halves = np.column_stack([ends[:, 0], ends.mean(axis=1), ends.mean(axis=1), ends[:, 1]]).reshape(-1, 2)
         group = Group("turns", np.arange(y.size), number, "number of the turn", "")
         names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        unit = ("direction of gravity after a turn, its noise made white", "″", ARCSEC)
+        unit = ("whitened direction of gravity", "″", ARCSEC)
         return Regression(names, W @ X, W @ y, halves[:, 0], halves[:, 1], [group], *unit, "white", limit=norms.LIMIT)
 
     def derived(self, found: Findings) -> Findings:
