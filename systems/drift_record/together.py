@@ -69,13 +69,15 @@ def summary(channels: Sequence[RecordChannel]) -> list[Table]:
         head = ["channel", f"N / ({unit})", "95 % from", "95 % to", *density,
                 f"B_min / ({units.unit})", "at / s", "model inside / %", *(["columns / %"] if explained else []),
                 "remarks"]  # fmt: skip
+        filled = [k for k in range(len(head)) if k < 4 or any(row[k] not in (None, "") for row in rows)]
+        least_shown = any(head[k].startswith("B_min") for k in filled)
         caption = (
-            f"N: {meaning}, with its 95 % interval. B_min: least Allan deviation and its averaging time. Model inside: "
-            "averaging times at which the deviation that the model implies lies in the record's own 95 % interval"
+            f"N: {meaning}, with its 95 % interval. "
+            f"{'B_min: least Allan deviation and its averaging time. ' if least_shown else ''}Model inside: averaging "
+            "times at which the deviation that the model implies lies in the record's own 95 % interval"
         )
         if explained:
             caption += "; columns: share of the variance of the samples that temperature and other columns explain"
-        filled = [k for k in range(len(head)) if k < 4 or any(row[k] not in (None, "") for row in rows)]
         rows = [[row[k] for k in filled] for row in rows]
         out.append(Table(id, title, caption, [head[k] for k in filled], rows))
     return out
