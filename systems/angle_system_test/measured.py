@@ -22,6 +22,7 @@ from .readings import in_turn, middle
 ERU = units.factor("ERU")
 METHODS = ("two_heads", "reversal")
 FAR = 0.1  # rad: a reading does not follow the position
+OTHER = 0.05  # of a rate: the reference turns at another one
 TEMPLATE = """\
 # Angle reading system: one row for each position of the table, then one for each reading at each rate.
 # method = two_heads
@@ -98,6 +99,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
         mode = "rate" if w_p else "index"
         record.run.plan.append(PlanRow(phase=int(p), label=label, mode=mode, face="table", target=w_p or at))
     problems += _unlike(w, position, (rate == 0.0) & ~turned)
+    problems += _turning_otherwise(w, rate)
     if problems:
         raise DataError(data, problems)
     quantum = float(system["quantum"])
@@ -118,6 +120,24 @@ def _unlike(w: Mapping[str, Array], position: Array, rest: NDArray[np.bool_]) ->
             found.append(
                 f"{name}: does not follow the position in {np.count_nonzero(off)} of {off.size} rows at rest; check "
                 "unit and sense"
+            )
+    return found
+
+
+def _turning_otherwise(w: Mapping[str, Array], rate: Array) -> list[str]:
+    """Return at which rates the reference turns at another one, of the other sense or in another unit."""
+    found = []
+    for p in np.unique(w["phase"][rate != 0.0]):
+        of = w["phase"] == p
+        turned, went = np.diff(w["reference"][of]), rate[of][1:] * np.diff(w["t_reference"][of])
+        if went.size < 3:
+            continue
+        off = float(np.median(np.abs(in_turn(turned - went))))
+        if off > OTHER * float(np.median(np.abs(went))):
+            seen = float(np.median(in_turn(turned) / np.diff(w["t_reference"][of]))) / ERU
+            found.append(
+                f"phase {p}: by its readings the reference turns at {seen:.4g} ERU, rate says "
+                f"{float(rate[of][0]) / ERU:.4g} ERU; check sign and unit of the rate, and the times"
             )
     return found
 

@@ -36,6 +36,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCSEC
 
 from . import harmonics
+from .outlying import outlying
 from .readings import CLOCKS, OTHER, RATES, SHOWN, AngleSystemSetup, assemble
 from .sources import TABLE_RATE
 
@@ -84,7 +85,7 @@ class Reduction(DriftReduction[AngleSystemSetup]):
         return groups
 
     def fitted(self) -> Findings:
-        """Return the fit.  Its rows are readings at instants, no windows: they are not searched for outliers."""
+        """Return the fit.  Its rows are readings at instants, no windows."""
         found, t = super().fitted(), self.rows.at.t
         return replace(found, data=replace(found.data, t_start=t, t_end=t))
 
@@ -113,7 +114,7 @@ class Reduction(DriftReduction[AngleSystemSetup]):
                 "Each reading counts at the instant that its time stamp states.",
             ],
             tables=[*self._of_reader(found), *self._slipped(), *self._readouts(found)],
-            reasons=self._reasons(),
+            reasons=[*self._reasons(), *self._outlying(found)],
             random="counting and reading noise",
         )  # fmt: skip
 
@@ -191,6 +192,10 @@ class Reduction(DriftReduction[AngleSystemSetup]):
         caption = "Errors of the scale taken out; u: counting, LSB and noise. Type A"
         head = ["readout", "rate of the table / ERU", "rate read, deviation / 1e-6", "u / 1e-6", "u / ERU"]
         return [Table("rate_readouts", "Rate readouts", caption, head, rows)] if rows else []
+
+    def _outlying(self, found: Findings) -> list[Reason]:
+        weights = np.ones_like(found.y) if found.weights is None else found.weights
+        return [] if found.ideal else outlying(found.X, found.y, weights, self.rows.at.angle)
 
     def _reasons(self) -> list[Reason]:
         a, angles, found = self.setup, self.slips.angle, []

@@ -110,13 +110,9 @@ class ImuChannel(DriftReduction[ImuSetup]):
         c = self.channel
         taken = "temperature" if self.thermal is not None else "-"  # the model has more of it
         rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items() if not n.startswith(taken)}
-        found = nuisances.common(rows, f" {c.name}")
         if c.gyro:
-            return found
-        return [
-            Candidate(f.name, f.meaning.replace("drift", "bias"), f.unit.replace("°/h", "µg", 1), UG, f.columns)
-            if not f.scatter else f for f in found if not f.scatter
-        ]  # fmt: skip
+            return nuisances.common(rows, f" {c.name}")
+        return [f for f in nuisances.common(rows, f" {c.name}", nuisances.FORCE) if not f.scatter]
 
     def error(self, found: Findings, omega: Array, force: Array) -> Array:
         """Return the error of the data where rate and specific force are other ones by these (n, 3)."""

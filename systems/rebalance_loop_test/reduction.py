@@ -165,7 +165,7 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
         return Regression(
             quantities, design(x, std, s.full), self.rate / s.k - x, t0, t1,
             [Group("all rates", np.arange(x.size), x / MA, "reading", "mA", curve)], "input current less reading", "µA",
-            UA, candidates=nuisances.common(w) if s.nuisances else (),
+            UA, candidates=nuisances.common(w, of=nuisances.Read("zero", "µA", UA)) if s.nuisances else (),
         )  # fmt: skip
 
     def effects(self, found: Findings) -> list[Effect]:

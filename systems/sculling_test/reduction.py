@@ -129,7 +129,7 @@ class Reduction(DriftReduction[ScullingSetup]):
             Group(label, np.flatnonzero(at), f[at], "frequency", "Hz")
             for label, at in (("at rest", number < 0), ("in motion", number >= 0))
         ]
-        candidates = nuisances.common(w, "") if s.nuisances else ()
+        candidates = nuisances.common(w, of=nuisances.FORCE) if s.nuisances else ()
         return Regression(quantities, X, y, t0, t1, shown, "acceleration", "µg", UG, candidates=candidates)
 
     def effects(self, found: Findings) -> list[Effect]:

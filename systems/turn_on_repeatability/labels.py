@@ -1,4 +1,4 @@
-"""Windows of a record of turn-ons, with the turn-on and the day of each."""
+"""Windows of a record of turn-ons, with the turn-on and the day of each; names of what a fit finds of them."""
 
 from __future__ import annotations
 
@@ -19,3 +19,10 @@ def labelled(record: Record) -> dict[str, Array]:
         if record.run.options["rate"]:
             windows["rate"] = np.array([rows[p].target for p in phase])
     return windows
+
+
+def unknowns(group: str, columns: int, warming: int, scaling: int) -> list[str]:
+    """Return the names of the unknowns of the fit: biases, sizes and time constants of the exponentials."""
+    each = [("warm-up", k + 1) for k in range(warming)] + [("scale factor", k + 1) for k in range(scaling)]
+    names = [f"bias of {group} {k + 1}" for k in range(columns)]
+    return names + [f"{what} of {n} {k}" for what in ("size", "time constant") for n, k in each]

@@ -45,7 +45,7 @@ from gyrobench.units import DPH
 from . import components, mistakes, temperature
 from .components import Spread, spread
 from .draws import Posterior
-from .labels import labelled
+from .labels import labelled, unknowns
 from .truth import true_values
 from .warming import Kind, Warming, fitted, means
 
@@ -54,6 +54,10 @@ FEW = 4  # readings of a turn-on from which on a warm-up is looked for
 MEANT = "time constant of the warm-up: after it 1/e is left"
 SECONDS = "s"
 ENDLESS = "longer than the record tells"
+ALIKE = (
+    "the warm-up differs from turn-on to turn-on: some began before the gyro was cold, or at another temperature",
+    "the warm-up of all turn-ons is the same",
+)
 HIDDEN = "Intervals of the warm-up allow for a second exponential that the record does not exclude."
 
 
@@ -142,7 +146,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         X = np.column_stack([own, warm, scale])
         self.about = np.linalg.lstsq(X, y, rcond=None)[0][self.columns :]
         X = np.column_stack([X, *self._slopes(self.tau, self.tau_E, self.about)])
-        quantities = [Quantity.of(f"p_{k + 1}", "unknown of the fit", "deg/h") for k in range(X.shape[1])]
+        names = unknowns("day" if self.single else "turn-on", self.columns, self.tau.size, self.tau_E.size)
+        quantities = [Quantity.of(n, "unknown of the fit", "deg/h") for n in names]
         shown = [
             Group(f"turn-on {n}", np.flatnonzero(self.turn == k), self.since[self.turn == k], "time since turn-on", "s")
             for k, n in enumerate(self.numbers.tolist())
@@ -342,6 +347,9 @@ class Reduction(DriftReduction[TurnOnSetup]):
         return [TIME_BASE.effect(self.setup, None, values=values)]
 
     def test(self, found: Findings) -> None:
+        if self.tau.size and not self.single and self.count > 1:
+            own = found.X[:, : self.columns] * self._exponentials(self.tau[-1:])
+            found.f_test("warm_up.alike", "warm-up of each turn-on", own, "turn-ons that began warm", *ALIKE)
         if "temperature" not in self.windows or self.single:
             return
         columns = temperature.lags(self.windows, found.est.X, self.read)

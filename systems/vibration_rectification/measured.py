@@ -17,6 +17,7 @@ TEMPLATE = """\
 #
 # axis: of the case, along the vibration.  up: 1 where it points up, -1 where it points down.
 # level: rms of the vibration in the band of the instruments, without gravity; 0 at rest.
+#   Where it is y or z, the axis x of the gyro points east, up and down alike: else the Earth rate is in b_g or G.
 # rate: mean rate that the gyro about x reads.  force: mean that the accelerometer along the axis reads.  One of them
 #   may be left out.  flagged (samples beyond the range), temperature [degC]: optional.
 t_start [s],t_end [s],up,level [g],rate [deg/h],force [g]

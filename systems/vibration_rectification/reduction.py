@@ -51,7 +51,9 @@ from .sources import CONTROL
 GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
 LEAST = 3  # levels, rest included
+FADING = 1.0 / 3.0  # of a level that is not reached: from a reading to the next one
 UG = 1e-6 * G0
+EAST = "The axis x of the gyro points east, up and down alike, where it sees nothing of the Earth rate."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +117,8 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             for way, sign in (("up", 1.0), ("down", -1.0)) if np.any(self.up == sign)
         ]  # fmt: skip
         unit = ("drift", "°/h", DPH) if gyro else ("departure of the specific force", "µg", UG)
-        weighed = nuisances.common(self.windows, f" {self.channel}") if self.setup.nuisances and gyro else ()
+        of = nuisances.DRIFT if gyro else nuisances.FORCE
+        weighed = nuisances.common(self.windows, f" {self.channel}", of) if self.setup.nuisances else ()
         X = self.columns(self.f, self.s2)
         return Regression(self.quantities(), X, y, t0, t1, shown, *unit, candidates=weighed)
 
@@ -137,6 +140,20 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             "the readings do not go with the mean square of the vibration",
             "the readings go with the mean square of the vibration",
         )  # fmt: skip
+        if np.any(late := self.late()):
+            found.f_test(
+                "level.late", "step of the level before", late[:, None], "readings before the level was reached",
+                "the first readings of a level hold some of the level before: wait longer, or leave them out",
+                "each level was reached before its readings",
+            )  # fmt: skip
+
+    def late(self) -> Array:
+        """Return the step of the mean square that a reading would still hold some of, a third of the one before it."""
+        new = np.append(True, (np.diff(self.s2) != 0.0) | (np.diff(self.up) != 0.0))
+        start = np.maximum.accumulate(np.where(new, np.arange(new.size), 0))
+        step = np.where(start > 0, self.s2[start - 1] - self.s2, 0.0) / float(np.max(self.s2))
+        turned = self.up[start] != self.up[start - 1]
+        return np.asarray(np.where(turned, 0.0, step) * FADING ** (np.arange(new.size) - start))
 
     def account(self, found: Findings) -> Account:
         if self.channel == GYRO:
@@ -154,6 +171,7 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             conventions=[
                 "f: gravity along the axis, +1 g where it points up; s: rms of the vibration as the control "
                 "accelerometer reads it.",
+                *([EAST] if self.channel == GYRO and self.setup.axis != "x" else []),
                 *([] if self.both else [one_way]),
             ],
             random="noise of the instrument",

@@ -25,7 +25,7 @@ from imu_world import EDGES, FACES, Unit, World, handled, plan, poses
 
 from gyrobench.frames import G0
 
-KINDS = ("axis exchanged", "left-handed", "sign", "unit", "position forgotten", "row late")
+KINDS = ("axis exchanged", "left-handed", "sign", "unit", "position forgotten", "row late", "not settled")
 Columns = dict[str, np.ndarray]
 Change = Callable[[Columns], None]
 
@@ -129,6 +129,12 @@ def late_stamp(c: Columns) -> None:
     c["since [s]"] = c["since [s]"] + 10.0
 
 
+def began_warm(c: Columns) -> None:
+    """Of the third turn-on half of the warm-up is gone."""
+    half = np.where(c["turn_on"] == 3, np.exp(-c["since [s]"] / 60.0), 0.0)
+    c["mean [deg/h]"] = c["mean [deg/h]"] - half
+
+
 def other_bias(c: Columns) -> None:
     c["mean [deg/h]"] = -7.0 + 0.5 * c["mean [deg/h]"]
 
@@ -141,6 +147,7 @@ TURN_ONS = Sheet(
         Mistake("unit", "since in min under s", "unit", times(1.0 / 60.0, "since [s]")),
         Mistake("position forgotten", "a turn-on that was none: it had stayed on", "turn-on 4", stayed_on),
         Mistake("row late", "stamps of the turn-on late by a reading", "short by one reading", late_stamp),
+        Mistake("not settled", "a turn-on began before the gyro was cold", "before the gyro was cold", began_warm),
     ),
 )  # fmt: skip
 
@@ -215,6 +222,20 @@ SCULLING = Sheet(
 )  # fmt: skip
 
 LEVEL = "t_start [s],t_end [s],up,level [g],rate [deg/h],force [g]"
+
+
+def level_late(c: Columns) -> None:
+    """A reading lacks 2 % of the step of the mean square before it."""
+    s2 = c["level [g]"] ** 2
+    lacks = 0.02 * np.where(np.diff(c["up"], prepend=c["up"][0]) == 0.0, np.diff(s2, prepend=s2[0]), 0.0)
+    c["rate [deg/h]"] = c["rate [deg/h]"] - 3.0 * lacks
+    c["force [g]"] = c["force [g]"] - 8e-5 * lacks
+
+
+def gyro_north(c: Columns) -> None:
+    c["rate [deg/h]"] = c["rate [deg/h]"] + 15.04 * c["up"]
+
+
 VIBRATION = Sheet(
     "vibration_rectification", "vibration_rectification", "# latitude = 0deg\n# gravity = 9.80665\n# axis = y\n",
     lambda: table_of(LEVEL, test_vibration_rectification.rows()),
@@ -228,6 +249,9 @@ VIBRATION = Sheet(
                 copied(8, 0, 8, "rate [deg/h]", "force [g]")),
         Mistake("row late", "readings of a level of the level before", "Row 4 ",
                 copied(3, 2, 1, "rate [deg/h]", "force [g]")),
+        Mistake("not settled", "each level read before it was reached", "wait longer", level_late),
+        Mistake("axis exchanged", "the axis x of the gyro lay to the north", "gyro to the north",
+                gyro_north),
     ),
 )  # fmt: skip
 

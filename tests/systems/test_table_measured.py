@@ -259,11 +259,37 @@ def test_angles_of_a_laboratory(tmp_path: Path, reversal: bool, zero: float) -> 
         (("method = two_heads", "method = reversal"), "positions with turned = 0 and with turned = 1"),
         (("method = two_heads", "method = three"), "method = three: two_heads or reversal"),
         (("reading_2 [deg],", "reading_2 [rad],"), "reading_2: does not follow the position"),
+        (
+            ("rate [ERU]", "rate [deg/h]"),
+            "phase 61: .* reference turns at 500 ERU, rate says 33.24 ERU",
+        ),
     ],
 )
 def test_errors_of_angles(tmp_path: Path, swap: tuple[str, str], text: str) -> None:
     file = write(tmp_path / "angles.csv", template("angle_system_test"), angle_rows(), swap)
     with pytest.raises(gb.GyrobenchError, match=text):
+        gb.reduce("angle_system_test", file)
+
+
+def test_a_reading_that_lies_outside_is_named(tmp_path: Path) -> None:
+    """5 arcsec in one reading of the scale: harmonics were off by up to 3.6 u without a word."""
+    rows = angle_rows()
+
+    def said() -> list[str]:
+        file = write(tmp_path / "angles.csv", template("angle_system_test"), rows)
+        return [r.text for r in gb.reduce("angle_system_test", file).result.reasons if r.id == "outliers"]
+
+    assert not said()
+    rows[17][6] += 5.0 / 3600.0
+    (text,) = said()
+    assert f"at {rows[17][4]:.2f}° (+4.9" in text and "more" not in text
+
+
+def test_a_rate_of_the_other_sense_is_refused(tmp_path: Path) -> None:
+    """It was a lag of the other sign, 100 u from the true one."""
+    rows = [[*row[:3], -row[3], *row[4:]] for row in angle_rows()]
+    file = write(tmp_path / "angles.csv", template("angle_system_test"), rows)
+    with pytest.raises(gb.GyrobenchError, match=r"phase 62: .* turns at -500 ERU, rate says 500 ERU"):
         gb.reduce("angle_system_test", file)
 
 

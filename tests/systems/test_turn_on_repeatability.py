@@ -279,6 +279,23 @@ def test_one_reading_of_each_turn_on(command: Command, tmp_path: Path) -> None:
     assert "A" not in found and "t_w" not in found
 
 
+def test_a_turn_on_that_began_warm_is_named() -> None:
+    """Of turn-on 4 a fourth of the warm-up is left: A was 1.75 °/h, the mean of all, of u = 0.03."""
+    names, units = ("t_start", "t_end", "turn_on", "day", "since", "mean"), (1.0, 1.0, 1.0, 1.0, 1.0, DPH)
+
+    def tested(table: list[list[float]]) -> tuple[float, list[str]]:
+        columns = {n: np.array(c) * u for n, u, c in zip(names, units, zip(*table, strict=True), strict=False)}
+        found = Reduction.reduce(columns, TurnOnSetup(limit=0.2 * DPH))
+        (p,) = (t.p or 0.0 for t in found.tests if t.id == "warm_up.alike")
+        return p, [r.text for r in found.reasons if r.id == "residuals.contradict"]
+
+    cold = [row for row in rows() if row[4] < 160.0]
+    assert tested(cold)[0] > 0.01
+    warm = [[*r[:5], r[5] - (1.5 * math.exp(-r[4] / 60.0) if r[2] == 4 else 0.0), r[6]] for r in cold]
+    p, said = tested(warm)
+    assert p < 1e-3 and "began before the gyro was cold" in said[0]
+
+
 def test_mistakes_are_named() -> None:
     units = (1.0, 1.0, 1.0, 1.0, 1.0, DPH)
     names = ("t_start", "t_end", "turn_on", "day", "since", "mean")

@@ -126,6 +126,8 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     code, _, err = command("reduce", NAME, "--data", str(file), "--out", str(tmp_path / "r"))
     assert code == 0, err
     result = json.loads((tmp_path / "r" / "result.json").read_text())
+    (asked,) = (r["text"] for r in result["reasons"] if r["id"] == "arrangement.unstated")
+    assert "the rate reversed (G2 by" in asked and "the axis x of the gyro to the north" in asked
     found = {c["name"]: c for c in result["coefficients"]}
     for name, value in {"b_g": 4.0, "G": 12.0, "G2": 3.0, "b_a": 2000.0, "S": 500.0, "K2": 80.0, "K3": 1.0}.items():
         low, high = found[name]["interval"]
@@ -152,6 +154,37 @@ def test_mistakes_are_named() -> None:
     assert "accelerometer" in reason.text and "up and down" in reason.text  # it was called a gyro
     assert any("levels are needed" in p for p in problems([row for row in rows() if row[3] < 1.5]))
     assert any("up: 1" in p for p in problems([[*row[:2], 2.0, *row[3:]] for row in rows()]))
+
+
+def shaken(drift: float = 0.0, late: float = 0.0) -> list[list[float]]:
+    """Four readings of each level; force drifts by ``drift`` g over the record, a level lacks ``late`` of its step."""
+    rng, out, t, before = np.random.default_rng(11), list[list[float]](), 0.0, 0.0
+    for way in (1.0, -1.0):
+        for s in (0.0, 1.0, 2.0, 3.0) * 2:
+            for j in range(4):
+                s2 = s * s + (before - s * s) * late * math.exp(-j)
+                rate = 4.0 + 12.0 * way + 3.0 * (1.0 + s2) + 0.1 * rng.normal()
+                force = way + 2e-3 + 5e-4 * way + 8e-5 * (1.0 + s2) + 1e-6 * (way + 3.0 * way * s2)
+                force += drift * (t / 1000.0 - 0.5)
+                out.append([t, t + 6.0, way, s, rate, force + 2e-6 * rng.normal()])
+                t += 8.0
+            before = s * s
+    return out
+
+
+def test_a_level_that_was_not_reached_is_named() -> None:
+    """A fifth of the step is missing in the first reading: G2 was 2.36 °/h/g², 11 u from 3; K2 62.6 µg/g², from 80."""
+    for late in (0.0, 0.2):
+        p = [t.p or 0.0 for t in reduced(shaken(late=late)).tests if t.id.startswith("level.late")]
+        assert len(p) == 2 and (max(p) < 1e-3 if late else min(p) > 0.01)
+    assert any("wait longer" in r.text for r in reduced(shaken(late=0.2)).reasons if r.id == "residuals.contradict")
+
+
+def test_a_force_that_drifts() -> None:
+    """50 µg over the record, up before down: S was off by half of it, 25 ppm, without a trend."""
+    found = {c.name: c for c in reduced(shaken(drift=5e-5)).coefficients}
+    low, high = found["S"].interval
+    assert low < 500.0 < high and high - low < 25.0
 
 
 def problems(table: list[list[float]]) -> list[str]:

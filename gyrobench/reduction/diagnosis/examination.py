@@ -37,7 +37,7 @@ def examined(
             hint = f"it can be reduced, with ordinary residuals, with {named}: was that mistaken?"
             raise ReductionError([*getattr(error, "problems", [str(error)]), hint]) from None
         raise
-    if "latitude" in record.run.options:
+    if "latitude" in record.run.options and "since" not in record.windows:  # turn-ons: the Earth rate is in the bias
         near = plausibility.earth_rate_warnings(result, Location.of(record.run))
         result = replace(result, reasons=[*result.reasons, *near])
     found = with_diagnosis(record, result, reduce, candidates)

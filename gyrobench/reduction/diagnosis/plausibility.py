@@ -2,7 +2,8 @@
 
 Such mistakes change the estimates and leave the residuals as they are: with the latitude of the other sign the constant
 drift of a gyro with its input axis up is wrong by 2 omega sin(latitude).  A drift of that size may be real, so this is
-a warning and withholds nothing.
+a warning and withholds nothing.  Of a gyro whose other coefficients are of that size, too, it is real: one of them in
+six would lie near one of the rates by chance.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from gyrobench.units import DPH
 
 NEAR = 0.03  # relative distance
 RATES = ("°/h", "°/h/g", "°/h/g²")
+ALONE = 3.0  # times the others, where there are others: a mistake stands out from the drift of the gyro
 LEAST = 3.0  # deg/h: smaller multiples (near the pole, at the equator) are the size of drifts
 
 
@@ -26,10 +28,8 @@ def earth_rate_warnings(result: DriftTestResult, site: Location) -> list[Reason]
         "horizontal component of the Earth rate": whole * abs(math.cos(site.latitude)),
         "Earth rate": whole,
     }
-    found = []
-    for c in result.coefficients:
-        if c.unit not in RATES:
-            continue
+    found, others = [], []
+    for c in (c for c in result.coefficients if c.unit in RATES and math.isfinite(c.estimate)):
         near = [
             (abs(abs(c.estimate) / (m * rate) - 1.0), f"{words} {name}, {m * rate:.4g} °/h")
             for m, words in ((1.0, "the"), (2.0, "twice the"))
@@ -38,8 +38,12 @@ def earth_rate_warnings(result: DriftTestResult, site: Location) -> list[Reason]
         ]
         distance, words = min(near, default=(1.0, ""))
         if distance < NEAR:
-            found.append(f"{c.name} = {c.estimate:.4g} {c.unit} is close to {words}".replace("-", "−"))
-    if not found:
+            text = f"{c.name} = {c.estimate:.4g} {c.unit} is close to {words}".replace("-", "−")
+            found.append((abs(c.estimate), text))
+        else:
+            others.append(abs(c.estimate))
+    said = [text for size, text in found if size > ALONE * max(others, default=0.0)]
+    if not said:
         return []
-    text = f"{'; '.join(found)}. Check the sign of the latitude, the attitudes and the sense of rotation."
+    text = f"{'; '.join(said)}. Check the sign of the latitude, the attitudes and the sense of rotation."
     return [Reason("plausibility.earth_rate", text)]

@@ -25,7 +25,7 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from gyrobench.frames import G0
+from gyrobench.frames import EARTH_RATE, G0
 from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import (
     ANGLES,
@@ -50,7 +50,7 @@ from gyrobench.reduction.drift.late_temperature import following
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup.conditions import READINGS
+from gyrobench.reduction.setup.conditions import READINGS, SHAKEN, readings
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
 
@@ -84,6 +84,8 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     yield from _two_pairs(record)
     yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
     yield from reversed_columns(record, [n for n in record.windows if n.startswith(READINGS)], "the reading", False)
+    for name in (n for n in readings(record.windows) if not n.startswith(READINGS)):
+        yield from reversed_columns(record, [name], f"the {name}", False)
     for a, b in (*NEIGHBOURS, *(GYROS if "outer_start" not in record.windows else ())):
         yield from exchanged_columns(record, [(a, b)], f"the columns {a} and {b} exchanged")
     forces = [n for n in FORCES if n in record.windows]
@@ -100,6 +102,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
+    yield from _north(record)
     yield from _meters(record)
     yield from _daily(record)
     if "mean" in record.windows and len(rate := np.asarray(record.windows.get("rate", ()), dtype=float)) > 1:
@@ -147,6 +150,18 @@ def _daily(record: Record) -> Iterator[HandlingCandidate]:
     yield HandlingCandidate(
         "a drift by the time of day as large as the scatter of a window", changed(record, **columns)
     )
+
+
+def _north(record: Record) -> Iterator[HandlingCandidate]:
+    """A gyro that lies level on a shaker with its axis x to the north, turned over about it or about the other one."""
+    w, options = record.windows, record.run.options
+    if not all(n in w for n in SHAKEN) or options.get("axis") == "x":
+        return
+    rate, up = np.asarray(w[SHAKEN[0]], dtype=float), np.asarray(w["up"], dtype=float)
+    earth = EARTH_RATE * math.cos(float(options["latitude"]))
+    for words, sign in (("", np.ones_like(up)), (", down to the south", up)):
+        found = changed(record, **{SHAKEN[0]: rate - earth * sign})
+        yield HandlingCandidate(f"the axis x of the gyro to the north{words}", found)
 
 
 def _meters(record: Record) -> Iterator[HandlingCandidate]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gyrobench import units
 from gyrobench.arrays import Array
+from gyrobench.frames import G0
 from gyrobench.reduction.estimation import nuisance_states
 from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
@@ -27,8 +28,8 @@ from gyrobench.result import Reason, Table
 from gyrobench.units import DPH
 
 SCATTERS = {  # kind of the constants -> meaning of their scatter
-    "mount": "standard deviation of the drift from mount to mount",
-    "turn_on": "standard deviation of the drift from turn-on to turn-on",
+    "mount": "standard deviation of the {} from mount to mount",
+    "turn_on": "standard deviation of the {} from turn-on to turn-on",
 }
 BOTH = ("pass", "fail")
 FREEDOM = 10  # degrees of freedom that must be left beside all candidates
@@ -73,49 +74,65 @@ class Candidate:
         return NuisanceBlock(self.name, np.reshape(self.columns, (len(self.columns), -1)), self.scatter)
 
 
-def trend(t_start: Array, t_end: Array) -> Candidate:
+@dataclass(frozen=True)
+class Read:
+    """What a test reads, in the words and the unit (of ``scale`` SI) of its report."""
+
+    name: str
+    unit: str
+    scale: float
+
+
+DRIFT = Read("drift", "°/h", DPH)
+FORCE = Read("bias", "µg", 1e-6 * G0)
+
+
+def trend(t_start: Array, t_end: Array, of: Read = DRIFT) -> Candidate:
     """Drift that changes linearly in time; its column has no mean, so that the constant is that of the middle."""
     middle = (t_start + t_end) / 2.0
     hours = (middle - np.average(middle, weights=t_end - t_start)) / 3600.0
-    return Candidate("trend", "linear change of the drift in time", "°/h/h", DPH, hours)
+    return Candidate("trend", f"linear change of the {of.name} in time", f"{of.unit}/h", of.scale, hours)
 
 
-def temperature(windows: Mapping[str, Array]) -> list[Candidate]:
+def temperature(windows: Mapping[str, Array], of: Read = DRIFT) -> list[Candidate]:
     """One candidate of each column temperature... of a record: its mean over all (K) and, of two, their difference."""
     named = {n: np.asarray(v, dtype=float) for n, v in windows.items() if n.startswith("temperature")}
     values = list(named.values())
     if not values:
         return []
     mean = np.mean(values, axis=0)
-    found = [Candidate("temperature", "drift per kelvin", "°/h/K", DPH, mean - mean.mean())]
+    each = f"{of.unit}/K"
+    found = [Candidate("temperature", f"{of.name} per kelvin", each, of.scale, mean - mean.mean())]
     if len(values) == 2:
         step = values[1] - values[0]
         between = " and ".join(named)
-        found.append(Candidate("gradient", f"drift per kelvin between {between}", "°/h/K", DPH, step - step.mean()))
+        meaning = f"{of.name} per kelvin between {between}"
+        found.append(Candidate("gradient", meaning, each, of.scale, step - step.mean()))
     return found
 
 
-def scatter(kind: str, groups: Sequence[object], channel: str = "") -> Candidate:
+def scatter(kind: str, groups: Sequence[object], channel: str = "", of: Read = DRIFT) -> Candidate:
     """Return constants that scatter from group to group: groups (n,) names each row's mount, or turn-on.
 
     channel: as of :func:`common`.
     """
     keys = list(dict.fromkeys(groups))
     columns = np.array([[g == k for k in keys] for g in groups], dtype=float)
-    return Candidate(f"σ_{kind}{channel}", SCATTERS[kind], "°/h", DPH, columns, scatter=True, kind=kind)
+    meaning = SCATTERS[kind].format(of.name)
+    return Candidate(f"σ_{kind}{channel}", meaning, of.unit, of.scale, columns, scatter=True, kind=kind)
 
 
-def common(windows: Mapping[str, Array], channel: str = "") -> list[Candidate]:
+def common(windows: Mapping[str, Array], channel: str = "", of: Read = DRIFT) -> list[Candidate]:
     """The candidates of every test: what thermometers read (columns temperature...), a trend, and constants that
     differ from turn-on to turn-on (column turn_on, their numbers).
 
     A temperature that only ramps is a trend: what was measured comes first, and the trend is named as its alias.
-    channel: appended to their names, where several channels are reported together.
+    channel: appended to their names, where several channels are reported together.  of: what is read.
     """
     t0, t1 = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end"))
-    found = [*temperature(windows), trend(t0, t1)]
+    found = [*temperature(windows, of), trend(t0, t1, of)]
     if "turn_on" in windows:
-        found.append(scatter("turn_on", np.round(windows["turn_on"]).tolist()))
+        found.append(scatter("turn_on", np.round(windows["turn_on"]).tolist(), of=of))
     return [replace(c, name=c.name + channel) for c in found]
 
 

@@ -18,6 +18,7 @@ from gyrobench.result import Coefficient, Reason, Result
 R = TypeVar("R", bound=Result)
 #: what the columns of readings begin with
 READINGS = ("mean", "drift_", "acceleration", "force")
+SHAKEN = ("rate", "level")  # the rate that a gyro reads where a shaker has a level; else that of a table
 LEAST, MOST = 3, 3000  # rows of a block that was copied, of a record in which one is looked for
 CHANCE = 5.0  # decades by which rows that are equal are no chance
 TYPE_B_UNSTATED = "type_b.unstated"
@@ -30,6 +31,12 @@ WARMED = {
     "R_x": ("Dy_T", 1.0),
     "R_y": ("Dx_T", -1.0),
 }
+
+
+def readings(windows: Mapping[str, Array]) -> list[str]:
+    """Return the columns of a record that an instrument has read."""
+    rate, level = SHAKEN
+    return [n for n in windows if n.startswith(READINGS) or (n == rate and level in windows)]
 
 
 def applied(result: R, record: Record) -> R:
@@ -71,7 +78,7 @@ def reasons(record: Record) -> list[Reason]:
     found = [Reason("part.external", text) for text in run.external]
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
-        found += identical_phases(record) or identical_rows(record) or unsettled(record, READINGS)
+        found += identical_phases(record) or identical_rows(record) or unsettled(record, readings(record.windows))
     if run.measured and not run.type_b_stated:
         text = (
             "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
@@ -125,8 +132,8 @@ def identical_rows(record: Record) -> list[Reason]:
     A block of n rows that are all different is found again by chance at one of N^2 places with 1 in D^n; D as of
     :func:`identical_phases`.
     """
-    for name, values in record.windows.items():
-        y = np.asarray(values, dtype=float) if name.startswith(READINGS) else np.zeros(0)
+    for name in readings(record.windows):
+        y = np.asarray(record.windows[name], dtype=float)
         length, first, second = _longest_copy(y) if LEAST <= y.size <= MOST else (0, 0, 0)
         own = y[second : second + length]
         if length < LEAST or np.unique(own).size < length:

@@ -33,15 +33,12 @@ SAME = ("phase", "rate", "frequency", "level", "up", "turned", "angle_", "outer_
 WARMING = ("since", "turn_on")  # of a test of settling itself
 
 
-def unsettled(record: Record, readings: tuple[str, ...]) -> list[Reason]:
-    """Return that the ends of the dwells are not as what lies between; readings: what the names of their columns begin
-    with.
-    """
+def unsettled(record: Record, names: list[str]) -> list[Reason]:
+    """Return that the ends of the dwells are not as what lies between; names: of the columns of readings."""
     w = record.windows
     if any(n in w for n in WARMING):
         return []
-    names = [n for n in w if n.startswith(readings)]
-    dwells = _dwells(w)
+    dwells = _dwells(w, names)
     tested = [(n, *_tested(ends), ends) for n in names if (ends := _ends(w[n], dwells)) is not None]
     limit = LEVEL / max(2 * len(tested), 1)
     said = [_said(name, by_mean, ends) for name, by_mean, p, ends in tested if p < limit]
@@ -55,9 +52,9 @@ def unsettled(record: Record, readings: tuple[str, ...]) -> list[Reason]:
     return [Reason("record.unsettled", text, blocks=("pass", "fail"), severity="doubt")]
 
 
-def _dwells(w: dict[str, Array]) -> list[slice]:
-    """Return the stretches of three rows or more in which nothing but time changes."""
-    kept = [np.asarray(v, dtype=float) for n, v in w.items() if n.startswith(SAME)]
+def _dwells(w: dict[str, Array], names: list[str]) -> list[slice]:
+    """Return the stretches of three rows or more in which nothing but time and readings (names) changes."""
+    kept = [np.asarray(v, dtype=float) for n, v in w.items() if n.startswith(SAME) and n not in names]
     n = len(w["t_start"]) if "t_start" in w else 0
     if n == 0 or not kept:
         return []
