@@ -14,7 +14,6 @@ P = plate + T e^(-j theta) + W e^(j theta).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,87 +22,17 @@ from scipy import special
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCSEC,
     Account,
-    Array,
     MeasureReduction,
     ReductionError,
-    RunDocument,
     told,
 )
 from gyrobench.reduction.loops.scale_errors import truth, waves
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import Series, Table
 
+from .contradiction import contradicted, misplaced
 from .places_fit import Averaged, PlacesFit, averaged_over_walk, least_squares, visits, walk
-
-SEPARATED = 0.1  # least |1 - exp(j n angle)| at which an order is estimated
-JITTER = 0.005  # of the variance of a rounding is left where the loop moves the table by a count while it is read
-HEADS = ("reader", "reader_2")
-NEEDED = ("level_x", "level_y", "tracking", "second")
-
-
-def within_turn(x: Array) -> Array:
-    """Return angles less the nearest whole number of turns."""
-    return np.asarray(x - 2 * math.pi * np.round(x / (2 * math.pi)))
-
-
-class Readings:
-    """One row a position; angles in rad.
-
-    theta: commanded.  azimuth, mount: of polygon and level, and which of them.  t: middle of the reading, s.  sense: +1
-    on the way up, -1 back, 0 where the record shows no move since the reference was mounted.  second, true: reading of
-    the second head, and true position, less theta.  place, face: numbers of the position and of the face that is seen,
-    from 0; seen: faces seen at all.  rounding: variance of the difference of two counted readings, rad2.
-    """
-
-    def __init__(self, w: Mapping[str, Array], run: RunDocument) -> None:
-        o = run.options
-        self.faces, self.head, self.orders = int(o["positions"]), float(o["head"]), int(o["orders"])
-        quanta = (float(run.parameters.get(f"{n}.quantum", 0.0)) for n in HEADS)
-        self.rounding = sum(q**2 for q in quanta) * JITTER / 12.0
-        plan = {row.phase: row for row in run.plan}
-        rows = [plan[int(p)] for p in w["phase"]]
-        names = list(dict.fromkeys(row.face for row in run.plan))
-        azimuths = np.radians([*dict.fromkeys(map(float, str(o["mounts"]).split()))])
-        self.theta = np.array([row.target for row in rows])
-        self.mount = np.array([names.index(row.face) for row in rows])
-        self.azimuth = azimuths[self.mount]
-        self.mounts = int(self.mount.max()) + 1
-        self.t = (w["t_start"] + w["t_end"]) / 2.0
-        self.sense = np.zeros(self.theta.size)  # of the last move, by the cumulative reading
-        for k, moved in enumerate(np.diff(w["angle_start"]), 1):
-            stays = self.sense[k - 1] if self.mount[k] == self.mount[k - 1] else 0.0
-            self.sense[k] = np.sign(moved) if abs(moved) > 1e-3 else stays
-        self.deviation, self.tracking, self.level = w["mean"], w["tracking"], w["level_x"] + 1j * w["level_y"]
-        self.second = within_turn(w["second"] - self.theta)
-        self.true = within_turn(w["true"] - self.theta) if "true" in w else None
-        pitch = 2 * math.pi / self.faces
-        self.place = np.round(self.theta / pitch).astype(np.int64) % self.faces
-        self.face = np.round((self.theta + self.azimuth) / pitch).astype(np.int64) % self.faces
-        self.seen = np.unique(self.face)
-
-    @property
-    def both_senses(self) -> bool:
-        """Return whether a place was reached from both sides: lost motion looks like a face's error otherwise."""
-        return any(np.ptp(self.sense[self.place == x]) > 1.0 for x in np.unique(self.place))
-
-    def drifts(self) -> Array:
-        """Return the columns of a drift of the autocollimator, even with the time in each mount: from -1 to 1."""
-        columns: Array = (self.mount[:, None] == np.arange(self.mounts)).astype(np.float64)
-        for of in columns.T:
-            t = self.t[of > 0.0]
-            of[of > 0.0] = (2.0 * t - t.min() - t.max()) / max(float(np.ptp(t)), 1e-9)
-        return columns
-
-    def unknown_ways(self) -> Array:
-        """Return a column for each run of readings at a place that was reached in an unknown sense."""
-        unknown = self.sense == 0.0
-        run = np.cumsum(np.append(True, np.diff(self.mount) != 0)) * unknown
-        return np.asarray((run[:, None] == np.unique(run[unknown])).astype(float))
-
-    def separated(self, n: int) -> bool:
-        """Return whether an order is told from the errors of the polygon."""
-        apart = [b - self.azimuth[0] for b in np.unique(self.azimuth)] + [self.head]
-        return bool(max(abs(1.0 - np.exp(1j * n * b)) for b in apart) > SEPARATED)
+from .readings import Readings, faces_of
 
 
 def position_fit(r: Readings) -> tuple[PlacesFit, list[int], bool]:
@@ -117,8 +46,7 @@ def position_fit(r: Readings) -> tuple[PlacesFit, list[int], bool]:
     orders = [n for n in range(1, r.orders + 1) if r.separated(n)]
     n, both = r.theta.size, r.both_senses
     zeros = (r.mount[:, None] == np.arange(r.mounts)).astype(float)
-    seen = (r.face[:, None] == r.seen).astype(float)
-    seen = seen[:, :-1] - seen[:, -1:]  # the sum of p is 0
+    seen = faces_of(r)
     own = waves(orders, r.theta)
     fixed = np.column_stack([own, *([0.5 * r.sense] if both else []), zeros, np.zeros(n)])
     y, place = np.concatenate([r.deviation + r.tracking, r.second + r.tracking]), np.tile(r.place, 2)
@@ -171,6 +99,9 @@ DRIFT = (
 )
 
 
+NEEDED = ("level_x", "level_y", "tracking", "second")
+
+
 class Reduction(MeasureReduction):
     """Harmonics of the position error told from the polygon's, then tilt, wobble and squareness by the level."""
 
@@ -190,6 +121,9 @@ class Reduction(MeasureReduction):
         self._repeatability()
         if r.both_senses and not drifts:
             self.found.warn("lost_motion.drift", DRIFT)
+        if self.run.measured:
+            self.found.doubt("position.contradiction", contradicted(r))
+            self.found.doubt("position.mounts", misplaced(r))
         self._level()
         self._polygon()
         self.found.facts |= {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import jsonschema
@@ -178,6 +180,51 @@ def test_positions_that_do_not_tell_drift_from_lost_motion_say_so(tmp_path: Path
     result = gb.reduce("table_position_test", write(tmp_path / "p.csv", template("table_position_test"), rows)).result
     assert [r.id for r in result.reasons if r.id == "lost_motion.drift"] == ["lost_motion.drift"]
     assert "often enough" in result["lost motion"].no_value and not result["E1 cos"].no_value
+
+
+DEVIATION, MOUNT, SECOND = 4, 2, 6  # columns of position_rows
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda row: None, ""),
+        (
+            lambda row: row.__setitem__(DEVIATION, -row[DEVIATION]),
+            "contradict.*autocollimator's sign reversed",
+        ),
+        (lambda row: row.__setitem__(DEVIATION, 2.0 * row[DEVIATION]), "contradict each other.*twice the angle"),
+        (lambda row: row.__setitem__(MOUNT, -row[MOUNT] % 360), "all mounts.*turned the other way"),
+        (lambda row: row.__setitem__(MOUNT, {180: 210}.get(row[MOUNT], row[MOUNT])), "mount 210° at 180°"),
+    ],
+    ids=["none", "sign", "twice", "other way", "face"],
+)
+def test_readings_of_a_table_that_contradict_one_another(
+    tmp_path: Path, change: Callable[[list[float]], None], text: str
+) -> None:
+    """Autocollimator reversed: E3 was -0.2 for 0.2 arcsec or the mean of both, up to 100 u off, without a word."""
+    rows = position_rows()
+    for row in rows:
+        change(row)
+    file = write(tmp_path / "p.csv", template("table_position_test"), rows)
+    reasons = [r for r in gb.reduce("table_position_test", file).result.reasons if r.id.startswith("position.")]
+    assert all(r.blocks == ("pass", "fail") for r in reasons)
+    assert not reasons if not text else re.search(text, " ".join(r.text for r in reasons))
+
+
+def test_single_counts_leave_their_rounding_at_a_place(tmp_path: Path) -> None:
+    """A second head that is read in single counts of a table at rest: 0.18 arcsec / sqrt(12) = 0.052 arcsec a place, of
+    twelve places and waves of 2 E: sqrt(2/12) 0.052 / 2 = 0.011 arcsec.  u was 0.002 to 0.005, and E3 up to 8 u off.
+    """
+    rows = position_rows()
+    for row in rows:  # without the 0.03 arcsec of noise: E(x) - E(x + 180 deg) + 7 - e
+        x = math.radians(row[3])
+        exact = 2.0 * (0.7 * math.cos(x) + 0.2 * math.cos(3 * x)) + 7.0 - row[5]
+        row[SECOND] = row[3] + 0.18 * round(exact / 0.18) / 3600.0
+        row[DEVIATION] += 0.3 * math.sin(1e3 * row[0])  # an autocollimator that tells little
+    result = gb.reduce("table_position_test", write(tmp_path / "p.csv", template("table_position_test"), rows)).result
+    for name, value in {"E1 cos": 0.7, "E1 sin": 0.0, "E3 cos": 0.2, "E3 sin": 0.0}.items():
+        assert abs(result[name].estimate - value) < 3.0 * result[name].u and 0.008 < result[name].u < 0.014
 
 
 @pytest.mark.parametrize(
