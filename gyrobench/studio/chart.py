@@ -90,6 +90,7 @@ def panels(titles: Sequence[str], begin: float, end: float) -> dict[str, Any]:
     """Return the options of a chart over time, s: a panel for each title, one above the other, without series."""
     top = [TOP + k * (PANEL + GAP) for k in range(len(titles))]
     last = len(titles) - 1
+    begin, end = float(f"{begin:.12g}"), float(f"{end:.12g}")  # the axis writes them with all their digits
     return {
         "animation": False, "color": list(COLOURS), "backgroundColor": "transparent",
         "textStyle": {"color": TEXT},

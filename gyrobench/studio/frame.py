@@ -135,9 +135,8 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
         try:
             action()
         except Exception as error:
-            ui.notify(
-                visible(user_message(error)), type="negative", multi_line=True, close_button=say("Close"), timeout=0
-            )
+            words, close = say(visible(user_message(error))), say("Close")
+            ui.notify(words, type="negative", multi_line=True, close_button=close, timeout=0)
 
     return guarded
 

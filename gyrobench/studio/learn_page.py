@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+from functools import partial
 from html import escape
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from gyrobench.errors import GyrobenchError
 from gyrobench.report.language import ENGLISH
-from gyrobench.studio.frame import CopyLines, Studio, frame
+from gyrobench.studio.frame import CopyLines, Studio, frame, show_problem
 from gyrobench.studio.words import heading, say
 from gyrobench.workflow.lessons import Lesson, lesson, lessons, write_lesson
 
@@ -28,6 +29,22 @@ def page_of(studio: Studio, item: Lesson, language: str) -> Path:
     if not path.is_file():
         write_lesson(item, path, language, studio.bench)
     return path
+
+
+async def _shown(studio: Studio, item: Lesson, place: ui.element) -> None:
+    """Put the page of a lesson into its place, or what stands against it."""
+    problem = None
+    try:
+        await asyncio.to_thread(page_of, studio, item, say.code)
+    except Exception as error:
+        problem = error
+    place.clear()
+    with place:
+        if problem is not None:
+            show_problem(problem)
+            return
+        title, source = escape(item.texts(say.code)["title"]), f"/lesson/{say.code}/{item.name}"
+        ui.html(f'<iframe class="report" src="{source}" title="{title}"></iframe>', sanitize=False)
 
 
 def add_learn_pages(studio: Studio, app: FastAPI) -> None:
@@ -54,14 +71,15 @@ def add_learn_pages(studio: Studio, app: FastAPI) -> None:
                         ui.label(f"{item.number}. {texts['title']}").classes("title")
                         ui.label(texts["question"]).classes("summary")
 
-    @ui.page("/learn/{name}", response_timeout=120)
-    async def one(name: str) -> None:
+    @ui.page("/learn/{name}", response_timeout=60)
+    def one(name: str) -> None:
         with frame(studio, "Learn"):
             item = lesson(name, studio.bench)
-            await asyncio.to_thread(page_of, studio, item, say.code)  # what stands against it is said here
-            title = escape(item.texts(say.code)["title"])
-            source = f"/lesson/{say.code}/{item.name}"
-            ui.html(f'<iframe class="report" src="{source}" title="{title}"></iframe>', sanitize=False).classes("full")
+            with ui.element("div").classes("full") as place:
+                ui.label(say("The lesson is being made: at the first time its simulation is compiled.")).props(
+                    "role=status"
+                )
+            ui.timer(0.0, partial(_shown, studio, item, place), once=True)  # the page is there before its lesson
             language = f" --language {say.code}" if say.code != ENGLISH else ""
             every = lessons(studio.bench)
             at = [other.name for other in every].index(item.name)

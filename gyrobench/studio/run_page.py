@@ -259,9 +259,12 @@ def _add_runs_page(studio: Studio) -> None:
             _table(entries, chosen)
 
             def go() -> None:
-                places = [r.place for r in reversed(entries) if r.place in chosen and chosen[r.place].value]
+                ticked = [r for r in reversed(entries) if r.place in chosen and chosen[r.place].value]
+                places = [r.place for r in ticked]
                 if len(places) < 2:
                     raise UsageError("tick two runs or more to compare them")
+                if early := [r.place for r in ticked if not r.complete]:
+                    raise UsageError(f"{', '.join(early)}: not at its end; resume it, or untick it")
                 ui.navigate.to("/compare?" + "&".join(f"run={quote(p)}" for p in places))
 
             compare.on_click(told(go))

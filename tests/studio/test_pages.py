@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import urllib.error
@@ -203,6 +204,25 @@ def test_two_runs_are_compared(page: Any, studio: tuple[str, Path], two_runs: li
     series = "getElement(document.querySelector('.chart').id.slice(1)).chart?.getOption()?.series?.map(s => s.name)"
     page.wait_for_function(f"() => {series}?.length === 4")  # it comes empty first
     assert len({n.partition(", ")[0] for n in page.evaluate(series)}) == 2, "two signals of two runs"
+
+
+def test_a_run_that_was_stopped_early_is_not_compared(
+    page: Any, studio: tuple[str, Path], two_runs: list[Path]
+) -> None:
+    early = two_runs[0].with_name("early")
+    shutil.copytree(two_runs[0], early)
+    document = json.loads((early / "run.json").read_text())
+    (early / "run.json").write_text(json.dumps({**document, "complete": False}))
+    page.goto(base_of(studio) + "/runs")
+    page.get_by_label("choose fixed_position/run2").click()
+    page.get_by_role("button", name="Compare").click()
+    page.get_by_text("tick two runs or more").wait_for()
+    page.get_by_label("choose fixed_position/early").click()
+    page.get_by_role("button", name="Compare").click()
+    page.get_by_text("fixed_position/early: not at its end").wait_for()
+    assert page.url.endswith("/runs")
+    close = page.locator(".q-notification button").first
+    soon(lambda: close.evaluate("e => getComputedStyle(e).color"), "rgb(255, 255, 255)")  # on red
 
 
 @pytest.mark.long
