@@ -20,7 +20,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from systems.platform_alignment import plans
+from systems.platform_alignment import planning, plans
 
 DEG, ARCMIN = math.pi / 180.0, math.pi / 10800.0
 LATITUDES = {"0°": 0.0, "45°": 45.0 * DEG, "70°": 70.0 * DEG}
@@ -33,8 +33,8 @@ def ready(latitude: float, sensors: plans.Sensors, positions: int, wanted: float
     given = plans.Settings(
         latitude, positions=positions, coarse_time=0.0, fast_frequency=0.0, fast_time=-1.0, slow_frequency=0.0
     )
-    settings = plans.designed(given, sensors, wanted, math.pi / 2.0, LONGEST)
-    found = plans.ready_after(*plans.predicted(settings, sensors, math.pi / 2.0, LONGEST), wanted)
+    settings = planning.designed(given, sensors, wanted, math.pi / 2.0, LONGEST)
+    found = planning.ready_after(*planning.predicted(settings, sensors, math.pi / 2.0, LONGEST), wanted)
     return math.nan if found is None else found
 
 

@@ -11,6 +11,7 @@ where it is: the plant is the loop opened before it, over this gain.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -25,9 +26,9 @@ Values = Mapping[str, Any]  # parameters of the part by name
 
 
 @dataclass(frozen=True)
-class OwnController:
+class OwnController(ABC):
     """One kind.  names: parameters by which it is told; structure: that it has where none is asked for; unit: of its
-    output.  inner: no communication step lies between the controller and what it drives.
+    output.
     """
 
     names: ClassVar[tuple[str, ...]]
@@ -35,32 +36,23 @@ class OwnController:
     has: ClassVar[str] = "one number, its gain"
     unit: ClassVar[str] = "N·m"
     own: ClassVar[tuple[str, ...]] = ()  # parameters that no spread may have; (): all of the part
-    inner: ClassVar[bool] = False
     started: ClassVar[int] = 0  # steps after which one step of the part is like the next
 
-    def small(self, q: Values) -> float:
-        """Return a gain with which an inner controller without dynamics may run, and with twice as much."""
-        raise NotImplementedError
-
-    def blank(self, q: Values, gain: float) -> dict[str, Any]:
-        """Return the parameters that make an inner controller a gain alone."""
-        raise NotImplementedError
-
+    @abstractmethod
     def gain(self, q: Values) -> float:
         """Return the gain, output per signal."""
-        raise NotImplementedError
 
+    @abstractmethod
     def limit(self, q: Values) -> float:
         """Return the largest output."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def settings(self, controller: Controller, q: Values) -> dict[str, Any]:
+        """Return the parameters that make this controller."""
 
     def per_added(self, q: Values, f: Array) -> Array:
         """Return the signal at the controller per what a test adds to it, at frequencies in Hz."""
         return np.ones_like(f)
-
-    def settings(self, controller: Controller, q: Values) -> dict[str, Any]:
-        """Return the parameters that make this controller."""
-        raise NotImplementedError
 
     def fits(self, shape: ControllerStructure) -> bool:
         return shape.name == self.structure
@@ -97,14 +89,25 @@ class SlavingGain(OwnController):
         return {"k": controller.values["K"]}
 
 
-class TableNetworks(OwnController):
+class InnerOwnController(OwnController):
+    """One with no communication step between it and what it drives."""
+
+    @abstractmethod
+    def small(self, q: Values) -> float:
+        """Return a gain with which it may run without dynamics, and with twice as much."""
+
+    @abstractmethod
+    def blank(self, q: Values, gain: float) -> dict[str, Any]:
+        """Return the parameters that make it a gain alone."""
+
+
+class TableNetworks(InnerOwnController):
     """Three networks in a turntable, between its demodulator and its motor; the part knows its gyro by H_g ... K_g."""
 
     names = ("network", "zeros", "poles", "stiffness", "torque_max")
     structure = "lag+lead+lead"
     has = "three networks: lag and lead, joined by +, at most three"
     own = ("network", "zeros", "poles", "stiffness", "crossover", "H_g", "J_g", "C_g", "K_g", "polarity")
-    inner = True
     started = 3  # mode, capture, fine
     COUNT = 3
     SLOW = 0.1  # of what is slowest in the plant: its crossover with a small gain

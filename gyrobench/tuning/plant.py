@@ -20,7 +20,7 @@ from gyrobench.record.run_document import LinearModel
 from gyrobench.system.wiring import Assembly
 from gyrobench.tuning.inner_plant import opened_inside
 from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
-from gyrobench.tuning.own_controllers import own_controller, own_values
+from gyrobench.tuning.own_controllers import InnerOwnController, own_controller, own_values
 from gyrobench.tuning.structures import Controller
 
 
@@ -79,7 +79,7 @@ def plants(
 ) -> list[Plant]:
     """Return the plant at each point of the spread.  Raises LinearizationError and ComponentError."""
     own = own_controller(parameters, ports.slot)
-    inner = own is not None and own.inner
+    inner = isinstance(own, InnerOwnController)
     matrices = [_opened(assembly, {**parameters, **values}, part_of, step, ports) for values in points]
     if len({len(a) for a, _, _ in matrices}) > 1:
         raise UsageError("--over: the parts have other states at some points of the spread: narrow it")
@@ -113,7 +113,7 @@ def _opened(
     if own is None:
         return _matrices(without_controller(linear(), slot, {("v", "u"): -1.0}).discrete(ports.opened))
     q = own_values(parameters, slot)
-    if not own.inner:
+    if not isinstance(own, InnerOwnController):
         a, b, c = _matrices(linear().discrete(ports.opened))
         return a, b, c / own.gain(q)
     small = own.small(q)

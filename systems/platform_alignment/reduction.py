@@ -18,7 +18,7 @@ from gyrobench import units
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, MeasureReduction, told
 from gyrobench.reduction.setup.run_metadata import Location
 
-from . import plans, shown
+from . import planning, plans, shown
 from .record import Alignment, AlignmentColumns
 
 AT_LIMIT = 0.1  # share of the second half of the gyrocompass with a limit active
@@ -112,7 +112,7 @@ class Reduction(MeasureReduction):
             self.found.measure("ready time", meaning, "s", None, unsettled=why)
             return
         t = float(np.asarray(self.record.channels["controller.ready_time"])[-1])
-        expected = None if self.a.fine is None else plans.ready_after(self.a.history, self.a.sigma, wanted)
+        expected = None if self.a.fine is None else planning.ready_after(self.a.history, self.a.sigma, wanted)
         self.found.measure("ready time", meaning, "s", t, 0.0, closed=expected)
 
     def _void(self) -> str:

@@ -10,7 +10,7 @@ from gyrobench.reduction.loops.loop_curves import line, over_time
 from gyrobench.result import BudgetLine, Response, Table
 from gyrobench.units import ARCMIN, ARCSEC, DEG
 
-from . import plans
+from . import planning, plans
 from .record import Alignment, AlignmentColumns, K
 
 GOALS = (60.0, 30.0, 15.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5)  # ′
@@ -69,7 +69,7 @@ def tables(a: Alignment) -> list[Table]:
     rows: list[list[Any]] = []
     for goal in GOALS:
         at = _reached(run, goal * ARCMIN)
-        expected = plans.ready_after(a.history, a.sigma, goal * ARCMIN)
+        expected = planning.ready_after(a.history, a.sigma, goal * ARCMIN)
         error = run.error[at] / ARCMIN if at is not None and not a.record.run.measured else None
         rows.append([goal, float(run.t[at]) if at is not None else None, expected, error])
     caption = (

@@ -19,7 +19,7 @@ from gyrobench.system.families.three_gyros import design as three_gyros
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
 
-from . import plans
+from . import planning, plans
 
 DEG = math.pi / 180.0
 MOST = 85.0 * DEG  # latitude
@@ -155,7 +155,7 @@ class PlatformAlignment(System):
             self["latitude"], gravity, positions=self["positions"], coarse_time=self["coarse_time"],
             order=self["order"], fast_frequency=self["fast"], fast_time=self["fast_time"], slow_frequency=self["slow"],
         )  # fmt: skip
-        return plans.designed(given, self.sensors, self["wanted"], psi, self["time"])
+        return planning.designed(given, self.sensors, self["wanted"], psi, self["time"])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         sensors = self.sensors
@@ -214,8 +214,8 @@ class PlatformAlignment(System):
         if self.check():
             return found
         c, s = self.settings(), self.sensors
-        reached, sigma = plans.predicted(c, s, math.pi / 2.0, self["time"])
-        if plans.ready_after(reached, sigma, self["wanted"]) is None:
+        reached, sigma = planning.predicted(c, s, math.pi / 2.0, self["time"])
+        if planning.ready_after(reached, sigma, self["wanted"]) is None:
             arcmin = DEG / 60.0
             h = plans.history(c, math.pi / 2.0, self["time"], s.tau)
             sources = {n: float(np.abs(v[-1, 2])) for n, (_, _, v) in h.sources(c, s).items()}

@@ -25,6 +25,7 @@ LAT = 45.75 * DEG
 N = W * math.cos(LAT)
 SYSTEM = load_system(NAME)
 plans: Any = importlib.import_module(".plans", type(SYSTEM).__module__)
+planning: Any = importlib.import_module(".planning", type(SYSTEM).__module__)
 QUIET = {n: 0.0 for n in SYSTEM.noises if not n.startswith("site.")}
 FIXED = {"coarse_time": 40.0, "fast": 0.04, "fast_time": 60.0, "slow": 0.02, "wanted": 1e-6, "time": 450.0}
 
@@ -250,8 +251,8 @@ def test_a_looser_heading_is_never_ready_later(latitude: float, grade: str, posi
                            slow_frequency=0.0)  # fmt: skip
     times = []
     for wanted in np.geomspace(0.7, 80.0, 10) * ARCMIN:
-        settings = plans.designed(given, sensors, float(wanted), 1.0, 700.0)
-        ready = plans.ready_after(*plans.predicted(settings, sensors, 1.0, 700.0), float(wanted))
+        settings = planning.designed(given, sensors, float(wanted), 1.0, 700.0)
+        ready = planning.ready_after(*planning.predicted(settings, sensors, 1.0, 700.0), float(wanted))
         times.append(math.inf if ready is None else ready)
     assert times == sorted(times, reverse=True) and math.isfinite(times[-1])
 
@@ -262,22 +263,23 @@ def test_what_constant_errors_leave_in_the_end_is_that_of_the_error_model(order:
     quiet = plans.Sensors(0.02 * DPH, 0.0, 0.0, 50.0 * UG, 0.0)
     one = plans.Settings(LAT, order=order, fast_frequency=0.03, slow_frequency=0.02)
     end = float(plans.history(one, 0.5, 3000.0).sigma(one, quiet)[-1, 2])
-    assert end == pytest.approx(plans.lasting(one, quiet), rel=0.02)
+    assert end == pytest.approx(planning.lasting(one, quiet), rel=0.02)
     two = plans.Settings(LAT, positions=2, order=order, fast_frequency=0.03, slow_frequency=0.02)
-    assert plans.history(two, 0.5, 3000.0).sigma(two, quiet)[-1, 2] < 0.01 * end and plans.lasting(two, quiet) == 0.0
+    assert plans.history(two, 0.5, 3000.0).sigma(two, quiet)[-1, 2] < 0.01 * end and planning.lasting(two, quiet) == 0.0
 
 
 def test_what_is_given_is_kept_and_what_is_not_is_worth_it() -> None:
     """Of the settings that are tried none is ready sooner; given ones stand in all of them."""
     sensors = plans.GRADES["navigation"]
     given = plans.Settings(LAT, positions=2, coarse_time=90.0, fast_frequency=0.0, fast_time=0.0, slow_frequency=0.0)
-    every = plans.prepared(given, sensors)
+    every = planning.prepared(given, sensors)
     assert len(every) > 20 and {(c.coarse_time, c.fast_time) for c in every} == {(90.0, 0.0)}
     times = []
     for settings in every:
-        h, sigma = plans.predicted(settings, sensors, 1.0, 900.0)
-        ready = plans.ready_after(h, sigma, 3.0 * ARCMIN)
+        h, sigma = planning.predicted(settings, sensors, 1.0, 900.0)
+        ready = planning.ready_after(h, sigma, 3.0 * ARCMIN)
         times.append(math.inf if ready is None else ready)
-        assert plans.begin(settings, 1.0) == pytest.approx(h.t[np.argmax(h.usable)], abs=0.2 / settings.fast_frequency)
-    chosen = plans.designed(given, sensors, 3.0 * ARCMIN, 1.0, 900.0)
+        first = h.t[np.argmax(h.usable)]
+        assert planning.begin(settings, 1.0) == pytest.approx(first, abs=0.2 / settings.fast_frequency)
+    chosen = planning.designed(given, sensors, 3.0 * ARCMIN, 1.0, 900.0)
     assert times[every.index(chosen)] == min(times) < max(times)
