@@ -17,6 +17,7 @@ from gyrobench.report.style import (
     HALF,
     INK,
     MARKERS,
+    MM,
     MUTED,
     VERMILION,
     WIDE,
@@ -32,6 +33,7 @@ from gyrobench.report.style import (
 )
 from gyrobench.result import AllanDeviation, Coefficient, PowerSpectrum, Series
 
+LETTER = 1.6  # mm, a letter of an axis, about
 MANY = 20  # coefficients, from which a correlation below 0.3 is colour only
 
 
@@ -106,6 +108,8 @@ def fit(series: Sequence[Series], key: str, alike: Sequence[Series], everything:
         bottom.plot(rx, ry, "o", color=BLUE, markersize=2.6, markeredgewidth=0)
         bottom.set_xlabel(axis_label(s.x_name, s.x_unit))
         degree_ticks(bottom, s.x_unit)
+        if s.x_unit in ("", "1") and all(value == round(value) for value in x):
+            bottom.xaxis.get_major_locator().set_params(integer=True)
     first = series[0]
     axes[0, 0].set_ylabel(axis_label(first.y_name, first.y_unit))
     axes[1, 0].set_ylabel(axis_label("residual", first.y_unit))
@@ -261,10 +265,10 @@ def correlation(matrix: Sequence[Sequence[float]], names: Sequence[str], key: st
             ax.text(j, i, text, ha="center", va="center", color=INK, fontsize=7 if n < 11 else 8)
     ax.set_xlim(-0.5, n - 1.5)
     ax.set_ylim(n - 0.5, 0.5)
-    ax.set_xticks(range(n - 1), [short(m, 14) for m in names[:-1]], rotation=0 if max(map(len, names)) < 6 else 40)
-    for label in ax.get_xticklabels():
-        if label.get_rotation():
-            label.set_ha("right")
+    below = [short(m, 14) for m in names[:-1]]
+    column = (side / MM - 20.0) / (n - 1)  # mm
+    turned = 0 if max(map(len, below)) * LETTER < column else 40 if column > 2.0 * LETTER else 90
+    ax.set_xticks(range(n - 1), below, rotation=turned, ha="right" if turned == 40 else "center")
     ax.set_yticks(range(1, n), [short(m, 22) for m in names[1:]])
     return svg(fig, key)
 
