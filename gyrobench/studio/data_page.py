@@ -139,7 +139,10 @@ def _preview(mapping: _Mapping) -> None:
 def _columns(mapping: _Mapping) -> None:
     """Add a row for each column of the test: which of the file it is, its unit, its sign."""
     columns = mapping.proposal.layout.columns
-    names = {k: f"{c.name} [{c.unit or c.written}]" if c.unit or c.written else c.name for k, c in enumerate(columns)}
+    names = {}
+    for k, c in enumerate(columns):
+        name = " + ".join(map(str, c.sources)) if len(c.sources) > 1 else c.name  # a date and a clock time
+        names[k] = f"{name} [{c.unit or c.written}]" if c.unit or c.written else name
     for name in dict.fromkeys([*mapping.proposal.wanted, *mapping.proposal.found]):
         wanted = mapping.proposal.wanted.get(name, "")
         with ui.element("div").classes("setting mapped"):
@@ -195,7 +198,7 @@ def _stated(mapping: _Mapping) -> None:
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
                 content(option.doc if option else "", mapping.proposal.test.name)
-            value = ui.input(placeholder=example).props("dense outlined debounce=250")
+            value = ui.input(placeholder=say(example)).props("dense outlined debounce=250")
             value.props["aria-label"] = name
             value.on_value_change(lambda e, n=name: take(n, e.value or ""))
 

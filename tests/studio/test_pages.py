@@ -173,6 +173,7 @@ def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str
     page.locator("input[type=file]").set_input_files(tmp_path / "Messung <b>1.csv")
     page.get_by_text("Every column has its place").wait_for()
     page.get_by_text("Strom / mA").first.wait_for()
+    page.get_by_text("Datum + Uhrzeit").first.wait_for()
     page.get_by_label("unit of mean").fill("deg")
     page.get_by_text("deg is no unit of").wait_for()
     page.get_by_label("unit of mean").fill("uA")

@@ -97,6 +97,13 @@ def test_every_system_is_said_in_chinese(chinese: None, name: str) -> None:
     assert [text for text in texts if words.say.find(text, name) is None] == []
 
 
+def test_what_a_comparison_remarks_is_said_in_chinese(chinese: None) -> None:
+    said = words.say(
+        "runs of different systems (servo_polar, tumble_two_axis): equal names may not mean equal quantities"
+    )
+    assert "（servo_polar, tumble_two_axis）" in said
+
+
 def test_no_english_word_is_left_in_a_line() -> None:
     chinese = catalogue("zh", FOLDER)
     own = {e: s for e, s in chinese.texts.items() if catalogue("zh").texts.get(e) != s}
