@@ -25,7 +25,6 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
-from gyrobench.reduction.noise_model.constancy import over_time
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
@@ -35,7 +34,6 @@ from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
-from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
@@ -94,10 +92,9 @@ def fit_noise(
     treated, found, clouds, at, ramp = fitted.treated, fitted.found, fitted.clouds, fitted.at, fitted.ramp
     whole, clean = fitted.agreements
     of = {name: _coefficient(name, at, found, clouds) for name in CALLED} | {"R": ramp}
-    shape = joined([*split(at.model, at.p), *found.resonances])
     return NoiseModel(
         scale=scale,
-        shape=shape,
+        shape=joined([*split(at.model, at.p), *found.resonances]),
         coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
         processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
         minimum=_minimum(at, clouds, ramp, treated.samples, scale),
@@ -106,8 +103,6 @@ def fit_noise(
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
         filtered=filter_probability(clouds),
-        over_time=over_time(treated, shape, means),
-        slower=rows_of_a_slower_record(treated.cleaned()),
     )
 
 

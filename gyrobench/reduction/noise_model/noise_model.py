@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
-from gyrobench.reduction.noise_model.constancy import TermOverTime
+from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.steps import LevelStep
 from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
+from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
 
 ABSENT = 0.025  # probability of its absence below which a term is determined
 
@@ -88,8 +90,7 @@ class NoiseModel:
     coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
-    filtered: probability that the white noise has passed a filter.  over_time: terms in the quarters of the record.
-    slower: rows after which changes vanish and come back: those of a slower record, held or interpolated; 0: of none.
+    filtered: probability that the white noise has passed a filter.
     """
 
     scale: Scale
@@ -102,8 +103,6 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
     filtered: float
-    over_time: tuple[TermOverTime, ...]
-    slower: float
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -119,6 +118,18 @@ class NoiseModel:
         stands for missing and wild samples came to an end, and no rows are those of a slower record.
         """
         return all(a.holds for a in self.agreements) and self.treatment.settled and not self.slower
+
+    @cached_property
+    def over_time(self) -> tuple[TermOverTime, ...]:
+        """Return the terms in the quarters of the record."""
+        return over_time(self.treatment, self.shape, self.scale.means)
+
+    @cached_property
+    def slower(self) -> float:
+        """Return the rows after which changes vanish and come back: those of a slower record, held or interpolated; 0
+        of none.
+        """
+        return rows_of_a_slower_record(self.treatment.cleaned())
 
     @property
     def cleaned(self) -> Array:
