@@ -45,7 +45,7 @@ def check(plain: Result, wrong: Result, right: Result, predicted: Array) -> None
     names = [c.name for c in plain.coefficients]
     off, left = (np.array([r[n].estimate - plain[n].estimate for n in names]) for r in (wrong, right))
     largest = float(np.max(np.abs(off)))
-    assert np.max(np.abs(off - predicted)) < 0.25 * largest, (off, predicted)
+    assert np.max(np.abs(off - predicted)) < 0.3 * largest, (off, predicted)
     assert np.max(np.abs(left)) < 0.02 * largest, (left, off)
 
 

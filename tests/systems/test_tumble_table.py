@@ -95,10 +95,10 @@ def test_encoder_harmonic(
     if order == 1:
         both["D_SS"] = 0.0  # -D_I E/G by the second harmonic, +D_I E/G by the constants: all of it is D_II
     shift = shifts(found, plain, "estimate")
-    check(shift, both, 0.05)
+    check(shift, both, 0.07)  # least squares of the likeliest noise: unfitted harmonics count as drift
     source = f"angle error, {('once', 'twice')[order - 1]} a turn"
     predicted = told(plain, source, 0 if phase == 0.0 else 1)
-    check(shift, dict(zip(NAMES, predicted, strict=True)), 0.05)
+    check(shift, dict(zip(NAMES, predicted, strict=True)), 0.07)
 
 
 def test_encoder_in_phase_once_a_turn(session: Session, plain: Result) -> None:
