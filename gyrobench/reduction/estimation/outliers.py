@@ -34,6 +34,7 @@ MOST = 0.2  # share of the rows that may be outliers
 FEWEST = 10  # degrees of freedom that must be left
 EXACT = 2000  # rows up to which every (R^-1)_ii is computed
 LISTED = 8
+ENDLESS = 1e6  # standard deviations from which on the others have none: rounding of the arithmetic
 MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
@@ -70,6 +71,8 @@ def find(found: Findings) -> Outliers | None:
         if rest is None:
             return None
         distance, t = _against(found, rest, rows)
+        if rest.ideal and rows.size > 2 and np.ptp(np.abs(distance)) < 1e-6 * np.max(np.abs(distance)):
+            return None  # all others alike, these a count off: too coarse to show a noise
         p = 2.0 * special.stdtr(rest.dof, -np.abs(t))
         if np.all(p < LEVEL / n):
             return Outliers(rows, distance / found.y_scale, t, rest)
@@ -138,10 +141,10 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     if outliers is None:
         return []
     rows, rest = outliers.rows, outliers.without
-    listed = "; ".join(
-        f"{row + 1} ({d:+.3g} {found.y_unit}, {abs(t):.0f} standard deviations)".replace("-", "−")
-        for row, d, t in zip(rows[:LISTED], outliers.distance, outliers.t, strict=False)
-    )
+    each = [f"{d:+.3g} {found.y_unit}".replace("-", "−") for d in outliers.distance]
+    far = [f", {abs(t):.0f} standard deviations" if abs(t) < ENDLESS else "" for t in outliers.t]
+    shown = zip(rows[:LISTED], each, far, strict=False)
+    listed = "; ".join(f"{row + 1} ({off}{deviations})" for row, off, deviations in shown)
     more = f" and {rows.size - LISTED} more" if rows.size > LISTED else ""
     both = _common(found, rest)
     a, b = max(both, key=lambda ab: abs(rest.value[ab[1]] - found.value[ab[0]]) / rest.u[ab[1]])
