@@ -16,6 +16,7 @@ from gyrobench.units import ARCSEC
 from .contest import BENDING, GAP_PERIOD, LINE, RIDES, WILD_PERIOD
 
 ANGLE, VOLTAGE = "platform.attitude", "stabilizer.v"
+ROUNDING = 1e-9  # degrees: no more than the rounding of a response
 PERIODS = {RIDES["gaps"]: GAP_PERIOD, RIDES["wild"]: WILD_PERIOD}
 #: coefficient -> what the smallest is the choice for
 PURPOSES = {
@@ -75,8 +76,10 @@ def lag(found: LoopFindings, points: list[Point]) -> None:
     f = np.log([p.f for p in points])
     phase = np.degrees(np.unwrap(np.angle([p.value for p in points])))
     near = [p.u or 0.0 for p in points if abs(math.log(p.f / crossover)) <= math.log(2.0)]
-    found.measure("lag", "phase that the estimator takes at the crossover", "°",
-                  -float(np.interp(math.log(crossover), f, phase)), math.degrees(max(near, default=0.0)))  # fmt: skip
+    taken, u = -float(np.interp(math.log(crossover), f, phase)), math.degrees(max(near, default=0.0))
+    if max(abs(taken), u) < ROUNDING:  # an estimator that hands the reading on
+        taken = u = 0.0
+    found.measure("lag", "phase that the estimator takes at the crossover", "°", taken, u)
 
 
 def bending(found: LoopFindings) -> None:
