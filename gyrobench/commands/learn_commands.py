@@ -41,5 +41,7 @@ def learn(
     if out is not None and out.suffix != ".html":
         raise UsageError(f"--out {out}: a page ends in .html")
     path = out or home.products / f"lesson-{name}.html"
-    write_lesson(lesson(name, home), path, language, home)
+    item = lesson(name, home)
+    typer.echo("The simulation of the page is compiled; at the first time this takes a while.", err=True)
+    write_lesson(item, path, language, home)
     echo(display_path(path))

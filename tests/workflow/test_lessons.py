@@ -195,6 +195,12 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
     assert command("learn", "--out", tmp_path / "x.html")[0] == 2
 
 
+def test_what_takes_long_is_said_before(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gyrobench.workflow.lessons.write_lesson", lambda *_: None)
+    code, out, err = command("learn", "drift", "--out", tmp_path / "x.html")
+    assert code == 0 and out.strip().endswith("x.html") and "is compiled" in err
+
+
 def ended(browser: Browser) -> None:
     deadline = time.monotonic() + LIMIT
     while browser.run("document.body.dataset.run") not in ("ended", "failed"):
