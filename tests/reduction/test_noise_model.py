@@ -78,7 +78,11 @@ def test_whitening_in_blocks_and_its_transpose(monkeypatch: pytest.MonkeyPatch, 
 
 @pytest.mark.long
 def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
-    """A matrix of 10,000 x 10,000 would take 800 MB."""
+    """A matrix of 10,000 x 10,000 would take 800 MB.
+
+    u is that of white noise, 0.1/sqrt(10,000), and by what the slowest drift may add that the record cannot show: a tenth
+    for Gauss-Markov drift, another for power laws.
+    """
     t0 = 10.0 * np.arange(10_000)
     y = 1.0 + 0.1 * np.random.default_rng(1).normal(size=t0.size)
     tracemalloc.start()
@@ -89,7 +93,7 @@ def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
     finally:
         tracemalloc.stop()
     assert peak < 30e6
-    assert e.u[0] == pytest.approx(0.1 / 100.0, rel=0.1) and e.gain[0] == pytest.approx(1e-4, rel=0.2)
+    assert 0.1 / 100.0 < e.u[0] < 1.25 * 0.1 / 100.0 and e.gain[0] == pytest.approx(1e-4, rel=0.2)
 
 
 def test_two_windows_by_hand() -> None:

@@ -64,6 +64,7 @@ class NoiseSummary:
     density: Range = (0.0, 0.0, 0.0)  # N of the white part, unit sqrt(s)
     sigma_reading: Range = (0.0, 0.0, 0.0)  # of one reading
     law: Range = (0.0, 0.0, 0.0)  # rms of the drift with a power law in a window
+    markov: tuple[float, float, float] = (0.0, 0.0, 1.0)  # N, rms and tau of the likeliest model without a power law
     #: (g, 4): tau, share, reading and weight of the models that count, the most likely one first; noise.NoiseGrid
     models: Array = field(default_factory=lambda: np.array([[1.0, 0.0, 0.0, 1.0]]))
     unbounded: str = ""  # that the record does not bound the correlation time, as a sentence

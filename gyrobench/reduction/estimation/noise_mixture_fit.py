@@ -254,6 +254,8 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     s2 = weighed.s2[best]
     without_reading = s2 * (1.0 - grid.reading)
     tau = spread(models, grid.tau, k, markov)
+    white, drift = np.sqrt(without_reading * (1.0 - grid.share) * window), np.sqrt(without_reading * grid.share / v)
+    m = int(np.argmax(np.where(law, -1.0, models)))
     record = float(problem.t1[-1] - problem.t0[0])
     unbounded = ""
     if float(models[law].sum()) > 0.5:
@@ -271,10 +273,11 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     return NoiseSummary(
         white=float(models[problem.white_only].sum()),
         tau=tau,
-        sigma=spread(models, np.sqrt(without_reading * np.where(law, 0.0, grid.share) / v), k, ~law),
-        density=spread(models, np.sqrt(without_reading * (1.0 - grid.share) * window), k),
+        sigma=spread(models, drift, k, ~law),
+        density=spread(models, white, k),
         sigma_reading=spread(models, np.sqrt(s2 * grid.reading / 2.0) * window, k),
         law=spread(models, np.sqrt(without_reading * grid.share), k, law),
+        markov=(float(white[m]), float(drift[m]), float(grid.tau[m])),
         models=_listed(grid, models, counted),
         unbounded=unbounded,
     )
@@ -376,7 +379,7 @@ def ordinary(
         X=X,
         design=design,
         mixture=Mixture(np.ones(1), np.zeros((1, len(names))), ols.covariance[None], ols.dof),
-        noise=NoiseSummary(density=(density, density, density)),
+        noise=NoiseSummary(density=(density, density, density), markov=(density, 0.0, 1.0)),
         likeliest=Likeliest(whitened, X * root[:, None], ols.gain),
     )
 
