@@ -80,8 +80,8 @@ def test_whitening_in_blocks_and_its_transpose(monkeypatch: pytest.MonkeyPatch, 
 def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
     """A matrix of 10,000 x 10,000 would take 800 MB.
 
-    u is that of white noise, 0.1/sqrt(10,000), and by what the slowest drift may add that the record cannot show: a tenth
-    for Gauss-Markov drift, another for power laws.
+    u is that of white noise, 0.1/sqrt(10,000), and by what the slowest drift may add that the record cannot show:
+    a tenth for Gauss-Markov drift, another for power laws.
     """
     t0 = 10.0 * np.arange(10_000)
     y = 1.0 + 0.1 * np.random.default_rng(1).normal(size=t0.size)
