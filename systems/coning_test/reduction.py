@@ -23,6 +23,7 @@ import numpy as np
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.setup.sources import TIME_BASE, TURNED
 from gyrobench.reduction.toolkit import (
@@ -159,6 +160,7 @@ class ConingAxis(DriftReduction[ConingSetup]):
                 f"Stated: filter of {c.bandwidth:g} Hz (0: none), an increment each {c.interval * 1e3:g} ms, "
                 f"which are {kind}; {c.samples} of them an update.",
             ],
+            reasons=jumped(found),
             random="noise of the gyros",
         )
 

@@ -20,6 +20,7 @@ import numpy as np
 from gyrobench.frames import G0
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE
@@ -163,6 +164,7 @@ class Reduction(DriftReduction[ScullingSetup]):
                 f"Stated: filters of {c.bandwidth:g} Hz (gyros) and {c.acc_bandwidth:g} Hz (accelerometers; 0: none), "
                 f"an increment each {c.interval * 1e3:g} ms, {kind}; {c.samples} of them an update.",
             ],
+            reasons=jumped(found),
             random="noise of the accelerometers",
         )
 

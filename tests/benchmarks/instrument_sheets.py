@@ -25,7 +25,7 @@ from imu_world import EDGES, FACES, Unit, World, handled, plan, poses
 
 from gyrobench.frames import G0
 
-KINDS = ("axis exchanged", "left-handed", "sign", "unit", "position forgotten", "row late", "not settled")
+KINDS = ("axis exchanged", "left-handed", "sign", "unit", "position forgotten", "row late", "not settled", "bump")
 Columns = dict[str, np.ndarray]
 Change = Callable[[Columns], None]
 
@@ -76,6 +76,15 @@ def copied(first: int, source: int, count: int, *names: str) -> Change:
         for n in names:
             own = c[n][source : source + count]
             c[n][first : first + count] = own + 0.5 * np.std(own) * rng.normal(size=count)
+
+    return change
+
+
+def knocked(first: int, by: float, name: str) -> Change:
+    """The level of a column is another one from a row on."""
+
+    def change(c: Columns) -> None:
+        c[name][first:] += by
 
     return change
 
@@ -195,6 +204,8 @@ CONING = Sheet(
         Mistake("unit", "°/s under °/h", "and drift in the units", times(1.0 / 3600.0, *DRIFTS)),
         Mistake("position forgotten", "a cone left out: the table stayed at rest", "drifts by",
                 copied(20, 0, 5, *DRIFTS)),
+        Mistake("bump", "the bias of x another one from row 18 on, by 10 standard deviations", "level of the record",
+                knocked(17, 0.5, DRIFTS[0])),
     ),
 )  # fmt: skip
 
@@ -218,6 +229,8 @@ SCULLING = Sheet(
                 times(2.0, "angle [deg]", "vibration [m/s2]")),
         Mistake("position forgotten", "a motion left out: the table stayed at rest", "computed acceleration is",
                 copied(20, 0, 5, "acceleration [ug]")),
+        Mistake("bump", "the bias another one from row 18 on, by 10 standard deviations", "level of the record",
+                knocked(17, 50.0, "acceleration [ug]")),
     ),
 )  # fmt: skip
 
