@@ -36,7 +36,8 @@ TEMPLATE = """\
 # head (angle between the two readings of the scale), quantum (angle of one count): needed, here or by --set.
 #   reference_quantum: of the reference, if it differs.
 # phase: number of the position or rate, from 1.  rate: 0 at a position.  position: of the table, at least 30 all
-#   around, at irregular angles; 0 at a rate.  turned: 1 at positions after the scale was turned, else 0.
+#   around, at irregular angles, in an irregular order (else a drift of the heads looks like an error once a turn); 0 at
+#   a rate.  turned: 1 at positions after the scale was turned, else 0.
 # reading, reading_2: of the scale.  reference: of the reference encoder.  t_reading, t_reference: when they were taken,
 #   if not at t_end.
 # gate_..., inverse_...: readouts of the rate by gates of time or by the time of a degree: number of the reading, rate,

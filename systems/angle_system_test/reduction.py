@@ -4,7 +4,7 @@ Errors of the reader and of the reference by harmonics, lag of the reader agains
 excitation, clocks of the rate readouts; readings off by whole fine cycles are named and taken out.
 [ANGLE-INDUCTOSYN, READOUT-RATE]
 
-Not modelled: noise that is not white (thermal drift of the scale between the positions), rate errors of the table.
+Not modelled: noise that is not white, rate errors of the table.  Readings that drift against one another are named.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import ARCSEC
 
 from . import harmonics
+from .drifting import drifting
 from .outlying import outlying
 from .readings import CLOCKS, OTHER, RATES, SHOWN, AngleSystemSetup, assemble
 from .sources import TABLE_RATE
@@ -195,7 +196,10 @@ class Reduction(DriftReduction[AngleSystemSetup]):
 
     def _outlying(self, found: Findings) -> list[Reason]:
         weights = np.ones_like(found.y) if found.weights is None else found.weights
-        return [] if found.ideal else outlying(found.X, found.y, weights, self.rows.at.angle)
+        if found.ideal:
+            return []
+        drifts = drifting(found.X, found.y, weights, self.kind.tolist(), self.rows.at.t)
+        return [*outlying(found.X, found.y, weights, self.rows.at.angle), *drifts]
 
     def _reasons(self) -> list[Reason]:
         a, angles, found = self.setup, self.slips.angle, []

@@ -332,6 +332,36 @@ def test_a_reading_that_lies_outside_is_named(tmp_path: Path) -> None:
     assert f"at {rows[17][4]:.2f}° (+4.9" in text and "more" not in text
 
 
+@pytest.mark.parametrize(("columns", "text"), [((7,), "second reading of the scale"), ((6, 7), "scale drifts against")])
+def test_readings_that_drift_are_named(tmp_path: Path, columns: tuple[int, ...], text: str) -> None:
+    """0.5 arcsec by the 600 s of the positions, which follow one another around the turn: cos_1 was off by 8 u."""
+    rows = angle_rows()
+    for row in rows[:60]:
+        for k in columns:
+            row[k] += 0.5 * (1.0 - math.exp(-row[1] / 300.0)) / 3600.0
+    result = gb.reduce("angle_system_test", write(tmp_path / "a.csv", template("angle_system_test"), rows)).result
+    (reason,) = [r for r in result.reasons if r.id == "readings.drift"][:1]
+    assert text in reason.text and reason.blocks == ("pass", "fail")
+    assert float(reason.text.split("by +")[1].split("″")[0]) == pytest.approx(0.43, abs=0.15)  # 0.5 (1 - e^-2)
+
+
+def test_what_two_readings_of_a_scale_do_not_show_is_asked_for(tmp_path: Path) -> None:
+    """Each is fitted as well as the truth; a reversal has no second head that could be exchanged or drift."""
+    said = []
+    for reversal in (False, True):
+        head = template("angle_system_test")
+        if reversal:
+            head = head.replace("method = two_heads", "method = reversal").replace(",reading_2 [deg]", "")
+        result = gb.reduce("angle_system_test", write(tmp_path / "a.csv", head, angle_rows(reversal))).result
+        (text,) = [r.text for r in result.reasons if r.id == "arrangement.unstated"]
+        said.append(text)
+        assert not [r for r in result.reasons if r.id == "readings.drift"]
+        for words in ("scale and reference exchanged", "sign of the head angle reversed"):
+            assert words in text
+    for words in ("the two heads exchanged", "further apart by a count"):
+        assert words in said[0] and words not in said[1]
+
+
 def test_a_rate_of_the_other_sense_is_refused(tmp_path: Path) -> None:
     """It was a lag of the other sign, 100 u from the true one."""
     rows = [[*row[:3], -row[3], *row[4:]] for row in angle_rows()]

@@ -103,6 +103,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _north(record)
+    yield from _heads(record)
     yield from _meters(record)
     yield from _daily(record)
     if "mean" in record.windows and len(rate := np.asarray(record.windows.get("rate", ()), dtype=float)) > 1:
@@ -162,6 +163,34 @@ def _north(record: Record) -> Iterator[HandlingCandidate]:
     for words, sign in (("", np.ones_like(up)), (", down to the south", up)):
         found = changed(record, **{SHAKEN[0]: rate - earth * sign})
         yield HandlingCandidate(f"the axis x of the gyro to the north{words}", found)
+
+
+def _heads(record: Record) -> Iterator[HandlingCandidate]:
+    """Two readings of one scale, an angle apart: exchanged, at another angle, moving apart by a count while the
+    positions are gone through; scale and reference exchanged.
+    """
+    w, options = record.windows, record.run.options
+    if not all(n in w for n in ("reading", "reading_2", "reference")) or "head" not in options:
+        return
+    head, reversal = float(options["head"]), options.get("method") == "reversal"
+    both = {"reading": w["reference"], "reference": w["reading"]}
+    if reversal:  # its second reading is the first one, after the scale was turned
+        both["reading_2"] = w["reference"] + w["reading"] - w["reading_2"]
+    yield HandlingCandidate("scale and reference exchanged", changed(record, **both))
+    yield HandlingCandidate("the sign of the head angle reversed", with_options(record, {"head": -head}))
+    yield HandlingCandidate("the head angle wrong by 1°", with_options(record, {"head": head + OFF}))
+    if reversal:
+        return
+    yield from exchanged_columns(record, [("reading", "reading_2")], "the two heads exchanged")
+    count = float(record.run.parameters.get("reader.quantum", 0.0))
+    t, rest = np.asarray(w["t_end"], dtype=float), [row.phase for row in record.run.plan if row.mode == "index"]
+    of = np.isin(np.asarray(w["phase"]).astype(int), rest)
+    if count and np.any(of):
+        since = (t - t[of].min()) / max(float(np.ptp(t[of])), 1e-9)
+        warmed = (1.0 - np.exp(-2.0 * since)) / (1.0 - math.exp(-2.0))
+        words = "the heads further apart by a count at the last position than at the first"
+        moved = np.where(of, w["reading_2"] + count * warmed, w["reading_2"])
+        yield HandlingCandidate(words, changed(record, reading_2=moved))
 
 
 def _meters(record: Record) -> Iterator[HandlingCandidate]:
