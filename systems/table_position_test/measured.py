@@ -21,11 +21,13 @@ TEMPLATE = """\
 # head = 180deg
 # quantum = 0.18arcsec
 # orders = 3
+# u_scale = 0
 # instrument = type and number of the table
 # operator = who took the record
 #
 # positions (faces of the polygon), head (angle between the two reading heads), quantum (angle of one count): needed,
-#   here or by --set.  orders: harmonics of the position error.
+#   here or by --set.  orders: harmonics of the position error.  u_scale: relative
+#   standard uncertainty of the scale of the autocollimator, by its certificate; no residual shows it.
 # mount: azimuth of polygon and level on the table, whole faces.  position: commanded, counted on through the turns, so
 #   that 360 deg and 0 deg are the same place and the way to it shows.
 # deviation: reading of the autocollimator, positive where the table has turned too far.  tracking: mean error of the

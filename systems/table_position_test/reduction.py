@@ -28,11 +28,13 @@ from gyrobench.reduction.loops.loop_toolkit import (
 )
 from gyrobench.reduction.loops.scale_errors import truth, waves
 from gyrobench.reduction.setup.window_checks import window_problems
-from gyrobench.result import Series, Table
+from gyrobench.result import BudgetLine, Series, Table
 
 from .contradiction import contradicted, misplaced
 from .places_fit import Averaged, PlacesFit, averaged_over_walk, least_squares, visits, walk
 from .readings import Readings, faces_of
+from .scale import unstated
+from .sources import SCALE
 
 
 def position_fit(r: Readings) -> tuple[PlacesFit, list[int], bool]:
@@ -115,12 +117,14 @@ class Reduction(MeasureReduction):
             raise ReductionError(problems)
         self.r = r = Readings(w, self.run)
         self.fit, self.orders, drifts = position_fit(r)
+        self.slopes: dict[str, float] = {}
         fit = self.fit
         self._accuracy()
         self._harmonics()
         self._repeatability()
         if r.both_senses and not drifts:
             self.found.warn("lost_motion.drift", DRIFT)
+        self.found.reasons += unstated(self.run, self.slopes, self.found)
         if self.run.measured:
             self.found.doubt("position.contradiction", contradicted(r))
             self.found.doubt("position.mounts", misplaced(r))
@@ -154,8 +158,21 @@ class Reduction(MeasureReduction):
         )
 
     def _add(self, name: str, meaning: str, value: float, u: float, dof: float, truth: Any = None, none: str = "",
-             k: float | None = None) -> None:  # fmt: skip
-        """Measure an angle, SI; none: why it has no value."""
+             k: float | None = None, places: int = 1, slope: float = 0.0) -> None:  # fmt: skip
+        """Measure an angle, SI; none: why it has no value.
+
+        slope: its change by the scale of the autocollimator, SI per 1.  places: figures for which the interval holds.
+        """
+        share = abs(slope) * float(SCALE.size(self.run.options))
+        if slope and not none:
+            self.slopes[name] = slope / ARCSEC
+        if share and not none:
+            line = (share / abs(slope), "1", slope / ARCSEC, "arcsec", share / ARCSEC, "arcsec")
+            self.found.budget.append(BudgetLine(SCALE.id, SCALE.name, *line, name, SCALE.note))
+            dof *= (1.0 + (share / u) ** 2) ** 2 if u else math.inf  # Welch and Satterthwaite
+            u = math.hypot(u, share)
+        if places > 1:
+            k = float(special.stdtrit(dof, 1.0 - 0.025 / places))
         known = None if truth is None or none else float(truth)
         self.found.measure(name, meaning, "arcsec", float(value), float(u), scale=ARCSEC, dof=dof, truth=known,
                            no_value=none, k=k)  # fmt: skip
@@ -174,25 +191,28 @@ class Reduction(MeasureReduction):
         worst = int(np.argmax(np.abs(at)))
         g = mean[worst] @ (np.eye(n, 2 * n) - taken @ fit.gain)
         dof, self.where = fit.freedom(g), 360.0 * visited[worst] / r.faces
-        k = float(special.stdtrit(dof, 1.0 - 0.025 / visited.size))
         true = None if r.true is None else mean[worst] @ r.true
         meaning = f"position error of the largest magnitude, at {self.where:g}°"
-        self._add("accuracy", meaning, at[worst], math.sqrt(float(g @ fit.V @ g)), dof, true, k=k)
+        self._add("accuracy", meaning, at[worst], math.sqrt(float(g @ fit.V @ g)), dof, true, places=visited.size,
+                  slope=float(g[:n] @ r.deviation))  # fmt: skip
 
     def _harmonics(self) -> None:
         """Measure the harmonics of the position error, and the lost motion behind them."""
         fit, orders, reader = self.fit, self.orders, truth(self.run.parameters, "reader")
+        slopes = fit.gain[:, : self.r.theta.size] @ self.r.deviation
         for n in range(1, self.r.orders + 1):
             true = [-x for x in reader.get(n, (0.0, 0.0))] if reader else UNKNOWN  # the table errs by less its scale
             same = f"order {n} is the same in all mounts and at both heads: take another mount"
             for j, part in enumerate(("cos", "sin")):
                 k, none = (2 * orders.index(n) + j, "") if n in orders else (0, same)
                 meaning = f"position error, {part} {n if n > 1 else ''}θ"
-                self._add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), true[j], none)
+                self._add(f"E{n} {part}", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), true[j], none,
+                          slope=float(slopes[k]))  # fmt: skip
         if self.r.both_senses:
             k, meaning = 2 * len(orders), "position on the way up less that on the way back"
             none = "" if fit.redundant else "no place is visited often enough to show what a reading scatters by"
-            self._add("lost motion", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), none=none)
+            self._add("lost motion", meaning, fit.value[k], fit.u[k], fit.freedom(fit.gain[k]), none=none,
+                      slope=float(slopes[k]))  # fmt: skip
 
     def _repeatability(self) -> None:
         """Measure the standard deviation of visits, with the interval of a variance (chi-squared)."""

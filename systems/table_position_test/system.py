@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.system.connectors import Socket, inp, limit_flag, out
-from gyrobench.system.families.option_groups import SITE
+from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
@@ -20,6 +20,7 @@ from gyrobench.system.system import Option, Slot, System, Windows
 from gyrobench.system.table_program import MotionProgram, read_program
 from gyrobench.system.values import InvalidValueError
 
+from . import sources
 from .measured import MEASURED
 
 REFERENCE = Socket(
@@ -115,6 +116,7 @@ class TablePositionTest(System):
         "settle": Option(2.0, "s", "wait after each move", 0.0),
         "dwell": Option(2.0, "s", "time averaged at each position", 0.01),
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the readers", 0.0),
+        **type_b(sources),
     }
     windows = Windows.of("sampler", **{n: f"{n}.mean" for n in SAMPLED if n != "sampler"})
     done = "sequencer.done"

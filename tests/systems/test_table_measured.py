@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -210,6 +211,22 @@ def test_readings_of_a_table_that_contradict_one_another(
     reasons = [r for r in gb.reduce("table_position_test", file).result.reasons if r.id.startswith("position.")]
     assert all(r.blocks == ("pass", "fail") for r in reasons)
     assert not reasons if not text else re.search(text, " ".join(r.text for r in reasons))
+
+
+def test_the_scale_of_the_autocollimator_is_stated_or_asked_for(tmp_path: Path) -> None:
+    """Order 2 is told by the polygon alone: of -0.4 arcsec, 5 % are 0.02, beside u of the noise."""
+
+    def reduced(said: str) -> Any:
+        head = template("table_position_test").replace("# u_scale = 0\n", said)
+        return gb.reduce("table_position_test", write(tmp_path / "p.csv", head, position_rows())).result
+
+    plain, stated, checked = (reduced(x) for x in ("", "# u_scale = 0.05\n", "# arrangement = checked\n"))
+    assert stated["E2 sin"].u == pytest.approx(math.hypot(plain["E2 sin"].u, 0.05 * 0.4), rel=0.03)
+    assert stated["E2 sin"].estimate == plain["E2 sin"].estimate
+    (line,) = [b for b in stated.budget if b.coefficient == "E2 sin" and b.id == "autocollimator.scale"]
+    assert line.contribution == pytest.approx(0.02, rel=0.05) and line.sensitivity == pytest.approx(-0.4, rel=0.05)
+    said = [[r.text for r in x.reasons if r.id == "arrangement.unstated"] for x in (plain, stated, checked)]
+    assert "scale of the autocollimator wrong by 2 %" in said[0][0] and said[1:] == [[], []]
 
 
 def test_single_counts_leave_their_rounding_at_a_place(tmp_path: Path) -> None:
