@@ -31,7 +31,7 @@ MOVED = 0.02  # relative change of the response that counts, rms over the lines
 PERIODS = 4  # after the transient
 FALLS = 0.7  # of |L| from an octave to the next, at least: a slope of -1 has 0.5
 SEEN, STRONG = 0.05, 0.3  # |L| at the highest frequencies that is said, with which nothing passes
-FEW = 4  # lines in an octave
+FEW = 4  # lines, of an octave or more
 CHANGED = "the loop changed while it was recorded"
 LEVEL_END = "|L| does not fall towards the highest frequencies"
 
@@ -72,11 +72,16 @@ def halves(record: LoopRecord, period: int, f: Array) -> str:
 
 def level_end(s: MeasuredResponse) -> tuple[str, bool]:
     """Return that |L| does not fall at the end of a response S, or "", and whether its margins are in doubt for it."""
-    top, size = float(s.f.max()), np.abs(1.0 / s.value - 1.0)
-    last, before = size[s.f > 0.5 * top], size[(s.f > 0.25 * top) & (s.f <= 0.5 * top)]
-    if min(last.size, before.size) < FEW:
+    if s.f.size < 2 * FEW:
         return "", False
-    end, was = float(np.median(last)), float(np.median(before))
+    order = np.argsort(s.f)
+    f, size = s.f[order], np.abs(1.0 / s.value[order] - 1.0)
+    top = float(f[-1])
+    edge = min(int(np.searchsorted(f, 0.5 * top, side="right")), f.size - FEW)  # an octave, of few lines more
+    start = min(int(np.searchsorted(f, 0.5 * f[edge], side="right")), edge - FEW)
+    if start < 0:
+        return "", False
+    end, was = float(np.median(size[edge:])), float(np.median(size[start:edge]))
     if end < SEEN or end < FALLS * was:
         return "", False
     text = (

@@ -16,8 +16,9 @@ import gyrobench as gb
 from gyrobench.identification.identification_page import page
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.line_spectrum import LineAmplitudes, find_period, misfit
+from gyrobench.identification.loop_doubts import level_end
 from gyrobench.identification.loop_record import LoopRecord, read_loop
-from gyrobench.identification.ratios import ratio
+from gyrobench.identification.ratios import MeasuredResponse, ratio
 
 UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
 PERIOD = 4000  # samples
@@ -326,3 +327,13 @@ def test_an_input_of_another_kind_is_said(steady: LoopRecord, mistake: str) -> N
     u = {"late": np.roll(steady.u, 2), "scale": 3.0 * steady.u, "controller": steady.u - steady.r}[mistake]
     found = identify_record(replace(steady, u=u))
     assert "does not fall" in found.dependent and any("does not fall" in n for n in found.notes)
+
+
+def test_few_lines_show_it_too() -> None:
+    """Three lines in the second octave from the end: S late by a sample of 2 ms of L = 100/(2 pi f i), by hand."""
+    f = np.array([1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 25.0, 30.0, 38.0, 45.0, 52.0, 60.0, 70.0, 80.0])
+    S, none = 1.0 / (1.0 + 100.0 / (2j * np.pi * f)), np.zeros(f.size)
+    for late, said in ((0.0, False), (2e-3, True)):
+        value = S * np.exp(-2j * np.pi * f * late)
+        text, doubted = level_end(MeasuredResponse(f, value, none + 1e-3, none + 10.0, value, none))
+        assert bool(text) is said and doubted is said
