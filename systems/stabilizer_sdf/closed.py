@@ -44,7 +44,7 @@ class StabilizedAxis:
 
     @property
     def inertia(self) -> float:
-        """Return the apparent inertia of the axis with a rate gyro, J0 + H2/K, kg.m2  [5-40]."""
+        """Return the apparent inertia of the axis with a rate gyro, J0 + H²/K, kg.m2  [5-40]."""
         return self.J0 + self.H**2 / self.K
 
     def transient(self, t: Array) -> Array:

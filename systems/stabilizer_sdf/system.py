@@ -20,8 +20,8 @@ SWEEP = (0.05, 0.1, 0.2, 0.5, 1.0)  # Hz
 
 class StabilizerSdf(OneAxisTest):
     """The gyro itself resists a torque about the axis: its float yields by b, and H b' holds the axis.  Without spring
-    and damper the axis leans like a spring H2/J, with a damper it creeps by M C/H2, with a spring it feels like an
-    inertia J0 + H2/K.
+    and damper the axis leans like a spring H²/J, with a damper it creeps by M C/H², with a spring it feels like an
+    inertia J0 + H²/K.
 
     [STAB-SDF-INT, STAB-SDF-RATEINT, STAB-SDF-RATE; GSP ch. 5, section 5.1.4, eq. 5-27..5-43]
     """

@@ -173,9 +173,9 @@ def test_split_of_the_reaction_along_I():
 
 
 def test_what_the_mount_feels_by_kind():
-    """Rate-integrating: a damper H2/C.  Rate gyro: an inertia H2/K (J0 + H2/K of 5-40).  Integrating: a spring H2/J.
+    """Rate-integrating: a damper H²/C.  Rate gyro: an inertia H²/K (J0 + H²/K of 5-40).  Integrating: a spring H²/J.
 
-    The integrating gyro: b' = (H/J) integral of w dt = H a / J, so -H b' = -(H2/J) a.
+    The integrating gyro: b' = (H/J) integral of w dt = H a / J, so -H b' = -(H²/J) a.
     """
     w, t = 1e-6, 0.1
     damper = run(started(**{**RATE, "C": 0.02, "K": 0.0}, omega=[w, 0.0, 0.0], reaction=1.0), t)
