@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ class Job:
     """A run that is resolved and checked.
 
     starts: slot -> its parameters and start values, in the units of the FMU.  library: of the loop in C; None: the
-    reference engine.
+    reference engine.  units: of the channels, SI.
     """
 
     program: Program
@@ -31,6 +31,7 @@ class Job:
     schedule: Schedule
     library: Path | None
     checkpoints: CheckpointManager | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass

@@ -5,8 +5,8 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import FrameType
 from typing import Any
 
@@ -28,6 +28,7 @@ class ProgressReport:
     total: s, expected end of the simulated time; rate: steps per second of wall time; steps, elapsed (s of wall time):
     since the run was started or resumed, which was at the simulated time ``since``, s.  rows: gives the rows of the
     channels since its last call, names and [time, values ...], to look at: they may be torn while they are read.
+    units: theirs, SI.
     """
 
     time: float
@@ -38,6 +39,7 @@ class ProgressReport:
     elapsed: float
     since: float = 0.0
     rows: Callable[[], tuple[Sequence[str], Array]] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def fraction(self) -> float:

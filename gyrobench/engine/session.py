@@ -237,7 +237,7 @@ class Session:
             job |= {"parts": parts, "stop": system.stop, "every": schedule.every}
             checkpoints.check(job, self.program, self.assembly.descriptions)
         library, document.linked = self._library(system)
-        ending = self._execute(Job(self.program, starts, schedule, library, checkpoints), progress)
+        ending = self._execute(Job(self.program, starts, schedule, library, checkpoints, document.units), progress)
         self._warn(system, ending.remarks)
         document.notes += ending.remarks
         problem = ending.problem

@@ -238,6 +238,7 @@ class _Supervisor:
                 now - self.began,
                 s.first * h,
                 self._newest,
+                self.job.units,
             )
         )
 

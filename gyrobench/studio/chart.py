@@ -151,12 +151,17 @@ def _live(file: Path, _changed: int, _language: str) -> dict[str, Any] | None:
     if content is None or not content["time"]:
         return None
     names, time = content["names"], content["time"]
-    options = panels([f"{n}, SI" for n in names], time[0], time[-1])
+    scales = [
+        scaled([x for x in values if x is not None], unit or "1")
+        for values, unit in zip(content["values"], content["units"], strict=True)
+    ]
+    options = panels([f"{n}, {unit or '1'}" for n, (_, unit) in zip(names, scales, strict=True)], time[0], time[-1])
     options["legend"] = {"show": False}
     options["series"] = [
         {"type": "line", "name": n, "id": n, "showSymbol": False, "xAxisIndex": k, "yAxisIndex": k,
-         "lineStyle": {"width": 1.2}, "data": [list(point) for point in zip(time, values, strict=True)]}
-        for k, (n, values) in enumerate(zip(names, content["values"], strict=True))
+         "lineStyle": {"width": 1.2},
+         "data": [[t, None if x is None else factor * x] for t, x in zip(time, values, strict=True)]}
+        for k, (n, values, (factor, _)) in enumerate(zip(names, content["values"], scales, strict=True))
     ]  # fmt: skip
     return options
 

@@ -101,16 +101,21 @@ class _Writer:
             self.report.words = format_status(status)
             self.write()
             if (rows := getattr(status, "rows", None)) is not None:
-                self._signals(live, *rows())
+                self._signals(live, status.units, *rows())
 
         yield show
 
-    def _signals(self, live: LiveSignals, names: Sequence[str], rows: Array) -> None:
+    def _signals(self, live: LiveSignals, units: Mapping[str, str], names: Sequence[str], rows: Array) -> None:
         """Write the first signals as they are so far; SI."""
         shown = [*self.shown(names)][:LIVE_SIGNALS]
         live.add(rows[:, [0, *(1 + list(names).index(n) for n in shown)]])
         columns = [[x if math.isfinite(x) else None for x in c] for c in live.rows.T.tolist()]
-        content = {"names": shown, "time": columns[0] if columns else [], "values": columns[1:]}
+        content = {
+            "names": shown,
+            "units": [units.get(n, "") for n in shown],
+            "time": columns[0] if columns else [],
+            "values": columns[1:],
+        }
         store(self.folder / LIVE, content, durable=False)
 
 

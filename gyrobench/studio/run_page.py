@@ -11,6 +11,7 @@ from urllib.parse import quote, urlencode
 from nicegui import ui
 
 from gyrobench.bench import UsageError, display_path
+from gyrobench.errors import REDUCING, RESUMING
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
@@ -94,9 +95,8 @@ def _add_job_page(studio: Studio) -> None:
                     return
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
-                message.set_text(
-                    visible(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
-                )
+                text = visible(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
+                message.set_text(_advised(text) if now.resumable else text)
                 message.set_visibility(bool(message.text))
                 notes.set_text("\n".join(map(visible, now.report.notes)))
                 stop.set_visibility(now.active and not studio.read_only)
@@ -122,6 +122,11 @@ def _show_state(job: StudioJob, state: ui.label, words: ui.label, bar: ui.linear
     report = job.report
     words.set_text(say(f"{report.label}: {report.words}") if report.label and job.active else "")
     bar.set_value(1.0 if job.state == "done" else report.fraction)
+
+
+def _advised(message: str) -> str:
+    """Return a message with the buttons of the page in place of what it advises at a shell."""
+    return message.replace(RESUMING, f"“{say('Resume')}”").replace(REDUCING, "")
 
 
 def _resume(studio: Studio, key: str) -> None:

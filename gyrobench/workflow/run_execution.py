@@ -12,7 +12,7 @@ import numpy as np
 
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
-from gyrobench.errors import GyrobenchError
+from gyrobench.errors import REDUCING, RESUMING, GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Coefficient, Reason, Specification, StepChange, StepCheck
@@ -118,9 +118,9 @@ def _run(
         kept = save_partial_record(error.record, folder)
         message = f"{error}\nthe record until then is kept in {display_path(kept)}"
         if checkpoints is not None and checkpoints.is_there and not isinstance(error, RunInterrupted):
-            message += "; the same command with --resume goes on from its last checkpoint"
+            message += f"; {RESUMING} goes on from its last checkpoint"
         if isinstance(error, RunInterrupted):
-            message += " (gyrobench report reduces it, or lists what is missing)"
+            message += REDUCING
             raise CommandInterrupted(message, error.record) from None
         raise PostRunError(message, error.record) from None
     if folder is not None and checkpoints is not None:

@@ -17,6 +17,7 @@ from typing import Any
 
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.engine import checkpoint
+from gyrobench.errors import RESUMING
 from gyrobench.files import sha256
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import SuiteTestRun
@@ -75,7 +76,7 @@ def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT
         return outcome
     stopped = SuiteError(
         f"{', '.join(failed)} failed; the report in {display_path(folder)} covers the others. After correcting the "
-        "cause, the same command with --resume runs only what is missing"
+        f"cause, {RESUMING} runs only what is missing"
     )
     return replace(outcome, stopped=stopped)
 
@@ -85,7 +86,7 @@ def _run_test(request: RunRequest, system: System, folder: Path, label: str, fee
 
     Raises CommandInterrupted.
     """
-    resume_hint = "the same command with --resume continues the suite"
+    resume_hint = f"{RESUMING} continues the suite"
     has_run = request.resume and not request.force and has_complete_record(folder)
 
     def note(text: str) -> None:

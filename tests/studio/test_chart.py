@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from pathlib import Path
 
 import pytest
+
+from gyrobench.studio.job_process import store
 
 chart = pytest.importorskip("gyrobench.studio.chart", reason="the studio's packages are not installed")
 
@@ -27,3 +30,14 @@ def test_pages_do_not_wait_for_long_charts() -> None:
         assert asyncio.run(busy()) == 7
     finally:
         free.set()  # or the threads outlive the test
+
+
+def test_signals_so_far_have_their_units(tmp_path: Path) -> None:
+    """1 mrad is 1e-3 180/pi = 0.0572958 deg; a current of 2e-6 A is 2 uA; a value that is missing stays a gap."""
+    content = {"names": ["a", "i", "n"], "units": ["rad", "A", ""], "time": [0.0, 1.0]}
+    store(tmp_path / "live", {**content, "values": [[0.0, 1e-3], [2e-6, None], [1.0, 2.0]]})
+    options = chart._live(tmp_path / "live", 0, "en")
+    assert [t["text"] for t in options["title"]] == ["a, °", "i, µA", "n, 1"]
+    data = [s["data"] for s in options["series"]]
+    assert data[0] == [[0.0, 0.0], [1.0, pytest.approx(0.0572958, rel=1e-6)]]
+    assert data[1] == [[0.0, pytest.approx(2.0)], [1.0, None]] and data[2] == [[0.0, 1.0], [1.0, 2.0]]

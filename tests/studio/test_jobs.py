@@ -92,7 +92,8 @@ def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     until(jobs, first, lambda job: under_way(job) and file.is_file() and len(json.loads(file.read_text())["time"]) > 10)
     assert jobs.find(second).state == "waiting"
     live = json.loads(file.read_text())
-    assert live["names"] and all(len(v) == len(live["time"]) for v in live["values"])
+    assert live["names"] and len(live["units"]) == len(live["names"]) and all(live["units"])
+    assert all(len(v) == len(live["time"]) for v in live["values"])
     assert sorted(live["time"]) == live["time"]
     jobs.stop(second)
     assert jobs.find(second).state == "stopped"

@@ -156,6 +156,8 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.evaluate(seen, False)
     page.wait_for_function(f"said => ({left} ?? said) !== said", arg=before)
     page.get_by_role("button", name="Stop").click()
+    page.get_by_text("“Resume” continues it").wait_for()  # at a shell: the same command with --resume
+    assert "gyrobench report" not in (page.locator(".problem").text_content() or "")
     page.get_by_role("button", name="Resume").click()
     page.wait_for_function("document.querySelector('[role=status]')?.textContent === 'running'")
     assert page.url != address, "it goes on as a job of its own"
