@@ -22,6 +22,8 @@ from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, sh
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
 from gyrobench.studio.words import heading, say
+from gyrobench.system.system import load_system
+from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.tune_loop import tunable
 from gyrobench.workflow.gallery import gallery
 from gyrobench.workflow.run_list import list_runs
@@ -106,7 +108,7 @@ TUNE = CommandForm(
     (
         FormField("--want", "", "Wanted", "list", "phase margin=40deg\nbandwidth>10Hz\ndisk margin=0.5"),
         FormField("--over", "over", "Spread of the parts", "list", "platform.J=±30%"),
-        FormField("--loop", "loop", "Loop, of a system with several", "text", "pitch"),
+        FormField("--loop", "loop", "Loop", "choice", choices=("",)),
         FormField("--structure", "structure", "Structure of the controller", "choice", choices=STRUCTURES),
         SET,
     ), under="tuning",
@@ -184,7 +186,22 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
                     chosen.props("dense outlined").classes("full")
                     fields = {f.option: _field(f, studio) for f in form.fields}
                 asked = _asking(studio, form, fields, lambda: chosen.value or "")
-            chosen.on_value_change(asked)
+
+            def changed() -> None:
+                if form is TUNE:
+                    _offer_loops(fields["--loop"], chosen.value)
+                asked()
+
+            chosen.on_value_change(changed)
+            changed()
+
+
+def _offer_loops(field: ui.select, system: str) -> None:
+    """Let a loop be chosen where the system has several."""
+    there = [*loops_of(load_system(system))] if system else []
+    several = len(there) > 1
+    field.set_options(there if several else [""], value=there[0] if several else "")
+    field.set_visibility(several)
 
 
 def _asking(

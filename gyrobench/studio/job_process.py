@@ -198,7 +198,8 @@ def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: boo
         report.state = "done" if stopped is None or report.folder else "failed"
         report.message = "" if stopped is None else str(stopped)
     except (CommandInterrupted, KeyboardInterrupt) as error:
-        report.state, report.message = "stopped", str(error) or "stopped before its first step"
+        when = "before its report was written" if report.fraction else "before its first step"
+        report.state, report.message = "stopped", str(error) or f"stopped {when}"
     except Exception as error:
         report.state, report.message = "failed", user_message(error)
 

@@ -133,3 +133,18 @@ def test_an_fmu_of_another_tool_is_dropped_on_a_slot(page: Any, studio: tuple[st
     page.get_by_role("button", name="Run").click()
     run = json.loads((run_of(page, studio[1]) / "run.json").read_text())
     assert "RIG-7" in json.dumps(run["parts"]["gyro"]), run["parts"]["gyro"]
+
+
+def test_of_several_loops_one_is_chosen(page: Any, studio: tuple[str, Path]) -> None:
+    """Without it the command would be refused once it runs; a system with one loop has nothing to choose."""
+    page.goto(base_of(studio) + "/tune?system=platform_four_gimbal")
+    page.get_by_label("Loop", exact=True).wait_for()
+    code = page.locator(".code").first
+    soon(lambda: "--loop=pitch" in (code.text_content() or ""), True)
+    page.get_by_label("Loop", exact=True).click()
+    page.get_by_role("option", name="azimuth").click()
+    soon(lambda: "--loop=azimuth" in (code.text_content() or ""), True)
+    page.get_by_label("System", exact=True).fill("platform_single_axis")
+    page.get_by_role("option", name="platform_single_axis").click()
+    soon(lambda: "tune platform_single_axis" in (code.text_content() or ""), True)
+    assert "--loop" not in (code.text_content() or "") and not page.get_by_label("Loop", exact=True).is_visible()
