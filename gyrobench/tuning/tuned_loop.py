@@ -160,13 +160,16 @@ def _text(value: Any) -> str:
 def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
     """Return a point of the spread as text."""
     unit = {r.name: r.unit for r in spread}
-    return ", ".join(f"{n} = {units.format_quantity(float(f'{v:.4g}'), unit[n])}" for n, v in at.items()) or "nominal"
+    return ", ".join(f"{n} = {_shown(v, unit[n])}" for n, v in at.items()) or "nominal"
 
 
 def range_text(r: Range) -> str:
     """Return a range as text."""
-    low, high = (units.format_quantity(float(f"{x:.4g}"), r.unit) for x in (r.low, r.high))
-    return f"{r.name} {low} to {high}".replace(f" {r.unit}", f" {units.display(r.unit)}")
+    return f"{r.name} {_shown(r.low, r.unit)} to {_shown(r.high, r.unit)}"
+
+
+def _shown(value: float, unit: str) -> str:
+    return units.format_quantity(float(f"{value:.4g}"), unit).replace(f" {unit}", f" {units.display(unit)}")
 
 
 def _lines(t: LoopTuning) -> list[str]:

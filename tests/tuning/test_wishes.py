@@ -9,6 +9,7 @@ import pytest
 from gyrobench.bench import UsageError
 from gyrobench.tuning.spread import parse_spread, points
 from gyrobench.tuning.structures import ControllerStructure
+from gyrobench.tuning.tuned_loop import range_text, where
 from gyrobench.tuning.wishes import parse_wishes, with_margin
 
 FAST = "bandwidth>20Hz"
@@ -72,7 +73,9 @@ def test_a_spread_and_its_points() -> None:
     assert found[0] == {} and len(found) == 1 + 4 + 7
     assert {tuple(p.values()) for p in found[1:5]} == {(a, b) for a in (1.4, 2.6) for b in (38.0, 46.0)}
     assert all(1.4 < p["platform.J"] < 2.6 and 38.0 < p["mode.f"] < 46.0 for p in found[5:])
-    assert parse_spread(["platform.J=+-0.5kg.m2"], known)[0].low == 1.5
+    (spread,) = parse_spread(["platform.J=+-0.5kg.m2"], known)
+    assert spread.low == 1.5 and range_text(spread) == "platform.J 1.5 kg·m² to 2.5 kg·m²"
+    assert where({"platform.J": spread.low}, (spread,)) == "platform.J = 1.5 kg·m²", "written alike"
     assert points([]) == [{}]
 
 
