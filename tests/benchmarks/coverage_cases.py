@@ -237,6 +237,15 @@ class Case:
         return {**found, "attitude": attitude(rng)} if self.attitude else found
 
 
+def of_sizes(sizes: dict[str, float]) -> Callable[[Rng], Values]:
+    """Return draws of a floated gyro with such drift terms, deg/h."""
+    return lambda rng: {**floated(rng), **{f"gyro.{n}": float(rng.uniform(-s, s)) * DPH for n, s in sizes.items()}}
+
+
+def unbalanced(rng: Rng) -> Values:
+    return {**floated(rng), "gyro.D_S": 50.0 * float(rng.uniform(5.0, 12.0)) * sign(rng) * DPH}
+
+
 TURNING: Values = {"rate": 0.15, "windows": 24, "dwell": 17.5, "settle": 2.0}
 STOPPING: Values = {"stops": 24, "stop_dwell": 1.75, "windows": 24, "dwell": 17.5, "settle": 2.0,
                     "table.index_rate": 1.0, "table.acceleration": 1.0}  # fmt: skip
@@ -334,3 +343,18 @@ ALONE = {
     ),
 }  # fmt: skip
 ALL = CASES | ALONE
+
+#: gyros of large drift, counted where they are named.  Polar: the table turns by a third to twice its mean rate; drift
+#: and Earth rate fifty times larger than in a real day
+ASKED = {
+    "large drift, servo_vertical_level": Case(
+        "servo_vertical_level", {"dwell": 80.0, "cycles": 1, "settle": 2.0},
+        of_sizes({"D_F": 30.0, "D_I": 10.0, "D_S": 10.0}), latitude(0.0, 70.0), of_encoder,
+    ),
+    "large drift, servo_polar": Case(
+        "servo_polar",
+        {"site.earth_rate": 50.0 * frames.EARTH_RATE, "cage.i_max": 1.0, "time": 1724.0, "turns": 1, "window": 24.0,
+         "dwell": 240.0, "settle": 2.0, "table.capture_rate": 250.0},
+        unbalanced, latitude(12.0, 78.0), of_encoder,
+    ),
+}  # fmt: skip

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import BENCH, Native
+from wired import BENCH, Native, record
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -171,14 +171,6 @@ def test_resolution_of_the_reading():
     part = settled([-0.4321 * G0, 0.0, 0.0], resolution=1e-5, k0=0.0, k2=0.0, k3=0.0)
     assert part.i == pytest.approx(0.4321e-3, rel=1e-12)
     assert part.i_read == pytest.approx(0.43e-3, rel=1e-12)
-
-
-def record(part, n, h, name):
-    out = np.empty(n)
-    for k in range(n):
-        part.do_step(k * h, h)
-        out[k] = getattr(part, name)
-    return out
 
 
 @pytest.mark.parametrize("h", [1e-3, 4e-3])

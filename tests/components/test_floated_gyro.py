@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, RebalanceAnalog, Wired
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, RebalanceAnalog, Wired, record
 
 from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
@@ -211,14 +211,6 @@ def test_ageing_and_temperature_in_torque_sign():
 
 
 # --------------------------------------------------------------------------------------- random drift
-def record(part, n, h, name="drift"):
-    out = np.empty(n)
-    for k in range(n):
-        part.do_step(k * h, h)
-        out[k] = getattr(part, name)
-    return out
-
-
 @pytest.mark.parametrize("h", [1e-3, 4e-3])
 @pytest.mark.parametrize("port, name", [("white", "drift"), ("pickoff", "u")])
 def test_noise_density_does_not_depend_on_the_step(port, name, h):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from wired import Native
+from wired import Native, run
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -25,14 +25,6 @@ def gyro(name: str = "gyro_vibratory", omega: Any = (0.0, 0.0, 0.0), temperature
     part.temperature = temperature
     part.initialize()
     return part
-
-
-def run(part: Any, seconds: float, h: float = 1e-3) -> np.ndarray:
-    out = np.empty((round(seconds / h), 2))
-    for k in range(len(out)):
-        part.do_step(k * h, h)
-        out[k] = part.rate
-    return out
 
 
 def sense(omega: float, quadrature: float, split: float, q: float, f: float = F) -> complex:

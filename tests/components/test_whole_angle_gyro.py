@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
-from wired import Native
+from wired import Native, run
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -22,14 +22,6 @@ def gyro(omega: Any = (0.0, 0.0, 0.0), **given: Any) -> Any:
     part.omega = list(omega)
     part.initialize()
     return part
-
-
-def run(part: Any, seconds: float, h: float = 1e-3) -> np.ndarray:
-    out = np.empty((round(seconds / h), 2))
-    for k in range(len(out)):
-        part.do_step(k * h, h)
-        out[k] = part.rate
-    return out
 
 
 # ------------------------------------------------------------------------------------------------ Bryan factor

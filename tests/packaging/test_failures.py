@@ -169,29 +169,19 @@ def test_a_memory_is_looked_at_when_it_comes_out(instance: Callable) -> None:
     assert everywhere(instance, tell, "raiser") == "slot: output y is inf at t = 0.003 s"
 
 
-def test_arithmetic_fails(instance: Callable) -> None:
-    """Python stops at log(-1) and says where; in C it becomes NaN and is found at the end of the step."""
+@pytest.mark.parametrize(
+    ("u", "native", "python"),
+    [  # log(-1) becomes NaN in C, and is found at the end of the step
+        (1.0, "output y is nan at t = 0.001 s", "math domain error in tick at t = 0.001 s"),
+        (2.0, "an index is 3, not in 0 to 2 (t = 0.001 s)", "list index out of range in tick at t = 0.001 s"),
+    ],
+)
+def test_arithmetic_and_indices_fail(instance: Callable, u: float, native: str, python: str) -> None:
     for form in STATUS:
         one = instance("raiser", form, toy=True)
         one.initialize()
-        one.set({"u": 1.0})
-        message = refused(form, one.step, 0.0, 1e-3)
-        if form.startswith("native"):
-            assert message == "slot: output y is nan at t = 0.001 s"
-        else:
-            assert message == "slot: math domain error in tick at t = 0.001 s"
-
-
-def test_an_index_outside_its_array(instance: Callable) -> None:
-    for form in STATUS:
-        one = instance("raiser", form, toy=True)
-        one.initialize()
-        one.set({"u": 2.0})
-        message = refused(form, one.step, 0.0, 1e-3)
-        if form.startswith("native"):
-            assert message == "slot: an index is 3, not in 0 to 2 (t = 0.001 s)"
-        else:
-            assert message == "slot: list index out of range in tick at t = 0.001 s"
+        one.set({"u": u})
+        assert refused(form, one.step, 0.0, 1e-3) == f"slot: {native if form.startswith('native') else python}"
 
 
 def test_own_refusal_while_running(instance: Callable) -> None:

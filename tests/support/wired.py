@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from native_parts import native_files
 
 from gyrobench.component import Component, ComponentError
@@ -29,6 +30,21 @@ Sampler = load_part("sampler", BENCH)
 
 QUIET = {"markov": 0.0, "white": 0.0, "pickoff": 0.0}  # floated_gyro without noise
 NO_DRIFT = dict.fromkeys(("D_F", "D_I", "D_O", "D_S", "D_II", "D_SS", "D_IO", "D_OS", "D_IS"), 0.0)
+
+
+def record(part: Any, n: int, h: float, name: str = "drift") -> np.ndarray:
+    """Return an output after each of n steps of h."""
+    found = []
+    for k in range(n):
+        part.do_step(k * h, h)
+        found.append(np.copy(getattr(part, name)))
+    return np.array(found)
+
+
+def run(part: Any, seconds: float, h: float = 1e-3) -> np.ndarray:
+    """Return the rates after each step."""
+    return record(part, round(seconds / h), h, "rate")
+
 
 WIRES = [
     ("site.f", "table.f_local"),
