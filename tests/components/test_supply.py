@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,20 +47,17 @@ def test_wander_has_its_rms_and_correlation() -> None:
     assert part.wheel_frequency == 0.0
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_floated_gyro_against_its_torques(seed: int) -> None:
-    """J b'' + C b' = H (1 + f)(w_I cos b - w_S sin b) + torques.  Those of drift and torquer are the nominal ones, for
-    they do not turn with the wheel; reaction torques go with the square of the excitation.
-    """
+def excited(cls: Any, seed: int, **more: Any) -> tuple[Any, np.ndarray, np.ndarray, float, float]:
+    """Return a gyro after 20 ms with random supplies, their errors, the rates, its nominal drift, its torque."""
     rng = np.random.default_rng(seed)
-    f, v, p, e, a = rng.normal(size=5) * 0.02
+    errors = rng.normal(size=5) * 0.02
+    _, v, p, e, a = errors
     w, g, i = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 6.0, 1e-3
-    given = dict(
-        zip(("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS"), rng.normal(size=6) * 3e-6, strict=True)
-    )
-    gyro = Gyro(white=0.0, markov=0.0, pickoff=0.0, k_E=0.7, reaction=True, **given)
+    names = ("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS")
+    given = dict(zip(names, rng.normal(size=6) * 3e-6, strict=True))
+    gyro = cls(white=0.0, markov=0.0, pickoff=0.0, k_E=0.7, **more, **given)
     gyro.initialize()
-    for name, x in zip(OUTPUTS, (f, v, p, e, a), strict=True):
+    for name, x in zip(OUTPUTS, errors, strict=True):
         setattr(gyro, name, x)
     for j in range(3):
         gyro.omega[j], gyro.f[j] = w[j], g[j]
@@ -71,7 +69,15 @@ def test_floated_gyro_against_its_torques(seed: int) -> None:
     D_F = gyro.D_F + given["D_pickoff"] * ((1 + e) ** 2 - 1) + given["D_torquer"] * ((1 + a) ** 2 - 1)
     nominal = D_F + D_I * X + gyro.D_O * Y + D_S * Z + gyro.D_II * X * X + gyro.D_SS * Z * Z
     nominal += gyro.D_IO * X * Y + gyro.D_OS * Y * Z + gyro.D_IS * X * Z
-    torque = -gyro.H * (nominal + gyro.k * (1 + 0.7 * a) * i)
+    return gyro, errors, w, nominal, -gyro.H * (nominal + gyro.k * (1 + 0.7 * a) * i)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_floated_gyro_against_its_torques(seed: int) -> None:
+    """J b'' + C b' = H (1 + f)(w_I cos b - w_S sin b) + torques.  Those of drift and torquer are the nominal ones, for
+    they do not turn with the wheel; reaction torques go with the square of the excitation.
+    """
+    gyro, (f, _, _, e, _), w, nominal, torque = excited(Gyro, seed, reaction=True)
 
     def rhs(_: float, y: np.ndarray) -> list[float]:
         sensed = w[0] * math.cos(y[0]) - w[2] * math.sin(y[0])
@@ -90,26 +96,8 @@ def test_compliant_gyro_against_its_torques(seed: int) -> None:
     """H (1 + f) between rotor and gimbal, the torques of drift and torquer at the nominal H; rotor and float as in
     GYRO-DYN-3, integrated by scipy.
     """
-    rng = np.random.default_rng(seed)
-    f, v, p, e, a = rng.normal(size=5) * 0.02
-    w, g, i = rng.normal(size=3) * 1e-4, rng.normal(size=3) * 6.0, 1e-3
-    names = ("D_pickoff", "D_torquer", "D_UI", "D_US", "D_PI", "D_PS")
-    given = dict(zip(names, rng.normal(size=6) * 3e-6, strict=True))
-    gyro = Compliant(white=0.0, markov=0.0, pickoff=0.0, k_E=0.7, **given)
-    gyro.initialize()
-    for name, x in zip(OUTPUTS, (f, v, p, e, a), strict=True):
-        setattr(gyro, name, x)
-    for j in range(3):
-        gyro.omega[j], gyro.f[j] = w[j], g[j]
-    gyro.i = i
-    for n in range(20):
-        gyro.do_step(n * 1e-3, 1e-3)
-    X, Y, Z = -g / 9.80665
-    D_F = gyro.D_F + given["D_pickoff"] * ((1 + e) ** 2 - 1) + given["D_torquer"] * ((1 + a) ** 2 - 1)
-    nominal = D_F + (gyro.D_I + given["D_UI"] * v + given["D_PI"] * p) * X + gyro.D_O * Y
-    nominal += (gyro.D_S + given["D_US"] * v + given["D_PS"] * p) * Z + gyro.D_II * X * X + gyro.D_SS * Z * Z
-    nominal += gyro.D_IO * X * Y + gyro.D_OS * Y * Z + gyro.D_IS * X * Z
-    torque, H = -gyro.H * (nominal + gyro.k * (1 + 0.7 * a) * i), gyro.H * (1 + f)
+    gyro, (f, _, _, e, _), w, nominal, torque = excited(Compliant, seed)
+    H = gyro.H * (1 + f)
 
     def rhs(_: float, y: np.ndarray) -> list[float]:
         b, rate, about_i, about_o = y
