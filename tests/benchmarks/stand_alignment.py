@@ -10,6 +10,7 @@ import argparse
 import math
 
 import numpy as np
+from held import Held
 
 from gyrobench.engine.session import Session
 from gyrobench.units import ARCSEC
@@ -34,20 +35,18 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--gyro", action="store_true")
     given = parser.parse_args()
-    runs, rng, held = given.runs, np.random.default_rng(1), dict[str, int]()
+    rng, held = np.random.default_rng(1), Held()
     with Session("stand_alignment") as session:
-        for seed in range(runs):
+        for seed in range(given.runs):
             values = drawn(rng)
             if given.gyro:
                 off, u = float(rng.normal()) * 3.0 * ARCSEC, 3.0 * ARCSEC
                 values |= {"by": "gyro", "heading": 0.3, "theodolite.head": 0.3 + off, "u_heading": u}
             result = session.system.with_values(values).reduce(session.run(values, seed=seed + 1))
             for c in result.coefficients:
-                assert c.truth is not None
-                held[c.name] = held.get(c.name, 0) + (c.interval[0] <= c.truth <= c.interval[1])
-    for name, count in held.items():
-        print(f"{name:18} {count / runs:.3f} of {runs}")
-    print(f"{'all':18} {sum(held.values()) / (runs * len(held)):.4f}")
+                held.count(c.name, c)
+    held.show(18)
+    print(f"{'all':18} {np.mean(sum(held.hits.values(), [])):.4f}")
 
 
 if __name__ == "__main__":

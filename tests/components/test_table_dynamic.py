@@ -1,10 +1,11 @@
 """The table as it is built, against a loop written from its equations and integrated by scipy."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from native_parts import make
+from native_parts import make, stepped
 from scipy.integrate import solve_ivp
 
 from gyrobench.packaging.instance import InstanceError
@@ -23,15 +24,7 @@ def table():
     part.free()
 
 
-def run(part, until, names, h=1e-3, **values):
-    """Set values, initialize, step; return the rows after each step."""
-    part.set({"mode": 2.0, **{k: float(v) for k, v in values.items()}})
-    part.initialize()
-    rows = []
-    for k in range(round(until / h)):
-        part.step(k * h, h)
-        rows.append(part.get(names))
-    return np.array(rows)
+run = partial(stepped, mode=2.0)
 
 
 def by_hand(rate, load, until, quantum):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from native_parts import make
+from native_parts import stepped as run
 
 from gyrobench.packaging.instance import InstanceError
 
@@ -18,17 +19,6 @@ def table():
     part = make("table_two_axis_dynamic", "native")
     yield part
     part.free()
-
-
-def run(part, until, names, h=1e-3, **values):
-    """Set values, initialize, step; return the rows after each step."""
-    part.set({k: float(v) for k, v in values.items()})
-    part.initialize()
-    rows = []
-    for k in range(round(until / h)):
-        part.step(k * h, h)
-        rows.append(part.get(names))
-    return np.array(rows)
 
 
 @pytest.mark.long

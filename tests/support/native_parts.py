@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
+import numpy as np
 from fmpy import read_model_description
 
 from gyrobench.bench import standard_folder
@@ -30,3 +32,14 @@ def make(part: str, target: str) -> Instance:
         return instance.make(part, target, bench=standard_folder())
     files = native_files(part)
     return Fmu(files.folder / f"{part}.fmu", like=files)
+
+
+def stepped(part: Any, until: float, names: Any, h: float = 1e-3, **values: float) -> np.ndarray:
+    """Set values, initialize, step; return these outputs after each step."""
+    part.set({k: float(v) for k, v in values.items()})
+    part.initialize()
+    found = []
+    for k in range(round(until / h)):
+        part.step(k * h, h)
+        found.append(part.get(names))
+    return np.array(found)
