@@ -46,7 +46,7 @@ def main() -> None:
             for c in result.coefficients:
                 held.count(c.name, c)
     held.show(18)
-    print(f"{'all':18} {np.mean(sum(held.hits.values(), [])):.4f}")
+    print(f"{'all':18} {np.mean(np.concatenate([*held.hits.values()])):.4f}")
 
 
 if __name__ == "__main__":
