@@ -103,13 +103,15 @@ def test_killed_and_resumed(
     while processes_in(tmp_path / "tmp") and time.monotonic() < end:
         time.sleep(0.01)
     assert processes_in(tmp_path / "tmp") == []
+    # on a busy machine the run may have a checkpoint before it is looked at for the first time
+    loading = moment == "while the FMUs are loaded" and not (out / checkpoint.FILE).is_file()
     code, _, err = command("run", NAME, *TINY, "--out", out, "--resume")
     assert code == 0, err
     record = Record.load(out)
     assert record.complete and record.same_data(Record.load(whole))
-    from_checkpoint = moment in ("after a checkpoint", "between the tables and run.json")
+    from_checkpoint = moment in (*list(MOMENTS)[:2], "between the tables and run.json") and not loading
     assert bool(record.run.resumed_at) == from_checkpoint
-    assert ("this one begins at t = 0" in err) == (moment == "while the FMUs are loaded")
+    assert ("this one begins at t = 0" in err) == loading
     results = [json.loads((folder / "result.json").read_text(encoding="utf-8")) for folder in (out, whole)]
     assert results[0]["coefficients"] == results[1]["coefficients"]
     assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in whole.iterdir())
