@@ -54,7 +54,7 @@ STAY = RIDES | {
     "coefficients",  # a slot
     "by",  # an option
 }
-VALUES = {"current", "rate"}  # of an option of the system that is looked at
+VALUES = {"current", "rate", "pitch"}  # of an option of the system that is looked at, names of its loops
 
 
 @pytest.fixture

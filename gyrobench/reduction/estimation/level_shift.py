@@ -6,7 +6,7 @@ record and not one that fell together with a motion.  So a step from each row on
     t_k = s'v / (|s| sd),   s: the step, v: the residuals, both whitened and free of the terms of the fit
 
 externally studentized, LEVEL over the number of rows.  A single row that explains more than any step is an outlier
-(outliers), not a jump.  [Chen & Liu 1993]
+(outliers), not a jump.  [Chen 1993]
 """
 
 from __future__ import annotations

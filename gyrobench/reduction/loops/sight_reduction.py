@@ -175,7 +175,7 @@ class SightReduction(LoopReduction):
             )
             self.found.warn("budget.not_linear", text)
         largest = max(share, key=lambda n: share[n])
-        if largest.startswith("vibration"):
+        if largest.startswith("motion of the base"):
             self._rolls(share[largest], largest)
         return f", {share[largest]:.0f} % of its variance by {largest}"
 
