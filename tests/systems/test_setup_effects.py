@@ -141,9 +141,7 @@ def test_two_axis_servo() -> None:
         values = {**day(500.0), "gyro.Dy_0": 0.5 * DPH}
         clean, record = (session.run({**values, "gyro.Dy_p0": p}, seed=1) for p in (0.0, 0.01))
     assert all(c.truth is not None for c in reduced(clean).coefficients)
-    passes_when_remounts_are_stated(
-        clean, "Dx_xz"
-    )  # of y the weights are those of power-law drift, which let mounts in
+    passes_when_remounts_are_stated(clean, "Dx_xz")  # the weights of y, of power-law drift, let mounts in
     ageing = reduced(record)
     assert [c.name for c in ageing.coefficients if c.truth is None] == ["trend,y"]
     trend = ageing["trend,y"]
