@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import shutil
 import signal
@@ -137,3 +138,11 @@ def small() -> System:
     from small_tumble import SmallTumble
 
     return SmallTumble()
+
+
+@pytest.fixture
+def fewer_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No power laws among the noise models: for tests of what an error of known size does to estimates, whose weights
+    are to stay the same in the records with it and without.
+    """
+    monkeypatch.setattr("gyrobench.reduction.estimation.noise.BROAD", math.inf)

@@ -151,10 +151,7 @@ def test_the_sines_of_a_preset_turn_as_far_as_the_time(steps):
     part = make("base_motion", "native")
     part.set({"preset": 2.0, "onset": 0.0})
     part.initialize()
-    turns, worst = (
-        np.cumsum([0, *(round(2000 * h) for h in steps)]),
-        0.0,
-    )  # whole: a sum of times would add its own rounding
+    turns, worst = np.cumsum([0, *(round(2000 * h) for h in steps)]), 0.0  # whole: sums of times add their rounding
     for n in range(10_000):
         rounds, at = divmod(n, len(steps))
         part.step((rounds * turns[-1] + turns[at]) / 2000, steps[at])

@@ -44,6 +44,7 @@ def test_sensitivities_of_the_method() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("fewer_weights")
 def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
     """Each line's sensitivity equals the change of the estimates when the record is made with that error in it.  The
     errors are stated so small that they move no weights: stated in full, each record would have weights of its own.
@@ -73,8 +74,7 @@ def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
     tilt = frames.rotation([0, 0, 1], 1e-9).T  # small against the noise, else it would be taken for slow noise
     turned = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
     off = change(T.record(turned, truth, noise=T.white(1e-6)))
-    # the weights of the noise models, power laws among them, follow the data a little
-    assert line["input axis towards output axis", "D_O"].sensitivity == pytest.approx(off["D_O"] / 1e-9, rel=3e-2)
+    assert line["input axis towards output axis", "D_O"].sensitivity == pytest.approx(off["D_O"] / 1e-9, rel=2e-2)
     full = T.reduction.reduce(w, T.setup(truth=truth, **sizes))
     for c in full.coefficients:
         total = math.sqrt(sum(b.contribution**2 for b in full.budget if b.coefficient == c.name))

@@ -45,7 +45,7 @@ def check(plain: Result, wrong: Result, right: Result, predicted: Array) -> None
     names = [c.name for c in plain.coefficients]
     off, left = (np.array([r[n].estimate - plain[n].estimate for n in names]) for r in (wrong, right))
     largest = float(np.max(np.abs(off)))
-    assert np.max(np.abs(off - predicted)) < 0.3 * largest, (off, predicted)
+    assert np.max(np.abs(off - predicted)) < 0.25 * largest, (off, predicted)
     assert np.max(np.abs(left)) < 0.02 * largest, (left, off)
 
 
@@ -55,8 +55,8 @@ SOURCES = ("axis", "square", "mount", "angle1", "angle2", "wobble")
 VALUES |= {"nuisances": "none"} | {f"u_{n}": 1e-4 * FAINT for n in SOURCES}
 
 
-@pytest.fixture(scope="module")
-def plain(session: Session) -> Result:
+@pytest.fixture
+def plain(session: Session, fewer_weights: None) -> Result:
     return load_system(NAME).with_values(VALUES).reduce(session.run(VALUES))
 
 
@@ -98,6 +98,7 @@ def test_two_axis_tumble(session: Session, plain: Result, error: dict[str, Any],
 # ------------------------------------------------------------------------------------------ two-channel tumble
 @pytest.mark.parametrize("row", [0, 1])
 @pytest.mark.long
+@pytest.mark.usefixtures("fewer_weights")
 def test_wobble_of_the_two_channel_tumble(row: int) -> None:
     """The axis goes round a cone of A twice a turn.  Its rate, 2 A a' (-sin(2a + p), cos(2a + p)) in axes that stand,
     is 2 A a' (-sin(a + p), cos(a + p)) along the table's own, with a = -theta, a' = -R.  The mounts have x = -x_T, y =

@@ -53,8 +53,8 @@ def check(shift: Array, expected: dict[str, float], part: float) -> None:
     assert np.max(np.abs(shift - wanted)) < part * np.max(np.abs(wanted)), (shift, wanted)
 
 
-@pytest.fixture(scope="module")
-def plain(session: Session) -> Result:
+@pytest.fixture
+def plain(session: Session, fewer_weights: None) -> Result:
     return tumble(session, load(), gyro__white=WHITE, u_angle1=ERROR * FAINT, u_angle2=ERROR * FAINT)
 
 
@@ -95,10 +95,10 @@ def test_encoder_harmonic(
     if order == 1:
         both["D_SS"] = 0.0  # -D_I E/G by the second harmonic, +D_I E/G by the constants: all of it is D_II
     shift = shifts(found, plain, "estimate")
-    check(shift, both, 0.07)  # least squares of the likeliest noise: unfitted harmonics count as drift
+    check(shift, both, 0.05)
     source = f"angle error, {('once', 'twice')[order - 1]} a turn"
     predicted = told(plain, source, 0 if phase == 0.0 else 1)
-    check(shift, dict(zip(NAMES, predicted, strict=True)), 0.07)
+    check(shift, dict(zip(NAMES, predicted, strict=True)), 0.05)
 
 
 def test_encoder_in_phase_once_a_turn(session: Session, plain: Result) -> None:

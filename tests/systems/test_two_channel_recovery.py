@@ -150,9 +150,10 @@ def test_set_up_errors_shift_as_the_budget_predicts(
 
 @pytest.mark.parametrize(("order", "row"), [(1, 0), (1, 1), (2, 0), (2, 1)])
 @pytest.mark.long
+@pytest.mark.usefixtures("fewer_weights")
 def test_encoder_harmonic_shifts_as_the_budget_predicts(ran: Callable[..., Record], order: int, row: int) -> None:
     """The table's angle read too large by E sin(n theta) or E cos(n theta): the coefficients move, with sign, by what
-    the budget of the run without it says, to 12 % of the largest; a coefficient of 1 deg/h/g by some E times it.
+    the budget of the run without it says, to 10 % of the largest; a coefficient of 1 deg/h/g by some E times it.
     White noise of 3e-10 rad/s in a window keeps the weights as they are.
     """
     error = 1e-5
@@ -170,4 +171,4 @@ def test_encoder_harmonic_shifts_as_the_budget_predicts(ran: Callable[..., Recor
     told = np.sum([b.changes[row] for b in plain.type_b if source in b.source], axis=0)  # one for each channel
     shift = np.array([b.estimate - a.estimate for a, b in zip(plain.coefficients, off.coefficients, strict=True)])
     assert 0.1 * error < np.max(np.abs(told)) < 10.0 * error
-    assert np.max(np.abs(shift - told)) < 0.12 * np.max(np.abs(told)), (shift, told)
+    assert np.max(np.abs(shift - told)) < 0.1 * np.max(np.abs(told)), (shift, told)

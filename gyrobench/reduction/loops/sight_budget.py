@@ -42,6 +42,7 @@ EXCITED = (1, 3)  # their elements of the exciter
 LOS = ("platform.los[1]", "platform.los[2]")
 THETA = ("platform.theta[1]", "platform.theta[2]")
 BASE = ("vibration.omega[1]", "vibration.omega[2]", "vibration.omega[3]")
+OF_BASE = tuple(f"motion of the base about {axis}" for axis in "xyz")  # sources of the budget
 INSIDE = ("pitch.e", "yaw.e")  # behind the summing points of the loops
 TORQUES = ("cogging", "cogging_order", "friction", "stiction")
 GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
@@ -241,8 +242,8 @@ def by_source(
         """way: (frequency, line of sight)."""
         moved[name] = moved.get(name, np.zeros((), complex)) + way.T[:, None, :] * signal[None, :, use]
 
-    for k, axis in enumerate("xyz"):
-        add(f"motion of the base about {axis}", ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
+    for k, source in enumerate(OF_BASE):
+        add(source, ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
     lever = by_unbalance(p, ride.angles)
     for k in range(3) if np.any(lever) else ():
         add("acceleration by unbalance", (ways.torque * at_the_body(p, f)[:, None, :]) @ lever[:, k], ride.force[k])

@@ -15,7 +15,7 @@ from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Gate, LoopReduction, Response, Table
 from gyrobench.reduction.loops.open_loop import limits_hit
 from gyrobench.reduction.loops.platform_measures import peak_noise
-from gyrobench.reduction.loops.sight_budget import LOS, JitterSource, MoreSources, Ride, by_source, read_ride
+from gyrobench.reduction.loops.sight_budget import LOS, OF_BASE, JitterSource, MoreSources, Ride, by_source, read_ride
 from gyrobench.result import Curve
 
 Sources = Mapping[str, JitterSource]
@@ -175,7 +175,7 @@ class SightReduction(LoopReduction):
             )
             self.found.warn("budget.not_linear", text)
         largest = max(share, key=lambda n: share[n])
-        if largest.startswith("motion of the base"):
+        if largest in OF_BASE:
             self._rolls(share[largest], largest)
         return f", {share[largest]:.0f} % of its variance by {largest}"
 
