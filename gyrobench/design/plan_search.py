@@ -23,6 +23,7 @@ from gyrobench.design.visit_protocol import DataNoise, VisitProtocol
 LONGEST = 1e7  # s, beyond which a wanted uncertainty is not reached
 EXCHANGES = 400  # plans tried of each number of visits
 ROUNDS = 3  # of replacing each visit
+FAINT = 1e-4  # of the noise over the shortest dwell: white noise that sets no least time
 FEW = 30  # visits up to which each is replaced by the best candidate; shares of more are rounded well
 
 
@@ -48,7 +49,7 @@ class Want:
 class Search:
     """Protocol, wants and criterion.  instruments: noise of each channel, of one instrument or several of a population,
     for the worst of which the plan is made.  asked: number of wants that criterion A is the mean of; the others only
-    keep the rest of the unknowns within bounds.  least: shortest dwell, s.
+    keep the rest of the unknowns within bounds.
     """
 
     protocol: VisitProtocol
@@ -56,7 +57,6 @@ class Search:
     instruments: tuple[tuple[DataNoise, ...], ...]
     criterion: str = "minimax"
     asked: int = 1
-    least: float = 1.0
     _maps: dict[int, Array] = field(default_factory=dict)
 
     def wanted(self, channel: int) -> Array:
@@ -73,8 +73,10 @@ class Search:
         M, wanted, at = np.zeros((len(self.protocol.labels), total, total)), [], 0
         for k, c in enumerate(self.protocol.channels):
             own = slice(at, at + c.rows.shape[1])
-            density = noises[k].white if dwell is None else effective(noises[k], dwell)
-            M[:, own, own] = np.einsum("mi,mj->mij", c.rows, c.rows) / max(density, 1e-300) ** 2
+            density = effective(noises[k], self.protocol.least if dwell is None else dwell)
+            if dwell is None:  # drift without white noise sets no least time: as good as none, though not none
+                density = max(noises[k].white, FAINT * density)
+            M[:, own, own] = np.einsum("mi,mj->mij", c.rows, c.rows) / density**2
             rows = np.zeros((len(self.wanted(k)), total))
             rows[:, own] = self.wanted(k)
             wanted.append(rows)
@@ -156,7 +158,7 @@ def finish(search: Search, places: Sequence[int], weights: Array, time: float | 
     """
     weights = np.asarray(weights, dtype=float)
     weights = weights / weights.mean()
-    least = search.least / float(weights.min())
+    least = search.protocol.least / float(weights.min())
 
     def at(dwell: float) -> float:
         return search.merit(places, dwell * weights)
@@ -250,7 +252,7 @@ def _tempting(search: Search, design: ApproximateDesign) -> NDArray[np.int_]:
 def _replaced(search: Search, design: ApproximateDesign, places: Sequence[int]) -> list[int]:
     """Return the visits after each in turn was replaced by the best candidate, all of one dwell [Fedorov 1972]."""
     places, tempting, rng = list(places), _tempting(search, design), np.random.default_rng(0)
-    dwells = np.full(len(places), 10.0 * search.least + search.protocol.settle)
+    dwells = np.full(len(places), 10.0 * search.protocol.least + search.protocol.settle)
     value = search.merit(places, dwells)
     chances = design.shares[tempting] + 1e-3
     for _ in range(200):
@@ -309,7 +311,7 @@ def exchanged(search: Search, design: ApproximateDesign, plan: ExactPlan, time: 
             dwells = plan.dwell * weights * (plan.weights.sum() / weights.sum())
             spare = plan.duration - search.duration(places, dwells)
             dwells = dwells * (1.0 + spare / dwells.sum())
-            if dwells.min() < search.least or search.merit(places, dwells) >= plan.merit * (1.0 - 1e-6):
+            if dwells.min() < search.protocol.least or search.merit(places, dwells) >= plan.merit * (1.0 - 1e-6):
                 continue
         tried = finish(search, places, weights, time)
         if tried.cost(timed) < plan.cost(timed) * (1.0 - 1e-6):

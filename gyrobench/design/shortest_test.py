@@ -284,7 +284,8 @@ def _with_noise_of(protocol: VisitProtocol, folder: Path, system: System) -> Vis
     """Return the protocol with the most likely noise of a run of the same system.  Raises UsageError.
 
     A short run shows no slow drift: what it cannot exclude is named in ``unseen``, and so is drift with a power law, in
-    whose place stands the Gauss-Markov drift most like it.
+    whose place stands the Gauss-Markov drift most like it.  Nor do its windows show the noise within them: visits are
+    no shorter.
     """
     record = Record.load(folder)
     if record.run.system != system.name:
@@ -296,18 +297,21 @@ def _with_noise_of(protocol: VisitProtocol, folder: Path, system: System) -> Vis
     estimates = [f.est.noise for f, _ in fits]
     found = [DataNoise(*e.markov) for e in estimates]
     channels = [replace(c, noise=n) for c, n in zip(protocol.channels, found, strict=True)]
-    slow = max(e.sigma[2] / e.density[0] * math.sqrt(WINDOW) if e.density[0] > 0.0 else 0.0 for e in estimates)
-    said = (
-        f"the noise is the likeliest one of {folder}; slow drift of up to {slow:.2g} times the white noise of a minute "
-        "(95 %) is as well possible there, and would ask for more or shorter visits"
-    )
+    least = min(float(np.min(f.t_end - f.t_start)) for f, _ in fits)
+    said = f"the noise is the likeliest one of {folder}, and visits are not shorter than its windows of {least:.3g} s"
+    if all(e.density[0] > 0.0 for e in estimates):
+        slow = max(e.sigma[2] / e.density[0] for e in estimates) * math.sqrt(WINDOW)
+        said += (
+            f"; slow drift of up to {slow:.2g} times the white noise of a minute (95 %) is as well possible there, and "
+            "would ask for more or shorter visits"
+        )
     slope = max(e.slope for e in estimates)
     if slope:
         said += (
             f"; the spectrum of its drift is rather 1/f^{slope:g}, in whose place the plan has the Gauss-Markov drift "
             "most like it: drift that grows with the length of the test is not in the figures"
         )
-    return replace(protocol, channels=tuple(channels), unseen=(*protocol.unseen, said))
+    return replace(protocol, channels=tuple(channels), unseen=(*protocol.unseen, said), least=least)
 
 
 def _different(plans: Sequence[ExactPlan]) -> list[ExactPlan]:

@@ -66,7 +66,8 @@ class VisitProtocol:
     labels: of the m candidates.  move: s from one candidate (None: from the start) to another.  settle: s.
     options: the values of the system that make a plan of visits (candidate, s).  book: the visits of the plan as the
     system has it.  most: visits a plan may have.  required: candidates that every plan must visit.  averaged: whether
-    the readings of a visit are one datum.  unseen: what no plan of this test determines, as sentences.
+    the readings of a visit are one datum.  least: shortest dwell, s.  unseen: what no plan of this test determines, as
+    sentences.
     """
 
     labels: tuple[str, ...]
@@ -78,6 +79,7 @@ class VisitProtocol:
     most: int = 99
     required: tuple[int, ...] = ()
     unseen: tuple[str, ...] = ()
+    least: float = 1.0
 
     def times(self, places: Sequence[int], dwells: Array) -> tuple[Array, Array]:
         """Return start and end (n,) of each visit's readings, s."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,8 @@ from gyrobench.system.suite import Suite, load_test
 from gyrobench.system.system import load_system
 from gyrobench.system.values import InvalidValueError
 from gyrobench.system.visits import parse_visits
+
+Command = Callable[..., tuple[int, str, str]]
 
 #: short plans that hold every kind of candidate
 PLANS = {
@@ -248,6 +250,19 @@ def test_slow_drift_is_beaten_by_more_visits_and_not_by_longer_ones() -> None:
     assert two.duration == pytest.approx(5000.0, rel=0.1) and many.duration < 650.0
 
 
+def test_drift_without_white_noise_sets_no_least_time() -> None:
+    """What is left of the bound is the settling of a visit for what is wanted, 30 s."""
+    search = Search(protocol(noise := DataNoise(0.0, 1.0, 100.0), 30.0), (Want(0, 1, 0.2),), ((noise,),))
+    bound, optimum = plan_search.shortest_time(search, (noise,))
+    assert bound == pytest.approx(30.0, abs=0.1) and optimum.shares == pytest.approx([0.5, 0.5], abs=0.01)
+
+
+def test_no_visit_is_shorter_than_the_protocol_has_it() -> None:
+    """50 s would be enough, see above."""
+    one = replace(protocol(DataNoise(1.0), 3.0), least=60.0)
+    assert finish(Search(one, (Want(0, 1, 0.1),), ((DataNoise(1.0),),)), [0, 1], np.ones(2), None).dwell == 60.0
+
+
 def test_shares_are_rounded_in_proportion() -> None:
     assert rounded(np.array([0.5, 0.25, 0.25, 0.0]), 8).tolist() == [4, 2, 2, 0]
     assert rounded(np.array([0.9, 0.1, 0.0, 0.0]), 4, required=(3,)).tolist() == [2, 1, 0, 1]
@@ -330,7 +345,8 @@ def test_noise_of_a_run_takes_the_place_of_that_of_the_parts(tmp_path: Path) -> 
     three = pytest.approx(3.0, rel=3.0 / np.sqrt(80.0))
     assert trial.values["k0"].least / own.values["k0"].least == three
     assert trial.values["k0"].error / own.values["k0"].error == three
-    assert any(f"the likeliest one of {noisy}" in u for u in protocol.unseen)
+    assert any(f"the likeliest one of {noisy}, and visits are not shorter than" in u for u in protocol.unseen)
+    assert protocol.least == pytest.approx(3.0)  # the dwell of the run
     for folder, text in (
         (quiet, "a run without noise"),
         (other, "a run of fixed_position; a run of accelerometer_mul"),
@@ -341,3 +357,17 @@ def test_noise_of_a_run_takes_the_place_of_that_of_the_parts(tmp_path: Path) -> 
         design_test(system, {"k0": "1ug"}, noise_of=noisy, count=10)
     with pytest.raises(gb.GyrobenchError, match="No such file"):
         design_test(system, {"k0": "1ug"}, noise_of=tmp_path / "nothing")
+
+
+@pytest.mark.long
+def test_command_for_the_noise_of_a_run_with_flicker(gyrobench: Command, tmp_path: Path) -> None:
+    """Its likeliest Gauss-Markov drift may have no white noise beside it, which its windows of a minute do not show."""
+    folder = tmp_path / "run"
+    noise = ("--set", "gyro.flicker=0.01deg/h", "--set", "gyro.markov=0")
+    assert gyrobench("run", "tumble_two_axis", *noise, "--out", folder)[0] == 0
+    code, said, _ = gyrobench("design", "tumble_two_axis", "--want", "D_I=0.01deg/h/g", "--noise", folder)
+    assert code == 0
+    assert "visits are not shorter than its windows of 60 s" in said and "spectrum of its drift is rather 1/f^1" in said
+    assert "up to 0 times" not in said
+    visits = shlex.split(said.splitlines()[-1])[-1]
+    assert min(v.dwell for v in parse_visits("visits", visits.partition("=")[2], ("rad", "rad"), 0.0)) >= 60.0
