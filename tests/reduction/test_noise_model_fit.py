@@ -209,20 +209,6 @@ def test_the_deviation_of_two_filters_is_that_of_their_spectrum(name: str, p: li
 
 
 @pytest.mark.long
-def test_a_mean_of_five_after_a_low_pass() -> None:
-    """A logger that takes running means of a sensor with a low-pass of its own, N = 1: before, N was 0.79 (0.78 to
-    0.81), with a step near an end, or below 0.33 with ten bands; and the least deviation was that of a sample.
-    """
-    a = math.exp(-1.0 / 0.56)
-    for seed in (0, 3):
-        x = lfilter([1.0 - a], [1.0, -a], np.random.default_rng([31, seed]).normal(size=8504))[500:]
-        model = fit_noise(np.convolve(x, np.full(5, 0.2), "valid"), 1.0, means=False)
-        assert model.agrees and model["N"].determined and model["N"].low < 1.0 < model["N"].high < 1.1
-        assert model.filter_words().startswith("mean over 5") and not model.steps and not model.peaks()
-        assert model.minimum.tau.value > 100.0
-
-
-@pytest.mark.long
 def test_wild_samples_of_very_different_sizes() -> None:
     """8 to 1e5 standard deviations in one record: all are found, and what a large one leaves in others is none.
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.terms import MEANS, PEAKS
+from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, nearly_whole
 
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
@@ -66,7 +66,7 @@ def maximize(data: Ordinates, prior: Prior, model: Model, start: Array) -> Fitte
             if damp > 1e6:
                 break
     information = 0.5 * H
-    evidence = -0.5 * f + volume(model, information)
+    evidence = -0.5 * f + volume(model, information) - by_chance(model, p, information)
     return Fitted(model, p, information, f + 2.0 * float(prior.log(model, p[None])[0]), evidence)
 
 
@@ -84,3 +84,18 @@ def volume(model: Model, information: Array) -> float:
         logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
     whole = sum(t.filter.startswith(MEANS) for t in model)  # its number of samples was sought as that of any mean
     return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * (count + whole)
+
+
+def by_chance(model: Model, p: Array, information: Array) -> float:
+    """Return what the width of an average costs more than that of a mean over a whole number k of samples nearby.
+
+    Of widths as likely in the cell of k, log (k + 1/2)/(k - 1/2) wide, one that the record shows to s lies as near to k
+    by chance in sqrt(2 pi) s of it; sensors take means of whole numbers of samples on purpose.
+    """
+    out, at = 0.0, 0
+    for term, q in split(model, p):
+        if term.filter.startswith("average") and (k := nearly_whole(q[1])):
+            cell = math.log((k + 0.5) / (k - 0.5))
+            out += max(math.log(cell * math.sqrt((information[at + 1, at + 1] + WIDEST) / (2.0 * math.pi))), 0.0)
+        at += term.size
+    return out

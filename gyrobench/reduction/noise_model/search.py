@@ -13,7 +13,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import DIGITAL, PEAKS, SLOW, NoiseTerm, passes_slow, samples_of
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, nearly_whole, samples_of
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence
@@ -141,7 +141,7 @@ class ModelSearch:
         if count > 1:  # of slow noise too, which fills its zeros otherwise
             made = joined([(NoiseTerm("white", f"boxcar{count}"), q[:1]), *rest])
             yield made[0], [made[1]]
-        if first == "average" and abs(math.exp(q[1]) / (whole := round(math.exp(q[1]))) - 1.0) < 0.02 and whole > 1:
+        if first == "average" and (whole := nearly_whole(q[1])):
             new = NoiseTerm("white", f"mean{whole}+{behind}" if behind else f"mean{whole}")
             made = joined([(new, np.delete(q, 1)), *rest])
             yield made[0], [made[1]]
@@ -189,12 +189,12 @@ class ModelSearch:
         else:
             self.seen = before
 
-    def grow_boxcar(self) -> None:
-        """Try slow terms beside a mean that they pass too, where it is nearly as likely as the best model: other
+    def grow_means(self) -> None:
+        """Try slow terms beside a mean over whole samples, where it is nearly as likely as the best model: other
         filters, of more parameters, hide its zeros, and each slow term that passes none fills them.
         """
         at: Fitted | None = None
-        while likely := [f for f in self.seen.values() if any(passes_slow(t.filter) for t in f.model)
+        while likely := [f for f in self.seen.values() if any(t.filter.startswith(MEANS) for t in f.model)
                          and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
             top = max(likely, key=lambda f: f.evidence)
             if at is not None and top.model == at.model:
@@ -332,7 +332,7 @@ def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
     for f in before.ranked[:3]:
         found.fit(f.model, f.p)
     found.climb(found.best, SIMPLE + SHAPES)
-    found.grow_boxcar()
+    found.grow_means()
     return found
 
 
@@ -347,5 +347,5 @@ def search(data: Ordinates) -> ModelSearch:
     if found.resonances:
         found.add_resonances()
         found.climb(found.best, SIMPLE + SHAPES)
-    found.grow_boxcar()
+    found.grow_means()
     return found
