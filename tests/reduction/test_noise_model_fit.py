@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from gyrobench.reduction.noise_model import treatment
 from gyrobench.reduction.noise_model.agreement import compare, with_spectrum
 from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
@@ -289,6 +290,18 @@ def test_steps_wild_and_missing_samples() -> None:
     (step,) = model.steps
     assert abs(step.at - 8000) < 50 and step.size == pytest.approx(1.0, abs=4.0 * step.u) and step.u < 0.05
     assert model.agrees, "with what was taken out the deviation is that of the record as it was"
+
+
+def test_steps_are_found_one_beside_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Levels 0, 1, -1, 0 of white noise of 1, a wild sample: three steps, and the record is completed anew once."""
+    rng, n = np.random.default_rng(6), 8000
+    x = rng.normal(size=n) + np.repeat([0.0, 1.0, -1.0, 0.0], n // 4)
+    x[3000] += 30.0
+    done = list[int]()
+    monkeypatch.setattr(treatment, "complete", lambda y, wild: (done.append(y.size), complete(y, wild))[1])
+    steps = sorted(fit_noise(x, 1.0).steps, key=lambda s: s.at)
+    assert [round(s.at / 2000.0, 2) for s in steps] == [1.0, 2.0, 3.0] and len(done) == 2
+    assert np.abs([s.size - true for s, true in zip(steps, (1.0, -2.0, 1.0), strict=True)]).max() < 0.15
 
 
 @pytest.mark.long

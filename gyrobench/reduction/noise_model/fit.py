@@ -30,9 +30,9 @@ from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseMo
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
-from gyrobench.reduction.noise_model.steps import LevelStep, largest_step
+from gyrobench.reduction.noise_model.steps import largest_step
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, Grid, NoiseTerm
-from gyrobench.reduction.noise_model.treatment import Treated, treat
+from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
@@ -122,44 +122,47 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
 def _without_steps(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
     """Return the record without the steps of its level that the likelihood asks for, and the models of what is left."""
     found = search(treated.ordinates(means))
-    for _ in range(STEPS):
-        better = _one_step(treated, found, means)
-        if better is None:
-            break
+    while steps := _steps_of(treated, found, means):
+        better = treated.without(steps)
         data = better.ordinates(means)
-        # what was completed beside the step, bands too, may not be there without it
+        # what was completed beside the steps, bands too, may not be there without them
         completed = any(s.done.extra is not None for s in treated.stretches)
         treated, found = better, search(data) if completed else search_again(data, found)
     return treated, found
 
 
-def _one_step(treated: Treated, found: ModelSearch, means: bool) -> Treated | None:
-    """Return the record without one step more, or None where the likelihood does not ask for it.
+def _steps_of(treated: Treated, found: ModelSearch, means: bool) -> list[PlacedStep]:
+    """Return the steps that the likelihood asks for beside those taken out, one after the other.
 
     Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift;
-    the model is fitted again without each of them.
+    the models are fitted again without each of them.
     """
-    at = found.best
     bound = 2.0 * math.log(treated.samples) + RATIO
-    fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
-    tried: list[tuple[float, int, LevelStep]] = []
-    for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
-        parts = [*split(model, p), *found.resonances]
-        places, angle = [], sum(float(t.angle(q)) for t, q in parts)
-        for i, s in enumerate(treated.stretches):
-            step, ratio = largest_step(s.done.x, _spectrum_of(s.own.size, parts, means), angle)
-            places.append((ratio, i, step))
-        ratio, i, step = max(places, key=lambda c: c[0])
-        if ratio < bound:
-            continue
-        data = treated.ordinates(means, less=(i, step))
-        data.hold(found.resonances)
-        tried.append((min(maximize(data, found.prior, f.model, f.p).value for f in found.ranked[:3]), i, step))
-    if not tried:
-        return None
-    value, i, step = min(tried, key=lambda t: t[0])
-    least = min(f.value for f in found.ranked[:3])
-    return None if least - value < bound else treated.without(i, step)
+    fits, steps = found.ranked[:3], list[PlacedStep]()
+    while len(treated.steps) + len(steps) < STEPS:
+        at = max(fits, key=lambda f: f.evidence)
+        fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
+        tried: list[tuple[PlacedStep, list[Fitted]]] = []
+        for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
+            parts = [*split(model, p), *found.resonances]
+            places, angle = [], sum(float(t.angle(q)) for t, q in parts)
+            for i in range(len(treated.stretches)):
+                x = treated.completed(i, steps)
+                step, ratio = largest_step(x, _spectrum_of(x.size, parts, means), angle)
+                places.append((ratio, i, step))
+            ratio, i, step = max(places, key=lambda c: c[0])
+            if ratio < bound:
+                continue
+            data = treated.ordinates(means, less=[*steps, (i, step)])
+            data.hold(found.resonances)
+            tried.append(((i, step), [maximize(data, found.prior, f.model, f.p) for f in fits]))
+        if not tried:
+            break
+        one, without = min(tried, key=lambda t: min(f.value for f in t[1]))
+        if min(f.value for f in fits) - min(f.value for f in without) < bound:
+            break
+        fits, steps = without, [*steps, one]
+    return steps
 
 
 def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> Array:

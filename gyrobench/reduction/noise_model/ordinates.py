@@ -234,7 +234,8 @@ class Ordinates:
 
     def angle(self, model: Model, p: Array) -> Array:
         """Return the variance of the error of an angle (...), 0 where the model has none."""
-        return np.asarray(self.fixed_angle + sum(term.angle(q) for term, q in split(model, p)))
+        angles = [term.angle(q) for term, q in split(model, p) if term.rises]
+        return np.asarray(np.zeros(p.shape[:-1]) + self.fixed_angle + sum(angles))
 
     def value(self, model: Model, p: Array) -> Array:
         """Return -2 log restricted likelihood (M,) of parameters p (M, q)."""

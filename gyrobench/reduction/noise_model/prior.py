@@ -55,6 +55,7 @@ class Prior:
         # slow noise falls by f^-2 at most: what is far below that has passed a low-pass, and slow noise with it
         fall = np.maximum.accumulate(self.level * self.grid.omega**2) / self.grid.omega**2
         self.before = np.where(self.level < HELD_BACK * fall, fall, self.level)
+        self._bounds: dict[Model, tuple[Array, Array]] = {}
         self.longest, self.samples = math.log(float(np.max(data.n))), data.samples
         self.taus = np.linspace(math.log(SHORTEST_TAU), self.longest, 40)
         self.markov = np.array([self._range(NoiseTerm("gauss_markov"), np.array([t])) for t in self.taus])
@@ -80,6 +81,8 @@ class Prior:
 
     def bounds(self, model: Model) -> tuple[Array, Array]:
         """Return the least and largest value of each parameter."""
+        if model in self._bounds:
+            return self._bounds[model]
         limits: list[tuple[float, float]] = []
         for term in model:
             limits.append((-40.0, 40.0))
@@ -92,7 +95,8 @@ class Prior:
                     limits += [(-6.0, 6.0)] * int(part[5:])
                 limits += [(math.log(a), math.log(b)) for a, b in FILTERS.get(part, [])]
         low, high = zip(*limits, strict=True)
-        return np.array(low), np.array(high)
+        self._bounds[model] = np.array(low), np.array(high)
+        return self._bounds[model]
 
     def log(self, model: Model, p: Array) -> Array:
         """Return the logarithm of the prior density (M,) of parameters (M, q), steep walls instead of ends."""

@@ -10,6 +10,7 @@ D = diag(1/S), c = 2 q2/(1 + 2 q2 u'D u), u_k = sqrt(2/n) cos(omega_k/2).  The l
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,10 +70,11 @@ def largest_step(x: Array, S: Array, q2: float = 0.0) -> tuple[LevelStep, float]
     return LevelStep(k, float(size[k]), float(sd[k])), float(ratio[k])
 
 
-def without(x: Array, step: LevelStep) -> Array:
-    """Return a stretch without a step; its mean level stays."""
+def without(x: Array, steps: Sequence[LevelStep]) -> Array:
+    """Return a stretch without steps; its mean level stays."""
     n = x.size
-    out = x.copy()
-    out[step.at :] -= step.size * step.at / n
-    out[: step.at] += step.size * (n - step.at) / n
-    return out
+    for step in steps:
+        x = x.copy()
+        x[step.at :] -= step.size * step.at / n
+        x[: step.at] += step.size * (n - step.at) / n
+    return x

@@ -42,6 +42,7 @@ from gyrobench.reduction.series.noise_spectra import folded
 PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")
 DIGITAL = ("butterworth", "cascade")  # filters that slow noise passes too, as they hold back what it has above them
+SIZES = {"gauss_markov": 2, "resonance": 3, "band": 3}  # parameters, one of other terms
 MEANS = ("mean", "boxcar")  # over a whole number of samples, with zeros; slow noise passes a boxcar too
 NEARLY = 0.02  # of the width of an average: a mean over a whole number of samples is tried in its place
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
@@ -208,6 +209,7 @@ def passes_slow(name: str) -> bool:
     return name in DIGITAL or name.startswith("boxcar")
 
 
+@functools.cache
 def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
     """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none.
 
@@ -234,9 +236,16 @@ class NoiseTerm:
     @property
     def size(self) -> int:
         """Return the number of parameters."""
-        if self.name == "white":
-            return 1 + filter_of(self.filter)[1]
-        return {"gauss_markov": 2, "resonance": 3, "band": 3}.get(self.name, 1)
+        return 1 + filter_of(self.filter)[1] if self.name == "white" else SIZES.get(self.name, 1)
+
+    @property
+    def rises(self) -> bool:
+        """Return whether the spectrum rises from frequency 0 on, so that single angles have errors."""
+        return (
+            self.name == "quantization"
+            or self.name in PEAKS
+            or (self.name == "white" and (self.filter == "second" or "shape" in self.filter))
+        )
 
     def unit(self, p: Array, grid: Grid) -> Array:
         """Return the spectrum (..., b) for a unit first parameter; p (..., size - 1) are the others."""
@@ -268,7 +277,7 @@ class NoiseTerm:
             return np.asarray(v)
         if self.name in PEAKS:
             return np.asarray(v / (4.0 * np.sin(0.5 * np.exp(p[..., 2])) ** 2))
-        if self.name == "white" and (self.filter == "second" or "shape" in self.filter):
+        if self.rises:  # of the filter
             grid = Grid(math.pi * (np.arange(RISES) + 0.5) / RISES)
             return np.asarray(v * np.mean(np.maximum(self.unit(p[..., 1:], grid) - 1.0, 0.0) / grid.sine, axis=-1))
         return np.zeros_like(v)

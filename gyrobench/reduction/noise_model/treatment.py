@@ -33,6 +33,9 @@ ENDS = 256  # samples of an end of a stretch that do not tell of the level
 CHUNK = 1 << 17  # samples of a sine computed at a time
 
 
+PlacedStep = tuple[int, LevelStep]  # and the place of its stretch
+
+
 @dataclass(frozen=True)
 class TreatedStretch:
     """Samples from ``start`` on without a long gap, lines and steps taken out: ``own`` (n,) with NaN, ``done``
@@ -63,17 +66,18 @@ class Treated:
     p_level: float
     find_wild: bool
 
-    def without(self, place: int, step: LevelStep) -> Treated:
-        """Return the record with a step of a stretch taken out and that stretch completed anew.
+    def without(self, steps: Sequence[PlacedStep]) -> Treated:
+        """Return the record with steps taken out and their stretches completed anew.
 
         A step has power at low frequencies; what was completed beside it has too much of them.
         """
-        s = self.stretches[place]
-        own = without(s.own, step)
-        new = TreatedStretch(s.start, own, complete(own, self.find_wild), (*s.steps, step))
-        stretches = (*self.stretches[:place], new, *self.stretches[place + 1 :])
+        stretches = list(self.stretches)
+        for place in sorted({place for place, _ in steps}):
+            s, mine = stretches[place], [step for i, step in steps if i == place]
+            own = without(s.own, mine)
+            stretches[place] = TreatedStretch(s.start, own, complete(own, self.find_wild), (*s.steps, *mine))
         spread, levels, p_level = _levels(stretches)
-        return replace(self, stretches=stretches, spread=spread, levels=levels, p_level=p_level)
+        return replace(self, stretches=tuple(stretches), spread=spread, levels=levels, p_level=p_level)
 
     @property
     def there(self) -> int:
@@ -104,14 +108,18 @@ class Treated:
         """Return the steps, at their place on the grid."""
         return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.steps]
 
-    def ordinates(self, means: bool, keep_wild: bool = False, less: tuple[int, LevelStep] | None = None) -> Ordinates:
-        """Return the ordinates of the stretches; keep_wild: with the wild samples left in; less: without a step of a
-        stretch, what was completed as it is.
+    def completed(self, place: int, less: Sequence[PlacedStep] = ()) -> Array:
+        """Return a stretch completed, without steps, beside which it was completed."""
+        return without(self.stretches[place].done.x, [step for i, step in less if i == place])
+
+    def ordinates(self, means: bool, keep_wild: bool = False, less: Sequence[PlacedStep] = ()) -> Ordinates:
+        """Return the ordinates of the stretches; keep_wild: with the wild samples left in; less: without steps, what
+        was completed as it is.
         """
         weight = self.there / sum(s.own.size for s in self.stretches) / self.spread
         x, extra = [], list[Array | None]()
         for i, s in enumerate(self.stretches):
-            y = without(s.done.x, less[1]) if less is not None and less[0] == i else s.done.x
+            y = self.completed(i, less)
             if keep_wild and s.done.wild.size:
                 y = y.copy()
                 y[s.done.wild] += s.own[s.done.wild] - s.done.x[s.done.wild]
