@@ -120,6 +120,24 @@ def test_intervals_hold_under_power_laws(slope: float, least: float) -> None:
     assert held(150, 300, slope, 2) > least
 
 
+@pytest.mark.long
+def test_flicker_that_white_noise_hides_is_warned_of() -> None:
+    """Densities alike at 10 over the record of 100 windows: 0.90 of 800 means hold, not 0.95, as ten ordinates tell
+    little of what is below them; 0.95 of the records say that drift may be slower, and its interval then holds 0.97.
+
+    A step of :func:`flicker` has the density 2/(4 n 8 f) at f, a window of white noise 8 w^2: w^2 = 1/160.
+    """
+    t0, rng, rows = 10.0 * np.arange(100), np.random.default_rng(91), []
+    for _ in range(300):
+        y = flicker(rng, 100) + rng.normal(scale=160.0**-0.5, size=100)
+        e = noise_mixture_fit.fit(np.ones((100, 1)), y, ["mean"], t0, t0 + 10.0)
+        slow = float(e.mixture.if_slow(np.eye(1))[1][0])
+        half, off = float(e.half_width[0]), abs(float(e.beta[0]))
+        rows.append([off <= half, off <= max(half, slow), bool(e.noise.unbounded) or slow > half])
+    held, held_if_slow, warned = np.mean(rows, axis=0)
+    assert held > 0.86 and held_if_slow > 0.94 and warned > 0.91
+
+
 def test_a_short_record_does_not_ask_for_power_laws() -> None:
     assert np.all(noise.noise_grid(T0, T1).tau > 0.0)
     t0 = 10.0 * np.arange(60)

@@ -8,6 +8,7 @@ DRIFT-PERIODIC]
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -98,7 +99,7 @@ class Treated:
         """Return the variance of wild samples below the limit, which are in the samples and not in the noise."""
         return float(np.average([s.done.below for s in self.stretches], weights=[s.own.size for s in self.stretches]))
 
-    @property
+    @functools.cached_property
     def settled(self) -> bool:
         """Return whether what was completed came to an end, and is the lesser part, in all stretches."""
         return all(s.done.stays and mostly_known(s.done.x, s.done.extra) for s in self.stretches)
