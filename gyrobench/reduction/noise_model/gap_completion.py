@@ -11,6 +11,7 @@ others, so each change is carried on by half of itself and more.  [DRIFT-NOISE-M
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -72,21 +73,28 @@ class Completed:
         return self.x if self.noise is None else self.x + self.noise
 
 
+@functools.lru_cache(maxsize=1)
+def _means_about(n: int) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+    """Return, of the means about each of the ordinates 1 .. n - 1, the ordinate before the first one, the last one, and
+    their number.
+    """
+    k = np.arange(1, n)
+    half = np.maximum(6, (SMOOTH * k).astype(int))
+    # one-sided at the ends would be biased by the slope: as far on the one side as on the other
+    near = np.minimum(half, np.minimum(k - 1, n - 1 - k))
+    near = np.maximum(near, np.minimum(2, np.minimum(k - 1, n - 1 - k)))
+    return (k - near - 1).astype(np.int32), (k + near).astype(np.int32), 2.0 * near + 1.0
+
+
 def smooth_spectrum(power: Array) -> Array:
     """Return a smoothed spectrum (n,) of powers (n,) of ordinates; that of the mean, k = 0, is very large."""
     n = power.size
     total = np.concatenate([[0.0], np.cumsum(power[1:])])
-    k = np.arange(1, n)
-    half = np.maximum(6, (SMOOTH * k).astype(int))
-    a, b = np.maximum(k - half, 1), np.minimum(k + half, n - 1)
-    # one-sided at the ends would be biased by the slope: as far on the one side as on the other
-    near = np.minimum(k - a, b - k)
-    near = np.maximum(near, np.minimum(2, np.minimum(k - 1, n - 1 - k)))
-    a, b = k - near, k + near
-    broad = (total[b] - total[a - 1]) / (b - a + 1.0)
+    before, last, count = _means_about(n)
+    broad = (total[last] - total[before]) / count
     fine = ndimage.uniform_filter1d(power[1:], NARROW, mode="reflect")
     out = np.empty(n)
-    out[1:] = np.where((fine > ABOVE * broad) & (k > 30), fine, broad)
+    out[1:] = np.where((fine > ABOVE * broad) & (np.arange(1, n) > 30), fine, broad)
     out[1:] = np.maximum(out[1:], 1e-12 * float(np.mean(power[1:])))
     # nothing holds a mean of few ordinates up when completion and spectrum follow one another
     out[1:FIRST] = np.maximum(out[1:FIRST], LEAST * out[min(FIRST, n - 1)])
