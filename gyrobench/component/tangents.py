@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from gyrobench.component.composition import Derivatives
+from gyrobench.component.composition import Derivatives, stored
 from gyrobench.component.declarations import State
 from gyrobench.component.math import Dual, lift
-from gyrobench.component.vectors import Vector
+from gyrobench.component.vectors import Vector, copied
 
 if TYPE_CHECKING:
     from gyrobench.component.component import Component
@@ -22,7 +22,7 @@ def tangents(part: Component, directions: Iterable[dict[str, float]], outputs: b
 
     outputs: False leaves those out.
     """
-    twin, found = twin_of(part), []
+    twin, found = twin_of(part, dual), []
     shown = [s for s in part.layout if s.section == "output"] if outputs else []
     for seeds in directions:  # one twin for all: ``flow`` and ``outputs`` write ``der`` and outputs only
         seeded = [dig(getattr(twin, s.path[0]), s.path[1:]) for s in map(part._find, seeds)]
@@ -40,16 +40,18 @@ def tangents(part: Component, directions: Iterable[dict[str, float]], outputs: b
     return found
 
 
-def twin_of(part: Component) -> Component:
-    """Return a copy of a part whose values are dual numbers, with derivatives 0."""
+def twin_of(part: Component, of: Callable[[Any], Any] = copied) -> Component:
+    """Return a copy of a part at its present point; its values, numbers and arrays, are what ``of`` makes of them."""
     twin = object.__new__(type(part))
     twin.__dict__.update(part.__dict__)
     twin.der = Derivatives()
+    values = twin.__dict__
     for name, d in part.declarations.items():
-        setattr(twin, name, dual(getattr(part, name)))
+        key = stored(name) if d.shape else name
+        values[key] = of(values[key])
         if isinstance(d, State):
-            setattr(twin.der, name, dual(getattr(part.der, name)))
-    twin.noise = SimpleNamespace(**{k: dual(v) for k, v in vars(part.noise).items()})
+            setattr(twin.der, name, of(getattr(part.der, name)))
+    twin.noise = SimpleNamespace(**{k: of(v) for k, v in vars(part.noise).items()})
     return twin
 
 
@@ -61,5 +63,5 @@ def dig(x: Any, path: tuple[Any, ...]) -> Any:
 
 
 def dual(x: Any) -> Any:
-    """Return a number, or an array, as dual numbers."""
+    """Return a number, or an array, as dual numbers with derivatives 0."""
     return Vector([dual(e) for e in x]) if isinstance(x, list) else Dual(float(x))

@@ -116,7 +116,11 @@ def _multirate(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...],
 def _undelayed(
     point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float
 ) -> tuple[Array, Array, Array, Array] | None:
-    return undelayed(point.part, [*inputs], [*outputs], step)
+    try:
+        whole = _step(point, inputs, outputs, step)
+    except ValueError:
+        return None
+    return None if whole is None else undelayed(point.part, [*inputs], [*outputs], step, whole)
 
 
 def _within(part: Component, inputs: tuple[str, ...], b: Array, step: float) -> list[Array]:

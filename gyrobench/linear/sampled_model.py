@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component, ComponentError
+from gyrobench.component.tangents import twin_of
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.packaging.dependencies import moved
 from gyrobench.packaging.source import PartCode
@@ -28,6 +29,8 @@ from gyrobench.packaging.source import PartCode
 DELTA = 1e-6  # of a value, or of 1 where it is smaller
 SETTLED = 1000  # steps after which a filter with a changing gain has its last one
 ALIKE = 1e-3  # relative change of a coefficient between two steps that are alike
+ROUNDED = 1e-14  # of a difference of values, its rounding
+STILL = ALIKE / SETTLED  # the same, where it is not to grow to that until the filter has settled
 FINE = 1e-3  # of the step, where it is to be none
 MAX_DISCRETE = 100  # discrete values: more are a memory, whose step is not the same one step later
 
@@ -60,8 +63,7 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     """
     if not part.pieces["sampled"] or not inputs:
         return None
-    twin = type(part)(part.instance)
-    twin.set_state(part.get_state())
+    twin = twin_of(part)
     discrete, reached = _moved(twin, inputs, step)
     if not reached.any():
         return None
@@ -75,9 +77,18 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
     first.within = not any(np.any(side) for k in np.flatnonzero(reached) for side in part.tangent({discrete[k]: 1.0}))
     if first.within:
         return first
+    return _settled(first, twin, inputs, outputs, step)
+
+
+def _settled(first: SampledStep, twin: Component, inputs: list[str], outputs: list[str], step: float) -> SampledStep:
+    """Return the first step of a part that stands before it, or a later one that is like the next; ValueError without.
+
+    The part goes on.
+    """
+    discrete = first.names[len(twin.states) :]
     try:
         twin.do_step(0.0, step)
-        if first.is_like(differences(twin, inputs, outputs, step, discrete), ALIKE / SETTLED):
+        if _is_still(first, twin, inputs, outputs, step):
             return first
         for k in range(1, SETTLED):
             twin.do_step(k * step, step)
@@ -92,36 +103,37 @@ def sampled_step(part: Component, inputs: list[str], outputs: list[str], step: f
 
 
 def undelayed(
-    part: Component, inputs: list[str], outputs: list[str], step: float
+    part: Component, inputs: list[str], outputs: list[str], step: float, whole: SampledStep
 ) -> tuple[Array, Array, Array, Array] | None:
     """Return A, B, C, D of x' = A x + B u, y = C x + D u without the delay of the sampled methods; x: the states.
 
-    None where a discrete value that the inputs reach keeps something from step to step (a filter in samples), or where
-    half the step is not the same method twice as often (a sampling period of its own).
+    whole: the step of the part, of :func:`sampled_step`.  None where a discrete value that the inputs reach keeps
+    something from step to step (a filter in samples), or where half the step is not the same method twice as often (a
+    sampling period of its own).
 
     Values d that are handed on, d+ = N d + K x + L u with a nilpotent N, are (I - N)^-1 (K x + L u) as the step goes to
     zero.
     """
     n = len(part.states)
-    try:
-        twin = type(part)(part.instance)
-        twin.set_state(part.get_state())
-        if sampled_step(part, inputs, outputs, 0.5 * step) is None:
-            return None
-        discrete, reached = _moved(part, inputs, step)
-        whole, fine = (differences(twin, inputs, outputs, h, discrete) for h in (step, FINE * step))
-    except (ComponentError, ValueError):
-        return None
-    there = _handed_on(whole, n, reached)
+    there = _handed_on(whole, n, _moved(part, inputs, step)[1])
     rows = n + np.flatnonzero(there)
     kept = whole.a[np.ix_(rows, rows)]
     if np.any(np.abs(np.linalg.matrix_power(kept, len(rows))) > DELTA):
         return None
-    still = np.linalg.inv(np.eye(len(rows)) - fine.a[np.ix_(rows, rows)])
-    of_x, of_u = still @ fine.a[rows, :n], still @ fine.b[rows]
+    handed = [whole.names[k] for k in rows]
+    twin = twin_of(part)
+    try:
+        half = differences(twin, inputs, [], 0.5 * step, handed)
+        if _settled(half, twin, inputs, [], 0.5 * step) is not half:
+            part = twin  # where it has settled
+        fine = differences(part, inputs, [], FINE * step, handed)
+    except (ComponentError, ValueError):
+        return None
+    still = np.linalg.inv(np.eye(len(rows)) - fine.a[n:, n:])
+    of_x, of_u = still @ fine.a[n:, :n], still @ fine.b[n:]
     a, b, c, d = jacobians(part, inputs, outputs)
     all_outputs = [s.name for s in part.layout if s.section == "output"]
-    sides = list(part.tangents({discrete[k - n]: 1.0} for k in rows))
+    sides = list(part.tangents({name: 1.0} for name in handed))
     a_d = np.array([side[0] for side in sides], dtype=float).T.reshape(n, len(rows))
     c_d = np.array([[side[1][all_outputs.index(o)] for o in outputs] for side in sides], dtype=float).T
     c_d = c_d.reshape(len(outputs), len(rows))
@@ -144,14 +156,15 @@ def _moved(part: Component, inputs: list[str], step: float) -> tuple[list[str], 
     discrete = [s for s in part.layout if s.section == "discrete"]
     values = []
     for size in (0.0, DELTA):
-        twin = type(part)(part.instance)
-        twin.set_state(part.get_state())
+        twin = twin_of(part)
         for n in [*inputs, *(s.name for s in part.states)]:
             twin.set(n, twin.get(n) + size)
         for k in range(2):
             twin.do_step(k * step, step)
         values.append(np.array([twin.get(s.name) for s in discrete]))
     reached = values[0] != values[1]
+    if not reached.any():
+        return [], reached[:0]
     follow: set[str] = _following(type(part))  # type: ignore[arg-type]  # mypy takes the hash of an instance
     kept = [k for k, s in enumerate(discrete) if reached[k] or s.decl.name in follow]
     return [discrete[k].name for k in kept], reached[kept]
@@ -167,36 +180,64 @@ def differences(
 ) -> SampledStep:
     """Return the linear step of a part at its present point; discrete: values that are kept."""
     names = [s.name for s in part.states] + discrete
-    kept: Any = part.get_state()
 
-    def column(name: str, after: Callable[[], list[float]], move: bool) -> Array:
-        shifted = []
-        for sign in (1.0, -1.0):
-            part.set_state(kept)
-            x = part.get(name)
-            size = DELTA * max(1.0, abs(x))
-            part.set(name, x + sign * size)
-            if move:
-                part.do_step(part.t, step)
-            shifted.append(np.array(after()))
-        return np.asarray((shifted[0] - shifted[1]) / (2.0 * size))
+    def matrices(columns: list[str]) -> tuple[Array, Array]:
+        found = []
+        for name in columns:
+            size = _size(part, name)
+            found.append([change / (2.0 * size) for change in _changes(part, {name: size}, names, outputs, step)])
+        state, shown = (
+            np.array([pair[k] for pair in found]).reshape(len(columns), rows).T
+            for k, rows in enumerate((len(names), len(outputs)))
+        )
+        return state, shown
 
-    def state() -> list[float]:
-        return [part.get(n) for n in names]
+    (a, c), (b, d) = matrices(names), matrices(inputs)
+    return SampledStep(names, a, b, c, d)
 
-    def output() -> list[float]:
-        part.flow()  # an output may be a derivative
-        return [part.get(n) for n in outputs]
 
-    def matrix(columns: list[str], after: Callable[[], list[float]], move: bool, rows: int) -> Array:
-        return np.column_stack([column(n, after, move) for n in columns]) if columns else np.zeros((rows, 0))
+def _size(part: Component, name: str) -> float:
+    return DELTA * max(1.0, abs(part.get(name)))
 
-    found = SampledStep(
-        names,
-        matrix(names, state, True, len(names)),
-        matrix(inputs, state, True, len(names)),
-        matrix(names, output, False, len(outputs)),
-        matrix(inputs, output, False, len(outputs)),
-    )
-    part.set_state(kept)
-    return found
+
+def _changes(
+    part: Component, moves: dict[str, float], names: list[str], outputs: list[str], step: float
+) -> list[Array]:
+    """Return the differences of ``names`` after a step, and of outputs before it, between both signs of the moves."""
+    def moved(sign: float) -> Component:
+        twin = twin_of(part)
+        for name, size in moves.items():
+            twin.set(name, part.get(name) + sign * size)
+        return twin
+
+    after, before = [], []
+    for sign in (1.0, -1.0):
+        twin = moved(sign)
+        twin.do_step(twin.t, step)
+        after.append(np.array([twin.get(n) for n in names]))
+        if outputs:
+            twin = moved(sign)
+            twin.flow()  # an output may be a derivative
+        before.append(np.array([twin.get(n) for n in outputs]))
+    return [after[0] - after[1], before[0] - before[1]]
+
+
+def _is_still(model: SampledStep, part: Component, inputs: list[str], outputs: list[str], step: float) -> bool:
+    """Return whether the step of a part at its present point is the model.
+
+    First one step with all moved at once, each by a random share of its own, so that coefficients that differ do not
+    cancel; where that is not the sum of the columns (a kink at this point), column by column.
+    """
+    columns = [*model.names, *inputs]
+    shares = np.random.default_rng(1).uniform(0.5, 1.0, len(columns))
+    moves = {name: share * _size(part, name) for name, share in zip(columns, shares, strict=True)}
+    by = 2.0 * np.array(list(moves.values()))
+    changes = _changes(part, moves, model.names, outputs, step)
+    sides = np.hstack([model.a, model.b]), np.hstack([model.c, model.d])
+    if all(
+        np.all(np.abs(change - side @ by) <= STILL * (np.abs(side) @ by) + ROUNDED)
+        for change, side in zip(changes, sides, strict=True)
+    ):
+        return True
+    discrete = model.names[len(part.states) :]
+    return model.is_like(differences(part, inputs, outputs, step, discrete), STILL)
