@@ -12,9 +12,7 @@ see gyrobench.linear.multirate).
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,6 +202,7 @@ def _changes(
     part: Component, moves: dict[str, float], names: list[str], outputs: list[str], step: float
 ) -> list[Array]:
     """Return the differences of ``names`` after a step, and of outputs before it, between both signs of the moves."""
+
     def moved(sign: float) -> Component:
         twin = twin_of(part)
         for name, size in moves.items():
