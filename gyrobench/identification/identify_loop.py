@@ -28,6 +28,7 @@ from gyrobench.identification.loop_curve import loop_curve
 from gyrobench.identification.loop_doubts import CHANGED, LEVEL_END, halves, level_end
 from gyrobench.identification.loop_margins import margins
 from gyrobench.identification.loop_record import LoopRecord, read_loop
+from gyrobench.identification.missing_blocks import missing_blocks
 from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.ratios import loop_responses
 from gyrobench.identification.wanted_margins import parse_wanted
@@ -37,7 +38,10 @@ from gyrobench.record.csv_reader import DataError
 WHOLE = 0.05  # of a sample: what the last period may be off
 LINES = 8
 BANDS = 12
-CLIPPED = 4  # samples in a row at the largest value
+CLOCK = 0.05  # relative: a clock is not further off
+LIMITED = 0.01  # of the time: nothing passes then
+PILED = 3.0  # times as many samples at the largest value as at the next: not the steps of a coarse signal
+AT_LIMIT = "a signal is at its limit for a part of the time"
 DRIFT = 1.0  # rms of the response: more drift than that is said
 KNOWN = 0.5  # of the frequencies of a band at which L is determined
 STRONG = 0.01  # of the excited lines: with more distortion the margins may be others at another amplitude
@@ -72,7 +76,7 @@ def identify(
     if against is not None:
         found = _compared(found, Path(against), at, period, band, columns)
     if fit:
-        found = replace(found, fit=fit_plant(record, found.responses["P"], fit))
+        found = replace(found, fit=fit_plant(found.record, found.responses["P"], fit))
     found = replace(found, verdicts=[w.verdict(found.margins, found.dependent) for w in wanted])
     return replace(found, seconds=time.perf_counter() - begin)
 
@@ -99,7 +103,9 @@ def _compared(
 def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.inf)) -> Identification:
     """Return responses and margins of the loop of a record, between two frequencies, Hz.  Raises DataError."""
     _check(record)
+    record, pieces = _longest_piece(record)
     samples, notes = _samples_of_period(record)
+    notes = pieces + notes
     kinds: list[Distortion] = []
     if samples:
         lines, omitted = periodic_lines(record, samples)
@@ -121,14 +127,15 @@ def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.i
     seen = type(s)(*(getattr(s, n)[known] for n in ("f", "value", "u", "dof", "center", "radius")))
     curve = loop_curve(seen)
     found, missing = margins(curve)
-    notes += _drift(record, samples) + _clipped(record)
+    limited = _clipped(record)
+    notes += _drift(record, samples) + limited
     count = periods_used(record.r.size, samples) if samples else 0
     strong = [d for d in kinds if d.kind == "odd" and d.significant and d.level > STRONG]
     dependent = "odd harmonics show that the loop depends on its amplitude" if strong else ""
     moved = halves(record, samples, lines.f[known]) if samples else ""
     end, doubted = level_end(seen)
     notes = [*filter(None, (moved, end)), *notes]
-    dependent = dependent or (CHANGED if moved else LEVEL_END if doubted else "")
+    dependent = dependent or (CHANGED if moved else LEVEL_END if doubted else AT_LIMIT if limited else "")
     return Identification(
         record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2]), dependent
     )
@@ -144,12 +151,33 @@ def _check(record: LoopRecord) -> None:
         raise DataError(record.name, problems)
 
 
+def _longest_piece(record: LoopRecord) -> tuple[LoopRecord, list[str]]:
+    """Return the longest piece of a record with nothing missing in it, and what there is to say of it."""
+    behind = missing_blocks(record)
+    if not behind:
+        return record, []
+    edges = [0, *behind, record.r.size]
+    k = int(np.argmax(np.diff(edges)))
+    first, last = edges[k], edges[k + 1]
+    at = ", ".join(f"{x * record.step:.6g} s" for x in behind)
+    text = (
+        f"excitation and output jump within one sample {at} after the first: a block of the record is missing there, "
+        f"though the times go on. Its longest piece alone is reduced, from {first * record.step:.6g} s to "
+        f"{last * record.step:.6g} s"
+    )
+    piece = replace(record, **{name: getattr(record, name)[first:last] for name in ("r", "u", "y")})
+    return piece, [text]
+
+
 def _samples_of_period(record: LoopRecord) -> tuple[int, list[str]]:
     """Return the samples of a period, 0 for an excitation that is not periodic; and what there is to say of it."""
     stated = record.period / record.step
-    samples = round(stated) or find_period(record.r)
+    repeats = find_period(record.r)
+    samples = round(stated) or repeats
     if not samples:
         return 0, []
+    if record.period and repeats and samples % repeats:
+        raise DataError(record.name, [_other_clock(record, repeats)])
     count = record.r.size // samples
     text = f"the excitation has a period of {stated or samples:.7g} samples"
     if count < PERIODS:
@@ -170,6 +198,22 @@ def _samples_of_period(record: LoopRecord) -> tuple[int, list[str]]:
         return 0, [f"the excitation repeats every {found:.3f} samples, not a whole number of them (generator and "
                    "recorder have clocks of their own); reduced as an excitation without period"]  # fmt: skip
     return samples, []
+
+
+def _other_clock(record: LoopRecord, repeats: int) -> str:
+    """Return that the excitation repeats after another time than is stated; repeats: samples."""
+    found = repeats * record.step
+    times = max(1, round(record.period / found))  # a stated period may be several
+    off = times * found / record.period - 1.0
+    clock = f"the times are off by {100.0 * off:+.2g} %, and frequencies, delays and parameters with them, or "
+    return (
+        (
+            f"the excitation repeats every {found:.6g} s by the times of the file, {repeats} samples; the period stated is "
+            f"{record.period:.6g} s: {clock if abs(off) < CLOCK else ''}the period is another. Correct what is wrong"
+        )
+        .replace("+", "")
+        .replace("-", "−")
+    )
 
 
 def _too_few(record: LoopRecord, samples: int, lines: LineAmplitudes, known: int) -> str:
@@ -221,21 +265,24 @@ def _drift(record: LoopRecord, samples: int) -> list[str]:
 
 def _clipped(record: LoopRecord) -> list[str]:
     return [
-        f"the {name} stays at its largest value for several samples, {n} times: it may be at its limit, where the loop "
-        "is another"
+        f"the {name} is at its largest or smallest value for {100.0 * share:.2g} % of the time: at a limit the loop is "
+        "another"
         for name, x in (("input", record.u), ("output", record.y))
-        if (n := _runs_at_end(x)) >= 2
-    ]  # fmt: skip
+        if (share := _share_at_ends(x)) > LIMITED
+    ]
 
 
-def _runs_at_end(x: Array) -> int:
-    """Return how often x stays CLIPPED samples and more at its largest or smallest value."""
-    count = 0
-    for end in (x.max(), x.min()):
-        there = np.concatenate([[False], np.abs(x - end) <= 1e-9 * np.ptp(x), [False]])
-        edges = np.flatnonzero(there[1:] != there[:-1])
-        count += int(np.sum(edges[1::2] - edges[::2] >= CLIPPED))
-    return count
+def _share_at_ends(x: Array) -> float:
+    """Return the share of samples at the largest or smallest value, where they are many more than at the value next
+    to it: a coarse signal is as often there.
+    """
+    count, same = 0, 1e-9 * np.ptp(x)
+    for y in (x, -x):
+        at_end = y >= y.max() - same
+        rest = y[~at_end]
+        if np.sum(at_end) > PILED * np.sum(rest >= rest.max() - same):
+            count += int(np.sum(at_end))
+    return count / x.size
 
 
 def parse_band(text: str) -> tuple[float, float]:

@@ -14,10 +14,11 @@ from scipy import optimize, signal
 
 import gyrobench as gb
 from gyrobench.identification.identification_page import page
-from gyrobench.identification.identify_loop import identify_record
+from gyrobench.identification.identify_loop import _share_at_ends, identify_record
 from gyrobench.identification.line_spectrum import LineAmplitudes, find_period, misfit
 from gyrobench.identification.loop_doubts import level_end
 from gyrobench.identification.loop_record import LoopRecord, read_loop
+from gyrobench.identification.missing_blocks import missing_blocks
 from gyrobench.identification.ratios import MeasuredResponse, ratio
 
 UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
@@ -256,7 +257,9 @@ def changed(file: Path, to: Path, **columns) -> Path:
         ({"comment": "# excitation enters at = reference\n"}, "do not add"),
         ({"comment": "# perod = 4s\n"}, "'perod' is not known; did you mean 'period'"),
         ({"comment": "# period = 4.0001s\n"}, "not a whole number: generator and recorder need one clock"),
-        ({"comment": "# period = 9s\n"}, "too short: 2.7 periods"),
+        ({"comment": "# period = 12s\n"}, "too short: 2 periods"),
+        ({"comment": "# period = 9s\n"}, "repeats every 4 s .* stated is 9 s: the period is another"),
+        ({"comment": "# period = 3.96s\n"}, "4000 samples; .* stated is 3.96 s: the times are off by 1 %"),
         ({"rows": 100}, "100 samples; at least 200 are needed"),
         ({"rows": 600}, "have a response above the noise"),
         ({"excitation [N.m]": 0}, "column 'excitation' does not change"),
@@ -327,6 +330,41 @@ def test_an_input_of_another_kind_is_said(steady: LoopRecord, mistake: str) -> N
     u = {"late": np.roll(steady.u, 2), "scale": 3.0 * steady.u, "controller": steady.u - steady.r}[mistake]
     found = identify_record(replace(steady, u=u))
     assert "does not fall" in found.dependent and any("does not fall" in n for n in found.notes)
+
+
+@pytest.mark.parametrize("stated", [0.0, PERIOD * H])
+def test_a_block_that_is_missing_is_found(steady: LoopRecord, stated: float) -> None:
+    """The times are even, as those of samples that were counted; the longer piece has the margins of the whole."""
+    first, missing = 9_300, 1_700
+    keep = np.r_[0:first, first + missing : steady.r.size]
+    cut = replace(steady, period=stated, **{n: getattr(steady, n)[keep] for n in ("r", "u", "y")})
+    found, whole = identify_record(cut), identify_record(steady)
+    assert missing_blocks(cut) == [first] and not missing_blocks(steady)
+    assert found.record.r.size == cut.r.size - first and found.period == PERIOD * H
+    assert any("9.3 s after the first: a block of the record is missing" in n for n in found.notes)
+    assert whole["phase margin"].value in found["phase margin"]
+
+
+def test_an_excitation_that_jumps_of_itself_has_nothing_missing() -> None:
+    """Steps, a sweep that begins late, another multisine: the output does not follow within the sample."""
+    rng = np.random.default_rng(4)
+    late = np.r_[np.zeros(3000), signal.chirp(np.arange(27000) * H, 1.0, 27.0, 150.0, phi=50.0)]
+    two = np.r_[np.tile(odd_multisine(PERIOD, rng, 1.0, 150.0), 4), np.tile(odd_multisine(PERIOD, rng, 1.0, 150.0), 3)]
+    for seed, r in enumerate((np.repeat([0.0, 1.0, -1.0, 0.5], 5000), late, two)):
+        loop, noise = random_platform(np.random.default_rng(seed)), 1e-3 * rng.standard_normal(r.size)
+        assert not missing_blocks(LoopRecord("own", H, r, *loop.run(r, PLACES[0], noise, noise), PLACES[0], UNITS))
+
+
+def test_nothing_passes_at_a_limit(steady: LoopRecord) -> None:
+    """A fifth of the time there, by the limit of the input; a coarse signal, of 30 steps, is not at one."""
+    top = float(np.quantile(np.abs(steady.u), 0.8))
+    limited = identify_record(replace(steady, u=np.clip(steady.u, -top, top)))
+    assert "at its limit" in limited.dependent or "odd harmonics" in limited.dependent
+    assert any("the input is at its largest or smallest value for 20 % of the time" in n for n in limited.notes)
+    slow = np.sin(2.0 * np.pi * np.arange(20000) / 4000.0)
+    assert _share_at_ends(np.round(15.0 * slow)) == 0.0
+    assert _share_at_ends(np.clip(np.round(15.0 * slow), -12.0, 12.0)) == pytest.approx(0.444, abs=0.005)
+    # |sin| >= 11.5/15 for 1 - (2/pi) asin(0.767) = 0.444 of the time
 
 
 def test_few_lines_show_it_too() -> None:

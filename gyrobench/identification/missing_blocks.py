@@ -1,0 +1,61 @@
+"""Samples between which a block of the record is missing, though its times go on: excitation and output jump together.
+
+The excitation jumps where it is not what its last ORDER values predict; it may do so of itself (a step, the begin of a
+sweep).  The output of a loop does not follow within the same sample.  So where it is not what the ORDER values before
+it, of output and excitation, predict, at the very sample at which the excitation jumps, samples between are missing.
+
+Predictors by least squares over the record; what is usual are medians, so that a few jumps do not count.
+
+Not seen: a block where the excitation goes on as if nothing were missing (whole periods of it: the loop's transient is
+all that is wrong), is as random as from one sample to the next, or where the noise is as large as the jump; what is
+wrong then is among the noise, and in the intervals.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from gyrobench.arrays import Array
+from gyrobench.identification.loop_record import LoopRecord
+
+ORDER = 24
+ROWS = 50_000  # of the record, that the predictors are fitted to
+JUMP = 30.0  # times the median of what the excitation is off its prediction
+NOISE = 5.0  # standard deviations of what the output is off: one in a million, of MOST samples that are asked
+LEAST = 1e-6  # of the rms: rounding
+MOST = 5  # jumps: more are of an excitation that jumps of itself, and each is asked for
+
+
+def missing_blocks(record: LoopRecord) -> list[int]:
+    """Return the first samples behind missing blocks, of MOST at most."""
+    r, y = record.r, record.y
+    if r.size < 8 * ORDER:
+        return []
+    alone = _off(r, r[:, None])
+    size = np.abs(alone)
+    limit = max(JUMP * float(np.median(size)), LEAST * float(np.std(r)))
+    jumps = _heads(np.flatnonzero(size > limit)) + ORDER
+    if not 0 < jumps.size <= MOST:
+        return []
+    rest = _off(y, np.column_stack([y, r]))
+    usual = max(float(np.median(np.abs(rest))) / 0.6745, LEAST * float(np.std(y)))
+    return [int(k) for k in jumps if abs(rest[k - ORDER]) > NOISE * usual]
+
+
+def _heads(at: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the first of each run of samples that share a prediction's past."""
+    return at[np.diff(at, prepend=-2 * ORDER) > ORDER]
+
+
+def _off(x: Array, past: Array) -> Array:
+    """Return x from ORDER on less what the ORDER rows of ``past`` before predict of it, by least squares."""
+    rows = np.arange(ORDER, x.size, max(1, -(-(x.size - ORDER) // ROWS)))
+    before = np.concatenate([past[rows - k] for k in range(1, ORDER + 1)], axis=1)
+    scale = np.linalg.norm(before, axis=0) + 1e-300
+    weights = np.linalg.lstsq(before / scale, x[rows], rcond=None)[0] / scale
+    found = x[ORDER:].copy()
+    for j, w in enumerate(weights.reshape(ORDER, -1).T):
+        found -= signal.lfilter(w, [1.0], past[:, j])[ORDER - 1 : -1]
+    return np.asarray(found)
