@@ -42,6 +42,7 @@ AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
 REST = "rest"  # phase without a test signal
 CUT = 1e-3  # of the time: more is said
+LOOSE = 0.25  # of what is wanted: with a larger U a measure tells nothing of it, unless all of its interval fulfils it
 FEW = 6  # sines that count: fewer are no measurement
 
 
@@ -61,8 +62,24 @@ class ProvenWish:
     @property
     def kept(self) -> bool:
         """True where what is measured, with its uncertainty, is not below the wish."""
-        best = self.value + self.U if self.wish.least else self.value - self.U
-        return self.wish.ratio(best) >= 1.0 - 1e-9
+        return self._fulfils(1.0)
+
+    @property
+    def told(self) -> bool:
+        """False where noise leaves open whether the wish is kept: within less than LOOSE of it, or a bound below."""
+        return self._fulfils(-1.0) or (not self.bound and LOOSE * self.wish.value >= self.U)
+
+    def _fulfils(self, sign: float) -> bool:
+        """Return whether the better end of the interval fulfils the wish, or the worse one (sign -1)."""
+        end = self.value + (sign if self.wish.least else -sign) * self.U
+        return self.wish.ratio(end) >= 1.0 - 1e-9
+
+    @property
+    def verdict(self) -> str:
+        """Return "" where the wish is kept, else how it is not."""
+        if not self.told:
+            return "not told: noise leaves open whether it is what is wanted"
+        return "" if self.kept else "below what is wanted"
 
     @property
     def agrees(self) -> bool:
@@ -109,7 +126,7 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        return not self.why_not and not self.lost and all(w.kept for w in self.wishes)
+        return not self.why_not and not self.lost and not any(w.verdict for w in self.wishes)
 
 
 def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) -> list[float]:
@@ -192,7 +209,7 @@ def proof_of(
         return _read(ports.measured(record), at, f, L, wishes, load, ports, sight)
 
     found = tried(1.0)
-    if not found.limits and (found.why_not or any(w.bound and not w.kept for w in found.wishes)):
+    if not found.limits and (found.why_not or not all(w.told for w in found.wishes)):
         louder = tried(1.0, LOUDER)
         return found if louder.limits else louder
     for share in SMALLER:

@@ -325,6 +325,12 @@ def _notes(proofs: Sequence[Proof]) -> list[str]:
                 "amplitude of the test sines the loop is another one (describing function)"
             )
             break
+    if untold := list(dict.fromkeys(w.wish.name for p in proofs for w in p.wishes if not w.told)):
+        notes.append(
+            f"the co-simulation does not tell {' and '.join(untold)}: the test sines stand too little above what else "
+            "moves the loop. Less noise in the parts (gyro, images, base) would tell, or a larger limit, which lets "
+            "larger sines through"
+        )
     if any(p.limits for p in proofs):
         notes.append("a part was at its limit in the test sines: what was measured there is not linear")
     if lost := max((p.lost for p in proofs), default=0.0):

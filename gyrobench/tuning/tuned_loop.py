@@ -144,7 +144,10 @@ def _trade(trade: Trade | None) -> dict[str, Any] | None:
 
 
 def _measured(w: ProvenWish) -> dict[str, Any]:
-    return {"name": w.wish.name, "value": _finite(w.value), "U": _finite(w.U), "model": _finite(w.expected)}
+    return {
+        "name": w.wish.name, "value": _finite(w.value), "U": _finite(w.U), "model": _finite(w.expected),
+        "verdict": w.verdict,
+    }  # fmt: skip
 
 
 def _finite(x: float) -> float | None:
@@ -193,7 +196,7 @@ def _lines(t: LoopTuning) -> list[str]:
         if p.why_not:
             lines.append(f"  not measured: {p.why_not}")
         for w in p.wishes:
-            end = "" if w.kept else "  ! below what is wanted"
+            end = f"  ! {w.verdict}" if w.verdict else ""
             end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
             lines.append(f"  {w.wish.name}: {measured_text(w)}{end}")
         if p.limits:

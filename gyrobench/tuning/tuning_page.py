@@ -143,8 +143,8 @@ def _proofs(t: LoopTuning) -> list[Any]:
 
 
 def _proven(point: str, w: ProvenWish) -> list[Any]:
-    state = ("holds", "pass") if w.kept else ("below what is wanted", "fail")
-    if w.kept and not w.agrees:
+    state = (w.verdict, "fail" if w.told else "warn") if w.verdict else ("holds", "pass")
+    if not w.verdict and not w.agrees:
         state = ("holds, unlike the linear model", "warn")
     cells = [point, w.wish.name, minus(measured_text(w)), minus(w.wish.shown(w.expected))]
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]

@@ -13,7 +13,7 @@ from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
-from gyrobench.tuning.proof import _gain_margin, _run, proof_of, sine_frequencies
+from gyrobench.tuning.proof import Proof, ProvenWish, _gain_margin, _run, proof_of, sine_frequencies
 from gyrobench.tuning.robustness import gain_limits
 from gyrobench.tuning.tuned_settings import quiet
 from gyrobench.tuning.wishes import parse_wishes
@@ -82,6 +82,24 @@ def test_sines_lost_on_one_side_bound_that_side_alone() -> None:
     F_low = np.geomspace(1e-3, 30.0, 2000)
     none = _gain_margin(WISHES[0], points[:6], [0.81, 0.87], F_low, loop(F_low))
     assert none.bound and abs(none.value / 17.94 - 1.0) < 1e-3
+
+
+def test_a_measure_that_tells_nothing_proves_nothing() -> None:
+    """Of 40 degrees that are wanted, 66 +- 110 degrees were "proven"; an interval that lies above them tells all."""
+    wish = parse_wishes(["phase margin=40deg", "bandwidth>1Hz"])[0]
+
+    def proof(value: float, U: float, bound: bool = False) -> Proof:
+        measured = ProvenWish(wish, math.radians(value), math.radians(U), math.radians(66.0), bound)
+        return Proof({}, (measured,), (), 20, "", "", None, 0.0)
+
+    assert [proof(*x).holds for x in ((66.0, 110.0), (66.0, 20.0), (45.0, 9.0), (30.0, 5.0))] == [
+        False,
+        True,
+        True,
+        False,
+    ]
+    words = [proof(*x).wishes[0].verdict for x in ((66.0, 110.0), (30.0, 5.0), (30.0, 0.0, True), (50.0, 0.0, True))]
+    assert [w[:8] for w in words] == ["not told", "below wh", "not told", ""]
 
 
 @pytest.mark.long
