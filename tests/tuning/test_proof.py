@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
-from gyrobench.tuning.proof import Proof, ProvenWish, _gain_margin, _run, proof_of, sine_frequencies
+from gyrobench.tuning.proof import Proof, ProvenWish, _gain_margin, _run, loop_plan, proof_of, sine_frequencies
 from gyrobench.tuning.robustness import gain_limits
 from gyrobench.tuning.tuned_settings import quiet
 from gyrobench.tuning.wishes import parse_wishes
@@ -100,6 +101,18 @@ def test_a_measure_that_tells_nothing_proves_nothing() -> None:
     ]
     words = [proof(*x).wishes[0].verdict for x in ((66.0, 110.0), (30.0, 5.0), (30.0, 0.0, True), (50.0, 0.0, True))]
     assert [w[:8] for w in words] == ["not told", "below wh", "not told", ""]
+
+
+@pytest.mark.parametrize("name", ["platform_single_axis", "gimbal_tracking"])
+def test_a_recorded_motion_waits_for_the_ride(name: str, tmp_path: Path) -> None:
+    """The base rests while the test sines of a proof are measured; a run of the system begins with the recording."""
+    file = tmp_path / "ride.csv"
+    file.write_text("time [s],pitch [deg]\n0,0\n1,1\n2,0\n", encoding="utf-8")
+    system = load_system(name).with_values({"profile": str(file)})
+    assert system.recorded_motion()["motion.profile_t"] == [0.0, 1.0, 2.0]
+    plan, _ = loop_plan(system, [3.0, 6.0], lambda f: 0.1)
+    vars(system).update(plan=lambda: plan)
+    assert system.recorded_motion()["motion.profile_t"][0] == pytest.approx(sum(p.duration() for p in plan.phases))
 
 
 @pytest.mark.long

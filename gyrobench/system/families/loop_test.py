@@ -14,6 +14,7 @@ user is told before the run, with what was set or swapped.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -127,9 +128,15 @@ class LoopTest(System):
         return LoopPlan([LoopPhase("ride", dwell=self["hold"])] if self.values.get("profile") else self.phases())
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        profile = self.values.get("profile")
-        motion = read_profile(Path(profile)) if profile else {}
-        return {**self.plan().parameters(), **motion, **self.owned(), **self.design(parts)}
+        return {**self.plan().parameters(), **self.recorded_motion(), **self.owned(), **self.design(parts)}
+
+    def recorded_motion(self) -> dict[str, Any]:
+        """Return the parameters of a recorded motion of the base, which begins with the ride and rests before it."""
+        if not self.values.get("profile"):
+            return {}
+        found = read_profile(Path(self.values["profile"]))
+        began = sum(p.duration() for p in itertools.takewhile(lambda p: p.label != "ride", self.plan().phases))
+        return {**found, "motion.profile_t": [began + t for t in found["motion.profile_t"]]}
 
     def asked(self) -> list[str]:
         """Return the labels in the option phases."""

@@ -8,7 +8,6 @@ class Mine(SightTest):
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.record.motion_profile import RECORDED, profile_rates, read_profile
+from gyrobench.record.motion_profile import RECORDED, profile_rates
 from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import shortest, spectra
 from gyrobench.system.families import loop_test as loop
@@ -244,10 +243,6 @@ class SightTest(LoopTest):
             **(spectrum.parameters() if spectrum else {"vibration.points?": 0}),
             "vibration.first?": next((k for k, p in enumerate(self.plan().phases, 1) if p.label == "ride"), NEVER),
         }
-        if self.values.get("profile"):  # begins with the ride
-            ahead = itertools.takewhile(lambda p: p.label != "ride", self.plan().phases)
-            began, profile = sum(p.duration() for p in ahead), read_profile(Path(self.values["profile"]))
-            found["motion.profile_t"] = [began + t for t in profile["motion.profile_t"]]
         for k, axis in enumerate(AXES):
             found |= self.controller(axis, k, parts)
         return found
