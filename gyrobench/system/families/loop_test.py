@@ -14,7 +14,6 @@ user is told before the run, with what was set or swapped.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -131,11 +130,14 @@ class LoopTest(System):
         return {**self.plan().parameters(), **self.recorded_motion(), **self.owned(), **self.design(parts)}
 
     def recorded_motion(self) -> dict[str, Any]:
-        """Return the parameters of a recorded motion of the base, which begins with the ride and rests before it."""
+        """Return the parameters of a recorded motion of the base, from the ride on, or behind all that is excited."""
         if not self.values.get("profile"):
             return {}
         found = read_profile(Path(self.values["profile"]))
-        began = sum(p.duration() for p in itertools.takewhile(lambda p: p.label != "ride", self.plan().phases))
+        phases = self.plan().phases
+        excited = [k + 1 for k, p in enumerate(phases) if p.kind != "hold"]
+        first = next((k for k, p in enumerate(phases) if p.label == "ride"), max(excited, default=0))
+        began = sum(p.duration() for p in phases[:first])
         return {**found, "motion.profile_t": [began + t for t in found["motion.profile_t"]]}
 
     def asked(self) -> list[str]:
