@@ -1,29 +1,44 @@
 from __future__ import annotations
 
+import math
+
 from gyrobench.component import IDENTITY, Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.component.math import Vector, clip, exp, fabs, floor, log, pi, sin, sqrt, vector
+from gyrobench.component.math import Vector, clip, cos, cross, dot, exp, fabs, floor, log, pi, sin, sqrt, vector
 from gyrobench.component.set_up import each
 
 LINES = 12  # sines
+LEANS = ("east", "north", "up")
 
 
 class VibrationTable(Component):
     """Vibration table (shaker) with a vertical axis: one sine, or noise in a band, at levels.  [TEST-RECTIFICATION]
 
         s = sqrt(2/n) sum sin(2 pi f_k t + phi_k)                     rms 1; n: sines, 1 or 12
-        f = face (f_local + (0, 0, level s)),   omega = face omega_local
+        f = face R(lean)' (f_local + (0, 0, level s)),   omega = face R(lean)' omega_local
         f_control = (1 + read_gain) level s + noise                   control accelerometer, for the rms of the level
 
     f_k: in equal ratios from `low` to `high`, each at the next odd multiple of 1/repeat; phases by the seed.  Over
     `repeat` the mean of s is 0 and that of s2 is 1, and no two lines add up to a third, so that the mean of s3 is 0,
-    too.  level goes to the one asked for, in a straight line within `ramp`.
+    too.  level goes to the one asked for, in a straight line within `ramp`.  R(lean): the case is turned on its fixture
+    against `face` by this vector, of its own with the axis along the vibration up and down.
     Not modelled: servo and resonances of the table, motion across and about the axis, distortion, limits of its travel.
     Source: IEEE 1293 (vibration rectification); own form.
     """
 
     version = "1.0.0"
 
-    simulates = (each("read_gain", ("table.control.gain",)),)
+    simulates = (
+        each("read_gain", ("table.control.gain",)),
+        lambda p: {
+            "fixture.lean": {
+                f"{way}, about {axis}": float(x)
+                for way in ("up", "down") for axis, x in zip(LEANS, p[f"lean_{way}"], strict=True)
+            },
+            "fixture.cosine": {
+                way: 1.0 - math.cos(math.hypot(*map(float, p[f"lean_{way}"][:2]))) for way in ("up", "down")
+            },
+        },
+    )  # fmt: skip
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     lines = Parameter(LINES, int, "sines: 12, noise in a band; 1: a sine at low", min=1, max=LINES)
@@ -32,6 +47,8 @@ class VibrationTable(Component):
     repeat = Parameter(2.0, "s", "time after which the vibration repeats itself", above=0.0)
     ramp = Parameter(0.5, "s", "time in which the level goes to another one", above=0.0)
     read_gain = Parameter(0.0, "1", "relative error of the control accelerometer", min=-0.5, max=0.5)
+    lean_up = Parameter([0.0, 0.0, 0.0], "rad", "turn of the case about east, north, up, the axis up")
+    lean_down = Parameter([0.0, 0.0, 0.0], "rad", "the same with the axis down")
     control = Noise(1e-3, "m/s2/sqrt(Hz)", "white noise of the control accelerometer (100 ug/sqrt(Hz))")
     phases = Noise(1.0, "1", "1: phases by the seed", per="start", samples=LINES)
 
@@ -86,9 +103,20 @@ class VibrationTable(Component):
         """Return the specific force in east, north, up."""
         return vector([self.f_local[0], self.f_local[1], self.f_local[2] + self.now * self.s])
 
+    def seen(self, v: Vector) -> Vector:
+        """Return a vector in east, north, up as the leaning case sees it, before `face`."""
+        upward = self.face[0][2] + self.face[1][2] + self.face[2][2]
+        turn = vector(self.lean_up)
+        if upward < 0.0:
+            turn = vector(self.lean_down)
+        angle = sqrt(dot(turn, turn))
+        along = turn / angle if angle > 0.0 else turn
+        around = (1.0 - cos(angle)) * dot(along, v)
+        return vector(cos(angle) * v - sin(angle) * cross(along, v) + around * along)
+
     def outputs(self) -> None:
-        self.f = self.face @ self.shaken()
-        self.omega = self.face @ vector(self.omega_local)
+        self.f = self.face @ self.seen(self.shaken())
+        self.omega = self.face @ self.seen(vector(self.omega_local))
         self.f_control = (1.0 + self.read_gain) * self.now * self.s + self.noise.control
         self.level = self.now
         self.angle = 0.0

@@ -7,6 +7,9 @@ f = +-g by the way the axis points, s the rms of the vibration that the control 
 rest; w the part of the Earth rate along the axis of the gyro.  With the axis one way only, G (S) and K3 are not seen:
 then b is that with gravity, and K2 has 3 K3 f in it.  [TEST-RECTIFICATION; IEEE 1293; IEEE 1431]
 
+The case may lean otherwise with the axis up than down (u_lean): the gyro then sees another part of the Earth rate, and
+gravity across its axis, by a g-sensitivity that this axis does not show: it is taken as large as G.
+
 Not modelled: vibration across the axis and about it, change of the rectification with frequency, a mean specific force
 of the table, fifth and higher powers.
 """
@@ -46,7 +49,7 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 from . import mistakes
-from .sources import CONTROL
+from .sources import CONTROL, LEAN, LEAN_ACROSS, LEAN_COSINE
 
 GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
@@ -79,6 +82,12 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         """Earth rate along the axis of the gyro, rad/s: x points up, down, or east."""
         s = self.setup
         return self.up * (s.earth_rate * math.sin(s.latitude) if s.axis == "x" else 0.0)
+
+    @property
+    def ways(self) -> dict[str, Array]:
+        """Return which readings have the axis up or down, of those that there are."""
+        found = {"up": self.up > 0.0, "down": self.up < 0.0}
+        return {n: rows.astype(float) for n, rows in found.items() if np.any(rows)}
 
     def columns(self, f: Array, s2: Array) -> Array:
         """Return the regressors of bias, linear, square and cube."""
@@ -128,8 +137,21 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         if self.channel == FORCE:
             more = self.columns(self.f + 1e-4 * self.up, self.s2) / 1e-4 - X / 1e-4
             out.append(GRAVITY.effect(s, found.error(-self.up, more)))
-        elif s.axis == "x":
-            out.append(LATITUDE.effect(s, found.error(-self.up * s.earth_rate * math.cos(s.latitude))))
+            cosine = math.sqrt(2.0) * LEAN.size(s) ** 2  # rms of (x2 + y2)/2
+            shorter = np.array([-self.f * w for w in self.ways.values()])
+            out.append(LEAN_COSINE.effect(cosine, shorter, parts=tuple(self.ways)))
+            return out
+        north, up = s.earth_rate * math.cos(s.latitude), s.earth_rate * math.sin(s.latitude)
+        if s.axis == "x":
+            out.append(LATITUDE.effect(s, found.error(-self.up * north)))
+        # an axis d that is turned by r is d + r x d: up x goes to -north by a turn about east, and so on
+        turns = {"about east": -self.up * north} if s.axis == "x" else {
+            "about north": np.full_like(self.up, -up), "about up": np.full_like(self.up, north)}  # fmt: skip
+        errors = {f"{way}, {axis}": w * e for way, w in self.ways.items() for axis, e in turns.items()}
+        out.append(LEAN.effect(s, np.array([*errors.values()]), parts=tuple(errors)))
+        if self.both:
+            across = abs(float(found.value[1])) * s.gravity  # along each of two level axes
+            out.append(LEAN_ACROSS.effect(s, np.array([across * w for w in self.ways.values() for _ in range(2)])))
         return out
 
     def test(self, found: Findings) -> None:

@@ -74,14 +74,16 @@ def sculling_test(rng: np.random.Generator) -> Drawn:
 
 def vibration_rectification(rng: np.random.Generator) -> Drawn:
     """Gyro and accelerometer with coefficients by chance, white noise and, in half of the runs each, flicker, a control
-    accelerometer that is off, one way only.
+    accelerometer that is off, a case that leans by 3 mrad, one way only.
     """
     gain, axis = 0.01 * rng.integers(2), int(rng.integers(3))
+    lean = 3e-3 * rng.integers(2)
     white, ug = 0.01 * DEG * 10.0 ** rng.uniform(-1.5, 0.0), 1e-6 * G0
     noise = 70.0 * ug * 10.0 ** rng.uniform(-1.0, 0.3)
     return {
         "levels": "0 0.8 1.2 1.6", "readings": 3, "window": 1.0, "settle": 1.0, "axis": "xyz"[axis], "u_gain": gain,
         "ways": "up down" if rng.integers(2) else "up", "table.read_gain": gain * rng.normal(), "gyro.white": white,
+        "u_lean": lean, **{f"table.lean_{way}": (lean * rng.normal(size=3)).tolist() for way in ("up", "down")},
         "gyro.flicker_x": white / 3.0 * rng.integers(2), "accelerometers.white": noise,
         f"accelerometers.{'xyz'[axis]}_flicker": noise / 3.0 * rng.integers(2),
         "gyro.g": (rng.uniform(-20.0, 20.0, (2, 3)) * DPH / G0).tolist(),

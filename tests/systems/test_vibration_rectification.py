@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from scipy.spatial.transform import Rotation
+from stated import with_sizes
 
 from gyrobench.component import ComponentError
 from gyrobench.engine.session import Session
@@ -48,6 +50,21 @@ def test_moments_of_the_vibration(lines: int) -> None:
     assert np.mean(s**2) == pytest.approx(9.0, rel=1e-12)
     assert np.mean(s**3) == pytest.approx(0.0, abs=1e-10)
     assert control == pytest.approx(1.01 * s, abs=1e-12)
+
+
+def test_the_table_leans_otherwise_up_and_down() -> None:
+    """By scipy: axes of the case that are turned see vectors turned back."""
+    leans = {1.0: [0.01, 0.02, 0.3], -1.0: [0.1, -0.2, 0.0]}
+    table = load_part("vibration_table")(lean_up=leans[1.0], lean_down=leans[-1.0])
+    table.initialize()
+    table.omega_local = [1.0, 2.0, 3.0]
+    for way, lean in leans.items():
+        face = np.array([[0.0, 0.0, way], [1.0, 0.0, 0.0], [0.0, way, 0.0]])
+        table.face = face.tolist()
+        table.do_step(0.0, 5e-4)
+        back = Rotation.from_rotvec(lean).inv()
+        assert np.array(table.omega) == pytest.approx(face @ back.apply([1.0, 2.0, 3.0]), rel=1e-12)
+        assert np.array(table.f) == pytest.approx(face @ back.apply([0.0, 0.0, G0]), rel=1e-12)
 
 
 def test_frequencies_that_fall_together_are_refused() -> None:
@@ -97,6 +114,21 @@ def test_a_control_accelerometer_that_reads_too_much(session: Session) -> None:
         assert found[name].estimate - true == pytest.approx(shift[name], rel=0.03)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("axis", "xy")
+def test_a_lean_is_predicted(session: Session, axis: str) -> None:
+    """Turned about east, north, up by 2, 1, 3 mrad up and by 1, −3, 1 mrad down: what the gyro and the accelerometer
+    are off by is in the table of shifts, but for products of the leans."""
+    more = {"table.lean_up": [2e-3, 1e-3, 3e-3], "table.lean_down": [1e-3, -3e-3, 1e-3], "gyro.g": [[0.0] * 3] * 2}
+    values = {**SHORT, "axis": axis}
+    result = load_system(NAME).with_values(values).reduce(session.run({**values, **QUIET, **more}))
+    found = {c.name: c for c in result.coefficients}
+    shift = {row[0]: row[-3] for t in result.tables if t.id.startswith("budget.predicted") for row in t.rows}
+    for name, size in (("b_g", 3e-3), ("G", 3e-3), ("b_a", 1.0), ("S", 1.0)):
+        c = found[name]
+        assert abs(shift[name]) > size and c.estimate - (c.truth or 0.0) == pytest.approx(shift[name], abs=size / 20.0)
+
+
 @pytest.mark.parametrize("limit", ["gyro.range_max", "accelerometers.range_max"])
 def test_clipping_is_refused(session: Session, limit: str) -> None:
     values = {**SHORT, "ways": "up"}
@@ -127,6 +159,7 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
     assert code == 0, err
     result = json.loads((tmp_path / "r" / "result.json").read_text())
     (asked,) = (r["text"] for r in result["reasons"] if r["id"] == "arrangement.unstated")
+    assert "a lean of the instruments by 1° with the axis up (" in asked
     assert "the rate reversed (G2 by" in asked and "the axis x of the gyro to the north" in asked
     found = {c["name"]: c for c in result["coefficients"]}
     for name, value in {"b_g": 4.0, "G": 12.0, "G2": 3.0, "b_a": 2000.0, "S": 500.0, "K2": 80.0, "K3": 1.0}.items():
@@ -135,10 +168,23 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
         assert high - low < 0.5 * max(abs(value), 3.0), name
 
 
-def reduced(table: list[list[float]], **columns: Any) -> Any:
+def reduced(table: list[list[float]], setup: dict[str, Any] | None = None, **columns: Any) -> Any:
     names, units = ("t_start", "t_end", "up", "level", "rate", "force"), (1.0, 1.0, 1.0, G0, DPH, G0)
     windows = {n: np.array(v) * u for n, v, u in zip(names, zip(*table, strict=True), units, strict=True)} | columns
-    return Reduction.reduce(windows, VibrationSetup(axis="y", latitude=0.0, gravity=G0))
+    said = with_sizes({"axis": "y", "latitude": 0.0, "gravity": G0, **(setup or {})})
+    return Reduction.reduce(windows, VibrationSetup(**said))
+
+
+def test_a_lean_by_itself_up_and_down_is_in_u() -> None:
+    """1 mrad about each axis.  A level gyro sees 15.041 °/h times a turn about north or up, whatever the latitude, and
+    12 °/h/g times gravity along two axes across: 15.04 and 17.0 m°/h in each way, mean and half difference of two ways
+    1/√2 of √(15.04² + 16.97²) = 16.03 m°/h.  Of the accelerometer √2 1e-6 in each way, 1 µg."""
+    for latitude in (0.2, 1.1):
+        one = {"u_lean": 1e-3, "latitude": latitude}
+        u = {c.name: c.u for c in reduced(rows(0.0), one).coefficients}
+        assert u["b_g"] == pytest.approx(16.03e-3, rel=1e-3) and u["G"] == pytest.approx(16.03e-3, rel=1e-3)
+        assert u["b_a"] == pytest.approx(1.0, rel=1e-3) and u["S"] == pytest.approx(1.0, rel=1e-3)
+        assert u["G2"] < 1e-9 and u["K2"] < 1e-6
 
 
 def test_gyro_or_accelerometer_alone_and_one_way() -> None:

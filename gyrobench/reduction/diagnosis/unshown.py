@@ -103,6 +103,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from _north(record)
+    yield from _leaning(record)
     yield from _heads(record)
     yield from _meters(record)
     yield from _daily(record)
@@ -163,6 +164,20 @@ def _north(record: Record) -> Iterator[HandlingCandidate]:
     for words, sign in (("", np.ones_like(up)), (", down to the south", up)):
         found = changed(record, **{SHAKEN[0]: rate - earth * sign})
         yield HandlingCandidate(f"the axis x of the gyro to the north{words}", found)
+
+
+def _leaning(record: Record) -> Iterator[HandlingCandidate]:
+    """Instruments on a shaker that lean with the axis up alone, to where the gyro sees the most of the Earth rate."""
+    w, options = record.windows, record.run.options
+    if not all(n in w for n in (*SHAKEN[1:], "up")) or options.get("u_lean"):
+        return
+    upright, latitude = np.asarray(w["up"]) > 0.0, float(options["latitude"])
+    north, up = math.cos(latitude), 0.0 if options.get("axis") == "x" else math.sin(latitude)
+    found = {n: np.asarray(w[n], dtype=float) for n in (SHAKEN[0], "force") if n in w}
+    for n, v in found.items():
+        lean = math.sin(OFF) * EARTH_RATE * max(north, abs(up)) if n == SHAKEN[0] else (1.0 - math.cos(OFF)) * v
+        found[n] = np.where(upright, v - lean, v)
+    yield HandlingCandidate("a lean of the instruments by 1° with the axis up", changed(record, **found))
 
 
 def _heads(record: Record) -> Iterator[HandlingCandidate]:
