@@ -182,6 +182,7 @@ class HandGyro(HandChannel):
     def __init__(self, positions: Positions, channel: ImuInstrument) -> None:
         super().__init__(positions)
         self.channel = channel
+        self.level = positions.level_by_others(channel.axis)  # Earth rate and its u
 
     @property
     def equation(self) -> str:  # type: ignore[override]
@@ -191,7 +192,7 @@ class HandGyro(HandChannel):
     def regression(self) -> Regression:
         at, c, s = self.at, self.channel, self.setup
         matrix = np.eye(3) + at.found.matrix
-        y = (at.gyro[:, c.axis] - self.middle) / at.scale_g - ((at.vertical + at.found.rate) @ matrix.T)[:, c.axis]
+        y = (at.gyro[:, c.axis] - self.middle) / at.scale_g - ((at.vertical + self.level[0]) @ matrix.T)[:, c.axis]
         quantities = self._quantities()
         X = np.column_stack([np.ones(len(y)), at.force / frames.G0])
         group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
@@ -218,7 +219,7 @@ class HandGyro(HandChannel):
         at, c = self.at, self.channel
         level = np.array([d[:, c.axis] for d in at.found.level])  # (n, 2)
         if at.enough:
-            return [LEVEL_RATE.effect(at.found.u, level.T.copy(), parts=("first", "second"))]
+            return [LEVEL_RATE.effect(self.level[1], level.T.copy(), parts=("first", "second"))]
         own = np.concatenate([np.diag(level[:, 0]), np.diag(level[:, 1])])  # a heading of its own each
         return [LEVEL_RATE.effect(at.level_size, own)]
 

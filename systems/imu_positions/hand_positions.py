@@ -5,7 +5,7 @@ of its instruments share: sizes of gravity, turns, heading of the Earth rate.  [
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -198,19 +198,32 @@ class Positions:
         change = (self.setup.gravity * up - 0.5 * (self.force[k] + self.force[k + 1])) / frames.G0
         return Turn(t.time, rate - change @ G.T, t.before + span * np.cross(level, t.before), t.after)
 
-    def _level_rate(self, level: list[Array], matrix: Array) -> tuple[Array, float]:
-        """Return the level Earth rate along both level directions (2,), and the standard uncertainty of each: from what
-        the gyros read at rest, and from its size, which is known.
+    def level_by_others(self, axis: int) -> tuple[Array, float]:
+        """Return the level Earth rate (n, 3) at each position as the two other gyros show it, and its u: the fit of
+        this one weighs it by its own readings, which would count twice.
         """
-        n = len(self.up)
-        y = self.gyro / self.scale_g - self.vertical
+        found = self.found
+        if not self.enough:
+            return found.rate, found.u
+        rate, u = self._level_rate(found.level, found.matrix, [k for k in range(3) if k != axis])
+        return np.array([rate @ d for d in found.level]), u
+
+    def _level_rate(self, level: list[Array], matrix: Array, gyros: Sequence[int] = (0, 1, 2)) -> tuple[Array, float]:
+        """Return the level Earth rate along both level directions (2,), and the standard uncertainty of each: from what
+        these gyros read at rest, and from its size, which is known.
+        """
+        n, K = len(self.up), np.eye(3) + matrix
         own = np.column_stack([np.ones(n), self.force / frames.G0])
-        d = np.array(level)  # (n, 2, 3)
-        left = [v - own @ np.linalg.lstsq(own, v, rcond=None)[0] for v in (*y.T, *d.transpose(1, 2, 0).reshape(6, n))]
-        data = np.concatenate(left[:3])
-        X = np.array([np.concatenate(left[3:6]), np.concatenate(left[6:9])]).T
+
+        def left(v: Array) -> Array:
+            """Return what bias and g-sensitivity leave of rates (n, 3), one gyro behind the other."""
+            v = v[:, list(gyros)]
+            return np.asarray((v - own @ np.linalg.lstsq(own, v, rcond=None)[0]).T.ravel())
+
+        data = left(self.gyro / self.scale_g - self.vertical @ K.T)
+        X = np.column_stack([left(d @ K.T) for d in np.swapaxes(np.array(level), 0, 1)])
         alone = np.linalg.lstsq(X, data, rcond=None)[0]
-        variance = float(np.sum((data - X @ alone) ** 2)) / max(3 * (n - 4) - 2, 1)
+        variance = float(np.sum((data - X @ alone) ** 2)) / max(len(gyros) * (n - 4) - 2, 1)
         precision = X.T @ X / variance + np.eye(2) / self.level_size**2
         covariance = np.linalg.inv(precision)
         return covariance @ (X.T @ data) / variance, float(np.sqrt(np.max(np.diag(covariance))))

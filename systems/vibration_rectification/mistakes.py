@@ -30,6 +30,17 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
         yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
 
 
+def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Reason]:
+    """Yield that a gyro reads the same up and down where the vertical Earth rate alone, deg/h, would show."""
+    for c in found:
+        if c.name == "G" and abs(c.estimate + vertical) < 3.0 * c.u < 0.3 * abs(vertical):
+            text = (
+                f"The gyro reads the same up and down, where the vertical Earth rate is {abs(vertical):.4g} °/h: "
+                "was it not turned over, or does another axis stand up?"
+            )
+            yield Reason("gyro.same", text, ("pass", "fail"), severity="doubt")
+
+
 def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:
     """Yield why a scale factor error beyond 10 % is that of no accelerometer."""
     for c in found:

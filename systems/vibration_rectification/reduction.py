@@ -243,7 +243,11 @@ class Reduction(ChannelTests[VibrationSetup]):
 
     def result(self) -> DriftTestResult:
         found = super().result()
-        return replace(found, reasons=[*found.reasons, *mistakes.implausible(found.coefficients)])
+        s, said = self.setup, [*mistakes.implausible(found.coefficients)]
+        if s.axis == "x":
+            vertical = s.earth_rate * math.sin(s.latitude) / DPH
+            said += mistakes.same_both_ways(found.coefficients, vertical / s.gravity * G0)
+        return replace(found, reasons=[*found.reasons, *said])
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         every = [c for r in results.values() for c in r.coefficients]

@@ -11,7 +11,8 @@ thermal  six positions and turns, six times, while the temperature goes 40 K up 
          noise alone (thermal_white)
 unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; white noise of a small unit, of its
          gyros white, Gauss-Markov (0.3 positions to half the record) or both
-up_down  an axis up and down, 120 s each at 20 Hz; the same noise of the gyros
+up_down  an axis up and down, 120 s each at 20 Hz; the same noise of gyros and accelerometers; in half of the runs
+         each position leans by 2 mrad, which is stated
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ budget: Any = importlib.import_module(".budget", room)
 tables: Any = importlib.import_module(".tables", room)
 Rng = np.random.Generator
 DPH = math.pi / 648000.0
+LEAN = 2e-3  # rad
 
 
 def correlated(t0: Any, t1: Any, tau: float) -> Any:
@@ -166,16 +168,21 @@ def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
     unit, latitude, n = Unit.drawn(rng), rng.uniform(-1.2, 1.2), 2400
     unit.Sa = unit.Sa * np.eye(3)
     t = np.concatenate([np.arange(n), np.arange(n) + n + 400]) / 20.0
-    sign = np.repeat([1.0, -1.0], n)
-    earth = EARTH * math.sin(latitude)
-    gyro = np.outer(sign, unit.G[:, 0] + (np.eye(3) + unit.Sg)[:, 0] * earth) + unit.bg
-    gyro = gyro + series_of(rng, 2 * n, 0.05, 6.0, 0.2 * DPH)
-    acc = np.outer(sign * 9.805, (np.eye(3) + unit.Sa)[:, 0]) + unit.ba + rng.normal(size=gyro.shape) * 5e-3
+    lean = LEAN * rng.integers(2)
+    force, rate = [], []
+    for sign in (1.0, -1.0):  # axes of the case in east, north, up: x upright but for a lean of its own
+        case = Rotation.from_rotvec(lean * rng.normal(size=3)) * Rotation.from_euler("Y", -sign * np.pi / 2.0)
+        force.append(case.inv().apply([0.0, 0.0, 9.805]))
+        rate.append(case.inv().apply(EARTH * np.array([0.0, math.cos(latitude), math.sin(latitude)])))
+    f, w = (np.repeat(v, n, axis=0) for v in (force, rate))
+    gyro = w @ (np.eye(3) + unit.Sg).T + f @ unit.G.T / 9.80665 + unit.bg + series_of(rng, 2 * n, 0.05, 6.0, 0.2 * DPH)
+    acc = f @ (np.eye(3) + unit.Sa).T + unit.ba + series_of(rng, 2 * n, 0.05, 6.0, 4.5e-4)
     head = f"# attitudes = up_down\n# latitude = {math.degrees(latitude):.12g}deg\n# gravity = 9.805m/s2\n"
     truth = unit.coefficients()
-    truth["hg_x"] = float(unit.G[0, 0] + (1.0 + unit.Sg[0, 0]) * earth)
+    earth = EARTH * math.sin(latitude)
+    truth["hg_x"] = float(unit.G[0, 0] * 9.805 / 9.80665 + (1.0 + unit.Sg[0, 0]) * earth)
     truth["Sa_xx"] = float(unit.Sa[0, 0])
-    return of_file(head, t, gyro, acc), truth
+    return of_file(f"{head}# u_mount = {lean:g}rad\n", t, gyro, acc), truth
 
 
 WAYS: dict[str, Callable[[Rng], tuple[Any, dict[str, float]]]] = {

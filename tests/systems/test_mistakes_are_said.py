@@ -131,3 +131,43 @@ def test_a_scale_of_no_accelerometer(tmp_path: Path, factor: float, hint: str) -
         rows.append(f"{1 + k // 24},{40 * k},{40 * k + 30},{angle},{angle},{current!r}\n")
     found = said(reduced(tmp_path, "accelerometer_multipoint", CHECKED + "".join(rows)))
     assert hint in found.get("force.factor", "") and ("force.factor" in found) == (factor != 1.0)
+
+
+# ------------------------------------------------------------------------------------------------ warm-up, gravity
+def warm_up(top: float = 99.0) -> str:
+    """Six turn-ons on three days: 5 deg/h, 12 exp(-t/60 s), 0.1 deg/h/K; readings up to ``top``."""
+    rng = np.random.default_rng(21)
+    lines = ["t_start [s],t_end [s],turn_on,day,since [s],mean [deg/h],temperature [degC]\n"]
+    for k in range(6):
+        T = 20.0 + 3.0 * float(rng.normal())
+        own = 5.0 + 0.05 * float(rng.normal()) + 0.1 * (T - 20.0)
+        for since in np.arange(5.0, 245.0, 10.0).tolist():
+            curve = 72.0 * (math.exp(-(since - 5.0) / 60.0) - math.exp(-(since + 5.0) / 60.0))
+            mean = min(own + curve + 0.02 * float(rng.normal()), top)
+            t = 5000.0 * k + since
+            lines.append(f"{t - 5.0},{t + 5.0},{k + 1},{1 + k // 2},{since},{mean!r},{T!r}\n")
+    return "# limit = 0.2deg/h\n" + "".join(lines)
+
+
+def test_a_warm_up_that_reached_a_range_and_a_thermometer_in_fahrenheit(tmp_path: Path) -> None:
+    """Twelve of 144 readings at 12 deg/h to the last digit: b_T was ten u off, the residuals 'not normal' alone."""
+    name = "turn_on_repeatability"
+    assert "record.range" not in said(reduced(tmp_path, name, CHECKED + warm_up()))
+    text = said(reduced(tmp_path, name, CHECKED + warm_up(12.0)))["record.range"]
+    assert "readings of mean, the first in row 1, are its largest value" in text
+    asked = said(reduced(tmp_path, name, warm_up()))["arrangement.unstated"]
+    assert "the temperatures in °F and given as °C (b_T by" in asked
+
+
+def test_a_g_sensitivity_rests_on_the_earth_rate_and_on_turning_over(tmp_path: Path) -> None:
+    """Axis x at 45°, the gyro alone: G with the vertical Earth rate taken off twice is 10.64 °/h/g less."""
+    rng, lines = np.random.default_rng(23), ["t_start [s],t_end [s],up,level [g],rate [deg/h]\n"]
+    for k in range(24):
+        way, s = 1.0 - 2.0 * (k // 12), float(k % 4)
+        rate = 4.0 + 22.64 * way + 3.0 * (1.0 + s * s) + 0.1 * float(rng.normal())
+        lines.append(f"{12 * k},{12 * k + 10},{way:g},{s},{rate!r}\n")
+    text = "# latitude = 45deg\n# gravity = 9.80665\n# axis = x\n" + "".join(lines)
+    asked = said(reduced(tmp_path, "vibration_rectification", text))["arrangement.unstated"]
+    for words in ("the Earth rate taken off before (G by", "up and down exchanged (G by", "the rates wrong by 2 % (G"):
+        assert words in asked
+    assert not said(reduced(tmp_path, "vibration_rectification", CHECKED + text))

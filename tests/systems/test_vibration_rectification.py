@@ -250,3 +250,13 @@ def problems(table: list[list[float]]) -> list[str]:
 )
 def test_refused(values: dict[str, Any], said: str) -> None:
     assert any(said in p for p in load_system(NAME).with_values(values).check())
+
+
+def test_a_gyro_that_was_not_turned_over_is_named() -> None:
+    """Axis x at 45°: the vertical Earth rate, 10.64 °/h, changes its sign with the axis, and a gyro that stood still
+    reads the same.  One that turned over and reads it, and 12 °/h/g, does not."""
+    flat = [[*row[:4], 4.0 + 3.0 * row[3] ** 2 + 0.1 * k % 0.3, row[5]] for k, row in enumerate(rows())]
+    turned = [[*row[:4], row[4] + 10.64 * row[2], row[5]] for row in rows()]
+    for table, said in ((flat, True), (turned, False)):
+        found = reduced(table, {"axis": "x", "latitude": math.pi / 4.0})
+        assert any("was it not turned over" in r.text for r in found.reasons if r.id == "gyro.same") == said

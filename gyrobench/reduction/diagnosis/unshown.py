@@ -25,8 +25,9 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from gyrobench.frames import EARTH_RATE, G0
+from gyrobench.frames import G0
 from gyrobench.record.record import Record
+from gyrobench.reduction.diagnosis import unshown_instruments
 from gyrobench.reduction.diagnosis.handling_candidates import (
     ANGLES,
     attitude_name,
@@ -46,11 +47,10 @@ from gyrobench.reduction.diagnosis.handling_errors import (
     undone,
     with_options,
 )
-from gyrobench.reduction.drift.late_temperature import following
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
-from gyrobench.reduction.setup.conditions import READINGS, SHAKEN, readings
+from gyrobench.reduction.setup.conditions import READINGS, readings
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
 
@@ -102,8 +102,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
-    yield from _north(record)
-    yield from _leaning(record)
+    yield from unshown_instruments.shaken(record)
     yield from _heads(record)
     yield from _meters(record)
     yield from _daily(record)
@@ -117,10 +116,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         gap = float(np.median(np.diff(record.windows["since"])[later]))
         words = "the times since the turn-on short by one reading"
         yield HandlingCandidate(words, changed(record, since=record.windows["since"] + gap))
-    if "since" in record.windows and "temperature" in record.windows:
-        tau = float(np.max(record.windows["since"]))
-        words = f"an instrument {tau:.3g} s behind the temperature"
-        yield HandlingCandidate(words, changed(record, temperature=following(record.windows, tau)))
+    yield from unshown_instruments.warmed(record)
     if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)
@@ -152,32 +148,6 @@ def _daily(record: Record) -> Iterator[HandlingCandidate]:
     yield HandlingCandidate(
         "a drift by the time of day as large as the scatter of a window", changed(record, **columns)
     )
-
-
-def _north(record: Record) -> Iterator[HandlingCandidate]:
-    """A gyro that lies level on a shaker with its axis x to the north, turned over about it or about the other one."""
-    w, options = record.windows, record.run.options
-    if not all(n in w for n in SHAKEN) or options.get("axis") == "x":
-        return
-    rate, up = np.asarray(w[SHAKEN[0]], dtype=float), np.asarray(w["up"], dtype=float)
-    earth = EARTH_RATE * math.cos(float(options["latitude"]))
-    for words, sign in (("", np.ones_like(up)), (", down to the south", up)):
-        found = changed(record, **{SHAKEN[0]: rate - earth * sign})
-        yield HandlingCandidate(f"the axis x of the gyro to the north{words}", found)
-
-
-def _leaning(record: Record) -> Iterator[HandlingCandidate]:
-    """Instruments on a shaker that lean with the axis up alone, to where the gyro sees the most of the Earth rate."""
-    w, options = record.windows, record.run.options
-    if not all(n in w for n in (*SHAKEN[1:], "up")) or options.get("u_lean"):
-        return
-    upright, latitude = np.asarray(w["up"]) > 0.0, float(options["latitude"])
-    north, up = math.cos(latitude), 0.0 if options.get("axis") == "x" else math.sin(latitude)
-    found = {n: np.asarray(w[n], dtype=float) for n in (SHAKEN[0], "force") if n in w}
-    for n, v in found.items():
-        lean = math.sin(OFF) * EARTH_RATE * max(north, abs(up)) if n == SHAKEN[0] else (1.0 - math.cos(OFF)) * v
-        found[n] = np.where(upright, v - lean, v)
-    yield HandlingCandidate("a lean of the instruments by 1° with the axis up", changed(record, **found))
 
 
 def _heads(record: Record) -> Iterator[HandlingCandidate]:

@@ -79,6 +79,7 @@ def reasons(record: Record) -> list[Reason]:
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
         found += identical_phases(record) or identical_rows(record) or unsettled(record, readings(record.windows))
+        found += at_the_end(record)
     if run.measured and not run.type_b_stated:
         text = (
             "Type B is not stated, u is of type A only: give the uncertainties u_... that apply, or declare "
@@ -148,6 +149,27 @@ def identical_rows(record: Record) -> list[Reason]:
         )
         return [Reason("record.identical_rows", text, blocks=("pass", "fail"), severity="error")]
     return []
+
+
+def at_the_end(record: Record) -> list[Reason]:
+    """Return which readings are the largest or the smallest of their column, alike to the last digit, where hardly two
+    others are: a range was reached, and nothing beyond it read.  A channel that was not read says so elsewhere.
+    """
+    found = []
+    for name in readings(record.windows):
+        y = np.asarray(record.windows[name], dtype=float)
+        for end, word in ((np.max(y), "largest"), (np.min(y), "smallest")):
+            here = y == end
+            n, rest = int(np.count_nonzero(here)), y[~here]
+            if n < LEAST or n > y.size // 2 or n * math.log10(max(_rarity(rest, 0), 1.0)) < CHANCE:
+                continue
+            first = int(np.argmax(here)) + 1
+            text = (
+                f"{n} readings of {name}, the first in row {first}, are its {word} value to the last digit, and no two "
+                "others are alike: a range was reached. What was beyond it is not in the estimates."
+            )
+            found.append(Reason("record.range", text, blocks=("pass", "fail"), severity="doubt"))
+    return found
 
 
 def _longest_copy(y: Array) -> tuple[int, int, int]:
