@@ -33,7 +33,7 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
 def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Reason]:
     """Yield that a gyro reads the same up and down where the vertical Earth rate alone, deg/h, would show."""
     for c in found:
-        if c.name == "G" and abs(c.estimate + vertical) < 3.0 * c.u < 0.3 * abs(vertical):
+        if c.name == "G" and abs(c.estimate + vertical) < 3.0 * c.u < 0.05 * abs(vertical):
             text = (
                 f"The gyro reads the same up and down, where the vertical Earth rate is {abs(vertical):.4g} °/h: "
                 "was it not turned over, or does another axis stand up?"

@@ -23,13 +23,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from instrument_sheets import SHEETS, Columns, Mistake, Sheet
+from instrument_sheets import SHEETS as EARLIER
+from instrument_sheets import Columns, Mistake, Sheet
+from sheets_of_rates import DRIFT_RECORD, SENSITIVITY, WARM_UP
+from sheets_thermal import THERMAL
 
 import gyrobench as gb
 from gyrobench.errors import GyrobenchError
 from gyrobench.result import Result
 
 PAGE = Path(__file__).parents[2] / "docs" / "mistakes_of_a_record.md"
+SHEETS = (*EARLIER, THERMAL, WARM_UP, SENSITIVITY, DRIFT_RECORD)
 SERIOUS = ("error", "warning", "doubt")
 CHECKED = "# arrangement = checked\n"
 
@@ -69,7 +73,8 @@ def outcome(s: Sheet, m: Mistake, clean: Result, folder: Path) -> str:
         return "asked for"
     before = {x.name: x for x in clean.coefficients}
     pairs = [(before[x.name], x) for x in found.coefficients if x.name in before]
-    far = any(abs(a.estimate - b.estimate) > 3.0 * math.hypot(a.u, b.u) for a, b in pairs)
+    valued = [(a, b) for a, b in pairs if not (a.no_value or b.no_value)]
+    far = any(abs(a.estimate - b.estimate) > 3.0 * math.hypot(a.u, b.u) for a, b in valued)
     return "not seen" if far or not m.words else "harmless"
 
 

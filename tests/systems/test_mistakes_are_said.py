@@ -157,6 +157,7 @@ def test_a_warm_up_that_reached_a_range_and_a_thermometer_in_fahrenheit(tmp_path
     assert "readings of mean, the first in row 1, are its largest value" in text
     asked = said(reduced(tmp_path, name, warm_up()))["arrangement.unstated"]
     assert "the temperatures in °F and given as °C (b_T by" in asked
+    assert "another attitude, by 1°, from turn-on 4 on (" in asked  # 0.26 deg/h between days
 
 
 def test_a_g_sensitivity_rests_on_the_earth_rate_and_on_turning_over(tmp_path: Path) -> None:

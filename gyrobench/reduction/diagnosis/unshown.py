@@ -117,6 +117,7 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         words = "the times since the turn-on short by one reading"
         yield HandlingCandidate(words, changed(record, since=record.windows["since"] + gap))
     yield from unshown_instruments.warmed(record)
+    yield from unshown_instruments.moved(record)
     if options.get("u_mount", options.get("u_angle")) or not all(n in record.windows for n in ANGLES):
         return
     phase = np.asarray(record.windows["phase"]).astype(int)

@@ -57,6 +57,17 @@ def shaken(record: Record) -> Iterator[HandlingCandidate]:
     yield HandlingCandidate("a lean of the instruments by 1° with the axis up", changed(record, **moved))
 
 
+def moved(record: Record) -> Iterator[HandlingCandidate]:
+    """A gyro that is read from turn-on to turn-on, and stands otherwise from the middle one on."""
+    w = record.windows
+    numbers = list(dict.fromkeys(np.asarray(w["turn_on"]).tolist())) if "turn_on" in w and "mean" in w else []
+    if len(numbers) > 1:
+        first = numbers[len(numbers) // 2]
+        later = np.isin(w["turn_on"], numbers[len(numbers) // 2 :])
+        mean = np.asarray(w["mean"], dtype=float) + math.sin(LEAN) * EARTH_RATE * later
+        yield HandlingCandidate(f"another attitude, by 1°, from turn-on {first:g} on", changed(record, mean=mean))
+
+
 def warmed(record: Record) -> Iterator[HandlingCandidate]:
     """A thermometer on which coefficients over the temperature rest: in °F, reversed about the reference, standing
     where the changes are other ones, ahead of the instrument.
