@@ -58,7 +58,8 @@ class UntranslatedError(GyrobenchError):
         count = f"{len(self.sentences)} sentence{'s' * (len(self.sentences) > 1)}"
         shown = [f"  - {s}" for s in self.sentences[:5]]
         more = [f"  - and {len(self.sentences) - 5} more"] if len(self.sentences) > 5 else []
-        super().__init__("\n".join([f"{what} has {count} without a translation ({code}):", *shown, *more]))
+        head = f"{what} has {count} without a translation ({code}); without --language it is in English:"
+        super().__init__("\n".join([head, *shown, *more]))
 
 
 @dataclass(frozen=True)

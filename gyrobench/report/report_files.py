@@ -82,7 +82,9 @@ def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
         names |= {f"{k} {slot}" for k, slot in enumerate(run.order, 1)}  # as they stand in the drawing of the system
         ends = {part for wire in run.wires for end in wire.split(" -> ") for part in end.split(".")}
         names |= ends | {end.partition("[")[0] for end in ends}
-        names |= {column.name for column in getattr(result, "columns", [])}
+        for column in getattr(result, "columns", []):  # of a drift record: as the file of the user calls them
+            tables = [t for section in column.tables.values() for t in section if t.columns[0] == "column"]
+            names |= {column.name, *(str(row[0]) for t in tables for row in t.rows)}
     return own - {""}, names - {""}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.record import sampling
-from gyrobench.record.drift_columns import ANGLE, DIRECT, harmonic_names
+from gyrobench.record.drift_columns import ANGLE, DIRECT, FORCE, harmonic_names
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
@@ -25,6 +25,7 @@ from . import noise_tables
 from .noise_tables import number
 from .preparation import Prepared
 
+KIND_NAMES = {FORCE: "specific force"}  # where the word is another one
 NOTHING = 1e-9  # of the standard deviation of a rate: rounding
 MORE_DIGITS = "Record more digits."
 FINER_ANGLE = "Read a finer angle, or reduce one row in several: the change within a sample must be larger."
@@ -71,14 +72,14 @@ def _column_rows(name: str, units: ChannelUnits, series: Mapping[str, Any]) -> t
         si, unit = (units.si, units.unit) if kind in DIRECT else (ARCSEC, "″")
         rows.append(["resolution of the values", q / si, unit])
     rows.append(["jitter of time stamps, rms, of a step", 0.0 if about["rounded"] else round(about["jitter"], 9), "1"])
-    return [["column", f"{name}: {kind} [{column['unit'] or '1'}]", ""]], rows
+    return [["column", f"{name}: {KIND_NAMES.get(kind, kind)} [{column['unit'] or '1'}]", ""]], rows
 
 
 def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     """Return what sampling did to the rate, and what of the file was left out."""
     if run.series is None:
         reading = run.options.get("reading", "current")
-        read = {"force": "specific force"}.get(str(reading), str(reading))
+        read = KIND_NAMES.get(str(reading), str(reading))
         return [f"A sample is the mean of the {read} over a window, as an integrating meter reads it."]
     unused = run.series.get("unused", [])
     out = [
@@ -106,7 +107,7 @@ def regression(p: Prepared) -> list[Table]:
     for r in p.regressions:
         unit = f"{p.units.unit} per {units.display(r.unit)}" if r.unit != "1" else p.units.unit
         si = p.units.si
-        share = [100.0 * s for s in r.share]
+        share = [float(f"{100.0 * s:.3g}") for s in r.share]
         rows.append([r.name, r.slope / si, r.u / si, r.full[0] / si, r.full[1] / si, unit, r.p, *share,
                      "taken out" if r.kept else "not significant, left in"])  # fmt: skip
     names = harmonic_names(len(by))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gyrobench.record.csv_reader import DataError
-from gyrobench.report import drift_record_page, result_json
+from gyrobench.report import drift_record_page, report_files, result_json
 from gyrobench.result import DriftRecordResult
 from gyrobench.system.system import load_system
 
@@ -136,3 +136,19 @@ def test_the_smoothed_drift_follows_the_true_one(tmp_path: Path) -> None:
     assert 0.9 < np.mean((s["low"] < true) & (true < s["high"])) < 0.99
     assert np.std(s["mean"] - true) < 0.6 * np.std(drift)
     assert "smoothed from all samples" in str(drift_record_page.page(result_json.Report.of(result)))
+
+
+@pytest.mark.long
+def test_a_report_in_chinese_keeps_the_names_of_the_columns(tmp_path: Path) -> None:
+    """A regressor, a channel and a sentence that names both, as a German logger calls them: no text of a catalogue."""
+    rng = np.random.default_rng(4)
+    n = 600
+    time = np.arange(n, dtype=float)
+    warming = 25.0 + 2.0 * (1.0 - np.exp(-time / 150.0))  # its rate of change follows it, by 1 - exp
+    columns = {"time [s]": time, "Drehrate_X [deg/h]": rng.normal(size=n), "Temperatur [degC]": warming}
+    columns["Beschl_X [m/s2]"] = 1e-3 * rng.normal(size=n)
+    result = reduce(tmp_path / "a.csv", columns)
+    page = report_files.page_in("zh", result_json.Report.of(result))
+    said = str(page)
+    for text in ("Drehrate_X", "Temperatur的变化率与Temperatur本身同步", "Beschl_X：比力"):
+        assert text in said, text
