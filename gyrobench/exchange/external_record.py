@@ -259,7 +259,8 @@ class ResultReader:
                     "channels are recorded at"
                 )
                 if not windows:
-                    raise self._fail(f"{problem}; write a row every {self.step:g} s, from t = 0")
+                    row = f"write a row every {period:g} s, from t = 0"
+                    raise self._fail(f"{problem}; {row}; by FMPy: fmpy simulate --output-interval {period:g}")
                 run.notes.append(f"No channels: {problem}.")
                 channels = {}
         run.stopped_at = self.last[0]

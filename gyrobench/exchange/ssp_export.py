@@ -37,6 +37,7 @@ from gyrobench.exchange.gains import INPUT, Gains, gain_fmu, gains_of, varying
 from gyrobench.exchange.ssp_annotation import annotate, annotate_gains
 from gyrobench.exchange.ssp_values import SSC, SSD, SSV
 from gyrobench.system.binding import Bound
+from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.parameters import Starts, defaults, resolve
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.system import System
@@ -45,6 +46,7 @@ from gyrobench.system.wiring import Assembly, assemble
 PARAMETERS = "resources/parameters.ssv"
 STAMP = (1980, 1, 1, 0, 0, 0)
 SOLVER = "solver1"
+STAGES = 4  # of a phase of a loop plan at most, each rounded to a step: settle, gate, fade, and the end
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
@@ -87,13 +89,17 @@ def recorded(assembly: Assembly) -> dict[str, tuple[str, Bound]]:
 
 def stop_time(system: System) -> float:
     """Return a time by which the plan has ended, in whole steps: that at which a run stops, else the duration of the
-    plan plus 5 % plus a minute for each phase.
+    plan, of a table with 5 % and a minute for each phase on top, for its ways, of a loop with a step for each stage.
     """
     if system.stop is not None:
         steps = round(system.stop / system.step)  # as many as a run of the bench
     else:
         plan = system.plan()
-        steps = math.ceil(math.ceil(1.05 * plan.duration() + 60.0 * len(plan.phases)) / system.step - 1e-6)
+        phases, duration = len(plan.phases), plan.duration()
+        end = (
+            duration + STAGES * phases * system.step if isinstance(plan, LoopPlan) else 1.05 * duration + 60.0 * phases
+        )
+        steps = math.ceil(math.ceil(end) / system.step - 1e-6)
     return float(f"{max(1, steps) * system.step:.15g}")
 
 

@@ -48,6 +48,16 @@ def test_windows_need_no_option(tmp_path: Path) -> None:
     assert estimates(found) == estimates(test.run(check_step=False))
 
 
+def test_a_loop_test_stops_where_its_plan_ends(tmp_path: Path) -> None:
+    """A stage is rounded to a step, so that the plan of 3 phases may take 9 steps of 1 ms more; then whole seconds."""
+    system = load_system(LOOP).with_values(SHORT)
+    export_fmu(system, tmp_path / "loop.fmu")
+    found = simulate_fmu(str(tmp_path / "loop.fmu"))
+    planned = system.plan().duration()
+    assert planned <= found["time"][-1] <= planned + 1.012
+    assert found["exciter.done"][-1] == 1.0 and found["exciter.done"][found["time"] < planned - 0.5].max() == 0.0
+
+
 def test_a_container_gives_all_that_a_record_needs(tmp_path: Path) -> None:
     """What is wired inside is an output too, with its unit; its order in the structure is that of the variables."""
     if importlib.util.find_spec("fmu_manipulation_toolbox") is None:

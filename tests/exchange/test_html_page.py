@@ -114,11 +114,12 @@ def test_without_a_compiler_for_it(tmp_path: Path, command: Any, monkeypatch: py
 
 
 def test_progress_is_that_of_the_plan_and_a_slider_says_what_its_option_means() -> None:
-    """The end of gimbal_tracking allows a minute for each of its 53 phases; the plan alone takes 10 minutes."""
-    system = load_system("gimbal_tracking")
+    """The end of rate_table_test allows a minute for the way to each of 61 rates; the plan alone takes 11 minutes."""
+    system = load_system("rate_table_test")
     plan = system.plan().duration()
     assert html_page._planned(system, stop_time(system)) == pytest.approx(plan) and plan < 0.3 * stop_time(system)
     assert html_page._planned(system, 10.0) == 10.0
+    system = load_system("gimbal_tracking")
     decl = Parameter(60.0, "s", "time the gate is open")
     scalar = SimpleNamespace(name="ride", start=60.0, reference=1, decl=decl)
     shown = html_page._parameter(SimpleNamespace(scalar=scalar), system)  # type: ignore[arg-type]
