@@ -2,12 +2,42 @@
 
 from __future__ import annotations
 
-#: what messages advise a person at a shell to do; a face that has a button for it names the button
+from dataclasses import dataclass
+from typing import Self
+
+#: the way on from a stopped run at a shell
 RESUMING = "the same command with --resume"
-REDUCING = " (gyrobench report reduces it, or lists what is missing)"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The way on from an error.
+
+    action: "resume" or "reduce", for a face that has a button for it; shell: a clause for all others.
+    """
+
+    action: str
+    shell: str
 
 
 class GyrobenchError(Exception):
-    """An error whose text says what is wrong and what to do; a command shows the text and no traceback."""
+    """An error whose text says what is wrong and what to do; a command shows the text and no traceback.
+
+    advice: what goes on from here; ``str`` has it behind the text, as a shell shows them, ``text`` is without it.
+    """
 
     exit_code = 2  # of the command that ends with it
+    advice: tuple[Advice, ...] = ()
+
+    def advised(self, *advice: Advice) -> Self:
+        """Return the error, with this advice."""
+        self.advice = advice
+        return self
+
+    @property
+    def text(self) -> str:
+        """What is wrong, without the advice."""
+        return super().__str__()
+
+    def __str__(self) -> str:
+        return "\n".join(filter(None, (self.text, "; ".join(a.shell for a in self.advice))))

@@ -30,7 +30,7 @@ from gyrobench.bench import display_path
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import RunState, read_outputs
-from gyrobench.errors import RESUMING, GyrobenchError
+from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 
 FILE = "checkpoint.npz"
@@ -175,7 +175,7 @@ class CheckpointManager:
         self.stop_at = stop_at
         self.period = PERIOD if period is None else period
         self.remark = ""  # for the user, before the run
-        self.resume_hint = ""  # whether and how an interrupted run goes on
+        self.lost = ""  # why an interrupted run cannot go on
         self.resumed_at: list[float] = []  # s
         self.job: dict[str, Any] = {}
         self.head: dict[str, Any] = {}
@@ -268,8 +268,7 @@ class CheckpointManager:
 
     def save_on_interrupt(self, state: RunState) -> None:
         """Write the checkpoint of a run that the user stopped, or keep the reason why there is none."""
-        problem = self.obstacle or self.write(state)
-        self.resume_hint = f"it cannot be resumed: {problem}" if problem else f"{RESUMING} continues it"
+        self.lost = self.obstacle or self.write(state)
 
     def write(self, state: RunState) -> str:
         """Write the checkpoint; return what prevents it, "" where nothing: the run itself is sound."""

@@ -192,7 +192,7 @@ def _write(files: RunFiles, job: Job, ending: Ending) -> None:
     elif error is not None:
         found["resume"] = [str(error)]
     if job.checkpoints is not None:
-        found["checkpoints"] = [job.checkpoints.resumed_at, job.checkpoints.resume_hint]
+        found["checkpoints"] = [job.checkpoints.resumed_at, job.checkpoints.lost]
     write_whole(files.file("ending"), json.dumps(found).encode(), durable=False)
 
 

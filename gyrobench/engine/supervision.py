@@ -277,7 +277,7 @@ class _Supervisor:
             raise RuntimeError(f"in the process of the run:\n{found['fault']}")
         checkpoints = self.job.checkpoints
         if checkpoints is not None and "checkpoints" in found:
-            checkpoints.resumed_at, checkpoints.resume_hint = found["checkpoints"]
+            checkpoints.resumed_at, checkpoints.lost = found["checkpoints"]
         remarks = [*found["remarks"]]
         if self.process.poll() != 0:
             slot, call = self._call()

@@ -1,4 +1,4 @@
-"""The pages of commands that a form asks for: tune or identify a loop, find a plan, sweep values, certify."""
+"""The pages of commands that a form asks for: tune or identify a loop, find a plan, sweep values."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from gyrobench.bench import UsageError, display_path
-from gyrobench.report.laboratory import FILE, Laboratory, laboratory_of, read_laboratory, write_laboratory
 from gyrobench.studio.data_page import FILES, keep
-from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, show_problem, told
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, told
 from gyrobench.studio.request import CommandRequest
 from gyrobench.studio.run_page import report_frame
 from gyrobench.studio.words import heading, say
@@ -26,7 +25,6 @@ from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.tune_loop import tunable
 from gyrobench.workflow.gallery import gallery
-from gyrobench.workflow.run_list import list_runs
 
 OWN = ("tuning.html", "tuning.pdf", "identification.html", "identification.pdf")
 PAGES = (*OWN, "site/index.html")  # that a command writes; certificates have names of their own
@@ -49,6 +47,11 @@ class FormField:
     example: str = ""
     choices: tuple[str, ...] = ()
 
+    @property
+    def key(self) -> str:
+        """Its name in the address of the form."""
+        return self.option.removeprefix("--")
+
     def entries(self, value: Any) -> list[str]:
         """Return what was given: the lines of a list, one text of any other kind, nothing where it was left out."""
         lines = [line.strip() for line in str("" if value is None else value).splitlines()]
@@ -63,7 +66,10 @@ class FormField:
 
 @dataclass(frozen=True)
 class CommandForm:
-    """A page with a form.  fixed: words that every command of it has.  under: folder of its pages, "" for none."""
+    """A page with a form.  fixed: words that every command of it has.  under: folder of its pages, "" for none.
+
+    subject: name of what the command is about, in the address of the form.
+    """
 
     name: str
     command: str
@@ -71,12 +77,17 @@ class CommandForm:
     fields: tuple[FormField, ...]
     fixed: tuple[str, ...] = ()
     under: str = ""
+    subject: str = "system"
 
-    def request(self, studio: Studio, system: str, given: dict[str, Any]) -> CommandRequest:
-        """Return the command that the fields ask for.  given: option -> value of its field."""
-        words, arguments = [self.command, system], [repr(system)]
+    def request(self, studio: Studio, system: str, given: dict[str, Any], place: str = "") -> CommandRequest:
+        """Return the command that the fields ask for.  given: option -> value of its field.
+
+        place: of a file that the command is about, as the address of the form names it.
+        """
+        words, arguments, query = [self.command, system], [repr(system)], [(self.subject, place or system)]
         for f in self.fields:
             if entries := f.entries(given.get(f.option)):
+                query += [(f.key, e) for e in entries]
                 words += [f"{f.option}={e}" for e in entries]
                 arguments.append(f"{f.argument}={f.literal(entries)}" if f.argument else f.literal(entries))
         folder = ""
@@ -84,7 +95,7 @@ class CommandForm:
             folder = f"{self.under}/{hashlib.sha256(repr(words).encode()).hexdigest()[:8]}"
             words.append(f"--out={display_path(studio.bench.out / folder)}")
         lines = f"import gyrobench as gb\n\nprint(gb.{self.command}({', '.join(arguments)}))"
-        return CommandRequest([*words, *self.fixed], lines, folder)
+        return CommandRequest([*words, *self.fixed], lines, folder, f"/{self.name.lower()}?{urlencode(query)}")
 
 
 SET = FormField("--set", "values", "Other values", "dict", "platform.J=0.7")
@@ -99,7 +110,7 @@ IDENTIFY = CommandForm(
         FormField("--period", "period", "Period of the excitation; empty: found in the record", "text", "4s"),
         FormField("--want", "want", "Margins that it must have", "list", "phase margin=40deg\ndisk margin=0.5"),
         FormField("--fit", "fit", "Physical parameters to find, or known", "list", "J\nviscous\ndelay"),
-    ), under="identified",
+    ), under="identified", subject="file",
 )  # fmt: skip
 TUNE = CommandForm(
     "Tune", "tune",
@@ -155,21 +166,21 @@ def _tunable(_changed: tuple[int, ...]) -> tuple[str, ...]:
 
 
 def _field(f: FormField, studio: Studio) -> Any:
+    """Add a field, with what the address of the page gives for it."""
+    given = given_in_address(f.key)
+    first = given[0] if given else ""
     if f.kind == "choice":
         choices = f.choices or ("", *studio.bench.specifications())
-        return ui.select(list(choices), value=choices[0], label=say(f.label)).props("dense outlined").classes("full")
+        value = first if first in choices else choices[0]
+        return ui.select(list(choices), value=value, label=say(f.label)).props("dense outlined").classes("full")
     if f.kind == "number":
-        return (
-            ui.number(say(f.label), min=0, precision=0, placeholder=f.example).props("dense outlined").classes("full")
-        )
+        number = float(first) if first.isdecimal() and len(first) < 16 else None
+        made = ui.number(say(f.label), value=number, min=0, precision=0, placeholder=f.example)
+        return made.props("dense outlined").classes("full")
     if f.kind == "text":
-        return ui.input(say(f.label), placeholder=f.example).props("dense outlined").classes("full")
-    made = (
-        ui.textarea(say(f"{f.label}, one a line"), placeholder=f.example)
-        .props("dense outlined autogrow stack-label")
-        .classes("full")
-    )
-    return made.props("debounce=250")
+        return ui.input(say(f.label), value=first, placeholder=f.example).props("dense outlined").classes("full")
+    lines = ui.textarea(say(f"{f.label}, one a line"), value="\n".join(given), placeholder=f.example)
+    return lines.props("dense outlined autogrow stack-label debounce=250").classes("full")
 
 
 def _add_form(studio: Studio, form: CommandForm) -> None:
@@ -186,30 +197,32 @@ def _add_form(studio: Studio, form: CommandForm) -> None:
                     chosen.props("dense outlined").classes("full")
                     fields = {f.option: _field(f, studio) for f in form.fields}
                 asked = _asking(studio, form, fields, lambda: chosen.value or "")
+            loop = next(iter(given_in_address("loop")), "")
 
             def changed() -> None:
                 if form is TUNE:
-                    _offer_loops(fields["--loop"], chosen.value)
+                    _offer_loops(fields["--loop"], chosen.value, loop)
                 asked()
 
             chosen.on_value_change(changed)
             changed()
 
 
-def _offer_loops(field: ui.select, system: str) -> None:
-    """Let a loop be chosen where the system has several."""
+def _offer_loops(field: ui.select, system: str, loop: str) -> None:
+    """Let a loop be chosen where the system has several.  loop: chosen at first, where there is one of this name."""
     there = [*loops_of(load_system(system))] if system else []
     several = len(there) > 1
-    field.set_options(there if several else [""], value=there[0] if several else "")
+    first = loop if loop in there else there[0] if several else ""
+    field.set_options(there if several else [""], value=first if several else "")
     field.set_visibility(several)
 
 
 def _asking(
-    studio: Studio, form: CommandForm, fields: dict[str, Any], subject: Callable[[], str]
+    studio: Studio, form: CommandForm, fields: dict[str, Any], subject: Callable[[], str], place: str = ""
 ) -> Callable[[], None]:
     """Add the lines to copy and the button that starts; return what shows them anew.
 
-    subject: the system or the file that the command is about, "" while none is chosen.
+    subject: the system or the file that the command is about, "" while none is chosen.  place: of the file.
     """
     with ui.element("div").classes("aside"):
         lines = CopyLines()
@@ -219,7 +232,7 @@ def _asking(
     def asked() -> CommandRequest:
         if not subject():
             raise UsageError("choose a system")
-        return form.request(studio, subject(), {o: f.value for o, f in fields.items()})
+        return form.request(studio, subject(), {o: f.value for o, f in fields.items()}, place)
 
     def show() -> None:
         if subject():
@@ -253,115 +266,7 @@ def _add_identify_page(studio: Studio) -> None:
             with ui.element("div").classes("two"):
                 with ui.element("div").classes("form"):
                     fields = {f.option: _field(f, studio) for f in IDENTIFY.fields}
-                _asking(studio, IDENTIFY, fields, lambda: display_path(there))
-
-
-# ---------------------------------------------------------------------------------------------- laboratory
-#: key of a profile -> its label, and whether it has a line each
-PROFILE = {
-    "name": ("Name", False), "address": ("Address, one line each", True),
-    "accreditation": ("Accreditation number", False), "country": ("Country, two letters", False),
-    "logo": ("Logo, a file beside laboratory.toml", False),
-    "language": ("Language of the certificate, en or zh", False),
-    "statements": ("Statements of the certificate, one a line", True),
-    "coefficients": ("Coefficients shown, one a line; none: all", True),
-}  # fmt: skip
-SIGNATORIES = "Signatories, ROLE: NAME, one a line"
-
-
-def _profile_fields(there: Laboratory | None) -> dict[str, Any]:
-    """Add the fields of a profile; return them by the name of the key."""
-    made: dict[str, Any] = {}
-    for key, (label, many) in PROFILE.items():
-        value = getattr(there, key, "") or ""
-        made[key] = ui.textarea(say(label), value="\n".join(value)) if many else ui.input(say(label), value=value)
-    signs = "\n".join(f"{s.role}: {s.name}" for s in there.signatories) if there else ""
-    made["signatories"] = ui.textarea(say(SIGNATORIES), value=signs)
-    for field in made.values():
-        field.props("dense outlined autogrow stack-label").classes("full")
-    return made
-
-
-def _profile(fields: dict[str, Any], file: Path) -> Laboratory:
-    """Return the profile that the fields make.  Raises UsageError naming all that is wrong with it."""
-    lines = {k: [s.strip() for s in (f.value or "").splitlines() if s.strip()] for k, f in fields.items()}
-    content: dict[str, Any] = {k: v if PROFILE[k][1] else v[0] for k, v in lines.items() if v and k in PROFILE}
-    if lines["signatories"]:
-        pairs = (line.partition(":") for line in lines["signatories"])
-        content["signatories"] = [{"role": role.strip(), "name": name.strip()} for role, _, name in pairs]
-    return laboratory_of(content, file)
-
-
-def certificate_request(studio: Studio, runs: list[str], number: str) -> CommandRequest:
-    """Return the command that certifies runs, given by their places below reports/out."""
-    if not runs:
-        raise UsageError("choose the run of the instrument, or the runs of a lot")
-    folder = f"certificates/{hashlib.sha256(repr((runs, number)).encode()).hexdigest()[:8]}"
-    folders = [display_path(studio.run_folder(r)) for r in runs]
-    numbered = [f"--number={number.strip()}"] if number.strip() else []
-    return CommandRequest(
-        ["certificate", *folders, *numbered, f"--out={display_path(studio.bench.out / folder)}"], folder=folder
-    )
-
-
-def _add_laboratory_page(studio: Studio) -> None:
-    @ui.page("/laboratory", response_timeout=60)
-    async def laboratory_page() -> None:
-        file = studio.bench.home / FILE
-        entries = await asyncio.to_thread(list_runs, studio.bench.out)
-        with frame(studio, "Laboratory"):
-            heading("Laboratory")
-            there = None
-            try:
-                there = read_laboratory(file) if file.is_file() else None
-            except UsageError as error:
-                show_problem(error)
-            with ui.element("div").classes("two"):
-                with ui.element("div").classes("form"):
-                    heading("Profile", 2)
-                    ui.label(say("Certificates say this of the laboratory; it is kept in laboratory.toml.")).classes(
-                        "soft"
-                    )
-                    fields = _profile_fields(there)
-                    save = ui.button(say("Save"), icon="save").mark("save")
-                with ui.element("div").classes("form"):
-                    heading("Certificate", 2)
-                    names = {
-                        r.place: ", ".join(filter(None, (say(r.title or r.system, r.system), r.instrument, r.place)))
-                        for r in entries[:LISTED]
-                        if r.report
-                    }
-                    runs = ui.select(
-                        names, multiple=True, label=say("Run of an instrument, runs of a lot"), with_input=True
-                    )
-                    runs.props("dense outlined use-chips").classes("full")
-                    number = ui.input(say("Number of the certificate")).props("dense outlined").classes("full")
-                    make = ui.button(say("Make the certificate"), icon="workspace_premium").mark("certify")
-                    lines = CopyLines()
-            for button in (save, make):
-                button.set_visibility(not studio.read_only)
-
-            def show() -> None:
-                asked = certificate_request(studio, runs.value, number.value or "").command() if runs.value else ""
-                lines.show(asked, "")
-
-            def keep() -> None:
-                if studio.read_only:
-                    raise UsageError("the studio is read-only: nothing is kept")
-                if file.is_file() and there is None:
-                    raise UsageError(f"{display_path(file)} cannot be read; mend or remove it, it is not written over")
-                write_laboratory(_profile(fields, file), file)
-                ui.notify(say(f"Saved: {display_path(file)}"))
-
-            def certify() -> None:
-                asked = certificate_request(studio, runs.value or [], number.value or "")
-                ui.navigate.to(f"/job/{studio.jobs.submit(asked)}")
-
-            save.on_click(told(keep))
-            make.on_click(told(certify))
-            runs.on_value_change(show)
-            number.on_value_change(show)
-            show()
+                _asking(studio, IDENTIFY, fields, lambda: display_path(there), file)
 
 
 # ---------------------------------------------------------------------------------------------- results
@@ -383,7 +288,6 @@ def add_command_pages(studio: Studio) -> None:
     for form in (TUNE, DESIGN, SWEEP):
         _add_form(studio, form)
     _add_identify_page(studio)
-    _add_laboratory_page(studio)
 
     @ui.page("/pages/{place:path}", response_timeout=60)
     def result_page(place: str) -> None:

@@ -13,15 +13,15 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
-from gyrobench import units
+from gyrobench import reading, units
 from gyrobench.bench import UsageError, display_path
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.record.column_map import cells_of_file
 from gyrobench.record.column_proposal import FileColumn
-from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, inside, told
-from gyrobench.studio.request import JobRequest
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, pairs_in_address, told
+from gyrobench.studio.request import KEPT, JobRequest
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.system import System
 from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
@@ -81,13 +81,28 @@ class _Mapping:
     def request(self) -> JobRequest:
         return JobRequest(
             self.proposal.test.name, values=dict(self.stated), data=display_path(self.proposal.file),
-            columns=display_path(self.map_file),
+            columns=display_path(self.map_file), place=Path(*self.proposal.file.parts[-2:]).as_posix(),
         )  # fmt: skip
 
     def write(self) -> JobRequest:
         """Write the map beside the file and return what reduces it."""
         write_whole(self.map_file, self.text()[0].encode())
         return self.request()
+
+    def restore(self) -> None:
+        """Take columns, units and signs as the map beside the file has them."""
+        if not self.map_file.is_file():
+            return
+        there = {c.sources: c for c in self.proposal.layout.columns}
+        found = {}
+        kept = reading.toml(reading.read_text(self.map_file, UsageError), self.map_file, UsageError)
+        for name, entry in kept.get("columns", {}).items():
+            source = entry.get("from", [])
+            if column := there.get(tuple(source) if isinstance(source, list) else (source,)):
+                unit = entry.get("unit", column.unit)
+                found[name] = replace(column, unit=unit, written=unit)
+                self.factors[name] = entry.get("factor", 1.0)
+        self.proposal = replace(self.proposal, found=found)
 
     def put(self, name: str, column: FileColumn | None) -> None:
         """Say which column of the file is a column of the test; None: there is none."""
@@ -151,14 +166,14 @@ def _columns(mapping: _Mapping) -> None:
                 ui.label(say(f"as {wanted}") if wanted not in ("", "1") else "").classes("range")
             with ui.element("div").classes("bar"):
                 held = mapping.proposal.found.get(name)
-                at = columns.index(held) if held in columns else -1
+                at = next((k for k, c in enumerate(columns) if held and c.sources == held.sources), -1)
                 menu = ui.select({-1: say(NOT), **names}, value=at).props("dense outlined")
                 menu.props(spoken(f"column for {name}"))
                 check = _unit_check(mapping, name)
                 unit = ui.input(value=held.unit if held else "", placeholder=say("unit"), validation=check)
                 unit.props("dense outlined hide-bottom-space debounce=250").classes("narrow")
                 unit.props(spoken(f"unit of {name}"))
-                sign = ui.checkbox(say("reversed")).props("dense")
+                sign = ui.checkbox(say("reversed"), value=mapping.factors.get(name, 1.0) < 0.0).props("dense")
         _follow(mapping, name, menu, unit, sign)
 
 
@@ -198,7 +213,8 @@ def _stated(mapping: _Mapping) -> None:
             with ui.element("div").classes("about"):
                 ui.label(name).classes("option")
                 content(option.doc if option else "", mapping.proposal.test.name)
-            value = ui.input(placeholder=say(example)).props("dense outlined debounce=250")
+            value = ui.input(value=mapping.stated.get(name, ""), placeholder=say(example))
+            value.props("dense outlined debounce=250")
             value.props["aria-label"] = name
             value.on_value_change(lambda e, n=name: take(n, e.value or ""))
 
@@ -213,7 +229,9 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
             with ui.element("div").classes("bar"):
                 check = ui.button(say("Check the file"), icon="rule")
                 go = ui.button(say("Reduce"), icon="play_arrow")
-            mapping = _Mapping(proposal, CopyLines())
+            mapping = _Mapping(proposal, CopyLines(), stated=pairs_in_address("set"))
+            if KEPT in given_in_address("columns"):
+                mapping.restore()
             with ui.expansion(say("Column map")).classes("full"):
                 text = ui.label().classes("code")
     with left:

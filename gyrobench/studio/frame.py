@@ -66,6 +66,17 @@ def inside(root: Path, place: str) -> Path:
     raise wrong
 
 
+def given_in_address(key: str) -> list[str]:
+    """Return what the address of the page says of a field of its form."""
+    found: list[str] = ui.context.client.request.query_params.getlist(key)
+    return found
+
+
+def pairs_in_address(key: str) -> dict[str, str]:
+    """Return name -> value of the NAME=VALUE that the address of the page has."""
+    return {name: value for name, sign, value in (text.partition("=") for text in given_in_address(key)) if sign}
+
+
 def address(page: str, place: str) -> str:
     """Return the address of a run's page."""
     return f"/{page}/{quote(place)}"
@@ -124,8 +135,8 @@ class PageSeen:
 
 
 def show_problem(error: BaseException) -> None:
-    """Show the message of an error, as the command prints it."""
-    content(visible(user_message(error))).classes("problem").props("role=alert")
+    """Show the message of an error, as the command prints it but for the advice for a shell."""
+    content(visible(user_message(error, at_shell=False))).classes("problem").props("role=alert")
 
 
 def told(action: Callable[[], None]) -> Callable[[], None]:
@@ -135,7 +146,7 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
         try:
             action()
         except Exception as error:
-            words, close = say(visible(user_message(error))), say("Close")
+            words, close = say(visible(user_message(error, at_shell=False))), say("Close")
             ui.notify(words, type="negative", multi_line=True, close_button=close, timeout=0)
 
     return guarded

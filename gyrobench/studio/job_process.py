@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
+from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
 from gyrobench.studio.request import CommandRequest, JobRequest, first_shown, read_request
 
@@ -38,7 +39,7 @@ class JobReport:
     """Account that a job gives of itself, kept in ``state.json``.
 
     state: running, done, stopped (it goes on with resume), failed.  fraction: 0 to 1, of the step named by ``label``.
-    folder: of the run, once it is known.
+    folder: of the run, once it is known.  advice: actions of :class:`gyrobench.errors.Advice` that go on from its end.
     """
 
     state: str = "running"
@@ -47,6 +48,7 @@ class JobReport:
     words: str = ""
     notes: list[str] = field(default_factory=list)
     message: str = ""
+    advice: list[str] = field(default_factory=list)
     folder: str = ""
     verdict: str = ""
 
@@ -188,6 +190,10 @@ def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: boo
     """Execute the request and put its end into the report."""
     from gyrobench.workflow.user_errors import CommandInterrupted, user_message
 
+    def ended(state: str, error: BaseException) -> None:
+        report.state, report.message = state, user_message(error, at_shell=False)
+        report.advice = [a.action for a in error.advice] if isinstance(error, GyrobenchError) else []
+
     try:
         if isinstance(request, CommandRequest):
             return _command(report, request, writer)
@@ -195,13 +201,16 @@ def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: boo
         report.folder = str(outcome.folder or "")
         report.verdict = getattr(outcome, "verdict", "") or getattr(outcome.result, "verdict", "") or ""
         stopped = outcome.stopped
-        report.state = "done" if stopped is None or report.folder else "failed"
-        report.message = "" if stopped is None else str(stopped)
-    except (CommandInterrupted, KeyboardInterrupt) as error:
+        report.state = "done"
+        if stopped is not None:
+            ended("done" if report.folder else "failed", stopped)
+    except CommandInterrupted as error:
+        ended("stopped", error)
+    except KeyboardInterrupt:
         when = "before its report was written" if report.fraction else "before its first step"
-        report.state, report.message = "stopped", str(error) or f"stopped {when}"
+        report.state, report.message = "stopped", f"stopped {when}"
     except Exception as error:
-        report.state, report.message = "failed", user_message(error)
+        ended("failed", error)
 
 
 def main(folder: Path) -> int:

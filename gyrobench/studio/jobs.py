@@ -51,7 +51,8 @@ class StudioJob:
     @property
     def resumable(self) -> bool:
         """True for what goes on where it was stopped."""
-        return self.state in ("stopped", "lost") and self.request.resumable
+        ended_so = self.state in ("stopped", "lost") or (self.state in ENDED and "resume" in self.report.advice)
+        return ended_so and self.request.resumable
 
 
 class StudioJobs:

@@ -6,8 +6,10 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
+from urllib.parse import quote, urlencode
 
 FIRST = 4  # signals shown at first
+KEPT = "kept"  # in an address: the columns as the map beside the file has them
 
 
 @dataclass(frozen=True)
@@ -16,6 +18,7 @@ class JobRequest:
 
     values: option or slot.parameter -> text with its unit.  parts: slot -> part or FMU.  maps: slot -> mapping file.
     data: measured file; columns: its column map, "" for a file of the template's layout.  spec: "" for none.
+    place: of the file below the files of the studio.
     """
 
     system: str
@@ -26,6 +29,22 @@ class JobRequest:
     spec: str = ""
     data: str = ""
     columns: str = ""
+    place: str = ""
+
+    @property
+    def form(self) -> str:
+        """The address of the form that asks for it, filled in; "" where there is none."""
+        given = [(o, f"{n}={v}") for o, g in (("set", self.values), ("part", self.parts), ("map", self.maps))
+                 for n, v in g.items()]  # fmt: skip
+        if self.data:
+            return (
+                f"/data?{urlencode([('file', self.place), ('test', self.system), ('columns', KEPT), *given])}"
+                if self.place
+                else ""
+            )
+        given += [("seed", str(self.seed))] if self.seed is not None else []
+        given += [("spec", self.spec)] if self.spec else []
+        return f"/system/{quote(self.system)}" + (f"?{urlencode(given)}" if given else "")
 
     @property
     def resumable(self) -> bool:
@@ -75,12 +94,13 @@ class CommandRequest:
     """Another command of the bench, with what it prints and the pages that it writes.
 
     words: of its line, without "gyrobench".  lines: of Python that do the same, "" for none.  folder: with its pages,
-    below reports/out, "" for none.
+    below reports/out, "" for none.  form: address of the form that asked for it, filled in.
     """
 
     words: list[str]
     lines: str = ""
     folder: str = ""
+    form: str = ""
     data: ClassVar[str] = ""
 
     @property

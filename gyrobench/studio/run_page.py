@@ -6,12 +6,11 @@ import asyncio
 from html import escape
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 from nicegui import ui
 
 from gyrobench.bench import UsageError, display_path
-from gyrobench.errors import REDUCING, RESUMING
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
@@ -76,15 +75,15 @@ def _add_job_page(studio: Studio) -> None:
             bar = ui.linear_progress(0.0, show_value=False).props(spoken("progress"))
             bar.set_visibility(not command)
             message, notes = ui.label().classes("problem"), ui.label().classes("printed" if command else "notes")
+            goes_on = ui.label(say("“Resume” continues it.")).classes("soft")
             with ui.element("div").classes("bar"):
                 stop = ui.button(say("Stop"), icon="stop", on_click=told(lambda: studio.jobs.stop(key))).mark("stop")
                 again = ui.button(say("Resume"), icon="play_arrow", on_click=told(lambda: _resume(studio, key))).mark(
                     "resume"
                 )
                 done = ui.link(say("Its pages" if command else "Report and signals"), "#").mark("result")
-                if isinstance(job.request, JobRequest) and not job.request.data:
-                    values = urlencode([("set", f"{n}={v}") for n, v in job.request.values.items()])
-                    ui.link(say("Change its values"), f"/system/{quote(job.request.system)}?{values}").mark("change")
+                if job.request.form:
+                    ui.link(say("Change its values"), job.request.form).mark("change")
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
             lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
@@ -96,7 +95,8 @@ def _add_job_page(studio: Studio) -> None:
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
                 text = visible(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
-                message.set_text(_advised(text) if now.resumable else text)
+                message.set_text(text)
+                goes_on.set_visibility(now.resumable and not studio.read_only)
                 message.set_visibility(bool(message.text))
                 notes.set_text("\n".join(map(visible, now.report.notes)))
                 stop.set_visibility(now.active and not studio.read_only)
@@ -122,11 +122,6 @@ def _show_state(job: StudioJob, state: ui.label, words: ui.label, bar: ui.linear
     report = job.report
     words.set_text(say(f"{report.label}: {report.words}") if report.label and job.active else "")
     bar.set_value(1.0 if job.state == "done" else report.fraction)
-
-
-def _advised(message: str) -> str:
-    """Return a message with the buttons of the page in place of what it advises at a shell."""
-    return message.replace(RESUMING, f"“{say('Resume')}”").replace(REDUCING, "")
 
 
 def _resume(studio: Studio, key: str) -> None:

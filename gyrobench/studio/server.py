@@ -23,6 +23,7 @@ from gyrobench.studio.data_page import add_data_page
 from gyrobench.studio.frame import Studio
 from gyrobench.studio.gate import TOKEN, StudioGate, is_loopback, refuse_remote
 from gyrobench.studio.jobs import StudioJobs
+from gyrobench.studio.laboratory_page import add_laboratory_page
 from gyrobench.studio.learn_page import add_learn_pages
 from gyrobench.studio.part_page import add_part_page
 from gyrobench.studio.run_page import add_run_pages
@@ -117,6 +118,7 @@ def build(studio: Studio) -> FastAPI:
     add_run_pages(studio)
     add_data_page(studio)
     add_command_pages(studio)
+    add_laboratory_page(studio)
     add_part_page(studio)
     add_learn_pages(studio, app)
     ui.run_with(app, title=studio.title, dark=None, show_welcome_message=False, tailwind=False, reconnect_timeout=AWAY)

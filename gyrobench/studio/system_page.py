@@ -9,13 +9,14 @@ from dataclasses import replace
 from functools import partial
 from html import escape
 from typing import Any
+from urllib.parse import quote
 
 from nicegui import ui
 
 from gyrobench.component.declarations import Declaration
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import wiring_figure
-from gyrobench.studio.frame import CopyLines, Studio, frame, search_field, told
+from gyrobench.studio.frame import CopyLines, Studio, frame, given_in_address, pairs_in_address, search_field, told
 from gyrobench.studio.request import JobRequest
 from gyrobench.studio.slot_fmu import drop_fmu
 from gyrobench.studio.time_line import TimeLine
@@ -222,7 +223,8 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 draw(slot)
         narrow()
 
-    dropped: dict[str, str] = {}  # FMU -> its mapping
+    asked = choice.request
+    dropped = {asked.parts[s]: file for s, file in asked.maps.items() if s in asked.parts}  # FMU -> its mapping
 
     def foreign(slot: str, menu: ui.select, file: str, mapping: str) -> None:
         dropped[file] = mapping
@@ -235,11 +237,11 @@ def _slots(studio: Studio, choice: _Choice, system: System, fitting: dict[str, l
                 name = declared.socket if isinstance(declared.socket, str) else declared.socket.name
                 here = "" if slot in system.slots else ", on request"
                 ui.label(say(f"socket {name}{here}")).classes("range")
-                about = ui.link(say("Equations, ports, limits"), f"/part/{declared.part}", new_tab=True)
-                about.props(spoken(f"equations of {slot}"))
-            menu = (
-                ui.select(fitting[slot], value=declared.part).props("dense outlined").props(spoken(f"part in {slot}"))
-            )
+                part = asked.parts.get(slot, declared.part)
+                about = ui.link(say("Equations, ports, limits"), f"/part/{quote(part, safe='')}", new_tab=True)
+                about.props(spoken(f"equations of {slot}")).set_visibility(part not in dropped)
+            offered = fitting[slot] if part in fitting[slot] else [*fitting[slot], part]
+            menu = ui.select(offered, value=part).props("dense outlined").props(spoken(f"part in {slot}"))
             menu.mark(f"slot {slot}")
         with ui.expansion(say(f"Parameters of {slot}")).props("dense").classes("full") as expansion:
             bodies[slot] = ui.element("div").classes("rows")
@@ -263,12 +265,12 @@ def _start(studio: Studio, choice: _Choice) -> None:
     """Add seed, specification and the button that runs the system."""
     specs = [NONE, *studio.bench.specifications()]
     with ui.element("div").classes("bar"):
-        seed = ui.number(say("Seed of the noise"), min=0, precision=0, placeholder="1").props(
-            "dense outlined clearable"
-        )
-        spec = ui.select(
-            {s: say(s) if s == NONE else s for s in specs}, value=NONE, label=say("Acceptance specification")
-        ).props("dense outlined")
+        asked = choice.request
+        seed = ui.number(say("Seed of the noise"), value=asked.seed, min=0, precision=0, placeholder="1")
+        seed.props("dense outlined clearable")
+        names = {s: say(s) if s == NONE else s for s in specs}
+        spec = ui.select(names, value=asked.spec or NONE, label=say("Acceptance specification"))
+        spec.props("dense outlined")
         for field in (seed, spec):
             field.on_value_change(lambda: choice.about(seed.value, spec.value))
 
@@ -288,7 +290,8 @@ def add_system_page(studio: Studio) -> None:
 
     @ui.page("/system/{name}", response_timeout=60)
     async def system(name: str) -> None:
-        given = ui.context.client.request.query_params.getlist("set")
+        given = {key: pairs_in_address(key) for key in ("set", "part", "map")}
+        seed, spec = (next(iter(given_in_address(key)), "") for key in ("seed", "spec"))
 
         def load() -> tuple[System | Suite, dict[str, list[str]]]:
             studio.bench.system_folder(name)  # refuses what is no name
@@ -319,11 +322,14 @@ def add_system_page(studio: Studio) -> None:
                     begin = ui.element("div").classes("begin")
                     lines = CopyLines()
                     choice = _Choice(test, lines)
-                    values = {n: v for n, sign, v in (g.partition("=") for g in given) if sign}
-                    choice.request = replace(choice.request, values=values)
+                    choice.request = replace(
+                        choice.request, values=given["set"], parts=given["part"], maps=given["map"],
+                        seed=int(seed) if seed.isdecimal() and len(seed) < 16 else None,
+                        spec=spec if spec in studio.bench.specifications() else "",
+                    )  # fmt: skip
                     if line:
                         choice.changed.append(lambda: line.show(choice.request.values))
-                        line.show(values)
+                        line.show(choice.request.values)
                     choice.show()
                     with begin:
                         _start(studio, choice)

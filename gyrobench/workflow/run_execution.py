@@ -12,7 +12,7 @@ import numpy as np
 
 from gyrobench.bench import Bench, display_path
 from gyrobench.engine.checkpoint import CheckpointManager
-from gyrobench.errors import REDUCING, RESUMING, GyrobenchError
+from gyrobench.errors import RESUMING, Advice, GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.report import FORMATS, NAMES
 from gyrobench.result import Coefficient, Reason, Specification, StepChange, StepCheck
@@ -116,13 +116,13 @@ def _run(
         if error.record is None or folder is None:
             raise
         kept = save_partial_record(error.record, folder)
-        message = f"{error}\nthe record until then is kept in {display_path(kept)}"
-        if checkpoints is not None and checkpoints.is_there and not isinstance(error, RunInterrupted):
-            message += f"; {RESUMING} goes on from its last checkpoint"
+        message = f"{error.text}\nthe record until then is kept in {display_path(kept)}"
         if isinstance(error, RunInterrupted):
-            message += REDUCING
-            raise CommandInterrupted(message, error.record) from None
-        raise PostRunError(message, error.record) from None
+            reducing = Advice("reduce", f"gyrobench report {display_path(kept)} reduces it, or lists what is missing")
+            raise CommandInterrupted(message, error.record).advised(*error.advice, reducing) from None
+        there = checkpoints is not None and checkpoints.is_there
+        going_on = [Advice("resume", f"{RESUMING} goes on from its last checkpoint")] if there else []
+        raise PostRunError(message, error.record).advised(*going_on) from None
     if folder is not None and checkpoints is not None:
         record.save(folder)
         checkpoints.remove()

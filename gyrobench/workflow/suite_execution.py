@@ -17,7 +17,7 @@ from typing import Any
 
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.engine import checkpoint
-from gyrobench.errors import RESUMING
+from gyrobench.errors import RESUMING, Advice
 from gyrobench.files import sha256
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import SuiteTestRun
@@ -74,9 +74,8 @@ def execute_suite(request: RunRequest, suite: Suite, feedback: Feedback = SILENT
     outcome = write_suite_report(suite, folder, document, spec, request.formats)
     if not failed:
         return outcome
-    stopped = SuiteError(
-        f"{', '.join(failed)} failed; the report in {display_path(folder)} covers the others. After correcting the "
-        f"cause, {RESUMING} runs only what is missing"
+    stopped = SuiteError(f"{', '.join(failed)} failed; the report in {display_path(folder)} covers the others").advised(
+        Advice("resume", f"after correcting the cause, {RESUMING} runs only what is missing")
     )
     return replace(outcome, stopped=stopped)
 
@@ -86,7 +85,7 @@ def _run_test(request: RunRequest, system: System, folder: Path, label: str, fee
 
     Raises CommandInterrupted.
     """
-    resume_hint = f"{RESUMING} continues the suite"
+    going_on = Advice("resume", f"{RESUMING} continues the suite")
     has_run = request.resume and not request.force and has_complete_record(folder)
 
     def note(text: str) -> None:
@@ -103,13 +102,13 @@ def _run_test(request: RunRequest, system: System, folder: Path, label: str, fee
         else:
             outcome = execute_run(replace(request, out=folder, resume=resume), system, feedback)
     except CommandInterrupted as error:
-        raise CommandInterrupted(f"{error}\n{resume_hint}") from None
+        raise CommandInterrupted(error.text).advised(going_on) from None
     except Exception as error:  # the other tests must still run
         message = user_message(error)
         note(f"no result: {message}")
         return " ".join(line.strip(" -") for line in message.splitlines()[:2])
     if isinstance(outcome.stopped, CommandInterrupted):
-        raise CommandInterrupted(f"{system.name}: {outcome.stopped}\n{resume_hint}")
+        raise CommandInterrupted(f"{system.name}: {outcome.stopped.text}").advised(going_on)
     if outcome.stopped:
         note(str(outcome.stopped))
     if outcome.result is None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
+from gyrobench.errors import Advice
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import (
     PartInfo,
@@ -103,7 +104,8 @@ def report_saved_suite(
     """Write the report of a suite again, from the results of its tests."""
     document = read_run(folder)
     if not isinstance(document, SuiteDocument) or not document.tests:
-        raise RecordError(f"{folder}: the suite is not complete; the same run command with --resume continues it")
+        going_on = Advice("resume", "the same run command with --resume continues it")
+        raise RecordError(f"{folder}: the suite is not complete").advised(going_on)
     for name in suite.options:
         if name in document.options:
             suite.set(name, document.options[name])

@@ -65,15 +65,18 @@ def content_location(error: BaseException) -> str | None:
     return None
 
 
-def user_message(error: BaseException) -> str:
-    """Return the message of an error for the user: its text; of errors that are not gyrobench's also type and place."""
+def user_message(error: BaseException, at_shell: bool = True) -> str:
+    """Return the message of an error for the user: its text; of errors that are not gyrobench's also type and place.
+
+    at_shell: with the advice for a shell.
+    """
     if isinstance(error, GyrobenchError):
         from gyrobench.report import ReportError  # after an error only: every command starts with this module
 
         if isinstance(error, ReportError):
             lines = [f"  - {name}: {user_message(cause)}" for name, cause in error.failures.items()]
             return "\n".join(["report not complete:", *lines])
-        return str(error)
+        return str(error) if at_shell else error.text
     place = content_location(error)
     if isinstance(error, OSError) and place is None:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror or str(error)

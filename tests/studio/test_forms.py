@@ -76,6 +76,20 @@ def test_what_a_command_refuses_is_said(page: Any, studio: tuple[str, Path]) -> 
     assert "beauty" in (page.locator(".printed").text_content() or "")
 
 
+def test_a_refused_command_leads_back_to_its_form_filled_in(page: Any, studio: tuple[str, Path]) -> None:
+    """Lists of several lines, a choice, the loop of a system that has several, characters of an address."""
+    query = "system=platform_three_axis&want=beauty%3D3&want=bandwidth%3E10Hz&over=platform.J%3D%C2%B130%25"
+    page.goto(f"{base_of(studio)}/tune?{query}&structure=pi&loop=azimuth")
+    line = "gyrobench tune platform_three_axis --want=beauty=3 '--want=bandwidth>10Hz' '--over=platform.J=±30%' "
+    filled(page, {}, line + "--loop=azimuth --structure=pi")
+    page.get_by_role("link", name="Change its values").click()
+    page.wait_for_url("**/tune?**")
+    soon(lambda: page.get_by_label("Wanted, one a line").input_value(), "beauty=3\nbandwidth>10Hz")
+    assert page.get_by_label("Spread of the parts, one a line").input_value() == "platform.J=±30%"
+    page.wait_for_function("t => document.querySelector('.code')?.textContent.startsWith(t)", arg=line)
+    assert "--loop=azimuth --structure=pi" in (page.locator(".code").first.text_content() or "")
+
+
 @pytest.mark.long
 def test_a_campaign_is_watched_and_its_site_opened(page: Any, studio: tuple[str, Path]) -> None:
     page.goto(base_of(studio) + "/campaign?system=fixed_position")

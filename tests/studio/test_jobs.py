@@ -19,7 +19,7 @@ from short_plans import SHORT as SHORT_PLANS
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.studio import job_process
-from gyrobench.studio.job_process import LIVE, REQUEST, STARTED
+from gyrobench.studio.job_process import LIVE, REQUEST, STARTED, JobReport
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
 
@@ -99,7 +99,8 @@ def test_one_waits_for_the_other_and_can_be_stopped(jobs: StudioJobs) -> None:
     assert jobs.find(second).state == "stopped"
     jobs.stop(first)
     stopped = until(jobs, first, ended)
-    assert stopped.state == "stopped" and "--resume" in stopped.report.message, stopped
+    assert stopped.state == "stopped" and stopped.report.advice == ["resume", "reduce"], stopped
+    assert "interrupted at t = " in stopped.report.message and "--resume" not in stopped.report.message
     again = jobs.resume(first)
     assert jobs.find(again).request == LONG and jobs.find(again).resume
     on = until(jobs, again, under_way)
@@ -192,6 +193,13 @@ def test_a_job_that_was_changed_is_not_run_as_another(jobs: StudioJobs) -> None:
     jobs.stop(blocker)
 
 
+def test_a_run_that_failed_after_a_checkpoint_goes_on() -> None:
+    def failed(*advice: str) -> StudioJob:
+        return StudioJob("k", JobRequest("a"), False, 0.0, "failed", JobReport(state="failed", advice=[*advice]))
+
+    assert failed("resume").resumable and not failed().resumable and not failed("reduce").resumable
+
+
 def test_lines_of_a_request() -> None:
     request = JobRequest(
         "tumble", {"latitude": "45.75deg", "tests": "a b"}, {"gyro": "v 1.fmu"}, {"gyro": "m.toml"}, 0, "limits"
@@ -201,6 +209,8 @@ def test_lines_of_a_request() -> None:
         "gyrobench", "run", "tumble", "--set", "latitude=45.75deg", "--set", "tests=a b", "--part", "gyro=v 1.fmu",
         "--map", "gyro=m.toml", "--seed", "0", "--spec", "limits",
     ]  # fmt: skip
+    address = "set=latitude%3D45.75deg&set=tests%3Da+b&part=gyro%3Dv+1.fmu&map=gyro%3Dm.toml&seed=0&spec=limits"
+    assert request.form == f"/system/tumble?{address}"
     compile(request.python(), "lines", "exec")
     measured = JobRequest("tumble", {"latitude": "1deg"}, data="it's.csv", columns="m.toml")
     assert shlex.split(measured.command())[:5] == ["gyrobench", "reduce", "tumble", "--data", "it's.csv"]

@@ -156,7 +156,8 @@ def test_a_run_is_stopped_in_another_tab_and_goes_on(page: Any, studio: tuple[st
     page.evaluate(seen, False)
     page.wait_for_function(f"said => ({left} ?? said) !== said", arg=before)
     page.get_by_role("button", name="Stop").click()
-    page.get_by_text("“Resume” continues it").wait_for()  # at a shell: the same command with --resume
+    page.get_by_text("“Resume” continues it.").wait_for()  # at a shell: the same command with --resume
+    assert "--resume" not in (page.locator(".problem").text_content() or "")
     assert "gyrobench report" not in (page.locator(".problem").text_content() or "")
     page.get_by_role("button", name="Resume").click()
     page.wait_for_function("document.querySelector('[role=status]')?.textContent === 'running'")
@@ -187,6 +188,11 @@ def test_a_messy_file_is_dropped_mapped_and_reduced(page: Any, studio: tuple[str
     page.wait_for_function("document.querySelector('.code')?.textContent.includes('attitude=E U -N')")
     page.get_by_role("button", name="Check the file").click()
     page.get_by_text("it can be reduced").wait_for()
+    page.get_by_role("button", name="Reduce").click()
+    page.get_by_role("link", name="Change its values").click()  # the mapping as it was made
+    page.wait_for_function("document.querySelector('.code')?.textContent.includes('attitude=E U -N')")
+    soon(lambda: page.get_by_label("latitude", exact=True).input_value(), "45.75deg")
+    assert page.get_by_label("unit of mean").input_value() == "uA"
     page.get_by_role("button", name="Reduce").click()
     folder = run_of(page, studio[1])
     kept = [k for k in range(47) if k != 7]

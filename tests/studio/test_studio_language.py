@@ -18,10 +18,11 @@ import gyrobench as gb
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.report.language import PLACEHOLDER, WORD, catalogue
 from gyrobench.studio import words
-from gyrobench.studio.command_pages import DESIGN, PROFILE, SIGNATORIES, SWEEP, TUNE
+from gyrobench.studio.command_pages import DESIGN, SWEEP, TUNE
 from gyrobench.studio.data_page import NOT
 from gyrobench.studio.frame import DARK, PAGES
 from gyrobench.studio.jobs import ENDED
+from gyrobench.studio.laboratory_page import PROFILE, SIGNATORIES
 from gyrobench.studio.picture import LEGEND
 from gyrobench.studio.run_page import HOW
 from gyrobench.system.moving_bodies import parse_bodies
