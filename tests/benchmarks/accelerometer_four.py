@@ -9,7 +9,6 @@ white noise; five terms of the sensor alone, and the joint least squares with th
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from accelerometers_four import ALPHA, ARCSEC, TRUE, head, voltages, windows
+from asked import asked
 
 from gyrobench.frames import G0
 from systems.accelerometer_four import chain
@@ -32,11 +32,7 @@ CASES: dict[str, tuple[float, float, tuple[float, float] | None]] = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=400)
-    parser.add_argument("--reports", type=int, default=100, help="of them reduced in full, for the intervals")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, runs=400, reports=(100, "of them reduced in full, for the intervals"), seed=1)
     print("case, method: K_F, K_I, K_O, K_IO, K_II, mean s0 in uV; intervals that held")
     for name, (size, noise, D1) in CASES.items():
         rng = np.random.default_rng(given.seed)

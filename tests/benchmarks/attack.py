@@ -8,7 +8,6 @@ The records are those of attack_models.py and attack_tables.py, written from the
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -17,6 +16,7 @@ from pathlib import Path
 import attack_models
 import attack_tables
 import numpy as np
+from asked import asked
 
 import gyrobench as gb
 
@@ -24,11 +24,7 @@ MODELS = attack_models.MODELS | attack_tables.MODELS
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--only", default="", help="systems whose name begins so")
-    given = parser.parse_args()
+    given = asked(__doc__, runs=100, first=1, only=("", "systems whose name begins so"))
     everything: list[bool] = []
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "record.csv"

@@ -8,11 +8,11 @@ Budget: 6 times the kinematic run.  The least of the rounds counts; other work o
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 
 import quoted
+from asked import asked
 
 from gyrobench.engine.session import Session
 
@@ -21,11 +21,7 @@ BUILT = {"table": "table_dynamic", "rebalance": "rebalance_pwm"}
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--turns", type=int, default=1)
-    parser.add_argument("--write", action="store_true", help="write the ratio into docs/figures.toml")
-    given = parser.parse_args()
+    given = asked(__doc__, rounds=3, turns=1, write=(False, "write the ratio into docs/figures.toml"))
     values = {"turns": given.turns}
     least: dict[str, float] = {}
     with Session("tumble_single_axis") as kinematic, Session("tumble_single_axis", BUILT) as built:

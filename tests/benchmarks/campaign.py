@@ -11,7 +11,6 @@ which is not timed: a look at all pages of all processes stops them for a tenth 
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import statistics
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import quoted
+from asked import asked
 
 SYSTEM = "tumble_single_axis"
 VALUES = {"rate": 0.3, "windows": 24, "dwell": 5.0, "settle": 1.0}
@@ -107,12 +107,9 @@ def campaign(runs: int, workers: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=10000)
-    parser.add_argument("--workers", type=int, default=os.cpu_count())
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--write", action="store_true", help="write the share into docs/figures.toml")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, runs=10000, workers=os.cpu_count(), rounds=5, write=(False, "write the share into docs/figures.toml")
+    )
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # as dask sets them for its workers
         os.environ[threads] = "1"
     one, many, whole, rates = [], [], [], []

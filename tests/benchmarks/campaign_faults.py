@@ -12,7 +12,6 @@ merge was under way.  At the end the file of the runs is compared with that of a
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import signal
@@ -22,6 +21,8 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
+
+from asked import asked
 
 BENCH = Path(__file__).parents[1] / "campaign" / "bench"
 ROOT = Path(__file__).parents[2]
@@ -108,12 +109,7 @@ def whole(folder: Path) -> bytes:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--runs", type=int, default=4000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--pause", type=float, default=6.0, help="s, longest time between two kills")
-    given = parser.parse_args()
+    given = asked(__doc__, kills=200, runs=4000, seed=1, pause=(6.0, "s, longest time between two kills"))
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started is ended
     rng = random.Random(given.seed)
     with tempfile.TemporaryDirectory() as name:

@@ -11,7 +11,6 @@ of docs/data_sheets.md anew; some minutes for all.
 
 from __future__ import annotations
 
-import argparse
 import logging
 import math
 import re
@@ -20,6 +19,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from asked import asked
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine.session import Session
@@ -257,10 +258,7 @@ def _rows(tests: Tests, name: str, sheet: Instrument, used: Sequence[Test], unte
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", metavar="NAME")
-    parser.add_argument("--write", action="store_true")
-    given = parser.parse_args()
+    given = asked(__doc__, "names", write=False)
     logging.getLogger("gyrobench").setLevel(logging.ERROR)
     tests, every = Tests(), []
     listed = sorted(Bench(standard_folder()).instruments())

@@ -9,11 +9,11 @@ counted rms error, with the standard error that N runs leave to a single value (
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 
 import numpy as np
+from asked import asked
 
 from gyrobench.design.shortest_test import design_test
 from gyrobench.system.system import load_system
@@ -40,14 +40,11 @@ CASES: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"one of: {'; '.join(CASES)}")
-    parser.add_argument("--runs", type=int, default=300)
-    asked = parser.parse_args()
-    for name in asked.cases or CASES:
+    given = asked(__doc__, "cases", runs=300)
+    for name in given.cases or CASES:
         system, wants, values = CASES[name]
         start = time.perf_counter()
-        found = design_test(load_system(system).with_values(values), wants, count=asked.runs)
+        found = design_test(load_system(system).with_values(values), wants, count=given.runs)
         u, error = ([], [])
         for v in found.values.values():
             counted = found.counted[v.name]
@@ -57,7 +54,7 @@ def main() -> None:
         print(
             f"{name}: {found.time:.0f} s, {found.time / found.book_time:.2f} of own {found.book_time:.0f} s; "
             f"predicted over stated u {rms[0]:.3f} ({min(u):.3f} to {max(u):.3f}), over rms error {rms[1]:.3f} "
-            f"({min(error):.3f} to {max(error):.3f}), +-{1.0 / math.sqrt(2.0 * asked.runs):.3f}; "
+            f"({min(error):.3f} to {max(error):.3f}), +-{1.0 / math.sqrt(2.0 * given.runs):.3f}; "
             f"bound {found.bound:.0f} s; {time.perf_counter() - start:.0f} s",
             flush=True,
         )

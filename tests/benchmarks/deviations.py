@@ -5,13 +5,13 @@ python tests/benchmarks/deviations.py [--samples 1e7] [--long 1e8]
 
 from __future__ import annotations
 
-import argparse
 import resource
 import time
 from collections.abc import Callable
 
 import allantools
 import numpy as np
+from asked import asked
 
 from gyrobench.reduction.series.deviations import KINDS, DeviationAccumulator, deviations
 from gyrobench.reduction.series.noise_coefficients import CoefficientAccumulator
@@ -30,10 +30,7 @@ def seconds(what: Callable[[], object]) -> float:
 
 
 if __name__ == "__main__":
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--samples", type=float, default=1e7)
-    ask.add_argument("--long", type=float, default=1e8)
-    given = ask.parse_args()
+    given = asked(__doc__, samples=1e7, long=1e8)
     rng = np.random.default_rng(1)
 
     begin = time.process_time()

@@ -8,7 +8,6 @@ python tests/benchmarks/drift_record.py --imu [--csv]          2 million rows of
 
 from __future__ import annotations
 
-import argparse
 import resource
 import subprocess
 import sys
@@ -21,6 +20,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
+from asked import asked
 from scipy.signal import lfilter
 
 BLOCK = 1 << 20
@@ -85,11 +85,7 @@ def write(file: Path, samples: int, blocks: Callable[[int], Iterator[pa.RecordBa
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--samples", type=int)
-    parser.add_argument("--csv", action="store_true")
-    parser.add_argument("--imu", action="store_true")
-    options = parser.parse_args()
+    options = asked(__doc__, samples=0, csv=False, imu=False)
     samples = options.samples or (2_000_000 if options.imu else 10_000_000)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"record.{'csv' if options.csv else 'parquet'}"

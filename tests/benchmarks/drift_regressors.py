@@ -9,11 +9,11 @@ estimate the noise from.
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import math
 
 import numpy as np
+from asked import asked
 from scipy.signal import lfilter
 
 from gyrobench.system.system import load_system
@@ -40,9 +40,7 @@ def columns(kind: str, number: int, rng: np.random.Generator) -> dict[str, np.nd
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--records", type=int, default=200)
-    records = parser.parse_args().records
+    records = asked(__doc__, records=200).records
     room = importlib.import_module(".regressors", type(load_system("drift_record")).__module__)
     print(f"{records} records each: share with a column taken out, share of 95 % intervals that hold zero")
     for kind in ("white", "random walk", "Gauss-Markov 60", "Gauss-Markov 300"):

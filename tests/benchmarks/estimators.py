@@ -13,7 +13,6 @@ Each should be 1; the bounds of 99 % are those of chi-square.  Rows "wrong: ..."
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import math
 import sys
@@ -27,6 +26,7 @@ from scipy import linalg, stats
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import polar_drift
+from asked import asked
 from estimating import (
     AIDED,
     AR3,
@@ -321,12 +321,9 @@ def live_days(days: int, seed: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="only the rows with one of these words")
-    parser.add_argument("--runs", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--days", type=int, default=0, help="count the live estimate of servo_polar in so many days")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, "names", runs=1000, seed=1, days=(0, "count the live estimate of servo_polar in so many days")
+    )
     if given.days:
         live_days(given.days, given.seed)
         return

@@ -10,10 +10,10 @@ the Earth's rate.  Counted, about north, east and down: rms of the growth over t
 
 from __future__ import annotations
 
-import argparse
 import math
 
 import numpy as np
+from asked import asked
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
@@ -78,14 +78,7 @@ def counted(sheet: str, seeds: range, align: float, total: float, latitude: floa
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sheet", nargs="*")
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--align", type=float, default=5.0)
-    parser.add_argument("--latitude", type=float, default=45.0)
-    parser.add_argument("--seed", type=int, default=0, help="of the first run")
-    given = parser.parse_args()
+    given = asked(__doc__, "sheet", runs=100, minutes=10.0, align=5.0, latitude=45.0, seed=(0, "of the first run"))
     every = [n for n in Bench(standard_folder()).instruments() if find_instrument(n).density is not None]
     for sheet in given.sheet or every:
         seeds = range(given.seed, given.seed + given.runs)

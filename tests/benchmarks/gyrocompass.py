@@ -8,9 +8,8 @@ standard deviation of the errors over u, share of 95 % intervals that hold.
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
+from asked import asked
 
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
@@ -19,12 +18,7 @@ NOISE = {"noise": "0.05deg/sqrt(Hz)", "random_drift": "0.005deg/sqrt(h)"}
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=200)
-    parser.add_argument("--damping", default="vertical")
-    parser.add_argument("--phases", default="settling speed")
-    args = parser.parse_args()
+    args = asked(__doc__, runs=40, seed=200, damping="vertical", phases="settling speed")
     system = load_system("gyrocompass")
     for name, value in {"damping": args.damping, "phases": args.phases, **NOISE}.items():
         system.set(name, value)

@@ -12,13 +12,13 @@ among them.  README.md here has the figures.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from asked import asked
 from coverage_cases import CASES
 from laboratory import Laboratory, Sheet, wide
 
@@ -213,12 +213,10 @@ def outcome(sheet: Sheet, mistake: str, clean: Result) -> Outcome:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--errors", type=int, default=len(MISTAKES), help="records with a mistake, in turn of the list")
-    parser.add_argument("--clean", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="", help="cases whose name begins so")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, errors=(len(MISTAKES), "records with a mistake, in turn of the list"), clean=100, seed=1,
+        only=("", "cases whose name begins so"),
+    )  # fmt: skip
     cases = [n for n in MEASURED if n.startswith(given.only)]
     rooms = {name: Laboratory(name, given.seed * 1000 + k) for k, name in enumerate(MEASURED) if name in cases}
     rng = np.random.default_rng(given.seed)

@@ -13,12 +13,12 @@ of the size of the Earth rate, "pass" otherwise.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
+from asked import asked
 from handling import HARMLESS, MEASURED, Laboratory, Rng, Sheet, wide
 
 from gyrobench.errors import GyrobenchError
@@ -124,10 +124,7 @@ def judged(sheet: Sheet, clean: Result, factor: float) -> tuple[str, str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, records=60, seed=1)
     rng = np.random.default_rng(given.seed)
     names = MEASURED
     rooms: dict[str, Laboratory] = {}

@@ -18,7 +18,6 @@ Clean records with arrangement = checked are reduced beside: those must pass.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 import zlib
@@ -26,6 +25,7 @@ from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
+from asked import asked
 from laboratory import Laboratory, Sheet, wide
 
 from gyrobench.errors import GyrobenchError
@@ -292,12 +292,10 @@ def outcome(sheet: Sheet, clean: Result) -> tuple[str, str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--only", default="", help="the test whose name begins so")
-    parser.add_argument("--kinds", default="", help="numbers of kinds, from 1, with commas")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, seeds=20, first=1, only=("", "the test whose name begins so"),
+        kinds=("", "numbers of kinds, from 1, with commas"),
+    )  # fmt: skip
     wanted = [int(k) for k in given.kinds.split(",")] if given.kinds else range(1, len(KINDS) + 1)
     counts: dict[str, Counter[str]] = {name: Counter() for name in KINDS}
     clean_counts: Counter[str] = Counter()

@@ -10,11 +10,11 @@ standard error that it has by chance.
 
 from __future__ import annotations
 
-import argparse
 import logging
 import math
 
 import numpy as np
+from asked import asked
 
 from gyrobench.bench import Bench, standard_folder
 from gyrobench.engine.session import Session
@@ -51,12 +51,7 @@ def errors(sheet: str, two: bool, runs: int, total: float, latitude: float) -> t
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sheet", nargs="*")
-    parser.add_argument("--runs", type=int, default=50)
-    parser.add_argument("--minutes", type=float, default=5.0)
-    parser.add_argument("--latitude", type=float, default=45.0)
-    given = parser.parse_args()
+    given = asked(__doc__, "sheet", runs=50, minutes=5.0, latitude=45.0)
     logging.getLogger("gyrobench").setLevel(logging.ERROR)
     every = [n for n in Bench(standard_folder()).instruments() if find_instrument(n).density is not None]
     for sheet in given.sheet or every:

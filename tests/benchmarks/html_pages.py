@@ -8,7 +8,6 @@ against FMPy's loop with the same rows, the best of three runs of each; both hav
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -18,6 +17,7 @@ import numpy as np
 from fmpy import extract, instantiate_fmu, read_model_description
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+from asked import asked
 from browser import Browser
 
 from gyrobench.bench import Bench, standard_folder
@@ -58,18 +58,15 @@ def seconds(browser: Browser, again: int) -> float:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    ask.add_argument("--steps", type=int, default=100_000)
-    ask.add_argument("systems", nargs="*")
-    asked = ask.parse_args()
+    given = asked(__doc__, "systems", steps=100_000)
     html_page.ROWS = 1000
     print(f"| system | page / kB | rows | largest difference | time / that of the FMU |\n|{'---|' * 5}")
     with tempfile.TemporaryDirectory() as name, Browser(Path(name) / "profile") as browser:
-        for system_name in asked.systems or sorted(Bench(standard_folder()).systems()):
+        for system_name in given.systems or sorted(Bench(standard_folder()).systems()):
             system = load_test(system_name)
             if isinstance(system, Suite):
                 continue
-            type(system).stop = asked.steps * system.step
+            type(system).stop = given.steps * system.step
             page, fmu = Path(name) / f"{system_name}.html", Path(name) / f"{system_name}.fmu"
             try:
                 html_page.export_page(system, page)

@@ -15,7 +15,6 @@ not seen     none of these
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
 import tempfile
@@ -23,6 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from asked import asked
 from instrument_sheets import SHEETS as EARLIER
 from instrument_sheets import Columns, Mistake, Sheet
 from sheets_of_rates import DRIFT_RECORD, SENSITIVITY, WARM_UP
@@ -96,10 +96,7 @@ def page(lines: list[str]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tests", nargs="*", metavar="TEST")
-    parser.add_argument("--write", action="store_true", help="the table of all tests into the page")
-    given = parser.parse_args()
+    given = asked(__doc__, "tests", write=(False, "the table of all tests into the page"))
     lines = []
     for s in SHEETS:
         if not given.tests or s.name in given.tests:

@@ -8,9 +8,10 @@ measures of tests/systems/test_servo_loop_of_a_table.py are counted instead, 4 s
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
+
+from asked import asked
 
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS / room) for room in ("support", "systems", "reduction")]
@@ -21,11 +22,10 @@ def main() -> None:
     import test_margins
     import test_stabilizer_power_2dof
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=200, help="runs of the stabilizer")
-    parser.add_argument("--draws", type=int, default=1000, help="draws of measured margins")
-    parser.add_argument("--table", type=int, default=0, help="runs of the servo loop of a table, these alone")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, runs=(200, "runs of the stabilizer"), draws=(1000, "draws of measured margins"),
+        table=(0, "runs of the servo loop of a table, these alone"),
+    )  # fmt: skip
     if given.table:
         import test_servo_loop_of_a_table
 

@@ -14,7 +14,6 @@ of the unit where there is none).
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import tempfile
@@ -25,6 +24,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from asked import asked
 from exported import NOISY, at_step, differences, effects, left_over, names_of, numbers, record_in, same, scales
 from masters import PeerError, run_in
 
@@ -196,15 +196,14 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    ask.add_argument("--out", type=Path, help="a line of JSON for each system, appended")
-    ask.add_argument("--table", type=Path, help="print the table of such a file")
-    ask.add_argument("systems", nargs="*")
-    asked = ask.parse_args()
-    if asked.table:
-        print(table([json.loads(line) for line in asked.table.read_text(encoding="utf-8").splitlines()]))
+    given = asked(
+        __doc__, "systems", out=(Path, "a line of JSON for each system, appended"),
+        table=(Path, "print the table of such a file"),
+    )  # fmt: skip
+    if given.table:
+        print(table([json.loads(line) for line in given.table.read_text(encoding="utf-8").splitlines()]))
         return
-    for name in asked.systems or sorted(Bench(standard_folder()).systems()):
+    for name in given.systems or sorted(Bench(standard_folder()).systems()):
         if isinstance(load_test(name), Suite):
             continue
         began = time.perf_counter()
@@ -212,8 +211,8 @@ def main() -> None:
         found["seconds"] = round(time.perf_counter() - began, 1)
         line = json.dumps(found, ensure_ascii=False)
         print(line, flush=True)
-        if asked.out:
-            with asked.out.open("a", encoding="utf-8") as file:
+        if given.out:
+            with given.out.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
 
 

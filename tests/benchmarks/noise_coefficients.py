@@ -12,11 +12,11 @@ or missing.  tau0 is log-uniform from 1 ms to 10 s.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 
 import numpy as np
+from asked import asked
 from scipy.signal import lfilter
 
 from gyrobench.reduction.series.deviations import deviations
@@ -143,13 +143,10 @@ def table(n: Array, truth: Array, ours: Array, lines: Array, checks: Array) -> N
 
 
 if __name__ == "__main__":
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--records", type=int, default=1000)
-    ask.add_argument("--seed", type=int, default=1)
-    ask.add_argument("--shortest", type=float, default=1e3)
-    ask.add_argument("--longest", type=float, default=1e6)
-    ask.add_argument("--save", help="file .npz for the figures of every record")
-    given = ask.parse_args()
+    given = asked(
+        __doc__, records=1000, seed=1, shortest=1e3, longest=1e6,
+        save=(str, "file .npz for the figures of every record"),
+    )  # fmt: skip
     figures = counts(given.records, given.seed, given.shortest, given.longest)
     if given.save:
         np.savez(given.save, *figures)

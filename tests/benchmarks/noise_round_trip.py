@@ -10,11 +10,11 @@ over that of the model of the first.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Mapping
 
 import numpy as np
+from asked import asked
 from noise_coefficients import record
 from numpy.typing import NDArray
 
@@ -46,11 +46,7 @@ class Gyro:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--samples", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, runs=200, samples=1000, seed=1)
     first, second, shown = (dict.fromkeys(TRUE, 0) for _ in range(3))
     ratios = []
     gyro = Gyro(given.samples)

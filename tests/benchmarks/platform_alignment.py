@@ -10,7 +10,6 @@ interval held.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
@@ -20,6 +19,8 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+from asked import asked
+
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
 from systems.platform_alignment import plans
@@ -42,10 +43,7 @@ def drawn(positions: int, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=50)
-    parser.add_argument("--base", default="rest")
-    given = parser.parse_args()
+    given = asked(__doc__, runs=50, base="rest")
     begun = time.perf_counter()
     for positions in (1, 2):
         system = load_system("platform_alignment")

@@ -9,10 +9,10 @@ drawn step by step.  The mean drift is zero.  --largest: of the population's var
 
 from __future__ import annotations
 
-import argparse
 import math
 
 import numpy as np
+from asked import asked
 
 from gyrobench.reduction.estimation import noise, noise_mixture_fit
 
@@ -43,10 +43,7 @@ def differences(rng: np.random.Generator, error: float, white: float, tau: float
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=1000)
-    parser.add_argument("--largest", type=float, default=noise.READING[1])
-    given = parser.parse_args()
+    given = asked(__doc__, runs=1000, largest=noise.READING[1])
     noise.READING = (noise.READING[0], given.largest)
     t = MINUTE * np.arange(READINGS - 1)
     ones = np.ones((t.size, 1))

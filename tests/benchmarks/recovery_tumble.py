@@ -9,7 +9,6 @@ when the step is halved against u of a run with noise.  Limits: 1e-6 deg/h per g
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from pathlib import Path
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+from asked import asked
 from tumbling import NAMES, errors, gyro, lag, latitude, load, quiet
 
 from gyrobench.engine.session import Session
@@ -24,10 +24,7 @@ from gyrobench.frames import EARTH_RATE
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--gyros", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, gyros=5, seed=1)
     rng, system = np.random.default_rng(given.seed), load()
     error, by_hand, ratio = np.zeros(9), np.zeros(9), np.zeros(9)
     began = time.monotonic()

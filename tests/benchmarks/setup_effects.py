@@ -13,7 +13,6 @@ in which share of the records each candidate is reported with the coefficients: 
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
@@ -26,6 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 import setup_plans
+from asked import asked
 from estimation_coverage import plan
 
 from gyrobench import drift, frames
@@ -193,14 +193,11 @@ def count(
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("case", nargs="*", help=", ".join(CASES))
-    parser.add_argument("--runs", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--white", action="store_true")
-    parser.add_argument("--how", help=f"of {', '.join(HOW)}, with commas; default: those that the case has")
-    parser.add_argument("--last", action="store_true", help="the last of these alone")
-    given = parser.parse_args()
+    given = asked(
+        __doc__, "case", runs=500, seed=1, white=False,
+        how=(str, f"of {', '.join(HOW)}, with commas; default: those that the case has"),
+        last=(False, "the last of these alone"),
+    )  # fmt: skip
     benches: dict[tuple[str, tuple[int, ...]], tuple[Bench, np.ndarray]] = {}
     for name in given.case or CASES:
         case = CASES[name]

@@ -6,10 +6,10 @@ that hold the truth, by coefficient.  --gyro: a north finder in place of Polaris
 
 from __future__ import annotations
 
-import argparse
 import math
 
 import numpy as np
+from asked import asked
 from held import Held
 
 from gyrobench.engine.session import Session
@@ -31,10 +31,7 @@ def drawn(rng: np.random.Generator) -> dict[str, object]:
 
 def main() -> None:
     """Count, and print a line for each coefficient."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--gyro", action="store_true")
-    given = parser.parse_args()
+    given = asked(__doc__, runs=200, gyro=False)
     rng, held = np.random.default_rng(1), Held()
     with Session("stand_alignment") as session:
         for seed in range(given.runs):

@@ -8,11 +8,11 @@ pickoff and the noises of the stand; each fault is put into ``--faults`` further
 
 from __future__ import annotations
 
-import argparse
 import importlib
 from collections import Counter
 
 import numpy as np
+from asked import asked
 
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.uncertainty import clopper_pearson
@@ -22,11 +22,7 @@ NOISES = {"stand.pickoff": 2e-6, "stand.reading": 2e-4, "stand.ammeter": 5e-4}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--faults", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, runs=100, faults=3, seed=1)
     rng, inside, broken = np.random.default_rng(given.seed), Counter[str](), 0
     with Session("test_start_up") as session:
         system = importlib.import_module(type(session.system).__module__)

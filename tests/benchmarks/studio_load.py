@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+from asked import asked
 from studio_pages import CHROMIUM
 from studio_requests import Door, SocketTab, wrong
 
@@ -114,13 +115,7 @@ def ask_for_runs(home: Path, count: int) -> list[str]:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    ask.add_argument("--rows", type=int, default=10_000_000)
-    ask.add_argument("--tabs", type=int, default=20)
-    ask.add_argument("--drawn", type=int, default=4)
-    ask.add_argument("--requests", type=int, default=2000)
-    ask.add_argument("--seconds", type=float, default=45.0)
-    asked = ask.parse_args()
+    given = asked(__doc__, rows=10_000_000, tabs=20, drawn=4, requests=2000, seconds=45.0)
     home = Path(tempfile.mkdtemp())
     keeper = subprocess.Popen(
         [sys.executable, "-c", KEEPER, str(home)], stdin=subprocess.PIPE, text=True, start_new_session=True
@@ -128,16 +123,16 @@ def main() -> None:
     assert keeper.stdin is not None
     try:
         record = home / "reports" / "out" / "fixed_position" / "long"
-        long_record(record, asked.rows)
+        long_record(record, given.rows)
         first, again = views(record)
-        print(f"{CHANNELS} channels of {asked.rows:,} rows: first look {first:.1f} s, views {1e3 * again:.1f} ms")
+        print(f"{CHANNELS} channels of {given.rows:,} rows: first look {first:.1f} s, views {1e3 * again:.1f} ms")
         command = [sys.executable, "-m", "gyrobench", "studio", "--no-browser", "--port", "0"]
         studio = subprocess.Popen(command, cwd=home, stdout=subprocess.PIPE, text=True)
         print(studio.pid, file=keeper.stdin, flush=True)
         assert studio.stdout is not None
         address = re.search(r"http://\S+", studio.stdout.readline())
         assert address
-        under_load(Door.of(address[0]), address[0], home, studio.pid, asked)
+        under_load(Door.of(address[0]), address[0], home, studio.pid, given)
     finally:
         keeper.stdin.close()
         keeper.wait(60)
@@ -183,7 +178,7 @@ def first_report(page: Any, address: str) -> float:
     return time.monotonic() - began
 
 
-def under_load(door: Door, address: str, home: Path, studio: int, asked: argparse.Namespace) -> None:
+def under_load(door: Door, address: str, home: Path, studio: int, given: argparse.Namespace) -> None:
     """Open the tabs, fetch pages for a while, then send what is hostile."""
     from playwright.sync_api import sync_playwright
 
@@ -193,9 +188,9 @@ def under_load(door: Door, address: str, home: Path, studio: int, asked: argpars
         context = browser.new_context()
         print(f"from the first page to a report: {first_report(context.new_page(), address):.1f} s")
         keys = ask_for_runs(home, 4)
-        paths = [f"/job/{keys[k // 2 % 4]}" if k % 2 else "/run/fixed_position/long" for k in range(asked.tabs)]
+        paths = [f"/job/{keys[k // 2 % 4]}" if k % 2 else "/run/fixed_position/long" for k in range(given.tabs)]
         tabs, zoomed = [], []
-        for k, path in enumerate(paths[: asked.drawn]):
+        for k, path in enumerate(paths[: given.drawn]):
             tab = context.new_page()
             tab.set_default_timeout(60_000)
             tab.goto(address if k == 0 else base + "/")
@@ -206,19 +201,19 @@ def under_load(door: Door, address: str, home: Path, studio: int, asked: argpars
                 tab.locator(".chart").hover()
                 zoomed.append(tab)
             tabs.append(tab)
-        others = [SocketTab(door, path) for path in paths[asked.drawn :]]
+        others = [SocketTab(door, path) for path in paths[given.drawn :]]
         for path in FETCHED:  # the first look at a page loads what it shows
             door.get(path)
         times: list[float] = []
-        end, used = time.monotonic() + asked.seconds, processor_time(studio)
+        end, used = time.monotonic() + given.seconds, processor_time(studio)
         fetching = threading.Thread(target=fetch, args=(door, end, times))
         fetching.start()
         for k in itertools.takewhile(lambda _: time.monotonic() < end, itertools.count()):
             zoomed[k % len(zoomed)].mouse.wheel(0, -120 if k % 40 < 20 else 120)
             tabs[0].wait_for_timeout(200)
         fetching.join()
-        share = (processor_time(studio) - used) / asked.seconds
-        print(f"{asked.tabs} tabs, {asked.drawn} of them drawn; 4 runs asked for; {len(times)} answers:")
+        share = (processor_time(studio) - used) / given.seconds
+        print(f"{given.tabs} tabs, {given.drawn} of them drawn; 4 runs asked for; {len(times)} answers:")
         print(f"median {np.median(times):.3f} s, worst {max(times):.2f} s")
         got = [tab.messages for tab in others if tab.path.startswith("/job/")]
         print(f"its processor time: {share:.2f} of a core; messages to a tab of a run: {min(got)} to {max(got)}")
@@ -227,12 +222,12 @@ def under_load(door: Door, address: str, home: Path, studio: int, asked: argpars
             tab.close()
         browser.close()
     rng, found = random.Random(3), []
-    for _ in range(asked.requests):
+    for _ in range(given.requests):
         raw, whole = door.hostile(rng)
         if said := wrong(door.send(raw, whole)):
             found.append((said, raw[:120]))
     status, _, _ = door.get("/")
-    print(f"{asked.requests} hostile requests: {len(found)} got something out; afterwards the studio answers {status}")
+    print(f"{given.requests} hostile requests: {len(found)} got something out; afterwards the studio answers {status}")
     print(*found[:10], sep="\n")
 
 

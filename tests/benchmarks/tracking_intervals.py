@@ -6,10 +6,10 @@ against their mean square over the runs.  The gyro's slow drift is off: with it 
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import numpy as np
+from asked import asked
 
 from gyrobench.engine.session import Session
 from gyrobench.system.system import load_system
@@ -21,9 +21,7 @@ DRIFTS = {f"gyro.{n}": 0.0 for n in ("turn_on", "flicker_x", "flicker_y", "walk_
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--runs", type=int, default=20)
-    runs = parser.parse_args().runs
+    runs = asked(__doc__, runs=20).runs
     for kind in (1, 2):
         system: Any = load_system("gimbal_tracking")
         for name, value in (VALUES | {"type": kind}).items():

@@ -9,7 +9,6 @@ from the command to the report, the best of three; --lot: `sweep imu_positions` 
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -17,6 +16,7 @@ import tempfile
 import time
 
 import quoted
+from asked import asked
 
 COMMANDS = {
     "imu_positions": ("run", "imu_positions"),
@@ -40,10 +40,7 @@ def seconds(command: tuple[str, ...]) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--lot", action="store_true")
-    parser.add_argument("--write", action="store_true")
-    given = parser.parse_args()
+    given = asked(__doc__, lot=False, write=False)
     for name, command in COMMANDS.items():
         wall, cpu = min(seconds(command) for _ in range(ROUNDS))
         print(f"{' '.join(command)}: {wall:.1f} s, {cpu:.1f} s of CPU", flush=True)

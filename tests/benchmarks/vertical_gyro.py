@@ -8,11 +8,11 @@ loop and a full roll are flown at the default step (10 ms, readings every 0.1 s)
 
 from __future__ import annotations
 
-import argparse
 import math
 from typing import Any
 
 import numpy as np
+from asked import asked
 
 from gyrobench.engine.session import Session
 
@@ -28,10 +28,7 @@ def flight(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = asked(__doc__, runs=30, seed=1)
     rng = np.random.default_rng(given.seed)
     rows: dict[str, list[tuple[bool, float, float]]] = {}
     with Session("vertical_gyro") as session:
