@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,9 +42,9 @@ METHOD = (
 LEFT = 0.1  # end of the axis of the restriction
 
 
-def write_bearing(design: BearingDesign, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+def write_bearing(design: BearingDesign, folder: Path) -> dict[str, Path]:
     """Write bearing.json, bearing.html, bearing.pdf and bearing.toml; return the path of each."""
-    written = write_files(design.as_dict(), lambda: page(design), folder, formats, NAMES, Bench.find().folder)
+    written = write_files(design.as_dict(), lambda: page(design), folder, FORMATS, NAMES, Bench.find().folder)
     values = folder / "bearing.toml"
     write_whole(values, design.toml().encode())
     return {**written, "toml": values}

@@ -142,7 +142,7 @@ def _read(path: Path, step: float | None) -> System:
             return found
         unlike = found
     ssd_units = root.find("ssd:Units", NS)
-    s = Structure(folder, Units(ssd_units), ssd_units)
+    s = Structure(folder, Units(ssd_units))
     schema = schema_errors(folder / STRUCTURE, STRUCTURE)
     fed = {c.get("endElement", "") for c in top.findall("ssd:Connections/ssd:Connection[@endConnector='u']", NS)}
     s.factors = fed & read_gains(root)

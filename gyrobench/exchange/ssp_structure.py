@@ -59,7 +59,6 @@ class Structure:
 
     folder: Path
     units: Units
-    ssd_units: ET.Element | None
     slots: dict[Place, str] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     bindings: dict[Place, Binding] = field(default_factory=dict)

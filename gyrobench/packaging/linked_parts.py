@@ -18,10 +18,6 @@ DEFINED = re.compile(
 MACRO = re.compile(r"^#define (\w+)", re.MULTILINE)
 
 
-def _defined(text: str) -> list[str]:
-    return list(dict.fromkeys(n for groups in DEFINED.findall(text) for n in groups if n))
-
-
 def c_name(part: str) -> str:
     """Return the name of a part as the end of C names."""
     return re.sub(r"\W", "_", part)
@@ -38,7 +34,7 @@ def linked_files(parts: Mapping[str, type[Component]]) -> dict[str, str]:
     for name, cls in parts.items():
         model = c_source(cls, "")
         files[f"part_{name}.c"] = model
-        names = _defined(files["core.h"] + model)
+        names = list(dict.fromkeys(n for groups in DEFINED.findall(files["core.h"] + model) for n in groups if n))
         lines = [f"#define {n} {n}_{name}" for n in names]
         lines += [f'#include "part_{name}.c"', *(f"#undef {n}" for n in (*names, *MACRO.findall(model)))]
         blocks.append("\n".join(lines))

@@ -216,15 +216,9 @@ def undeclared(description: Any) -> list[str]:
     ]
 
 
-def mapping_text(
-    socket: Socket,
-    description: Any,
-    head: str,
-    mapping: Mapping[str, Any] | None = None,
-    parameters: Sequence[str] = (),
-) -> str:
+def mapping_text(socket: Socket, description: Any, head: str, parameters: Sequence[str] = ()) -> str:
     """Return a first mapping file (TOML).  parameters: the lines of its table [parameters]."""
-    proposals = propose(socket, description, mapping)
+    proposals = propose(socket, description)
     blocks = ["\n".join(p.lines) for p in proposals]
     notes = undeclared(description)
     fits = [] if blocks else ["# Every connector has a variable of its name: no mapping is needed for them."]

@@ -74,7 +74,9 @@ def verify(folder: Path, key: Path | None = None) -> Verified:
         raise VerificationError(f"{manifest}: changed after it was written")
     there, others = _files(folder)
     problems = [f"{name}: is missing" for name in files if name not in there]
-    problems += [f"{name}: changed after the report was written" for name in there if _differs(folder, name, files)]
+    problems += [
+        f"{n}: changed after the report was written" for n in there if n in files and sha256(folder / n) != files[n]
+    ]
     if problems:
         raise VerificationError(
             f"{folder}: not the report that was written\n" + "\n".join(f"  - {p}" for p in problems)
@@ -120,10 +122,6 @@ def _files(folder: Path) -> tuple[list[str], list[str]]:
     own = [p.as_posix() for p in found if p.name in COVERED and p.as_posix() not in (MANIFEST, SIGNATURE)]
     others = [p.as_posix() for p in found if p.name not in COVERED]
     return own, others
-
-
-def _differs(folder: Path, name: str, files: dict[str, Any]) -> bool:
-    return name in files and sha256(folder / name) != files[name]
 
 
 def _check_signature(folder: Path, key: Path) -> None:

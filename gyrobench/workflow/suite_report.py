@@ -98,9 +98,7 @@ def reduce_runs(
     return write_suite_report(suite, folder, document, file, formats)
 
 
-def report_saved_suite(
-    folder: Path, suite: Suite, spec: str | None = None, formats: Sequence[str] = FORMATS
-) -> SuiteOutcome:
+def report_saved_suite(folder: Path, suite: Suite, spec: str | None = None) -> SuiteOutcome:
     """Write the report of a suite again, from the results of its tests."""
     document = read_run(folder)
     if not isinstance(document, SuiteDocument) or not document.tests:
@@ -109,7 +107,7 @@ def report_saved_suite(
     for name in suite.options:
         if name in document.options:
             suite.set(name, document.options[name])
-    return write_suite_report(suite, folder, document, find_specification(spec), formats)
+    return write_suite_report(suite, folder, document, find_specification(spec))
 
 
 def write_suite_report(

@@ -333,7 +333,7 @@ def _flat(p: Prepared, run: RunDocument) -> bool:
     return seen.independent
 
 
-def conventions(run: RunDocument) -> list[str]:
+def conventions() -> list[str]:
     return [
         "N, B, K, R, Q as in IEEE 952 with S two-sided; N in °/√h is the density in °/h/√Hz over 60, towards frequency "
         "0. B is flicker without cutoff, its floor in the Allan deviation 0.664 B; B_min is the least Allan deviation "

@@ -89,17 +89,14 @@ def from_record(record: Record) -> DriftRecordResult:
                  "DRIFT-STATS-RUNS, DRIFT-PERIODIC, DRIFT-AR-BURG; Xia 2008, ch. 3"],
         equation='S(f) = N^2 abs(H)^2 + sum_i (2 sigma_i^2 tau_i)/(1 + (2 pi f tau_i)^2) + B^2/(2 pi f) + '
         'K^2/(2 pi f)^2 + 4 Q^2/tau_0 sin^2 (pi f tau_0)',
-        conventions=[*columns.conventions, *description.conventions(run)],
+        conventions=[*columns.conventions, *description.conventions()],
         coefficients=[c for a in channels for c in a.coefficients],
         columns=[c.column for c in channels],
     )  # fmt: skip
-    site = run_metadata.Location.of(run).shown() if not run.measured or _stated_site(run) else {}
+    stated = not run.measured or "latitude" in (run.series or {}).get("stated", [])
+    site = run_metadata.Location.of(run).shown() if stated else {}
     found = replace(found, instrument=run.instrument, site=site, simulated=not run.measured)
     return replace(found, reasons=[*reasons, *description.of_rows(run)], summary=summary, tables=shared)
-
-
-def _stated_site(run: RunDocument) -> bool:
-    return "latitude" in (run.series or {}).get("stated", [])
 
 
 def _named(term: str, a: Analysed, several: bool) -> str:
@@ -138,14 +135,13 @@ def analyse(name: str, columns: Columns, run: RunDocument) -> Analysed:
     points = about["kind"] in DIRECT and series.get("samples") == "points" and series["factor"] == 1
     p = prepare(name, columns, bool(run.options.get("remove_lines", True)), not points, about["white"])
     held = deviations(p.clean, p.step, tuple(KINDS))
-    every = {kind: _read(d) for kind, d in series.get("deviations", {}).get(name, {}).items()}
+    every = {
+        kind: Deviation("", **{n: np.asarray(d[n]) for n in FIELDS})
+        for kind, d in series.get("deviations", {}).get(name, {}).items()
+    }
     if every and p.cleaned:  # of the averaging times that the means do not reach, as recorded
         held = {kind: _joined(every[kind], d) for kind, d in held.items()}
     return Analysed(p, held if p.cleaned or not every else every)
-
-
-def _read(d: Mapping[str, Any]) -> Deviation:
-    return Deviation("", **{n: np.asarray(d[n]) for n in FIELDS})
 
 
 def _joined(short: Deviation, long: Deviation) -> Deviation:

@@ -68,11 +68,6 @@ def closed(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, lati
     return {n: float(np.mean(v)) for n, v in estimates(I_x, I_y, rate, latitude).items()}
 
 
-def spreads(I_x: Mapping[int, float], I_y: Mapping[int, float], rate: float, latitude: float) -> dict[str, float]:
-    """Return the largest minus smallest value inside each mean of :func:`estimates`; 0 for the scale factors."""
-    return {n: max(v) - min(v) for n, v in estimates(I_x, I_y, rate, latitude).items()}
-
-
 def earth_and_gravity(attitude: Array, latitude: float) -> tuple[Array, Array]:
     """Return unit vectors of the Earth's rate and of the specific force of Hu 1981 (down) in gyro axes."""
     pole = np.array([0.0, math.cos(latitude), math.sin(latitude)])

@@ -133,9 +133,6 @@ def _starts(r: AngleResponse, free: int, top: float) -> list[Array]:
 
 
 # ------------------------------------------------------------------------------------------------ figures
-Values = Callable[[Array], Array]  # p -> figures
-
-
 def read_off(p: Array, highest: float, H: float, output: bool) -> Array:
     """Return g, tau, tau_0 (s), f_0, f_3dB (Hz), K_I, K_O (N.m/rad); NaN where the curve or H leaves none."""
     out = np.full(7, math.nan)

@@ -49,7 +49,6 @@ from gyrobench.units import DEG, DPH
 from . import handling, tables
 from .steps import cycle_of, direction, levels
 
-PPM = 1e-6
 LEAST = 8  # readings of the sweep
 
 

@@ -28,7 +28,6 @@ MOUNTS = {
 }  # fmt: skip
 Rates = Callable[[tuple[float, float, float]], tuple[float, float]]
 LEAST = 0.2  # of cos y  [SERVO2-LOCK]
-DAY = 2.0 * math.pi / frames.EARTH_RATE
 
 
 def base(mount: int, latitude: float) -> Array:

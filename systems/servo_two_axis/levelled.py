@@ -49,7 +49,7 @@ def torqued(setup: TwoAxisServoSetup, windows: dict[str, Array]) -> Array:
     return np.column_stack([setup.torquers[a] * np.asarray(windows[f"current_{a}"], dtype=float) for a in "xy"])
 
 
-def problems(setup: TwoAxisServoSetup, angles: dict[str, Array]) -> list[str]:
+def problems(angles: dict[str, Array]) -> list[str]:
     """Return angles that are not level; ``angles``: at the starts and ends of the windows, rad."""
     found = []
     for name, values in angles.items():

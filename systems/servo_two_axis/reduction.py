@@ -207,7 +207,7 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
             return [f"{', '.join(unknown)} unknown: give the scale factor of the torquer, as k_x = 17.2deg/h/mA"]
         held = {n: np.asarray(v, dtype=float)[self.held] for n, v in self.windows.items() if n.startswith("current_")}
         self.torqued = levelled.torqued(s, held)
-        return levelled.problems(s, {n: w[n] for n in ANGLES}) + self._tracking_problems()
+        return levelled.problems({n: w[n] for n in ANGLES}) + self._tracking_problems()
 
     def _tracking_problems(self) -> list[str]:
         s, found = self.setup, []

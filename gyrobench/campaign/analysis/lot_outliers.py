@@ -54,7 +54,7 @@ class LotOutliers:
     limit: float
 
 
-def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> LotOutliers | None:
+def robust_outliers(values: Array) -> LotOutliers | None:
     """Return the robust distances of the rows of ``values`` (n, q); None for fewer than eight complete rows.
 
     Coefficients that half of the rows lack are left out; rows that lack another are not judged.
@@ -80,8 +80,8 @@ def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> LotOu
         many = group.size > 1
         count = n * (1 if many else p) * (2 if together else 1)
         scaled = _scaled(inside[:, group])
-        accepted = _accepted(scaled, level / count, np.random.default_rng(seed))
-        d2, tail, limit2 = _judged(scaled, accepted, level / count)
+        accepted = _accepted(scaled, LEVEL / count, np.random.default_rng(1))
+        d2, tail, limit2 = _judged(scaled, accepted, LEVEL / count)
         chance = np.fmin(chance, count * tail)
         if many:
             distance, limit = np.sqrt(d2), float(np.sqrt(limit2))
@@ -93,7 +93,7 @@ def robust_outliers(values: Array, level: float = LEVEL, seed: int = 1) -> LotOu
         joint,
         _spread(distance, complete),
         _spread(np.minimum(1.0, chance), complete),
-        np.where(complete, _spread(chance, complete) < level, False),
+        np.where(complete, _spread(chance, complete) < LEVEL, False),
         _spread(score, complete),
         used,
         limit,

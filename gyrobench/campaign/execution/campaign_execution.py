@@ -12,7 +12,7 @@ import queue
 import time
 import uuid
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -297,7 +297,8 @@ class _Execution:
             tries = self.tries.setdefault(lost.run, [])
             tries.append(f"{lost.reason} {lost.detail}".strip())
             if len(tries) >= tries_allowed:
-                self.spent[lost.run] = lost.state, f"{lost.reason}{_times(tries_allowed)}"
+                times = f", {tries_allowed} times" if tries_allowed > 1 else ""
+                self.spent[lost.run] = lost.state, f"{lost.reason}{times}"
         machines = {_machine(address) for address in answers}
         late = time.monotonic() - PATIENCE
         for entry in [e for e in self.lost if e[1] in machines or e[2] < late]:
@@ -370,16 +371,6 @@ class _Execution:
 def _machine(address: str) -> str:
     """Return the machine in an address: tcp://10.0.0.1:4000."""
     return address.rpartition(":")[0].rpartition("/")[2]
-
-
-def _times(tries: int) -> str:
-    return f", {tries} times" if tries > 1 else ""
-
-
-def _equal(row: Mapping[str, Any], stored: Mapping[str, Any]) -> bool:
-    """Return whether a row is the stored one, but for its report."""
-    found = {k: None if v != v else v for k, v in row.items() if k != "report"}  # of numbers that are not there
-    return bool(found) and all(stored.get(k) == v for k, v in found.items())
 
 
 def _add_engine(plan: CampaignPlan) -> None:

@@ -58,7 +58,6 @@ from gyrobench.reading import shorten
 from gyrobench.system.values import parse_number
 
 KEEP = ("all", "failures", "extremes", "none")
-HOUR = 3600.0
 
 
 def _plain_text(value: str | Path) -> str | Path:

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
 SCHEMA = "gyrobench-campaign-1"
 FILE = "campaign.json"
-STATES = ("done", "refused", "failed", "crashed", "hung", "memory")
 LOG = pa.schema(
     {
         "run": pa.string(),

@@ -25,7 +25,7 @@ HOW = (
 )
 
 
-def certify_campaign(campaign: Campaign, language: str = "") -> list[Path]:
+def certify_campaign(campaign: Campaign) -> list[Path]:
     """Write the certificate of a campaign of measured files into its folder; return its paths.
 
     Raises UsageError where a file has no report: a lot is certified whole or not at all.
@@ -38,7 +38,7 @@ def certify_campaign(campaign: Campaign, language: str = "") -> list[Path]:
     if campaign.local is None:
         raise UsageError(f"{campaign.url}: not a folder of this machine; a certificate is made of reports that are")
     folders = [campaign.local / Path(str(report)).parent for report in frame.sort_values("data")["report"]]
-    return write_certificate(folders, out=campaign.local, language=language, charts=control_charts)
+    return write_certificate(folders, out=campaign.local, charts=control_charts)
 
 
 def control_charts(of: Sequence[Certified], laboratory: Laboratory) -> list[Any]:

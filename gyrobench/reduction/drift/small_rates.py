@@ -64,8 +64,8 @@ class SmallRates:
             u = 0.5 * max(size for size, *_ in sizes) / r
             known = [float(stats.t.ppf(p, dof)) * size for size, dof, p in sizes if dof]
             margin = max(known, default=math.inf)
-            rows.append((r, _half(y, plus, minus) / r, u, 0.5 * margin / r))
-        rate, ratio, u_ratio, margins = _columns(rows)
+            rows.append((r, 0.5 * (float(y[plus].mean()) - float(y[minus].mean())) / r, u, 0.5 * margin / r))
+        rate, ratio, u_ratio, margins = np.reshape(rows, (-1, 4)).T.copy()
         return cls(rate, ratio, u_ratio, margins, unit, scale)
 
     @property
@@ -146,14 +146,6 @@ def _both_senses(w: Array) -> Iterator[tuple[float, NDArray[np.bool_], NDArray[n
         plus, minus = (np.abs(s * w - r) < SAME * r for s in (1.0, -1.0))
         if plus.any() and minus.any():
             yield r, plus, minus
-
-
-def _half(y: Array, plus: NDArray[np.bool_], minus: NDArray[np.bool_]) -> float:
-    return 0.5 * (float(y[plus].mean()) - float(y[minus].mean()))
-
-
-def _columns(rows: list[tuple[float, float, float, float]]) -> list[Array]:
-    return [np.array([row[k] for row in rows]) for k in range(4)]
 
 
 def _pooled(groups: list[Array]) -> tuple[float, int]:

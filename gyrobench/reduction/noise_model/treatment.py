@@ -29,7 +29,6 @@ LONG = 1000  # samples of a gap that ends a stretch
 MOST = 64  # stretches that are used, the longest
 LEAST = 64  # samples of a record
 LEVELS = 32  # parts of a record whose noise is compared
-DEPARTS = 1e-4  # probability below which the noise level changes
 ENDS = 256  # samples of an end of a stretch that do not tell of the level
 CHUNK = 1 << 17  # samples of a sine computed at a time
 
