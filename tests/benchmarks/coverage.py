@@ -13,8 +13,8 @@ the densities that give a window the drawn shares.  ``--noise`` takes one instru
 population, or flicker, alone or with as much white noise; there intervals may hold the truth more or less often than
 95 %.  README.md here has the figures.
 
-Each count is a campaign, on all cores; campaigns/*.toml are the same in files, which keep their rows and go on where
-they were:
+Each count is a campaign, on all cores; in a file it keeps its rows and goes on where it was, another case by the names
+of system and case:
 
     gyrobench campaign tests/benchmarks/campaigns/tumble_single_axis.toml --out FOLDER
 """
@@ -105,7 +105,7 @@ def draws(case: Case, runs: int, seed: int = 1, corner: str = "population") -> l
 
 
 def rows(case: str, runs: int, seed: int = 1, noise: str = "population") -> list[Values]:
-    """The table of a campaign in campaigns/*.toml."""
+    """The table of a campaign, as in campaigns/tumble_single_axis.toml."""
     return draws(ALL[case], runs, seed, noise)
 
 

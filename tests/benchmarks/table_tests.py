@@ -2,7 +2,7 @@
 
 python tests/benchmarks/table_tests.py [--runs 300] [--test table_rate_test]
 
-Rate and position tests are campaigns, on all cores, and in files: campaigns/table_rate_test.toml and so on.
+Rate and position tests are campaigns, on all cores, and in a file: campaigns/table_rate_test.toml.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ TESTS = [*DRAWN, "table_motor_test"]
 
 
 def rows(test: str, runs: int, first: int = 1) -> list[dict[str, Any]]:
-    """The table of a campaign in campaigns/*.toml."""
+    """The table of a campaign, as in campaigns/table_rate_test.toml."""
     return [{**DRAWN[test](seed), "seed": seed} for seed in range(first, first + runs)]
 
 
