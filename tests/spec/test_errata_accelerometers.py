@@ -113,15 +113,6 @@ def test_printed_table_1_needs_the_scale_factor() -> None:
     assert np.sum(np.abs(right) < 6e-7) >= 11 and np.sum(np.abs(printed) < 6e-7) <= 5
 
 
-def test_sigma_of_table_2() -> None:
-    """EA10: sigma(K_F) of 24 positions is 0.3536 of the unit weight: 9.9e-6 of 2.8e-5, printed 9.9e-5."""
-    a = 2 * np.pi * np.arange(24) / 24
-    basis = np.c_[np.ones(24), np.sin(a), np.cos(a), np.sin(a) * np.cos(a), np.sin(a) ** 2]
-    factors = np.sqrt(np.diag(np.linalg.inv(basis.T @ basis)))
-    assert factors == pytest.approx([0.35355, 0.28868, 0.28868, 0.57735, 0.57735], abs=1e-5)
-    assert factors * 2.8e-5 == pytest.approx([9.9e-6, 8.1e-6, 8.1e-6, 1.6e-5, 1.6e-5], rel=0.015)
-
-
 def test_degrees_of_freedom() -> None:
     """EA9: after the angle error is taken out, n - 5 of 30 understates sigma; the joint fit has rank 41 of 96."""
     n = 24
