@@ -11,9 +11,11 @@ from gyrobench.system.system import load_system
 RIDE = {"sweeps": False, "base": 0.0, "load_step": 0.0}
 
 
-def ridden(parameters: dict[str, Any] | None = None, **options: Any) -> tuple[Any, Record]:
+def ridden(
+    parameters: dict[str, Any] | None = None, of: str = "gimbal_stabilization", **options: Any
+) -> tuple[Any, Record]:
     """Return result and record of a ride alone, or of what the options ask for."""
-    system: Any = load_system("gimbal_stabilization")
+    system: Any = load_system(of)
     for name, value in (RIDE | options).items():
         system.set(name, value)
     with Session(system) as session:

@@ -212,6 +212,7 @@ def test_records_that_say_nothing(command: Command, tmp_path: Path) -> None:
     assert "no reading has a cone" in reduced(command, tmp_path, [r for r in rows() if not r[2]], 2)
 
 
+@pytest.mark.parametrize("name", [NAME, "sculling_test"])
 @pytest.mark.parametrize(
     ("values", "said"),
     [
@@ -222,5 +223,5 @@ def test_records_that_say_nothing(command: Command, tmp_path: Path) -> None:
         ({"axis": "w"}, "x, y or z"),
     ],
 )
-def test_refused(values: dict[str, Any], said: str) -> None:
-    assert any(said in p for p in load_system(NAME).with_values(values).check())
+def test_refused(name: str, values: dict[str, Any], said: str) -> None:
+    assert any(said in p for p in load_system(name).with_values(values).check())

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from support.gimbal_rides import ridden
 
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
@@ -31,12 +32,7 @@ J, BAND, FC = 0.08, 100.0, 12.0  # kg.m2 about yaw, Hz, Hz
 
 def tracked(parameters: dict[str, Any] | None = None, **options: Any) -> tuple[Any, Record]:
     """Return result and record of a short ride alone, or of what the options ask for."""
-    system: Any = load_system("gimbal_tracking")
-    for name, value in (RIDE | options).items():
-        system.set(name, value)
-    with Session(system) as session:
-        record = session.run(parameters or {}, seed=3)
-    return system.reduce(record), record
+    return ridden(parameters, "gimbal_tracking", **(RIDE | options))
 
 
 def rate_loop(viscous: float = 0.01) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -210,17 +210,3 @@ def test_mistakes_are_named(given: list[list[float]], said: str) -> None:
 def test_records_that_say_nothing(command: Command, tmp_path: Path) -> None:
     assert "at rest" in reduced(command, tmp_path, [r for r in rows() if r[2]], 2)
     assert "no reading has a motion" in reduced(command, tmp_path, [r for r in rows() if not r[2]], 2)
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"frequencies": "5 60"}, "more than two updates"),
-        ({"frequencies": "0.1"}, "at least one period"),
-        ({"interval": 3.3e-4}, "whole number of steps"),
-        ({"window": 1.005}, "whole number of updates"),
-        ({"axis": "w"}, "x, y or z"),
-    ],
-)
-def test_refused(values: dict[str, Any], said: str) -> None:
-    assert any(said in p for p in load_system(NAME).with_values(values).check())
