@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, Wired
+from wired import BENCH, DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, Wired, begun, given
 
 from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
@@ -17,25 +17,16 @@ from gyrobench.packaging import load_part
 CompliantGyro = load_part("compliant_gyro", BENCH)
 H = 1e-3
 G0 = 9.80665
-INPUTS = ("omega", "alpha", "f", "i")
 STATES = ("float_angle", "float_rate", "rotor_I", "rotor_O")
 RNG = np.random.default_rng(12)
 
 
-def started(cls=CompliantGyro, **parameters):
-    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
-    part = cls(**parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(cls=CompliantGyro, **values):
+    return begun(cls, **values)
 
 
 def looped(late=False, **parameters):
-    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
-    gyro, loop = Native("compliant_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
-    for key, x in inputs.items():
-        setattr(gyro, key, x)
+    gyro, loop = given("compliant_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
     return Wired({"gyro": gyro, "rebalance": loop}, ["gyro", "rebalance"], late=late)
 
 

@@ -5,7 +5,7 @@ import math
 import control
 import numpy as np
 import pytest
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import Component, ComponentError, Input, Output, sampled
 from gyrobench.component.blocks.control import Capture
@@ -16,13 +16,8 @@ ERU, ARCSEC, GCM, DEG = 7.2921159e-5, math.pi / 648000, 9.80665e-5, math.pi / 18
 QUANTUM, J, M_MAX = 0.18 * ARCSEC, 2.56, 9.80665
 
 
-def started(**parameters):
-    inputs = {n: parameters.pop(n) for n in ("count_command", "rate_command", "enable") if n in parameters}
-    part = Controller(**parameters)
-    for name, x in inputs.items():
-        setattr(part, name, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun(Controller, **values)
 
 
 def network(number, w):

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
-from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, RebalanceAnalog, Wired, record
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, Native, RebalanceAnalog, Wired, begun, given, record
 
 from gyrobench.component import ComponentError
 from gyrobench.drift import NAMES, STANDARD, drift
@@ -18,21 +18,13 @@ G0 = 9.80665
 RNG = np.random.default_rng(11)
 
 
-def started(plain=False, **parameters):
-    inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f", "i", "dT", "v_float") if k in parameters}
-    part = FloatedGyro(**parameters) if plain else Native("floated_gyro", **parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(plain=False, **values):
+    return begun(FloatedGyro if plain else "floated_gyro", **values)
 
 
 def looped(h=H, late=False, **parameters):
     """Gyro and rebalance; the gyro sees the current of the step before."""
-    inputs = {k: parameters.pop(k) for k in ("omega", "alpha", "f") if k in parameters}
-    gyro, loop = Native("floated_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
-    for key, x in inputs.items():
-        setattr(gyro, key, x)
+    gyro, loop = given("floated_gyro", **{**QUIET, **parameters}), Native("rebalance_analog", meter=0.0)
     return Wired({"gyro": gyro, "rebalance": loop}, ["gyro", "rebalance"], late=late)
 
 

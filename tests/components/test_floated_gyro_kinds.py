@@ -8,7 +8,7 @@ from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro
+from wired import DEG_H, NO_DRIFT, QUIET, FloatedGyro, begun
 
 from gyrobench.component import ComponentError
 
@@ -16,16 +16,10 @@ H = 1e-3
 # the gyro of Xia 2008 [GYRO-SDF-EOM]; as a rate gyro of 100 Hz, damping 0.7
 SPIN, J_O, D_J, WN = 0.02, 2.5e-5, 3e-6, 2 * math.pi * 100
 RATE = {"H": SPIN, "J": J_O, "K": J_O * WN**2, "C": 2 * 0.7 * J_O * WN, "u_max": 10.0, "k": 1.0}
-INPUTS = ("omega", "alpha", "f", "i", "dT")
 
 
-def started(**parameters):
-    given = {k: parameters.pop(k) for k in (*INPUTS, "float_angle", "float_rate") if k in parameters}
-    part = FloatedGyro(**{**QUIET, **NO_DRIFT, **parameters})
-    for key, x in given.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun(FloatedGyro, **{**QUIET, **NO_DRIFT, **values})
 
 
 def run(part, seconds, h=H):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import BENCH, DEG_H, Native, Wired
+from wired import BENCH, DEG_H, Native, Wired, begun, given
 
 from gyrobench import drift as bench_drift
 from gyrobench.component import ComponentError
@@ -21,28 +21,19 @@ TERMS = ("0", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")
 QUIET = dict.fromkeys(("markov_x", "markov_y", "white_x", "white_y", "pickoff_x", "pickoff_y"), 0.0)
 NO_DRIFT = {f"D{c}_{n}": 0.0 for c in "xy" for n in TERMS}
 STILL = {**QUIET, **NO_DRIFT}
-INPUTS = ("omega", "f", "i_x", "i_y")
 
 
-def started(plain=False, **parameters):
-    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
-    part = Gyro2dof(**parameters) if plain else Native("gyro_2dof", **parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(plain=False, **values):
+    return begun(Gyro2dof if plain else "gyro_2dof", **values)
 
 
 def looped(late=False, **parameters):
     """The gyro and two rebalances: u_x feeds i_y, u_y feeds i_x."""
-    inputs = {k: parameters.pop(k) for k in INPUTS if k in parameters}
     parts = {
-        "gyro": Native("gyro_2dof", **{**QUIET, **parameters}),
+        "gyro": given("gyro_2dof", **{**QUIET, **parameters}),
         "about_y": Native("rebalance_analog", meter=0.0),
         "about_x": Native("rebalance_analog", meter=0.0),
     }
-    for key, x in inputs.items():
-        setattr(parts["gyro"], key, x)
     wires = [("gyro.u_x", "about_y.u"), ("about_y.i", "gyro.i_y"), ("gyro.u_y", "about_x.u"), ("about_x.i", "gyro.i_x")]
     return Wired(parts, list(parts), wires, late)
 

@@ -8,7 +8,7 @@ from native_parts import make
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from wired import Native
+from wired import begun
 
 from gyrobench.component import ComponentError
 
@@ -18,14 +18,8 @@ POWER = {"H": 10.0, "J_x": 0.5, "J_y": 0.02, "C_x": 10.0, "C_y": 2.0}  # STAB-PO
 STATES = ("psi_x", "psi_y", "p", "q")
 
 
-def started(**parameters):
-    inputs = {k: parameters.pop(k) for k in ("omega", "f", "i_x", "i_y", "M_x", "M_y") if k in parameters}
-    states = {k: parameters.pop(k) for k in STATES if k in parameters}
-    part = Native("gyro_2dof", **{**STILL, **parameters})
-    for key, x in {**inputs, **states}.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun("gyro_2dof", **{**STILL, **values})
 
 
 def run(part, seconds, h):

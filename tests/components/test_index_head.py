@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from wired import BENCH, Sampler, Sequencer, TableRate, Wired, plan
+from wired import BENCH, Sampler, Sequencer, TableRate, Wired, begun, plan
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -16,14 +16,8 @@ ARCSEC = math.pi / 648000.0
 H = 0.01
 
 
-def started(**parameters):
-    names = ("mode", "target", "number", "face", "f_local", "omega_local")
-    inputs = {k: parameters.pop(k) for k in names if k in parameters}
-    part = IndexHead(**parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun(IndexHead, **values)
 
 
 def run(part, until, start=0.0, h=H):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from wired import Native
+from wired import begun
 
 from gyrobench.component import ComponentError
 
@@ -15,13 +15,8 @@ RNG = np.random.default_rng(5)
 H = 0.01
 
 
-def started(**parameters):
-    inputs = {k: parameters.pop(k) for k in ("mode", "target", "face", "f_local", "omega_local") if k in parameters}
-    part = Native("table_rate", **parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun("table_rate", **values)
 
 
 def run(part, until, h=H, start=0.0):

@@ -7,19 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from servo_loop import ARCSEC, FAST, GCM, H, Loop, TableServo
-from wired import Native, TableRate
+from wired import TableRate, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
 
 
-def kinematic(**parameters):
-    inputs = {k: parameters.pop(k) for k in ("mode", "target", "face", "omega_local", "f_local") if k in parameters}
-    part = Native("table_servo", **parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def kinematic(**values):
+    return begun("table_servo", **values)
 
 
 # ------------------------------------------------------------------------------------------- the motor

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from wired import BENCH, TableRate
+from wired import BENCH, TableRate, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -17,14 +17,8 @@ G0 = 9.80665
 ERRORS = {"squareness": 0.02, "wobble": [0.03, 0.05], "wobble_order": [2, 3], "wobble_phase": [0.4, -1.1]}
 
 
-def started(**parameters):
-    inputs = {k: parameters.pop(k) for k in list(parameters) if k in ("face", "f_local", "omega_local")}
-    inputs |= {k: parameters.pop(k) for k in list(parameters) if k.startswith(("mode", "target"))}
-    part = TableTwoAxis(**parameters)
-    for key, x in inputs.items():
-        setattr(part, key, x)
-    part.initialize()
-    return part
+def started(**values):
+    return begun(TableTwoAxis, **values)
 
 
 def attitude(part):

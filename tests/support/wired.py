@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from native_parts import native_files
 
-from gyrobench.component import Component, ComponentError
+from gyrobench.component import Component, ComponentError, Parameter
 from gyrobench.component.vectors import copied
 from gyrobench.packaging import load_part
 from gyrobench.packaging.instance import Fmu, InstanceError
@@ -163,6 +163,25 @@ class Native:
 
     def __del__(self) -> None:
         self._fmu.free()
+
+
+def given(part: type[Component] | str, **values: Any) -> Any:
+    """Return a part with these values; a name stands for its native FMU, a value that is no parameter is set in it."""
+    native = isinstance(part, str)
+    known = (load_part(part, BENCH) if native else part).declarations
+    inner = {n: x for n, x in values.items() if n in known and not isinstance(known[n], Parameter)}
+    parameters = {n: x for n, x in values.items() if n not in inner}
+    made = Native(part, **parameters) if native else part(**parameters)
+    for name, x in inner.items():
+        setattr(made, name, x)
+    return made
+
+
+def begun(part: type[Component] | str, **values: Any) -> Any:
+    """Return a part with these values, initialized."""
+    made = given(part, **values)
+    made.initialize()
+    return made
 
 
 class Wired:
