@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import pytest
-from wired import BENCH, Native
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -13,10 +14,7 @@ from gyrobench.packaging import load_part
 H = 1e-4
 
 
-def started(**parameters):
-    part = Native("acquisition_card", **parameters)
-    part.initialize()
-    return part
+started = partial(begun, "acquisition_card")
 
 
 def test_the_quantum_of_the_source():

@@ -1,7 +1,9 @@
 """The current source: ramp, exact arrival, idle outside servo mode, ammeter."""
 
+from functools import partial
+
 import pytest
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -10,10 +12,7 @@ CurrentSource = load_part("current_source", BENCH)
 H = 1e-3
 
 
-def started(**parameters):
-    part = CurrentSource(**{"meter": 0.0, **parameters})
-    part.initialize()
-    return part
+started = partial(begun, CurrentSource, meter=0.0)
 
 
 def advance(part, steps, start=0):

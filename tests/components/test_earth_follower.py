@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
@@ -16,10 +18,7 @@ Part = load_part("earth_follower", BENCH)
 A, E2 = 6378137.0, 0.00669437999014
 
 
-def started(**parameters):
-    part = Part(**parameters)
-    part.initialize()
-    return part
+started = partial(begun, Part)
 
 
 def vec(part, name):

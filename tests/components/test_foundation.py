@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from native_parts import make
 from scipy.integrate import solve_ivp
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.packaging.loading import load_part
@@ -88,12 +88,6 @@ def test_slow_tilts_pass_and_fast_ones_do_not() -> None:
     assert abs(fast) == pytest.approx(abs(isolation.mount(12.0, 3.5, 0.1)), abs=0.02)
 
 
-def started(part: Any, **values: Any) -> Any:
-    made = part(**values)
-    made.initialize()
-    return made
-
-
 @pytest.mark.long
 def test_an_active_block_follows_a_lean() -> None:
     """Its accelerometers take g q for an acceleration: the part against scipy's solution of the same states."""
@@ -107,7 +101,7 @@ def test_an_active_block_follows_a_lean() -> None:
         seen = moved - G0 * q * math.sin(omega * t)  # a lean about N: f_E = a - g q
         return [v, moved, (seen - y) / tau, y - w_0 * slow, y - w_0 * slow - w_0 * i]
 
-    made = started(Active)
+    made = begun(Active)
     for k in range(round(seconds / h)):
         turn = omega * (k + 0.5) * h
         made.tilt = [0.0, q * math.sin(turn), 0.0]
@@ -130,11 +124,11 @@ def test_a_person_tilts_the_block() -> None:
         by_hand, rel=1e-3
     )
     for floor in (1.0, 0.02):
-        made = started(Passive, person=70.0, floor=floor, tread=0.0, period=80.0, rock_damping=0.7)
+        made = begun(Passive, person=70.0, floor=floor, tread=0.0, period=80.0, rock_damping=0.7)
         for k in range(400):  # 20 s: on the east side
             made.do_step(k * 0.05, 0.05)
         assert made.tilt_block[1] == pytest.approx(floor * by_hand, rel=2e-3) and made.tilt_block[0] == 0.0
-    treading = started(Passive, person=70.0, tread=0.3, reach=0.0)
+    treading = begun(Passive, person=70.0, tread=0.3, reach=0.0)
     pressed = []
     for k in range(2000):
         treading.do_step(k * 5e-3, 5e-3)
@@ -146,7 +140,7 @@ def test_a_person_tilts_the_block() -> None:
 
 def test_at_rest_it_is_the_ground() -> None:
     """Inputs of a ground that leans: f, omega, alpha of the block are those of the ground."""
-    ground = started(load_part("ground_motion", BENCH), tilt_amplitude=[[1e-4, 2e-4, 0.0]] + [[0.0] * 3] * 7,
+    ground = begun(load_part("ground_motion", BENCH), tilt_amplitude=[[1e-4, 2e-4, 0.0]] + [[0.0] * 3] * 7,
                      period=[1e7] * 8, phase=[0.5 * math.pi] * 8)  # fmt: skip
     made = Passive()
     for name in ("g", "a", "tilt", "tilt_rate", "tilt_acceleration", "omega", "alpha"):
@@ -160,7 +154,7 @@ def test_at_rest_it_is_the_ground() -> None:
 
 def test_rate_of_a_rocking_block_is_that_of_its_tilt() -> None:
     """omega turned back into ENU integrates to the tilt: central differences over 2 ms, mount and ground moving."""
-    made, seen, earth = started(Passive, person=70.0), [], np.array([0.0, 5e-5, 5e-5])
+    made, seen, earth = begun(Passive, person=70.0), [], np.array([0.0, 5e-5, 5e-5])
     for k in range(903):
         t = k * 1e-3
         q = np.array([2e-5 * math.sin(3 * t), 0.0, 0.0])
@@ -194,19 +188,19 @@ def test_an_unstable_servo_is_refused() -> None:
         should = stable(p)
         kinds[should] += 1
         if should:
-            started(Active, **p)
+            begun(Active, **p)
         else:
             with pytest.raises(ComponentError, match="the servo is unstable"):
-                started(Active, **p)
+                begun(Active, **p)
     assert min(kinds.values()) > 10
 
 
 def test_other_refusals() -> None:
     with pytest.raises(ComponentError, match="must be below the frequency of the mount"):
-        started(Active, corner=0.5)
+        begun(Active, corner=0.5)
     with pytest.raises(ComponentError, match="floor"):
-        started(Passive, floor=1.5)
-    made = started(Active)
+        begun(Passive, floor=1.5)
+    made = begun(Active)
     made.tilt = [0.0, 1e-3, 0.0]
     with pytest.raises(ComponentError, match=r"moved by its travel of 0.05 m"):
         for k in range(400):

@@ -1,23 +1,21 @@
 """Gains, limit and anti-windup, and the measurement of the current."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 from pulse_loop import ARCSEC, RATIO, SCALE, TAU, Loop, loop_gain
 from scipy.integrate import solve_ivp
 from scipy.signal import welch
-from wired import DEG_H, RebalanceAnalog
+from wired import DEG_H, RebalanceAnalog, begun
 
 from gyrobench.component import ComponentError
 
 H = 1e-3
 
 
-def started(**parameters):
-    part = RebalanceAnalog(**{"meter": 0.0, **parameters})
-    part.initialize()
-    return part
+started = partial(begun, RebalanceAnalog, meter=0.0)
 
 
 def feed(part, u, steps, h=H, k0=0):

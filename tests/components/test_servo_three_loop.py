@@ -1,11 +1,12 @@
 """Three loops against the poles of the continuous ones, with motor and platform written out; limits; refusals."""
 
 import math
+from functools import partial
 
 import control
 import numpy as np
 import pytest
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
@@ -16,10 +17,7 @@ H = 1e-4
 R, L, K_T, J = 2.0, 4e-3, 1.0, 2.0
 
 
-def started(**parameters):
-    part = ServoThreeLoop(**parameters)
-    part.initialize()
-    return part
+started = partial(begun, ServoThreeLoop)
 
 
 def axis(part, seconds, *, load=0.0, h=H, command=0.0):

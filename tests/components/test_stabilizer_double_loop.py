@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
@@ -14,10 +15,7 @@ from gyrobench.packaging import load_part
 Part = load_part("stabilizer_double_loop", BENCH)
 
 
-def started(**parameters: float):
-    part = Part(**parameters)
-    part.initialize()
-    return part
+started = partial(begun, Part)
 
 
 def test_by_hand() -> None:

@@ -1,10 +1,12 @@
 """The network against scipy.signal, its margins with python-control, limits without wind-up, refusals."""
 
+from functools import partial
+
 import control
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.component import ComponentError
 from gyrobench.linear.part_linearization import state_space
@@ -13,10 +15,7 @@ from gyrobench.packaging import load_part
 StabilizerLeadLag = load_part("stabilizer_lead_lag", BENCH)
 
 
-def started(**parameters):
-    part = StabilizerLeadLag(**parameters)
-    part.initialize()
-    return part
+started = partial(begun, StabilizerLeadLag)
 
 
 def network(K=2.0, tau1=0.2, T1=2.0, tau2=0.03, T2=0.003, integral=0.0):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from wired import BENCH
+from wired import BENCH, begun
 
 from gyrobench.linear.part_linearization import state_space
 from gyrobench.packaging import load_part
@@ -13,10 +15,7 @@ from gyrobench.packaging import load_part
 Part = load_part("stabilizer_observer", BENCH)
 
 
-def started(**parameters: float):
-    part = Part(**parameters)
-    part.initialize()
-    return part
+started = partial(begun, Part)
 
 
 def test_transfer_functions() -> None:
