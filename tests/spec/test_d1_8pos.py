@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reducing import named
 from scipy import stats
 from stated import with_sizes
 
@@ -78,10 +79,6 @@ def rows(I_x: dict[int, float], I_y: dict[int, float], cycles: int = 2, readings
 
 def setup(phi: float = math.radians(45.75), **changes: Any) -> Any:
     return R.EightPositionSetup(**with_sizes({"latitude": phi, "gravity": 9.80665, **changes}))
-
-
-def named(result: Any) -> dict[str, Any]:
-    return {c.name: c for c in result.coefficients}
 
 
 def si(c: Any) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reducing import named
 
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.estimation.verdict import conclude
@@ -27,10 +28,6 @@ PRINTED_K = (17.184, 17.169, 17.166, 17.160, 17.172, 17.173, 17.170, 17.171)
 @pytest.fixture(scope="module")
 def book() -> Any:
     return system.reduce(system.read_measured(BOOK, {}))
-
-
-def named(result: Any) -> dict[str, Any]:
-    return {c.name: c for c in result.coefficients}
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reducing import turned
 from servoing import QUIET
 from tumbling import DPH, NAMES, SHORT, load, quiet
 
@@ -37,12 +38,6 @@ def check(plain: Result, wrong: Result, right: Result, part: float, least: float
     off, left = (np.array([r[n].estimate - plain[n].estimate for n in names]) for r in (wrong, right))
     assert np.max(np.abs(off)) > least, off
     assert np.max(np.abs(left)) < part * np.max(np.abs(off)), (left, off)
-
-
-def turned(axis: int, angle: float) -> list[list[float]]:
-    """The mount of a gyro turned about one of its axes."""
-    rows: list[list[float]] = frames.rotation(np.eye(3)[axis], angle).T.tolist()
-    return rows
 
 
 TUMBLE = [

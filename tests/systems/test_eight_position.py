@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import named
+from reducing import reduced_run as reduced
 from scipy import stats
 from undiagnosed import reduce_undiagnosed
 
@@ -21,7 +23,6 @@ from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.multi_day_record import combine
 from gyrobench.record.record import Record
-from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 
@@ -55,15 +56,6 @@ def gyro(rng: np.random.Generator, terms: int = 10) -> dict[str, Any]:
 
 def latitude(rng: np.random.Generator) -> float:
     return float(math.radians(rng.uniform(0.0, 75.0)) * rng.choice([-1.0, 1.0]))
-
-
-def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
-    result: Result = load().with_values(values).reduce(session.run(values, seed=seed))
-    return result
-
-
-def named(result: Result) -> dict[str, Any]:
-    return {c.name: c for c in result.coefficients}
 
 
 # ------------------------------------------------------------------------------------------ recovery

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import named
 
 from gyrobench import report
 from gyrobench.engine.run_errors import ParameterRefusedError
@@ -42,10 +43,6 @@ def result(part: str, benchmark: str = "sine", seed: int = 1, **values: Any) -> 
         SESSIONS[part] = Session(NAME, {"estimator": f"estimator_{part}"})
     record = SESSIONS[part].run({"benchmark": benchmark, **more}, seed=seed)
     return system.with_values({"benchmark": benchmark}).reduce(record)
-
-
-def named(r: Any) -> dict[str, Any]:
-    return {c.name: c for c in r.coefficients}
 
 
 def test_an_estimator_that_is_not_consistent_is_a_finding_not_a_wrong_result() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import reduced_run as reduced
 from scipy import stats
 
 from gyrobench import drift, frames
@@ -20,7 +21,6 @@ from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.reduction.estimation import noise
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, System, load_system
 from gyrobench.system.values import InvalidValueError
 
@@ -37,11 +37,6 @@ def load() -> System:
 QUIET = {n: 0.0 for n in load().noises}
 PACKAGE = type(load()).__module__
 R: Any = importlib.import_module(".reduction", PACKAGE)
-
-
-def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
-    result: Result = load().with_values(values).reduce(session.run(values, seed=seed))
-    return result
 
 
 def turned(rng: np.random.Generator) -> np.ndarray:

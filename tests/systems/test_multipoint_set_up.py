@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from multipoint import G0, KS, estimates, load, module, polynomial, quiet, windows
+from reducing import turned
 from stated import with_sizes
 
 from gyrobench import frames
@@ -32,11 +33,6 @@ TURN = 2.0 * math.pi * np.arange(24) / 24
 def reduced(session: Session, values: dict[str, Any], corrections: str = "") -> Result:
     given = {**quiet(load()), "accelerometer.white": 1e-8, **VALUES, **values, "corrections": corrections}
     return load().with_values(given).reduce(session.run(given, seed=1))
-
-
-def turned(axis: int, angle: float) -> list[list[float]]:
-    rows: list[list[float]] = frames.rotation(np.eye(3)[axis], angle).T.tolist()
-    return rows
 
 
 def place(k: int, size: float) -> list[float]:

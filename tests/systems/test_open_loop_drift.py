@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import reduced_run as reduced
 
 from gyrobench import drift, frames
 from gyrobench.engine.session import Session
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.result import Result
 from gyrobench.system.system import InvalidConfigurationError, load_system
 
 NAME = "open_loop_drift"
@@ -30,11 +30,6 @@ SHORT: dict[str, Any] = {"pairs": 5, "wait": 6.0, "dwell": 0.1}  # 66 s
 
 QUIET = {n: 0.0 for n in load_system(NAME).noises}
 R: Any = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
-
-
-def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
-    result: Result = load_system(NAME).with_values(values).reduce(session.run(values, seed=seed))
-    return result
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commanding import Command
 from pickoffs import ARCMIN, DPH, NAME, R, load, made
+from reducing import named
 
 from gyrobench.engine.session import Session
 from gyrobench.reduction.estimation.verdict import conclude
@@ -20,10 +21,6 @@ from gyrobench.reduction.setup.window_checks import ReductionError
 
 def quiet() -> dict[str, Any]:
     return dict.fromkeys(load().noises, 0.0)
-
-
-def named(result: Any) -> dict[str, Any]:
-    return {c.name: c for c in result.coefficients}
 
 
 def test_ideal_input() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reducing import with_options as reduced
 from servoing import DAY50, DAY500, DPH, NAMES, QUIET, W50, errors, expected_rate, gyro, held, latitude, polar_at_2_ms
 from stated import FAINT
 from undiagnosed import reduce_undiagnosed
@@ -31,11 +32,6 @@ ARCSEC = math.pi / 648000.0
 def polar() -> Iterator[Session]:
     with Session(polar_at_2_ms()) as prepared:  # a soft servo and a fast table below want 1 ms
         yield prepared
-
-
-def reduced(record: Any, **options: Any) -> Any:
-    meta = record.run.replace(options={**record.run.options, **options})
-    return load_system(NAME).reduce(type(record)(record.windows, {}, meta))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import named
+from reducing import reduced_run as reduced
 
 from gyrobench.engine.session import Session
 from gyrobench.record.run_document import PlanRow
@@ -31,14 +33,6 @@ P: Any = importlib.import_module(".precession", type(load_system(NAME)).__module
 
 def quiet() -> dict[str, Any]:
     return dict.fromkeys(load_system(NAME).noises, 0.0)
-
-
-def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Any:
-    return load_system(NAME).with_values(values).reduce(session.run(values, seed=seed))
-
-
-def named(result: Any) -> dict[str, Any]:
-    return {c.name: c for c in result.coefficients}
 
 
 # ---------------------------------------------------------------------------------------------- marks

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reducing import with_options as reduced
 from tumbling import NAME, SHORT, gyro
 
 from gyrobench.engine.session import Session
@@ -27,13 +28,6 @@ def session() -> Any:
 @pytest.fixture(scope="module")
 def clean(session: Session) -> Record:
     return session.run({**PULSES, **gyro(np.random.default_rng(5))}, seed=7)
-
-
-def reduced(record: Record, **options: Any) -> DriftTestResult:
-    run = record.run.replace(options={**record.run.options, **options})
-    result = load_system(NAME).reduce(Record(record.windows, {}, run))
-    assert isinstance(result, DriftTestResult)
-    return result
 
 
 def predicted(result: DriftTestResult) -> dict[str, float]:

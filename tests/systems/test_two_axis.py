@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from commanding import Command
+from reducing import reduced_run as reduced
 
 from gyrobench import drift
 from gyrobench.engine.session import Session, run
-from gyrobench.result import Result
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import load_system
 
@@ -38,11 +38,6 @@ def quiet() -> dict[str, Any]:
 def gyro(rng: np.random.Generator) -> dict[str, Any]:
     sizes = {n: rng.uniform(*RANGES[drift.order(n)]) for n in NAMES}
     return {f"gyro.{n}": float(size * rng.choice([-1.0, 1.0]) * DPH) for n, size in sizes.items()}
-
-
-def reduced(session: Session, values: dict[str, Any], seed: int = 1) -> Result:
-    result: Result = load_system(NAME).with_values(values).reduce(session.run(values, seed=seed))
-    return result
 
 
 # ------------------------------------------------------------------------------------------ recovery
