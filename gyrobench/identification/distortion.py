@@ -44,7 +44,7 @@ class Distortion:
 
     @property
     def significant(self) -> bool:
-        return self.p < SIGNIFICANT
+        return self.p < SIGNIFICANT and self.level > 0.0
 
 
 def harmonics(lines: LineAmplitudes, period: float) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
@@ -70,7 +70,8 @@ def _of(kind: str, lines: LineAmplitudes, excited: LineAmplitudes) -> Distortion
     best: tuple[float, float, float, str] | None = None
     for k, name in ((1, SIGNALS[0]), (2, SIGNALS[1])):
         power, noise = np.abs(lines.z[:, k]) ** 2, lines.cov[:, k, k].real
-        test = float(np.mean(power / np.maximum(noise, 1e-300)))
+        mean = lines.dof / np.maximum(lines.dof - 1.0, 1.0)  # of F with 2 and 2 dof degrees of freedom
+        test = float(np.mean(power / np.maximum(noise, 1e-300) / mean))
         p = min(1.0, 2.0 * float(fdtrc(2.0 * lines.f.size, 2.0 * float(lines.dof.sum()), test)))
         whole = float(np.mean(np.abs(excited.z[:, k]) ** 2))
         found = (
@@ -87,7 +88,8 @@ def _of(kind: str, lines: LineAmplitudes, excited: LineAmplitudes) -> Distortion
 
 
 def with_distortion(excited: LineAmplitudes, omitted: LineAmplitudes, period: float) -> LineAmplitudes:
-    """Return the excited lines with the level of the odd ones left out beside them as their covariance.
+    """Return the excited lines with the level of the odd ones left out beside them as their covariance, where it is
+    above their own noise.
 
     Over frequency the level goes as a parabola of its logarithm, about which the lines beside one are averaged.
     """
@@ -102,4 +104,10 @@ def with_distortion(excited: LineAmplitudes, omitted: LineAmplitudes, period: fl
     count = min(NEIGHBOURS, odd.f.size)
     near = np.argsort(np.abs(np.log(excited.f)[:, None] - np.log(odd.f)[None, :]), axis=1)[:, :count]
     cov = products[near].mean(axis=1) * here[:, :, None] * here[:, None, :]
-    return replace(excited, cov=cov, dof=np.full(excited.f.size, float(count)))
+    diagonal, own = (np.einsum("nkk->nk", c).real[:, 1:] for c in (cov, excited.cov))
+    above = np.mean(diagonal / np.maximum(own, 1e-300), axis=1) > 1.0
+    return replace(
+        excited,
+        cov=np.where(above[:, None, None], cov, excited.cov),
+        dof=np.where(above, float(count), excited.dof),
+    )

@@ -34,6 +34,7 @@ CERTAIN = 0.03  # of |S|: a resonance that is known to that stands, however much
 UNSOUND, NEIGHBOURS = 3.0, 4  # times the median u of so many measured frequencies to either side
 MISFIT = 1e-6  # p, below which the best window is no noise
 RESOLVED = 0.02  # of |S|, the largest misfit: 0.17 dB, 1.1 degrees
+SHARP = 0.1  # of the mean distance of the points: half the width of a resonance that none of them shows
 DRAWS = 60
 BETWEEN = 8  # frequencies of the curve for each measured one
 #: weights of nine points for the value of their parabola in the middle (Savitzky 1964)
@@ -188,6 +189,9 @@ def _fits(d: Array, value: Complex, variance: Array, dof: Array, draw: Complex, 
     free = d.shape[1] - use.size
     square = np.where(np.isfinite(rest.sum(axis=1)), rest.sum(axis=1), 1e300) / free
     p = fdtrc(2.0 * free, dof.sum(axis=1), square)
+    if rational:
+        sharp = _sharp(theta, d)
+        p, square = np.where(sharp, 0.0, p), np.where(sharp, np.inf, square)
     jac = jac * w[:, :, None]
     cov, draws = np.zeros((d.shape[0], 6, 6), complex), np.zeros((d.shape[0], 6, DRAWS), complex)
     adjoint = np.conj(np.swapaxes(jac, 1, 2))
@@ -195,6 +199,19 @@ def _fits(d: Array, value: Complex, variance: Array, dof: Array, draw: Complex, 
     cov[:, use[:, None], use] = inverse
     draws[:, use] = inverse @ (adjoint @ draw)
     return _Models(theta, cov, scale, p, square, draws)
+
+
+def _sharp(theta: Complex, d: Array) -> NDArray[np.bool_]:
+    """Return which fractions have a pole among their frequencies d (n, m) that is sharper than they can tell."""
+    linear, square = theta[:, 4], theta[:, 5]
+    root = np.sqrt(linear**2 - 4.0 * square)
+    found = np.zeros(linear.size, bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for below in (linear + root, linear - root):  # of 1 + a1 d + a2 d2: -2/(a1 +- root)
+            pole = -2.0 / below
+            inside = (pole.real > d[:, 0]) & (pole.real < d[:, -1])
+            found |= inside & (np.abs(pole.imag) < SHARP * np.ptp(d, axis=1) / (d.shape[1] - 1))
+    return found
 
 
 def _solve(x: Complex | Array, y: Complex) -> Complex:
