@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 
+from gyrobench.tuning.controller_search import grazing
 from gyrobench.tuning.robustness import measure, peak
 from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.wishes import parse_wishes
@@ -97,3 +98,10 @@ def test_no_lead_is_faster_than_the_communication_step() -> None:
     assert abs(c.response(np.array([50j]))[0]) == pytest.approx(4.0, rel=1e-7)
     free = ControllerStructure("pi+lead").controller(50.0, [0.1, 10.0, 100.0], lambda f: 0.25j)
     assert free.values["T2"] == pytest.approx(2e-4)
+
+
+def test_a_resonance_just_under_one_counts_as_a_crossover() -> None:
+    """Peaks of 0.97 at 30 degrees from -180, of 0.85 and of 1.2 in three loops: the first alone grazes 1."""
+    bump = np.exp(-(np.linspace(-3.0, 3.0, 61) ** 2))
+    L = np.array([peak * bump for peak in (0.97, 0.85, 1.2)]) * -np.exp(1j * np.radians(30.0))
+    assert grazing(L).tolist() == [pytest.approx(np.radians(30.0)), np.inf, np.inf]
