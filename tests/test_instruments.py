@@ -135,6 +135,16 @@ def test_the_vibrating_table_returns_the_bandwidth_of_a_sheet() -> None:
     assert bandwidth.estimate == pytest.approx(255.0, rel=0.05)
 
 
+def test_an_output_rate_is_the_period_where_samples_are_taken() -> None:
+    """819.2 Hz: 1.2207 ms, in the test that takes each sample once; 8 kHz are hardly slower than steps of 0.1 ms."""
+    for name, system, period in (
+        ("adis16405", "gyro_bandwidth", 1.0 / 819.2), ("adis16405", "drift_record", None),
+        ("mpu9250", "gyro_bandwidth", None), ("crg20", "gyro_bandwidth", None),
+    ):  # fmt: skip
+        _, values = with_instruments(name, {}, load_system(system))
+        assert values.get("gyro.period") == period, (name, system)
+
+
 def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for room in ("components", "systems", "reports", "instruments"):
         (tmp_path / room).mkdir()

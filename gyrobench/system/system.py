@@ -158,6 +158,7 @@ class System(Configurable):
     assumed: ClassVar[
         tuple[str, ...]
     ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    sampled_gyro: ClassVar[bool] = False  # a gyro with an output rate is read by its samples, each once
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
     instrument: str = ""  # of whose data sheet its gyro is; "": the part is named

@@ -44,6 +44,7 @@ TABLE_SLOTS = ("table", "outer", "inner")
 TAKERS = "drift_record, rate_table_test, gyro_bandwidth, turn_on_repeatability, vibration_rectification, north_finder"
 UNITS = "imu_positions (with a chamber: over temperature), coning_test, sculling_test, attitude_estimator"
 FORCES = "accelerometers"  # kind of the sheet of those of a unit, and their slot
+HELD = 0.5  # of the rate of the steps: samples that come more often are told from them by two steps, and unevenly
 TABLE_SOCKETS = ("Table", "ServoTable", "TwoAxisTable")
 
 
@@ -171,6 +172,14 @@ def settings(sheet: Instrument, slot: str = "gyro") -> dict[str, Any]:
     return {f"{slot}.{n}": v for n, v in parameters(sheet).items()}
 
 
+def output_period(sheet: Instrument, step: float) -> dict[str, float]:
+    """Return the time between two samples of a gyro by the output rate of its sheet, of a part that has one; {} where
+    it is hardly longer than the communication step (s).
+    """
+    rate, declared = sheet.si("output_rate"), load_part(sheet.part, Bench.find().folder).declarations
+    return {"gyro.period": 1.0 / rate} if rate and "period" in declared and rate * step < HELD else {}
+
+
 def table_settings(sheet: Instrument, test: System, parts: dict[str, str]) -> dict[str, Any]:
     """Return what a turntable's sheet sets in a system: parameters of its tables, and options of what is believed.
 
@@ -263,6 +272,8 @@ def with_instruments(
         if parts.setdefault("gyro", sheet.part) != sheet.part:
             raise UsageError(f"the data sheet {name} puts {sheet.part} into the slot gyro: name no part for it")
         found |= settings(sheet)
+        if isinstance(test, System) and test.sampled_gyro:
+            found |= output_period(sheet, test.step)
         if isinstance(test, System) and "u_bias" in test.options and (bias := sheet_values.believed_bias(sheet)):
             found["u_bias"] = bias
     return "; ".join(titles), found

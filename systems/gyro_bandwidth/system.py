@@ -56,6 +56,7 @@ class GyroBandwidth(System):
     )
     assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
     noises = ("table.reading", "gyro.pickoff", *RATE_NOISES)
+    sampled_gyro = True
     done = "exciter.done"
     step = 1e-4
     channels = ("exciter.phase", "exciter.gate", "table.rate_read", "gyro.rate[1]", "gyro.saturated")

@@ -28,7 +28,15 @@ from gyrobench.frames import G0
 from gyrobench.packaging import load_part
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.system import load_system
-from gyrobench.workflow.instruments import FORCES, Instrument, find_instrument, parameters, settings, with_instruments
+from gyrobench.workflow.instruments import (
+    FORCES,
+    Instrument,
+    find_instrument,
+    output_period,
+    parameters,
+    settings,
+    with_instruments,
+)
 from gyrobench.workflow.sheet_values import FIGURES, FLOOR, SETTINGS
 
 PAGE = standard_folder() / "docs" / "data_sheets.md"
@@ -36,10 +44,11 @@ DEG = math.pi / 180.0
 ARCSEC = DPH = DEG / 3600.0
 UG = 1e-6 * G0
 NEAR = 0.05
+SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
 KINDS = ("fibre", "laser", "vibrating")
 ROOM = 0.8  # of the range, up to which the table turns
 NOT_TESTED = {
-    "output_rate": "sets nothing: a sample each communication step",
+    "output_rate": "no test takes accelerometers' samples once each: a sample each communication step",
     "range": "the part clips there; readings beyond it are refused",
     "resolution": "steps of the word are averaged out by the noise",
 }
@@ -204,6 +213,25 @@ def bandwidth(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
         yield Row(name, "bandwidth", printed, "gyro_bandwidth", c.estimate / value)
 
 
+def output_rate(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
+    """Yield the output rate by the delay: a sample that is held is late by half of a period, on average."""
+    value, test = sheet.si("output_rate"), load_system("gyro_bandwidth")
+    if value is None or sheet.kind == FORCES:
+        return
+    printed, period = sheet.figures["output_rate"].value, output_period(sheet, test.step)
+    if not period:
+        why = f"{sheet.part} gives a sample each communication step"
+        yield Row(name, "output_rate", printed, "", None, why)
+        return
+    options = {"lowest": 5.0, "highest": min(0.4 * value, 400.0), "points": 14, "dwell": 0.2, "settle": 0.1}
+    more = {"gyro.resolution": 0.0}
+    held, every = (
+        coefficients(tests.result("gyro_bandwidth", sheet, options, more | p, True))["delay"] for p in (period, {})
+    )
+    found = 0.5 / ((held.estimate - every.estimate) * SECONDS[held.unit])
+    yield Row(name, "output_rate", printed, "gyro_bandwidth", found / value)
+
+
 def sensitivity(tests: Tests, name: str, sheet: Instrument) -> Iterator[Row]:
     value = sheet.si("g_sensitivity")
     if value is None:
@@ -238,7 +266,7 @@ def rows(tests: Tests, name: str) -> list[Row]:
     """Return a row for each figure of a sheet, in the order of FIGURES."""
     sheet = find_instrument(name)
     forces = sheet.of_accelerometers
-    own = _rows(tests, name, sheet, (noise, rates, bandwidth, sensitivity, unit), NOT_TESTED)
+    own = _rows(tests, name, sheet, (noise, rates, bandwidth, output_rate, sensitivity, unit), NOT_TESTED)
     if forces is None:
         return own
     forces = forces.model_copy(update={"part": "accelerometer_mems"})
