@@ -53,6 +53,7 @@ from .thermal import Thermal, quantity
 from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
+LEAST_SPAN = 3.0  # K, from which on a record is one over temperature
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
 
 
@@ -232,6 +233,11 @@ class Reduction(ChannelTests[ImuSetup]):
             return problems
         if s.thermal and "temperature" not in self.windows:
             return ["thermal = true: the record has no column temperature [degC]"]
+        if s.thermal and (span := float(np.ptp(self.windows["temperature"]))) < LEAST_SPAN:
+            return [
+                f"thermal = true: the temperature changes by {span:.3g} K in all, which shows nothing of it: was that "
+                "of the room read, or of a chamber that stood still?"
+            ]
         return self._mistaken()
 
     def _mistaken(self) -> list[str]:

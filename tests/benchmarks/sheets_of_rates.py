@@ -177,7 +177,7 @@ DRIFT_RECORD = Sheet(
         Mistake("unit", "half of the true sampling rate in the times", "times wrong|sampling", other_header),
         Mistake("line", "50 Hz aliased to 0.3 Hz", "line|alias", hum),
         Mistake("rounding", "steps of four standard deviations", "round|coarse|steps", coarse),
-        Mistake("saturation", "clipped at 1.2 standard deviations", "end of the range|clip", saturated),
+        Mistake("saturation", "clipped at 1.2 standard deviations", "largest or smallest value", saturated),
         Mistake("row late", "each sample held for four rows", "held|repeat", held),
         Mistake("sign", "readings reversed", "reversed", times(-1.0, DRIFT)),
         Mistake("unit", "°/s under °/h", "unit", times(1.0 / 3600.0, DRIFT)),

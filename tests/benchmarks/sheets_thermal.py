@@ -72,7 +72,7 @@ THERMAL = Sheet(
         Mistake("not settled", "the unit follows the thermometer 300 s late", "late", late),
         Mistake("temperature", "the thermometer stood where it changes by 0.8", "temperature", elsewhere),
         Mistake("temperature", "its zero off by 3 K", "temperature", zero_of_thermometer),
-        Mistake("temperature", "that of the room was read", "temperature", of_the_room),
+        Mistake("temperature", "that of the room was read", "of the room", of_the_room),
         Mistake("unit", "°F under °C", "°F", fahrenheit),
         Mistake("sign", "the temperatures reversed about the reference", "temperature", mirrored),
         Mistake("row late", "heating and cooling exchanged", "temperature", exchanged_ramps),

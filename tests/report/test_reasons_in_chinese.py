@@ -35,10 +35,21 @@ SAID = {
     "vibration_rectification": (
         "the first readings of a level hold some of the level before: wait longer, or leave them out",
         "the levels of rows 9 and 10 exchanged",
+        "The gyro reads the same up and down, where the vertical Earth rate is 10.64 °/h: was it not turned over, or "
+        "does another axis stand up?",
+        "No residual of this record would show: a lean of the instruments by 1° with the axis up (b_g by 2.5 u); the "
+        "axis x of the gyro level, or the Earth rate taken off before (G by 3 u); the rates wrong by 2 % (G by 2 u). "
+        "State that attitudes, angles and values were checked (arrangement = checked), or add positions that show "
+        "them.",
     ),
     "turn_on_repeatability": (
         "warm-up of each turn-on: p < 0.001, the warm-up differs from turn-on to turn-on: some began before the gyro "
         "was cold, or at another temperature. The stated u may be too small.",
+        "13 readings of mean, the first in row 1, are its largest value to the last digit, and no two others are "
+        "alike: a range was reached. What was beyond it is not in the estimates.",
+        "No residual of this record would show: the temperatures in °F and given as °C (b_T by 51 u); another "
+        "attitude, by 1°, from turn-on 4 on (b by 7 u); the temperature wrong by 1 K (b_T by 2 u). State that "
+        "attitudes, angles and values were checked (arrangement = checked), or add positions that show them.",
     ),
 }
 
