@@ -139,13 +139,22 @@ class ImuChannel(DriftReduction[ImuSetup]):
         return out
 
     def test(self, found: Findings) -> None:
-        """Add an F test of constants of each phase: errors of single positions, nonlinearity."""
+        """Add an F test of constants of each phase: errors of single positions, nonlinearity; over temperature one of
+        plays of another width.
+        """
         phase = np.asarray(self.windows["phase"])[self.rows]
         block = np.array([phase == p for p in np.unique(phase)], dtype=float).T
         found.f_test(
             "phases.agree", "constants of the phases", block, "errors of single positions, nonlinearity",
             "the phases differ from the model by more than the noise", "the phases agree within the noise",
         )  # fmt: skip
+        if self.thermal is not None:
+            found.f_test(
+                "hysteresis.width", "hysteresis of another width", self.thermal.others,
+                "plays of a third and of three times the width",
+                "the hysteresis has another width than is stated (hysteresis_width), or the temperature is late",
+                "no hysteresis of another width is in the residuals",
+            )  # fmt: skip
 
     def account(self, found: Findings) -> Account:
         c, s = self.channel, self.setup

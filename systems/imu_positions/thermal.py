@@ -22,6 +22,7 @@ from gyrobench.units import DPH
 from .channels import UG, ImuInstrument
 
 PLACES = (np.arange(8) + 0.5) / 8.0  # of a window, at which the play is taken
+OTHER_WIDTHS = (1.0 / 3.0, 3.0)  # of the hysteresis, that a test looks for
 #: ending of a coefficient -> parameter of the parts, size of its unit over that of the bias, unit, meaning
 BIAS = {
     "T": ("bias_T", 1.0, "/K", "change of the bias of the {} per kelvin"),
@@ -43,12 +44,16 @@ SCALES = {
 
 @dataclass(frozen=True)
 class Thermal:
-    """Temperature of the windows: T, T2, T3, z, T' (n,), and the orders of bias and scale factor."""
+    """Temperature of the windows: T, T2, T3, z, T' (n,), and the orders of bias and scale factor.
+
+    others (n, 2): z of a third and of three times the width.
+    """
 
     powers: tuple[Array, Array, Array]
     way: Array
     slope: Array
     orders: tuple[int, int]
+    others: Array
 
     @classmethod
     def of(cls, windows: Mapping[str, Any], reference: float, width: float, orders: tuple[int, int]) -> Thermal:
@@ -61,12 +66,14 @@ class Thermal:
         start, end = between(t0), between(t1)
         path = start[:, None] + (end - start)[:, None] * PLACES
         first, second, third = ((path**k).mean(axis=1) for k in (1, 2, 3))
-        return cls((first, second, third), _play(start, path, end, width), (end - start) / (t1 - t0), orders)
+        way, *others = (_play(start, path, end, f * width) for f in (1.0, *OTHER_WIDTHS))
+        return cls((first, second, third), way, (end - start) / (t1 - t0), orders, np.column_stack(others))
 
     def rows(self, kept: Array) -> Thermal:
         """Return the temperatures of some of the windows."""
         first, second, third = (p[kept] for p in self.powers)
-        return replace(self, powers=(first, second, third), way=self.way[kept], slope=self.slope[kept])
+        changed = {n: getattr(self, n)[kept] for n in ("way", "slope", "others")}
+        return replace(self, powers=(first, second, third), **changed)
 
     def endings(self, scaled: bool) -> list[tuple[str, str]]:
         """Return kind and ending of the coefficients; scaled: whether those of the scale factor are shown."""

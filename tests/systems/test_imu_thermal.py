@@ -6,6 +6,7 @@ from __future__ import annotations
 import importlib
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,18 @@ def test_intervals_hold_the_truth() -> None:
             hits += low <= truth[c.name] <= high
             total += 1
     assert total == 300 and 0.9 < hits / total < 0.99
+
+
+@pytest.mark.long
+def test_a_hysteresis_of_another_width_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """30 K, stated as 10 K: bH and bT of both triads were off by ten u, and the residuals ordinary in 5 of 6 units."""
+    drawn = Heat.drawn
+    monkeypatch.setattr(Heat, "drawn", lambda *a: replace(drawn(*a), width=30.0))
+    w, _ = heated(900, 6, white(700))
+    for width in (10.0, 30.0):
+        found = reduction.reduce(w, setup(thermal=(3, 2, width, 0.0)))
+        said = [r.text for r in found.reasons if r.id == "residuals.contradict"]
+        assert any("another width than is stated" in t for t in said) == (width == 10.0)
 
 
 VALUES: dict[str, Any] = {
