@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -108,6 +109,9 @@ def fit(
         echo("to be completed by hand:", err=True)
         for p in problems:
             echo(f"  - {p}", err=True)
+    if system is not None and out is not None:
+        words = ["gyrobench", "reduce", system, "--data", display_path(file), "--columns", display_path(out)]
+        echo(f"check it, then: {shlex.join(words)}", err=True)
 
 
 @app.command()

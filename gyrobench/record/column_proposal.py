@@ -32,11 +32,18 @@ WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))
 #: how a row of units writes the form of a date or clock time: TT.MM.JJJJ hh:mm:ss
 FORM_OF_TIME = re.compile(r"(?i)([dtmjyhs]{1,4})([.:/, -]+[dtmjyhsf]{1,4})+")
 SPELLED = {"grad": "deg", "sek": "s", "std": "h", "c": "degC", "°c": "degC", "volt": "V", "ampere": "A", "kelvin": "K"}
+#: end of a name without a unit beside it, as loggers write it: gx_dps, ts_us -> unit
+ENDINGS = {
+    "dps": "dps", "mdps": "mdps", "degs": "deg/s", "deg_s": "deg/s", "rads": "rad/s", "rad_s": "rad/s", "degh": "deg/h",
+    "deg_h": "deg/h", "g": "g", "mg": "mg", "ms2": "m/s2", "mps2": "m/s2", "m_s2": "m/s2", "c": "degC", "degc": "degC",
+    "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
+}  # fmt: skip
+ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})", re.IGNORECASE)
 #: name of the bench, or its beginning -> what laboratories call it
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
     "t_end": r"t_?end|ende?|bis|stop|to|until",
-    "time": r"time.*|zeit.*|datum.*|date.*|uhrzeit|t",
+    "time": r"time.*|zeit.*|datum.*|date.*|uhrzeit|ts?",
     "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
     "day": r"day|tag",
     "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
@@ -155,6 +162,16 @@ def _read_unit(text: str) -> str | None:
     return None
 
 
+def _unit_at_end(text: str) -> tuple[str, str]:
+    """Return a name, and the unit that it ends with, "" for none; "s" and "c" count where the name says what it is."""
+    if match := ENDING.fullmatch(text):
+        name, unit = match[1], ENDINGS[match[2].lower()]
+        said = {"degC": r".*temp.*"}.get(unit, CALLED["time"] if units.same_dimension(unit, "s") else ".*")
+        if re.fullmatch(said, name, re.IGNORECASE):
+            return name, unit
+    return text, ""
+
+
 def _are_units(cells: Sequence[str]) -> bool:
     found = [_read_unit("" if FORM_OF_TIME.fullmatch(c) else c) for c in cells]
     return any(found) and all(f is not None for f in found)
@@ -168,6 +185,8 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         name = match[1] if match and match[1] else text
         if below:
             written = below[k] or written
+        elif not written:
+            name, written = _unit_at_end(name)
         cells = [r[k] for r in rows if r[k] not in NOTHING]
         time = next((f for f in FORMATS if cells and all(_fits(c, f) for c in cells[:200])), "")
         unit = "" if time else _read_unit(written) or ""

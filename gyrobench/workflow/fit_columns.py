@@ -31,7 +31,7 @@ MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
-LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"acc.*|beschl.*|[af]_?[xyz]": "m/s2", r"temp.*": "degC"}
+LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"acc.*|beschl.*|[af]_?[xyz]": "m/s2", r".*temp.*": "degC"}
 
 
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:
@@ -78,7 +78,10 @@ class ColumnProposal:
             if name == "t_end" and "t_start" in self.found:
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
-            problems.append(f"column '{name}': none of the file fits by name and unit; not used so far: {unused}")
+            unit = self.wanted.get(name) or "deg/s"
+            entry = f'[columns.{name}] with from = "ITS NAME" and unit = "{unit}"'
+            none = f"column '{name}': none of the file fits by name and unit"
+            problems.append(f"{none}; write {entry}; not used so far: {unused}")
         return text, problems
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gyrobench.bench import Bench, UsageError
+from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.errors import Advice, GyrobenchError
 from gyrobench.record.csv_reader import DataError
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.record import Record
@@ -65,7 +68,10 @@ def reduce_measured(
     if columns is not None:
         record = _read_mapped(measured, system, data, values, columns, feedback)
     else:
-        record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
+        try:
+            record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
+        except DataError as error:
+            raise error.advised(*_fitting(system, data)) from None
     with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())
@@ -103,6 +109,19 @@ def find_faults(system: System, data: Path, values: Mapping[str, str], columns: 
             _read(measured, system, data, values, SILENT)
     except DataError as error:
         return list(error.problems)
+    return []
+
+
+def _fitting(system: System, data: Path) -> list[Advice]:
+    """Return the command that proposes a column map, where one finds columns in a file under names of its own."""
+    from gyrobench.workflow.fit_columns import propose_columns
+
+    with suppress(GyrobenchError):
+        found = propose_columns(data, system.name).found
+        if any(str(column.sources[0]).partition("[")[0].strip() != name for name, column in found.items()):
+            out = f"{data.stem}.toml"
+            fit = shlex.join(["gyrobench", "fit", display_path(data), "--system", system.name, "--out", out])
+            return [Advice("fit", f"its columns have names of their own; {fit} proposes a column map for --columns")]
     return []
 
 
