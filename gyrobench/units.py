@@ -192,7 +192,7 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
     return f, p, rest
 
 
-USUAL = ("deg/h", "deg/s", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/h/K")
+USUAL = ("deg/h", "deg/s", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/h/K", "N/m", "N/um", "N.m", "N.m/rad", "kg.m2")
 
 
 @lru_cache(maxsize=1024)
@@ -248,6 +248,10 @@ def parse_quantity(text: str, to: str, per_g0: bool = False) -> float:
             f"'{shorten(text)}': a finite number with an optional unit is expected, such as 45.75deg, 0.3deg/h, 2mA"
         )
     value, name = float(match[1]), match[2]
+    if comma := re.match(r",\d+", name):
+        point = f"{match[1]}.{name[1:]}" if match[1].lstrip("+-").isdecimal() else ""
+        said = f"; did you mean {shorten(point)}?" if point else ""
+        raise UnitError(f"'{shorten(text.strip())}': a comma ({comma[0]}); the decimal sign is a point{said}")
     if not name:
         target = unit(to)
         return value if target.factor == 1.0 and not target.offset else (value - target.offset) / target.factor

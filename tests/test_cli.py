@@ -143,7 +143,7 @@ REFUSED = [
     (["run", NAME, "--set", "@no.toml"], "--set @no.toml: No such file or directory"),
     (["run", NAME, "--set", "@bad.fmu"], "--set @bad.fmu: not a TOML file"),
     (["run", NAME, "--step", "1m"], "units that fit: s, ms"),
-    (["run", NAME, "--part", "gyr=site"], "no slot 'gyr'; slots: site"),
+    (["run", NAME, "--part", "gyr=site"], "no slot 'gyr'; did you mean gyro?"),
     (["run", NAME, "--part", "gyro=floated_gyr"], "no part 'floated_gyr'; did you mean floated_gyro?"),
     (["run", NAME, "--part", "gyro=no.fmu"], "slot gyro: no.fmu: not a readable FMU: no such file"),
     (["run", NAME, "--part", "gyro=bad.fmu"], "slot gyro: bad.fmu: not a readable FMU"),

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gyrobench import units
-from gyrobench.units import UnitError, base_unit, convert, display, parse_quantity, unit
+from gyrobench.units import UnitError, base_unit, convert, display, fitting, parse_quantity, unit
 
 DEG = math.pi / 180
 
@@ -153,3 +153,17 @@ def test_every_symbol_reads_its_own_printed_form() -> None:
 def test_times_and_frequencies_of_electronics() -> None:
     assert units.parse_quantity("20ns", "s") == pytest.approx(2e-8, rel=1e-15)
     assert units.parse_quantity("10MHz", "Hz") == 1e7 and units.parse_quantity("10mHz", "Hz") == 0.01
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("1,5deg/h", "did you mean 1.5deg/h?"), ("-0,25", "did you mean -0.25?"), ("1.000,5deg/h", "is a point")],
+)
+def test_a_decimal_comma_is_named(text: str, said: str) -> None:
+    with pytest.raises(UnitError, match=r"a comma \(,\d+\)") as error:
+        parse_quantity(text, "rad/s")
+    assert str(error.value).endswith(said)
+
+
+def test_units_that_fit_are_written_as_the_trade_writes_them() -> None:
+    assert fitting("N/m") == ("kg/s2", "N/m", "N/um")

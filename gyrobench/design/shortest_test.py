@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.bench import UsageError
+from gyrobench.bench import Bench, UsageError
 from gyrobench.design import plan_search
 from gyrobench.design.approximate_design import CRITERIA, ApproximateDesign, SingularDesignError
 from gyrobench.design.choice_search import search_choices
@@ -40,12 +41,12 @@ from gyrobench.design.plan_runs import (
 from gyrobench.design.plan_search import ExactPlan, Search, Want
 from gyrobench.design.predicted_uncertainty import effective
 from gyrobench.design.visit_protocol import DataNoise, VisitProtocol
-from gyrobench.errors import GyrobenchError
+from gyrobench.errors import Advice, GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.fit_result import observed_fits
-from gyrobench.system.system import System
+from gyrobench.system.system import System, load_system
 
 CANDIDATES = 2  # plans that are run until their dwell is settled
 CLOSE = 0.01  # of the dwell
@@ -61,6 +62,17 @@ def protocol_of(system: System, record: Record) -> VisitProtocol | OptionProtoco
     owner = next(cls for cls in type(system).__mro__ if "protocol" in vars(cls))
     module = importlib.import_module(f".{system.protocol}", owner.__module__)
     found: VisitProtocol | OptionProtocol = module.protocol_of(system, record)
+    return found
+
+
+def designed_tests() -> list[str]:
+    """Return the systems of the bench that offer plans."""
+    found = []
+    for name in sorted(Bench.find().systems()):
+        with contextlib.suppress(GyrobenchError):
+            system = load_system(name)
+            if isinstance(system, System) and system.protocol:
+                found.append(name)
     return found
 
 
@@ -84,7 +96,8 @@ def design_test(
     if criterion not in CRITERIA:
         raise UsageError(f"criterion '{criterion}': one of {', '.join(CRITERIA)}")
     if not system.protocol:
-        raise DesignError(f"{system.name} offers no plans to choose from; docs/guides/shortest_test.md lists the tests")
+        able = Advice("design", f"design works for {', '.join(designed_tests())} and drift_test_suite")
+        raise DesignError(f"{system.name} offers no plans to choose from").advised(able)
     with Workbench(system, parts or {}, maps or {}, engine, seed, dict(given or {})) as bench:
         record, fits = bench.run({})
         protocol = protocol_of(system, record)

@@ -42,7 +42,7 @@ def design_suite(
                 given={k: str(v) for k, v in given[name].items()}, only_known=True,
             )  # fmt: skip
         except GyrobenchError as error:
-            left_out[name] = str(error)
+            left_out[name] = error.text
     reached = {n: {v.name for v in t.values.values() if v.wanted is not None} for n, t in found.items()}
     chosen = cheapest_cover({n: t.time for n, t in found.items()}, reached, frozenset(wants))
     if chosen is None:

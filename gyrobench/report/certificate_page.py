@@ -28,6 +28,7 @@ from gyrobench.report.page_model import (
     columns,
     text_cell,
 )
+from gyrobench.report.plain_text import no_values
 from gyrobench.report.report_files import own_texts
 from gyrobench.report.result_json import Report
 from gyrobench.report.result_page import date, place, what_u_is
@@ -70,8 +71,8 @@ class Certified:
         """Return id and sentence of every warning, of why a verdict is withheld, of why there is no value."""
         result = self.report.result
         reasons = [r for s in (("error", "warning"), ("doubt",)) for r in result.reasons if r.severity in s]
-        none = [(f"{c.name}.none", f"No value of {c.name}: {c.no_value}.") for c in result.coefficients if c.no_value]
-        return [*((r.id, r.text) for r in reasons), *none]
+        none = no_values((c.name, c.no_value) for c in result.coefficients)
+        return [*((r.id, r.text) for r in reasons), *(("no_value", text) for text in none)]
 
 
 def page(

@@ -66,7 +66,8 @@ def _signed(measure: Json, d: Json) -> str:
 
 def _settings(differing: Sequence[str]) -> str:
     """Parts, options and parameters by name; digests, dates, seeds and what comes with another part explain nothing."""
-    chosen = [w for w in differing if w.startswith(("system", "part ", "option ", "parameter ", "plan ", "site "))]
+    kinds = ("system", "part ", "option ", "site ", "parameter ", "plan ")  # choices, then what follows from them
+    chosen = [w for kind in kinds for w in differing if w.startswith(kind)]
     named = [w.removesuffix(": name") for w in chosen if (": " not in w or w.endswith(": name"))]
     swapped = tuple(f"parameter {w.removeprefix('part ')}." for w in named if w.startswith("part "))
     named = [w for w in named if not w.endswith(".seed") and not (swapped and w.startswith(swapped))]

@@ -77,7 +77,10 @@ class Laboratory(BaseModel):
 def read_laboratory(file: Path) -> Laboratory:
     """Return the profile of a TOML file.  Raises UsageError naming all that is wrong with it."""
     if not file.is_file():
-        raise UsageError(f"{file}: no profile of a laboratory; {FILE} needs two lines, name = and address = [...]")
+        raise UsageError(
+            f"{file}: no profile of a laboratory; write {FILE} with two lines, "
+            'name = "Laboratory" and address = ["Street 1", "12345 Town"]'
+        )
     return laboratory_of(reading.toml(reading.read_text(file, UsageError), file, UsageError), file)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from gyrobench.bench import suggest_names
 from gyrobench.system.system import InvalidConfigurationError, System
 
 
@@ -28,7 +29,7 @@ def resolve_parts(
     unknown = [s for s in parts if s not in system.slots]
     if unknown:
         raise InvalidConfigurationError(
-            system.name, [f"no slot '{s}'; slots: {', '.join(system.all_slots())}" for s in unknown]
+            system.name, [f"no slot '{s}'; {suggest_names(s, system.all_slots())}" for s in unknown]
         )
     paths: dict[str, Path] = {}
     built: dict[str, str] = {}

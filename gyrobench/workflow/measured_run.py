@@ -63,6 +63,8 @@ def reduce_measured(
     """
     measured = _measured_data(system)
     data = Bench.find().existing(data)
+    if data.is_dir() and not (data / RUN).is_file():
+        raise UsageError(f"{data}: no run there (no {RUN}); name a file, or the folder of a run")
     file = find_specification(spec)
     limits = load_limits(file)
     if columns is not None:

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 import pytest
+from certified import certified
 from other_results import unplotted
 from reading import pdf_text
 from simulated import tumble
@@ -148,3 +149,11 @@ def test_two_pages_at_most_and_the_same_in_both_renderers(laboratory: Laboratory
     (tmp_path / "c.pdf").write_bytes(pdf(page))
     text = pdf_text(tmp_path / "c.pdf")
     assert text.count("\f") <= 2 and "Certificate 2026-1" in text and "Traceable to the national" in text
+
+
+def test_values_that_lack_for_one_reason_are_one_remark() -> None:
+    found = certified(0).report.result.coefficients
+    lacking = [dataclasses.replace(c, no_value="the record is too short") for c in (*found, *found)]
+    remarks = [text for _, text in certified(0, coefficients=lacking).remarks]
+    names = ", ".join(c.name for c in lacking)
+    assert [t for t in remarks if t.startswith("No value")] == [f"No value of {names}: the record is too short."]
