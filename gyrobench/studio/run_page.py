@@ -99,6 +99,7 @@ def _add_job_page(studio: Studio) -> None:
                 goes_on.set_visibility(now.resumable and not studio.read_only)
                 message.set_visibility(bool(message.text))
                 notes.set_text("\n".join(map(visible, now.report.notes)))
+                notes.classes(add="failed" if now.state == "failed" else "")  # a refusal is read, a table scrolls
                 stop.set_visibility(now.active and not studio.read_only)
                 again.set_visibility(now.resumable and not studio.read_only)
                 place = _place(studio, now.report.folder)

@@ -91,6 +91,7 @@ def about(found: Quieting | None) -> list[str]:
     if found is None:
         return []
     return [
-        f"a controller with {found.ratio:.3g} times what is wanted gives {found.less:.3g} times as much noise of the "
-        "sensor to the motor; half of what was left over was given away for this one: wish for more if you need it"
+        f"the controller with the most reserve meets every wish by a factor of {found.ratio:.3g} and passes "
+        f"{found.less:.3g} times as much noise of the sensor to the motor; half of its reserve was given up for quiet: "
+        "where it is needed, want more"
     ]
