@@ -30,7 +30,7 @@ from gyrobench.bench import display_path
 from gyrobench.engine.fmu_instance import FmuCallError, FmuInstance
 from gyrobench.engine.program import Program
 from gyrobench.engine.reference_engine import RunState, read_outputs
-from gyrobench.errors import GyrobenchError
+from gyrobench.errors import RESUMING, Advice, GyrobenchError
 from gyrobench.files import write_whole
 
 FILE = "checkpoint.npz"
@@ -269,6 +269,11 @@ class CheckpointManager:
     def save_on_interrupt(self, state: RunState) -> None:
         """Write the checkpoint of a run that the user stopped, or keep the reason why there is none."""
         self.lost = self.obstacle or self.write(state)
+
+    @property
+    def going_on(self) -> tuple[Advice, ...]:
+        """What continues an interrupted run."""
+        return () if self.lost else (Advice("resume", f"{RESUMING} continues it"),)
 
     def write(self, state: RunState) -> str:
         """Write the checkpoint; return what prevents it, "" where nothing: the run itself is sound."""

@@ -24,7 +24,6 @@ from gyrobench.engine.reference_engine import RunState
 from gyrobench.engine.run_board import RunBoard
 from gyrobench.engine.run_driver import EngineStopped, Interrupts, ProgressReport, Schedule
 from gyrobench.engine.run_errors import ParameterRefusedError, RunError, RunInterrupted
-from gyrobench.errors import RESUMING, Advice
 from gyrobench.files import sha256, temporary_folder, unzip_fmu
 from gyrobench.record.record import Record, rows_to_columns
 from gyrobench.record.run_document import LinearModels, PartInfo, PlanRow, RunDocument, package_versions
@@ -319,9 +318,8 @@ class Session:
         if isinstance(problem, EngineStopped) and problem.by_user:
             if checkpoints is None:
                 raise RunInterrupted(str(problem), record)
-            if checkpoints.lost:
-                raise RunInterrupted(f"{problem}; it cannot be resumed: {checkpoints.lost}", record)
-            raise RunInterrupted(str(problem), record).advised(Advice("resume", f"{RESUMING} continues it"))
+            lost = f"; it cannot be resumed: {checkpoints.lost}" if checkpoints.lost else ""
+            raise RunInterrupted(f"{problem}{lost}", record).advised(*checkpoints.going_on)
         if problem is not None:
             raise RunError(text, record)
         if checkpoints is not None and out is not None:
