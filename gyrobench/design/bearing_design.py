@@ -79,12 +79,12 @@ def rows(d: BearingDesign) -> list[tuple[str, str]]:
     kgf, arcsec = 9.80665, math.pi / 648000.0
     return [
         ("pressure behind the orifices, centred", f"{found['pressure_ratio']:.3f} of the supply"),
-        ("stiffness", f"{found['stiffness'] * 1e-6:.4g} N/μm ({found['stiffness'] / kgf * 1e-6:.4g} kgf/μm)"),
+        ("stiffness", f"{found['stiffness'] * 1e-6:.4g} N/µm ({found['stiffness'] / kgf * 1e-6:.4g} kgf/µm)"),
         ("stiffness against tilt", f"{found['tilt_stiffness'] * arcsec:.4g} N·m/″ "
          f"({found['tilt_stiffness'] / kgf * arcsec:.4g} kgf·m/″)"),
         (f"load at an eccentricity of {FULL:g}", f"{found['greatest_load']:.0f} N"),
-        ("stiffest gap of this bearing", f"{found['stiffest_gap'] * 1e6:.3g} μm, "
-         f"{found['greatest_stiffness'] * 1e-6:.4g} N/μm"),
+        ("stiffest gap of this bearing", f"{found['stiffest_gap'] * 1e6:.3g} µm, "
+         f"{found['greatest_stiffness'] * 1e-6:.4g} N/µm"),
         ("eccentricity under the load", f"{d.eccentricity:.4g} at {d.load:.4g} N"),
         ("viscous torque of the journal", f"{d.viscous:.4g} N·m·s/rad"),
     ]  # fmt: skip

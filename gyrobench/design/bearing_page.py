@@ -138,8 +138,8 @@ def stiffness_curve(d: BearingDesign) -> str:
     ticks = [3, 5, 10, 20, 50, 100]
     ax.set_xticks(ticks, [str(t) for t in ticks])
     ax.set_xticks([], minor=True)
-    ax.set_xlabel(axis_label("gap", "μm"))
-    ax.set_ylabel(axis_label("stiffness", "N/μm"))
+    ax.set_xlabel(axis_label("gap", "µm"))
+    ax.set_ylabel(axis_label("stiffness", "N/µm"))
     return svg(fig, "stiffness")
 
 
@@ -151,5 +151,5 @@ def slope_curve(d: BearingDesign) -> str:
     slope = [(b.load(float(e) + step) - b.load(float(e))) / (step * b.gap) * 1e-6 for e in eps]
     ax.plot(eps, slope, color=BLUE)
     ax.set_xlabel(axis_label("eccentricity ε", "1"))
-    ax.set_ylabel(axis_label("stiffness dW/de", "N/μm"))
+    ax.set_ylabel(axis_label("stiffness dW/de", "N/µm"))
     return svg(fig, "slope")

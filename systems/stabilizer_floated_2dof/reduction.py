@@ -238,9 +238,9 @@ def _network(loop: LagLeadLoop, C2: float) -> list[Table]:
     R1, C1, R2 = found
     rows: list[list[Any]] = [
         ["R1", R1 * 1e-3, "kΩ"],
-        ["C1", C1 * 1e6, "μF"],
+        ["C1", C1 * 1e6, "µF"],
         ["R2", R2 * 1e-3, "kΩ"],
-        ["C2", C2 * 1e6, "μF"],
+        ["C2", C2 * 1e6, "µF"],
     ]
     caption = (
         "R1 beside C1 in series, R2 with C2 to ground, driven by a voltage and without load: its times are those of "
