@@ -35,10 +35,13 @@ SPELLED = {"grad": "deg", "sek": "s", "std": "h", "c": "degC", "°c": "degC", "v
 #: end of a name without a unit beside it, as loggers write it: gx_dps, ts_us -> unit
 ENDINGS = {
     "dps": "dps", "mdps": "mdps", "degs": "deg/s", "deg_s": "deg/s", "rads": "rad/s", "rad_s": "rad/s", "degh": "deg/h",
-    "deg_h": "deg/h", "g": "g", "mg": "mg", "ms2": "m/s2", "mps2": "m/s2", "m_s2": "m/s2", "c": "degC", "degc": "degC",
+    "deg_h": "deg/h", "g": "g", "mg": "mg", "ms2": "m/s2", "mps2": "m/s2", "m_s2": "m/s2",
+    "C": "degC", "c": "degC", "degC": "degC", "degc": "degC",
     "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
 }  # fmt: skip
-ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})", re.IGNORECASE)
+ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})")
+#: units whose sign means something else elsewhere (mg is milligauss, too) -> names that they count beside
+SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]_?[xyz]).*")}
 #: name of the bench, or its beginning -> what laboratories call it
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
@@ -163,10 +166,10 @@ def _read_unit(text: str) -> str | None:
 
 
 def _unit_at_end(text: str) -> tuple[str, str]:
-    """Return a name, and the unit that it ends with, "" for none; "s" and "c" count where the name says what it is."""
+    """Return a name, and the unit that it ends with, "" for none: one that the name does not contradict."""
     if match := ENDING.fullmatch(text):
-        name, unit = match[1], ENDINGS[match[2].lower()]
-        said = {"degC": r".*temp.*"}.get(unit, CALLED["time"] if units.same_dimension(unit, "s") else ".*")
+        name, unit = match[1], ENDINGS[match[2]]
+        said = CALLED["time"] if units.same_dimension(unit, "s") else SAID.get(unit, ".*")
         if re.fullmatch(said, name, re.IGNORECASE):
             return name, unit
     return text, ""

@@ -296,17 +296,20 @@ def test_what_is_not_plain_goes_row_by_row(row: str, tmp_path: Path, monkeypatch
 
 
 def test_units_at_the_end_of_a_name_and_the_way_to_a_map(tmp_path: Path, command: Any) -> None:
-    """A logger's own header is refused as it is, with the command that reads it; a bare "s" or "c" is no unit."""
-    text = "fw 2\nts_us,gx_dps,Gyro_Y_rad_s,az_m_s2,die_temp_C,axis_c,mode_s\n" + "10000,0.1,0.2,9.8,21.5,1,2\n" * 9
+    """A header of its own is refused with the command that reads it; no unit: a bare s or c, the mg of a magnet."""
+    text = (
+        "fw 2\nts_us,gx_dps,Gyro_Y_rad_s,az_m_s2,die_temp_C,axis_c,mode_s,mag_x_mg,acc_y_mg\n"
+        + "1,0.1,0.2,9.8,21.5,1,2,3,4\n" * 9
+    )
     names = [(c.name, c.unit) for c in find_layout(written(tmp_path / "a log.csv", text)).columns]
     assert names == [("ts", "us"), ("gx", "dps"), ("Gyro_Y", "rad/s"), ("az", "m/s2"), ("die_temp", "degC"),
-                     ("axis_c", ""), ("mode_s", "")]  # fmt: skip
+                     ("axis_c", ""), ("mode_s", ""), ("mag_x_mg", ""), ("acc_y", "mg")]  # fmt: skip
     code, _, err = command("reduce", "drift_record", "--data", tmp_path / "a log.csv")
     fit = next(line for line in err.splitlines() if "gyrobench fit" in line)
     assert code == 2 and f"gyrobench fit '{tmp_path / 'a log.csv'}' --system drift_record --out 'a log.toml'" in fit
     code, _, err = command("fit", tmp_path / "a log.csv", "--system", "drift_record", "--out", tmp_path / "m.toml")
     assert code == 0 and f"--columns {tmp_path / 'm.toml'}" in err and "by hand" not in err
-    assert (tmp_path / "m.toml").read_text(encoding="utf-8").count("unit = ") == 5
+    assert (tmp_path / "m.toml").read_text(encoding="utf-8").count("unit = ") == 6
     own = "# type_b = none\ntime [s],rate [deg/h]\n0,x\n1,2\n"  # the names of the bench: a map would change nothing
     code, _, err = command("reduce", "drift_record", "--data", written(tmp_path / "own.csv", own))
     assert code == 2 and "gyrobench fit" not in err, err
