@@ -42,6 +42,7 @@ def learn(
         raise UsageError(f"--out {out}: a page ends in .html")
     path = out or home.products / f"lesson-{name}.html"
     item = lesson(name, home)
+    item.texts(language)  # refused before it is said that something is made
     typer.echo("The simulation of the page is compiled; at the first time this takes a while.", err=True)
     write_lesson(item, path, language, home)
     echo(display_path(path))

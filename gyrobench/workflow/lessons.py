@@ -26,7 +26,7 @@ from typing import Any
 
 from gyrobench import reading, units
 from gyrobench.bench import Bench, UsageError, standard_folder
-from gyrobench.report.language import ENGLISH, catalogue, check_code
+from gyrobench.report.language import ENGLISH, catalogue, check_code, codes
 from gyrobench.report.render import equation_svg
 from gyrobench.workflow.formula import Formula
 from gyrobench.workflow.settings import load_system
@@ -54,7 +54,9 @@ class Lesson:
     def texts(self, language: str = ENGLISH) -> Mapping[str, Any]:
         """Return its texts in a language.  Raises UsageError for one that it does not have."""
         if language not in self.data:
-            raise UsageError(f"lesson {self.name}: there is no text in '{language}'")
+            raise UsageError(
+                f"lesson {self.name}: there is no text in '{language}'; there are: {', '.join(k for k in codes() if k in self.data)}"
+            )
         found: Mapping[str, Any] = self.data[language]
         return found
 

@@ -250,3 +250,8 @@ def test_the_page_of_a_lesson(tmp_path: Path) -> None:
         said = browser.run(f"{visible}.map(e => e.textContent).join(' | ')")
         assert set(WORD.findall(said)) <= {"cos", "min", "rad", "CSV"}, said
         assert browser.console == [], "no request, no error"
+
+
+def test_a_language_without_a_text_is_refused_before_anything_is_compiled(command: Any) -> None:
+    code, out, err = command("learn", "keyhole", "--language", "de")
+    assert (code, out, err) == (2, "", "gyrobench: lesson keyhole: there is no text in 'de'; there are: en, zh\n")
