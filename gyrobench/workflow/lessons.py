@@ -54,9 +54,8 @@ class Lesson:
     def texts(self, language: str = ENGLISH) -> Mapping[str, Any]:
         """Return its texts in a language.  Raises UsageError for one that it does not have."""
         if language not in self.data:
-            raise UsageError(
-                f"lesson {self.name}: there is no text in '{language}'; there are: {', '.join(k for k in codes() if k in self.data)}"
-            )
+            there = ", ".join(code for code in codes() if code in self.data)
+            raise UsageError(f"lesson {self.name}: there is no text in '{language}'; there are: {there}")
         found: Mapping[str, Any] = self.data[language]
         return found
 
