@@ -9,13 +9,13 @@ scales that read from any zero, with six orders of 0.05 to 2 arcsec and a lag, r
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from asked import asked
 
 import gyrobench as gb
 from gyrobench.system.system import load_system
@@ -192,12 +192,7 @@ def count(test: str, case: str, seeds: range, folder: Path) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=300)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--test", choices=TESTS, default=None)
-    parser.add_argument("--case", default="", help="cases whose name begins so")
-    given = parser.parse_args()
+    given = asked(__doc__, runs=300, first=1, test=["", *TESTS], case=("", "cases whose name begins so"))
     with tempfile.TemporaryDirectory() as folder:
         for test in [given.test] if given.test else TESTS:
             for case in (c for c in TESTS[test][0] if c.startswith(given.case)):

@@ -7,7 +7,6 @@ Rate and position tests are campaigns, on all cores, and in a file: campaigns/ta
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections import Counter
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from asked import asked
 
 import gyrobench as gb
 
@@ -94,11 +94,7 @@ def held_in_loop(runs: int, first: int) -> list[tuple[str, bool]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=300)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--test", choices=TESTS, default=None)
-    given = parser.parse_args()
+    given = asked(__doc__, runs=300, first=1, test=["", *TESTS])
     for name in [given.test] if given.test else TESTS:
         held: Counter[str] = Counter()
         all_of: Counter[str] = Counter()
