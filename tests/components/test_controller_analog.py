@@ -1,4 +1,4 @@
-"""Analogue controller: networks against python-control, count loop, tachometer loop, presets; the capture law."""
+"""Analogue controller: networks against python-control, count loop, tachometer loop, presets."""
 
 import math
 
@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from wired import BENCH, begun
 
-from gyrobench.component import Component, ComponentError, Input, Output, sampled
-from gyrobench.component.blocks.control import Capture
+from gyrobench.component import ComponentError
 from gyrobench.packaging import load_part
 
 Controller = load_part("controller_analog", BENCH)
@@ -150,108 +149,3 @@ def test_rates_of_the_tachometer_loop(rate, text):
     with pytest.raises(ComponentError, match=text):
         for k in range(3):
             part.do_step(k * 1e-3, 1e-3)
-
-
-# ---------------------------------------------------------------------------------------------- capture
-class Capturing(Component):
-    """Capture law and fine loop on a table with a float gyro (H/c 4/3, 1 ms), as a part."""
-
-    theta = Input(0.0, "rad", "float angle, positive for a table that lags")
-    tacho = Input(0.0, "rad/s", "table rate")
-    close = Input(1.0, "1", "1 closes the loop")
-    stage = Output("1", "stage")
-    torque = Output("N.m", "demand")
-    switched = Output("1", "1 at the switch")
-    law = Capture(sensitivity=4.0 / 3.0)
-
-    @sampled(every=1)
-    def tick(self) -> None:
-        self.law.advance(self.close, self.theta, self.tacho, self.h)
-
-    def outputs(self) -> None:
-        self.stage = self.law_stage
-        self.switched = self.law_switched
-        self.torque = self.law.demand(self.theta, self.tacho)
-
-
-def simulate(fine_from_the_start, time, h=1e-4):
-    """Table, float and motor lag of 0.5 ms; the fine loop is the network of 1 ms.  Semi-implicit steps of 0.1 ms."""
-    H, tau, lag, w = 0.04, 1e-3, 0.5e-3, 100 * math.pi
-    c = 0.03
-    table = control.tf([H], [J * c * tau, J * c, H * H, 0]) * control.tf([1], [lag, 1])
-    gain = 1 / abs((table * network(2, w))(1j * w))
-    net = control.ss(gain * network(2, w))
-    dn = control.sample_system(net, h, "zoh")
-    # float angle, float rate, table rate, motor torque: exact step with the torque demanded held
-    a = np.zeros((4, 4))
-    a[0, 1] = 1
-    a[1, 1:3] = -1 / tau, H / (c * tau)
-    a[2, 1], a[2, 3] = -H / J, -1 / J
-    a[3, 3] = -1 / lag
-    plant = control.sample_system(control.ss(a, np.array([[0], [0], [0], [1 / lag]]), np.eye(4), np.zeros((4, 1))), h)
-    part = Capturing()
-    part.initialize()
-    x, xn, rows = np.array([2 * DEG, 0, 0, 0.0]), np.zeros(net.nstates), []
-    fine, t_switch = fine_from_the_start, None
-    for k in range(round(time / h)):
-        seen = float(np.clip(x[0], -0.5 * DEG, 0.5 * DEG))
-        if not fine:
-            part.theta, part.tacho = seen, -x[2]
-            if k % 10 == 0:
-                part.do_step(k * h, 1e-3)
-            u = part.get("torque")
-            if part.stage == 2.0:
-                fine, t_switch = True, k * h
-                xn = np.linalg.solve(np.eye(net.nstates) - dn.A, dn.B[:, 0] * seen)
-        if fine:
-            u = float((dn.C @ xn + dn.D[:, 0] * seen)[0])
-            xn = dn.A @ xn + dn.B[:, 0] * seen
-        x = plant.A @ x + plant.B[:, 0] * float(np.clip(u, -M_MAX, M_MAX))
-        x[2] -= h / J * 1400 * GCM * math.tanh(x[2] / 1e-4)
-        rows.append((x[0], x[2]))
-    return t_switch, np.array(rows)
-
-
-def test_capture_from_two_degrees():
-    t_switch, rows = simulate(False, 3.0)
-    assert t_switch == pytest.approx(2.17, abs=0.05)
-    outside = np.flatnonzero(np.abs(rows[:, 0]) > ARCSEC * 4 / 3)
-    assert outside[-1] * 1e-4 == pytest.approx(2.31, abs=0.1)
-    assert np.abs(rows[:, 1]).max() / DEG == pytest.approx(1.95, abs=0.05)
-    assert -rows[:, 0].min() / ARCSEC < 25
-
-
-@pytest.mark.long
-def test_the_fine_loop_closed_at_two_degrees_diverges():
-    _, rows = simulate(True, 3.0)
-    assert np.abs(rows[-10000:, 0]).max() > 2 * DEG
-
-
-def test_the_capture_opens_and_begins_anew():
-    part = Capturing()
-    part.theta = 1e-5
-    part.initialize()
-    stages = []
-    for k in range(120):
-        part.close = 0.0 if 60 <= k < 65 else 1.0
-        part.do_step(k * 1e-3, 1e-3)
-        stages.append(part.stage)
-    assert (
-        stages[:50] == [1.0] * 50 and stages[50:60] == [2.0] * 10 and stages[60:65] == [0.0] * 5 and stages[65] == 1.0
-    )
-
-
-@pytest.mark.parametrize(
-    ("parameters", "theta", "text"),
-    [
-        ({"law_tacho": 0}, 0.0, "needs a tachometer"),
-        ({"law_near": 12 * ARCSEC}, 0.0, "beyond the linear range of the fine loop"),
-        ({}, 6 * DEG, "the sensor is at its stop"),
-    ],
-)
-def test_capture_refusals(parameters, theta, text):
-    with pytest.raises(ComponentError, match=text):
-        part = Capturing(**parameters)
-        part.theta = theta
-        part.initialize()
-        part.do_step(0.0, 1e-3)

@@ -1,4 +1,4 @@
-"""Control of a table axis: sampled controller, analogue networks, tachometer loop, capture, in-position window."""
+"""Control of a table axis: sampled controller, analogue networks, tachometer loop, in-position window."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from gyrobench.component.composition import Block
 from gyrobench.component.declarations import Discrete, Parameter, State
 from gyrobench.component.math import Number, Vector, clip, exp, fabs, floor, index, pi, sqrt, vector
 
-OFF, CAPTURE, FINE = 0.0, 1.0, 2.0  # stages of the capture
 DEG = pi / 180.0
 
 
@@ -330,71 +329,3 @@ class TachoLoop(Block):
             "the rate set is below {self}_rate_least = {rate_least} rad/s: use the synchronous rate (count loop)",
         )
         self.rate_last = rate
-
-
-class Capture(Block):
-    """Return of a table from a large offset to the range of its fine loop.  [CTRL-CAPTURE]
-
-        capture  demand = clip(k_p clip(e, +-reach), +-k_d v_lim) - k_d w
-                 k_p = J w_n2 / sensitivity, k_d = 2 zeta w_n J
-        fine     once |e| < near and |w| < slow have held for `hold`: `switched` is 1 for that sample, the part presets
-                 its networks to e and closes the fine loop; the tachometer is off
-
-    e: error angle of the sensor (its sign: positive demands positive torque), w: table rate by the tachometer.  The
-    fine loop is linear only within M_max / stiffness; closed from 2 deg it diverges.
-    Source: requirement: Hu 1981, sections 5.5 (one-1), 6.1 (item 6); law: own design.
-    """
-
-    J = Parameter(2.56, "kg.m2", "table inertia of the design", above=0.0)
-    sensitivity = Parameter(1.0, "1", "sensor angle per table angle: H/c of a float gyro, 1 of an encoder", above=0.0)
-    rate = Parameter(8.0 * pi, "rad/s", "natural frequency while capturing (4 Hz)", above=0.0)
-    damping = Parameter(1.2, "1", "damping ratio while capturing, by the tachometer", above=0.0)
-    speed = Parameter(2.0 * DEG, "rad/s", "speed limit while capturing (2 deg/s)", above=0.0)
-    reach = Parameter(0.5 * DEG, "rad", "sensor angle at which the sensor is saturated (0.5 deg)", above=0.0)
-    near = Parameter(8.0 * ARCSEC, "rad", "fine below this sensor angle (8 arcsec)", above=0.0)
-    slow = Parameter(3e-5, "rad/s", "fine below this rate", above=0.0)
-    hold = Parameter(0.05, "s", "when both held for this long", min=0.0)
-    stop = Parameter(5.0 * DEG, "rad", "sensor angle of its stop (5 deg)", above=0.0)
-    stiffness = Parameter(2.672e5, "N.m/rad", "static stiffness of the fine loop (13209 g.cm/arcsec)", above=0.0)
-    M_max = Parameter(9.80665, "N.m", "largest torque of the motor (1 kg.m)", above=0.0)
-    tacho = Parameter(1, int, "1: a tachometer is connected", min=0, max=1)
-
-    stage = Discrete(OFF, "1", "0 off, 1 capture, 2 fine")
-    switched = Discrete(0.0, "1", "1 at the sample that goes over to fine")
-    held = Discrete(0.0, "s", "time for which near and slow have held")
-    k_p = Discrete(0.0, "N.m/rad", "torque per sensor angle")
-    k_d = Discrete(0.0, "N.m.s/rad", "torque per rate")
-
-    def start(self) -> None:
-        self.refuse(self.tacho == 0.0, "capture needs a tachometer: without damping the table swings through null")
-        self.refuse(
-            self.near > self.sensitivity * self.M_max / self.stiffness,
-            "near = {near} rad is beyond the linear range of the fine loop, sensitivity M_max / stiffness",
-        )
-        self.k_p = self.J * self.rate * self.rate / self.sensitivity
-        self.k_d = 2.0 * self.J * self.rate * self.damping
-        self.stage = OFF
-        self.held = 0.0
-        self.switched = 0.0
-
-    def advance(self, close: Number, e: Number, w: Number, time: Number) -> None:
-        """Take a sample.  close: 1 wants the loop closed, 0 opens it; time: since the last sample, s."""
-        self.switched = 0.0
-        if close == 0.0:
-            self.stage = OFF
-            self.held = 0.0
-        elif self.stage == OFF:
-            self.refuse(fabs(e) >= self.stop, "the sensor is at its stop = {stop} rad: bring the table nearer by hand")
-            self.stage = CAPTURE
-            self.held = 0.0
-        elif self.stage == CAPTURE:
-            self.held = self.held + time if fabs(e) < self.near and fabs(w) < self.slow else 0.0
-            if self.held > self.hold:
-                self.stage = FINE
-                self.switched = 1.0
-
-    def demand(self, e: Number, w: Number) -> Number:
-        """Return the torque demanded while capturing, N.m."""
-        most = self.k_d * self.speed
-        push = clip(self.k_p * clip(e, -self.reach, self.reach), -most, most)
-        return clip(push - self.k_d * w, -self.M_max, self.M_max)
