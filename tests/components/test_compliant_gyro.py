@@ -1,7 +1,6 @@
 """Third-order dynamics against the transfer functions of Hu 1981, the loop, and what it shares with floated_gyro."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -187,7 +186,7 @@ def test_same_drift_and_the_same_noise_as_the_floated_gyro():
 @pytest.mark.parametrize("port, name", [("white", "drift"), ("pickoff", "u")])
 def test_noise_density_does_not_depend_on_the_step(port, name, h):
     n, size = 12_000, 3e-7
-    part = started(partial(Native, "compliant_gyro"), **{**QUIET, **NO_DRIFT, port: size, "step": 1.0})
+    part = started("compliant_gyro", **{**QUIET, **NO_DRIFT, port: size, "step": 1.0})
     x = np.empty(n)
     for k in range(n):
         part.do_step(k * h, h)
