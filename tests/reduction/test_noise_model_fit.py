@@ -292,6 +292,7 @@ def test_steps_wild_and_missing_samples() -> None:
     assert model.agrees, "with what was taken out the deviation is that of the record as it was"
 
 
+@pytest.mark.long
 def test_steps_are_found_one_beside_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Levels 0, 1, -1, 0 of white noise of 1, a wild sample: three steps, and the record is completed anew once."""
     rng, n = np.random.default_rng(6), 8000
