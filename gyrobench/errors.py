@@ -36,7 +36,7 @@ class GyrobenchError(Exception):
 
     @property
     def text(self) -> str:
-        """What is wrong, without the advice."""
+        """Return what is wrong, without the advice."""
         return super().__str__()
 
     def __str__(self) -> str:

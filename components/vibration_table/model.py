@@ -3,7 +3,7 @@ from __future__ import annotations
 import math
 
 from gyrobench.component import IDENTITY, Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.component.math import Vector, clip, cos, cross, dot, exp, fabs, floor, log, pi, sin, sqrt, vector
+from gyrobench.component.math import Vector, clip, cross, dot, exp, fabs, floor, log, pi, sin, sqrt, vector
 from gyrobench.component.set_up import each
 
 LINES = 12  # sines
@@ -20,7 +20,7 @@ class VibrationTable(Component):
     f_k: in equal ratios from `low` to `high`, each at the next odd multiple of 1/repeat; phases by the seed.  Over
     `repeat` the mean of s is 0 and that of s2 is 1, and no two lines add up to a third, so that the mean of s3 is 0,
     too.  level goes to the one asked for, in a straight line within `ramp`.  R(lean): the case is turned on its fixture
-    against `face` by this vector, of its own with the axis along the vibration up and down.
+    against `face` about this vector by 2 atan |lean|/2, of its own with the axis along the vibration up and down.
     Not modelled: servo and resonances of the table, motion across and about the axis, distortion, limits of its travel.
     Source: IEEE 1293 (vibration rectification); own form.
     """
@@ -109,10 +109,8 @@ class VibrationTable(Component):
         turn = vector(self.lean_up)
         if upward < 0.0:
             turn = vector(self.lean_down)
-        angle = sqrt(dot(turn, turn))
-        along = turn / angle if angle > 0.0 else turn
-        around = (1.0 - cos(angle)) * dot(along, v)
-        return vector(cos(angle) * v - sin(angle) * cross(along, v) + around * along)
+        g = 0.5 * turn  # of Gibbs: rational, so that it has derivatives at no lean as well
+        return vector(v + 2.0 / (1.0 + dot(g, g)) * cross(g, cross(g, v) - v))
 
     def outputs(self) -> None:
         self.f = self.face @ self.seen(self.shaken())

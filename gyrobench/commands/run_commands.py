@@ -170,7 +170,7 @@ def reduce(
 
     test = load_test(system)
     if template:
-        from gyrobench.workflow.measured_run import empty_record
+        from gyrobench.workflow.empty_record import empty_record
 
         echo(empty_record(test).rstrip("\n"))
         return

@@ -272,7 +272,7 @@ class CheckpointManager:
 
     @property
     def going_on(self) -> tuple[Advice, ...]:
-        """What continues an interrupted run."""
+        """Return what continues an interrupted run, nothing where no checkpoint could be written."""
         return () if self.lost else (Advice("resume", f"{RESUMING} continues it"),)
 
     def write(self, state: RunState) -> str:

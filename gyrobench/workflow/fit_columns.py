@@ -24,8 +24,8 @@ from gyrobench.record.column_proposal import (
 from gyrobench.record.log_files import as_text, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
+from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
-from gyrobench.workflow.measured_run import empty_record
 
 MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")

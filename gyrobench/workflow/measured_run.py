@@ -17,31 +17,13 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.record.run_document import DataFile
 from gyrobench.report import FORMATS
-from gyrobench.system.suite import Suite
 from gyrobench.system.system import MeasuredData, System
+from gyrobench.workflow.empty_record import measured_data
 from gyrobench.workflow.feedback import SILENT, Feedback
-from gyrobench.workflow.inputs import find_specification, load_limits, load_test
+from gyrobench.workflow.inputs import find_specification, load_limits
 from gyrobench.workflow.run_folders import prepare_folder
 from gyrobench.workflow.saved_run import RunOutcome, write_report
 from gyrobench.workflow.user_errors import record_kept
-
-
-def empty_record(test: System | Suite) -> str:
-    """Return an empty CSV with the columns that ``gyrobench reduce`` reads, and what each means.  Raises UsageError."""
-    from gyrobench.system.lab_record import explained
-
-    if isinstance(test, Suite):
-        raise UsageError(f"{test.name} compares runs: reduce each record by its own test, then give it their folders")
-    return explained(_measured_data(test).template, test.options)
-
-
-def _measured_data(system: System) -> MeasuredData:
-    """Return how a laboratory's record is read.  Raises UsageError for a system without, naming those that have one."""
-    if system.measured_data is None:
-        tests = {name: load_test(name) for name in Bench.find().systems()}
-        known = [n for n, t in tests.items() if not isinstance(t, Suite) and t.measured_data is not None]
-        raise UsageError(f"{system.name} has no reduction of measured data; there is one for {', '.join(known)}")
-    return system.measured_data
 
 
 def reduce_measured(
@@ -61,7 +43,7 @@ def reduce_measured(
     values: as given to --set, for the reader.  columns: column map of a file of another layout.  Raises
     UsageError, DataError, ReductionError and PostRunError.
     """
-    measured = _measured_data(system)
+    measured = measured_data(system)
     data = Bench.find().existing(data)
     if data.is_dir() and not (data / RUN).is_file():
         raise UsageError(f"{data}: no run there (no {RUN}); name a file, or the folder of a run")
@@ -103,7 +85,7 @@ def find_faults(system: System, data: Path, values: Mapping[str, str], columns: 
 
     Arguments as of :func:`reduce_measured`.  Raises UsageError for what is wrong beside the file.
     """
-    measured = _measured_data(system)
+    measured = measured_data(system)
     try:
         if columns is not None:
             _read_mapped(measured, system, data, values, columns, SILENT)

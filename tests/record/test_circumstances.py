@@ -16,7 +16,7 @@ from gyrobench.system.lab_record import POLARITY, WITH_POLARITY
 from gyrobench.system.suite import load_test
 from gyrobench.system.system import System, load_system
 from gyrobench.system.values import InvalidValueError
-from gyrobench.workflow.measured_run import empty_record
+from gyrobench.workflow.empty_record import empty_record
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 RECORDS = {f.stem: f for f in sorted(CORPUS.glob("*.csv"))}

@@ -10,8 +10,9 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, nearly_whole
+from gyrobench.reduction.noise_model.terms import MEANS, PEAKS
 
+NEARLY_WHOLE = 0.02  # of the width of an average: a mean over a whole number of samples is tried in its place
 STEPS = 40  # of the search for a maximum
 PRICE = 2.5  # of a parameter of a filter, of the logarithm of the evidence
 FLAT = 1e-2  # information of a parameter below which the search leaves it where it is
@@ -99,3 +100,10 @@ def by_chance(model: Model, p: Array, information: Array) -> float:
             out += max(math.log(cell * math.sqrt((information[at + 1, at + 1] + WIDEST) / (2.0 * math.pi))), 0.0)
         at += term.size
     return out
+
+
+def nearly_whole(log_width: float) -> int:
+    """Return the whole number of samples, from two on, that the width of an average is nearly, 0 where it is none."""
+    width = math.exp(log_width)
+    whole = round(width)
+    return whole if whole > 1 and abs(width / whole - 1.0) < NEARLY_WHOLE else 0

@@ -10,10 +10,10 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.maximum import Fitted, maximize
+from gyrobench.reduction.noise_model.maximum import Fitted, maximize, nearly_whole
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, nearly_whole, samples_of
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, samples_of
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence

@@ -44,7 +44,6 @@ SLOW = ("gauss_markov", "flicker", "walk")
 DIGITAL = ("butterworth", "cascade")  # filters that slow noise passes too, as they hold back what it has above them
 SIZES = {"gauss_markov": 2, "resonance": 3, "band": 3}  # parameters, one of other terms
 MEANS = ("mean", "boxcar")  # over a whole number of samples, with zeros; slow noise passes a boxcar too
-NEARLY = 0.02  # of the width of an average: a mean over a whole number of samples is tried in its place
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
@@ -195,13 +194,6 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
 def samples_of(name: str) -> int:
     """Return the samples that a filter of MEANS is over."""
     return int(name.lstrip(string.ascii_lowercase))
-
-
-def nearly_whole(log_width: float) -> int:
-    """Return the whole number of samples, two or more, that the width of an average is within NEARLY of, 0 of none."""
-    width = math.exp(log_width)
-    whole = round(width)
-    return whole if whole > 1 and abs(width / whole - 1.0) < NEARLY else 0
 
 
 def passes_slow(name: str) -> bool:
