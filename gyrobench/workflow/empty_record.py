@@ -1,4 +1,4 @@
-"""What a laboratory's record of a test holds: the columns that it is read by."""
+"""Empty record of a test: the columns that a laboratory's file is read by."""
 
 from __future__ import annotations
 
