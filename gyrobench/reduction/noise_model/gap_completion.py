@@ -102,6 +102,12 @@ def smooth_spectrum(power: Array) -> Array:
     return out
 
 
+def ordinates(x: Array) -> Array:
+    """Return those of the cosine transform of a series (n,)."""
+    out: Array = fft.dct(x, norm="ortho")
+    return out
+
+
 class _Precision:
     """Products with the precision P of a spectrum S (n,)."""
 
@@ -109,10 +115,14 @@ class _Precision:
         self.S = S
 
     def __call__(self, x: Array) -> Array:
-        out: Array = fft.idct(fft.dct(x, norm="ortho") / self.S, norm="ortho")
+        return self.of(ordinates(x))
+
+    def of(self, X: Array) -> Array:
+        """Return the product with the series of ordinates X (n,)."""
+        out: Array = fft.idct(X / self.S, norm="ortho")
         return out
 
-    @property
+    @functools.cached_property
     def diagonal(self) -> float:
         return float(np.mean(1.0 / self.S))
 
@@ -149,11 +159,15 @@ def level(x: Array) -> Array:
     n = x.size
     size = min(BLOCK, max(n // 4, 1))
     parts = x[: n // size * size].reshape(-1, size)
-    there = np.isfinite(parts).sum(axis=1) > size // 4
+    known = np.isfinite(parts).sum(axis=1)
+    there = known > size // 4
     if not there.any():
         return np.full(n, float(np.nanmedian(x)))
     middle = (np.arange(parts.shape[0]) + 0.5) * size
-    out: Array = np.interp(np.arange(n), middle[there], np.nanmedian(parts[there], axis=1))
+    medians = np.median(parts, axis=1)  # the faster one, of the blocks that are whole
+    part = there & (known < size)
+    medians[part] = np.nanmedian(parts[part], axis=1)
+    out: Array = np.interp(np.arange(n), middle[there], medians[there])
     return out
 
 
@@ -208,14 +222,8 @@ def core_excess(z: Array) -> float:
 
     def squares(s: float) -> float:
         c = CORE / s
-        return (
-            s
-            * s
-            * (
-                1.0
-                - 2.0 * c * math.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi) / float(special.erf(c / math.sqrt(2.0)))
-            )
-        )
+        density = math.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi)
+        return s * s * (1.0 - 2.0 * c * density / float(special.erf(c / math.sqrt(2.0))))
 
     s = math.sqrt(m2)
     for _ in range(30):
@@ -238,8 +246,9 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     S: Array | None = None
     stays = True
     draws = min(max(DRAWS // x.size, 1), 4)
+    Y = ordinates(y)
     for k in range(MOST_ROUNDS):
-        now = smooth_spectrum(fft.dct(y, norm="ortho") ** 2 + lost)
+        now = smooth_spectrum(Y**2 + lost)
         change = math.inf if S is None else changed(now, S)
         stays = change < STAYS
         if k >= ROUNDS and change < RESTS:
@@ -254,12 +263,15 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
             wild &= far > AGAIN * float(-special.ndtri(0.5 * FALSE / x.size))
             y = _filled(x, missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
-            z = P(y) / math.sqrt(P.diagonal)
+            Y = ordinates(y)
+            z = P.of(Y) / math.sqrt(P.diagonal)
             fresh = _wildest(z, missing, wild) if find_wild else np.zeros(1, dtype=bool)
             if not fresh.any():
                 break
             wild |= fresh
             y = _filled(x, missing | wild, P)
+        else:
+            Y = ordinates(y)
         at = np.flatnonzero(missing | wild)
         if not at.size:
             stays = True
@@ -273,6 +285,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         at = np.flatnonzero(missing | wild)
         wild[ends] = False
         y[ends] = x[ends]
+        Y = ordinates(y)
         kept = np.flatnonzero(missing | wild)
         lost, noise = _lacking(P, at, kept, AVERAGED * draws, rng) if kept.size else (np.zeros(x.size), None)
         stays = stays or not kept.size
@@ -282,7 +295,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         if excess > BELOW * float(np.sum((x[wild] - y[wild]) ** 2)) / x.size:
             excess = 0.0
         excess = min(excess, WHITE * float(P.S.min()))  # no more than is there
-    white = fft.idct(fft.dct(y, norm="ortho") / np.sqrt(P.S), norm="ortho")
+    white = fft.idct(Y / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
     return Completed(
         y,
@@ -308,7 +321,7 @@ def _lacking(
         full[at] = P.solve(at, fft.idct(rng.standard_normal(P.S.size) / np.sqrt(P.S), norm="ortho")[at])
         noise = np.zeros(P.S.size)
         noise[kept] = full[kept]
-        lost += fft.dct(noise, norm="ortho") ** 2 / draws
+        lost += ordinates(noise) ** 2 / draws
     return lost, noise
 
 
@@ -345,7 +358,7 @@ def mostly_known(x: Array, extra: Array | None) -> bool:
     """Return whether most of the power in every octave is that of x (n,), not of what the completion lacks."""
     if extra is None:
         return True
-    return bool(np.all(octaves(extra) < MOST_LOST * octaves(fft.dct(x, norm="ortho") ** 2 + extra)))
+    return bool(np.all(octaves(extra) < MOST_LOST * octaves(ordinates(x) ** 2 + extra)))
 
 
 def changed(now: Array, before: Array) -> float:
@@ -367,7 +380,7 @@ def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:
         return x.copy()
     base = level(np.where(gone, np.nan, x))  # the gradients start from it
     y = np.where(gone, 0.0, x - base)
-    y[at] = P.solve(at, -P(y)[at] - (P(base))[at])
+    y[at] = P.solve(at, -P(y + base)[at])
     y += base
     return y
 
