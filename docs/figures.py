@@ -1,7 +1,7 @@
 """Measured figures that the pages quote:  python docs/figures.py [--write]
 
 docs/figures.toml holds them, each with unit, command and the version it was measured at; the benchmarks write it
-(tests/benchmarks/figures.py).  A page quotes a figure between marks, or a row of a table whose columns bear the
+(tests/benchmarks/quoted.py).  A page quotes a figure between marks, or a row of a table whose columns bear the
 names of the values:
 
     a day takes <!--fig speed.day-->209<!--/--> s of CPU

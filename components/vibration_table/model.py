@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import math
-
 from gyrobench.component import IDENTITY, Component, Discrete, Input, Noise, Output, Parameter, sampled
 from gyrobench.component.math import Vector, clip, cross, dot, exp, fabs, floor, log, pi, sin, sqrt, vector
 from gyrobench.component.set_up import each
@@ -35,7 +33,8 @@ class VibrationTable(Component):
                 for way in ("up", "down") for axis, x in zip(LEANS, p[f"lean_{way}"], strict=True)
             },
             "fixture.cosine": {
-                way: 1.0 - math.cos(math.hypot(*map(float, p[f"lean_{way}"][:2]))) for way in ("up", "down")
+                way: 2.0 * (x * x + y * y) / (4.0 + x * x + y * y + z * z)
+                for way in ("up", "down") for x, y, z in [map(float, p[f"lean_{way}"])]
             },
         },
     )  # fmt: skip

@@ -205,12 +205,12 @@ def _other_clock(record: LoopRecord, repeats: int) -> str:
     found = repeats * record.step
     times = max(1, round(record.period / found))  # a stated period may be several
     off = times * found / record.period - 1.0
-    clock = f"the times are off by {100.0 * off:.2g} %, and frequencies, delays and parameters with them, or "
-    text = (
+    percent = f"{100.0 * off:.2g}".replace("-", "−")
+    clock = f"the times are off by {percent} %, and frequencies, delays and parameters with them, or "
+    return (
         f"the excitation repeats every {found:.6g} s by the times of the file, {repeats} samples; the period stated is "
         f"{record.period:.6g} s: {clock if abs(off) < CLOCK else ''}the period is another. Correct what is wrong"
     )
-    return text.replace("-", "−")
 
 
 def _too_few(record: LoopRecord, samples: int, lines: LineAmplitudes, known: int) -> str:

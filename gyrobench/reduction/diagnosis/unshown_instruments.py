@@ -48,12 +48,11 @@ def shaken(record: Record) -> Iterator[HandlingCandidate]:
     if options.get("u_lean"):
         return
     seen = max(math.cos(latitude), 0.0 if options.get("axis") == "x" else abs(math.sin(latitude)))
-    leaning = {rate_name: math.sin(LEAN) * EARTH_RATE * seen, "force": 0.0}
     moved: dict[str, Array] = {}
-    for n, off in leaning.items():
-        if n in w:
-            v = np.asarray(w[n], dtype=float)
-            moved[n] = np.where(up > 0.0, v * (1.0 if off else math.cos(LEAN)) - off, v)
+    if rate_name in w:
+        moved[rate_name] = np.asarray(w[rate_name], dtype=float) - math.sin(LEAN) * EARTH_RATE * seen * (up > 0.0)
+    if "force" in w:
+        moved["force"] = np.asarray(w["force"], dtype=float) * np.where(up > 0.0, math.cos(LEAN), 1.0)
     yield HandlingCandidate("a lean of the instruments by 1° with the axis up", changed(record, **moved))
 
 
