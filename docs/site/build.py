@@ -25,7 +25,7 @@ NOTEBOOK = Path("docs/guides/first_runs.ipynb")
 #: caption of the sidebar -> pages in their order, by pattern
 CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
-    "Tests and loops": ["live", "docs/tests_and_loops", "docs/gallery", "systems/*/README"],
+    "Tests and loops": ["live", "docs/tests_and_loops", "docs/shared_options", "docs/gallery", "systems/*/README"],
     "Parts": ["docs/parts", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "instruments/README", "reports/README", "fmus/README"],

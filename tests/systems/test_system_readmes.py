@@ -11,7 +11,9 @@ from gyrobench.system.system import load_system
 
 SYSTEMS = sorted(n for n in Bench(standard_folder()).systems() if n != "drift_test_suite")
 TABLE = re.compile(r"^\| option \| default \| unit \| meaning \|\n\|---\|---\|---\|---\|\n((?:\|.*\n)+)", re.M)
-#: their table has all options, in the words of the declarations
+SHARED = "shared_options.md"
+LINK = re.compile(rf"\(../../docs/{SHARED}\)\): ([^.]+)\.")
+#: their table and this link have all options, in the words of the declarations
 WHOLE = {
     "accelerometer_four", "accelerometer_multipoint", "drift_record", "eight_position", "fixed_position",
     "imu_positions", "open_loop_drift", "pickoff_scale_factor", "rate_table_test", "servo_polar", "servo_two_axis",
@@ -23,20 +25,29 @@ PART = {
 }  # fmt: skip
 
 
+def rows_of(text: str) -> list[str]:
+    """Return the rows of the tables of options in a page."""
+    return "".join(TABLE.findall(text)).splitlines()
+
+
+SHARED_ROWS = {row.split("`")[1]: row for row in rows_of((standard_folder() / "docs" / SHARED).read_text("utf-8"))}
+
+
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_readme(name: str) -> None:
     system = load_system(name)
     assert system.folder is not None
     text = (system.folder / "README.md").read_text("utf-8")
+    shared = [n for names in LINK.findall(text) for n in re.findall(r"`(\w+)`", names)]
     listed = set()
-    for row in "".join(TABLE.findall(text)).splitlines():
+    for row in [*rows_of(text), *(SHARED_ROWS[n] for n in shared)]:
         names, default, unit, meaning = (c.strip() for c in row.strip("|").split("|"))
         for each in re.findall(r"`(\w+)`", names):
             option = system.options[each]
             listed.add(each)
             declared = option.unit if isinstance(option.unit, str) else option.unit.__name__
             assert not unit or declared in unit.split(", "), each
-            assert meaning == option.doc or name not in WHOLE, each
+            assert meaning == option.doc or (name not in WHOLE and each not in shared), each
             if re.match(r"[-\d]|true$|false$", default) and "," not in names:
                 parsed, real = (option.parse(each, d) for d in (default, option.default))
                 assert parsed == (pytest.approx(real, rel=1e-3) if isinstance(real, float) else real), each
