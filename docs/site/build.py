@@ -26,7 +26,7 @@ NOTEBOOK = Path("docs/guides/first_runs.ipynb")
 CONTENTS = {
     "Guides": ["docs/guides/first_runs", "docs/guides/*"],
     "Tests and loops": ["live", "docs/tests_and_loops", "docs/shared_options", "docs/gallery", "systems/*/README"],
-    "Parts": ["docs/parts", "components/*/README"],
+    "Parts": ["docs/parts", "docs/shared_ports", "components/*/README"],
     "Methods": ["docs/methods/README", "docs/methods/*", "docs/verdict", "docs/errata", "docs/references"],
     "Reference": ["docs/systems", "docs/public_interface", "instruments/README", "reports/README", "fmus/README"],
     "Python API": ["api/gyrobench", "api/*"],

@@ -10,17 +10,35 @@ from gyrobench.component import Input, Output, Parameter
 from gyrobench.packaging import load_part
 
 PARTS = sorted(Bench(BENCH).parts())
+SHARED = (BENCH / "docs" / "shared_ports.md").read_text(encoding="utf-8")
+LINK = re.compile(r"\(../../docs/shared_ports.md#([\w-]+)\)\):([^.]+)\.")
 
 
-@pytest.mark.parametrize("name", PARTS)
-def test_readme(name):
-    text = (BENCH / "components" / name / "README.md").read_text(encoding="utf-8")
+def rows_of(text):
+    """Return the rows of the tables of ports and parameters in a text, by name."""
     rows = {}
     for line in text.splitlines():
         cells = [c.strip() for c in line.strip("|").split("|")]
         found = re.match(r"`(\w+)(\[.*\])?`$", cells[0])
         if found and len(cells) == 5:
             rows[found[1]] = cells
+    return rows
+
+
+#: of each kind of parts: title -> rows
+KINDS = {title.lower().replace(" ", "-"): rows_of(text)
+         for title, text in re.findall(r"^## (.+)\n((?:(?!## ).*\n)+)", SHARED, re.M)}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_readme(name):
+    text = (BENCH / "components" / name / "README.md").read_text(encoding="utf-8")
+    rows = rows_of(text)
+    for kind, names in LINK.findall(text):
+        for each, shape in re.findall(r"`(\w+)(\[[^`]*\])?`", names):
+            assert each not in rows, f"{each} stands twice"
+            rows[each] = KINDS[kind][each]
+            assert rows[each][0] == f"`{each}{shape}`"
     declared = load_part(name, BENCH).declarations.values()
     for d in declared:
         if isinstance(d, Input | Output | Parameter):
