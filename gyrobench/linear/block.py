@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import functools
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component
-from gyrobench.linear.multirate import MultirateStep, multirate_step
+from gyrobench.linear.multirate import multirate_step
 from gyrobench.linear.part_linearization import jacobians
-from gyrobench.linear.sampled_model import SampledStep, sampled_step, undelayed
+from gyrobench.linear.sampled_model import sampled_step, undelayed
 
 KEPT = 256  # parts at a point
+T = TypeVar("T")
 
 
 @dataclass
@@ -72,58 +75,43 @@ class _Point:
         return hash(self._key)
 
 
+def _kept(find: Callable[[Component, list[str], list[str], float], T]) -> Callable[..., T]:
+    """Return a function of a part, its inputs and outputs, and a step that takes again what it has found."""
+
+    @functools.lru_cache(maxsize=KEPT)
+    def found(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> T:
+        return find(point.part, [*inputs], [*outputs], step)
+
+    def of(part: Component, inputs: list[str], outputs: list[str], step: float) -> T:
+        return found(_Point(part), tuple(inputs), tuple(outputs), step)
+
+    return of
+
+
+@_kept
 def block_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> LinearBlock:
     """Return the part, slot = its instance name, linearized at its present point.  Raises ComponentError."""
-    return _block(_Point(part), tuple(inputs), tuple(outputs), step)
+    a, b, c, d = jacobians(part, inputs, outputs)
+    states = [s.name for s in part.states]
+    return LinearBlock(part.instance, inputs, outputs, states, a, b, c, d, _within(part, inputs, b, step))
 
 
-def step_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> SampledStep | None:
-    """Return, and raise, what :func:`gyrobench.linear.sampled_model.sampled_step` does."""
-    return _step(_Point(part), tuple(inputs), tuple(outputs), step)
+step_of, multirate_of = _kept(sampled_step), _kept(multirate_step)
 
 
-def multirate_of(part: Component, inputs: list[str], outputs: list[str], step: float) -> MultirateStep | None:
-    """Return, and raise, what :func:`gyrobench.linear.multirate.multirate_step` does."""
-    return _multirate(_Point(part), tuple(inputs), tuple(outputs), step)
-
-
+@_kept
 def undelayed_of(
     part: Component, inputs: list[str], outputs: list[str], step: float
 ) -> tuple[Array, Array, Array, Array] | None:
     """Return what :func:`gyrobench.linear.sampled_model.undelayed` does."""
-    return _undelayed(_Point(part), tuple(inputs), tuple(outputs), step)
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _block(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> LinearBlock:
-    part = point.part
-    a, b, c, d = jacobians(part, inputs, outputs)
-    states = [s.name for s in part.states]
-    return LinearBlock(part.instance, [*inputs], [*outputs], states, a, b, c, d, _within(part, inputs, b, step))
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _step(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> SampledStep | None:
-    return sampled_step(point.part, [*inputs], [*outputs], step)
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _multirate(point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float) -> MultirateStep | None:
-    return multirate_step(point.part, [*inputs], [*outputs], step)
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _undelayed(
-    point: _Point, inputs: tuple[str, ...], outputs: tuple[str, ...], step: float
-) -> tuple[Array, Array, Array, Array] | None:
     try:
-        whole = _step(point, inputs, outputs, step)
+        whole = step_of(part, inputs, outputs, step)
     except ValueError:
         return None
-    return None if whole is None else undelayed(point.part, [*inputs], [*outputs], step, whole)
+    return None if whole is None else undelayed(part, inputs, outputs, step, whole)
 
 
-def _within(part: Component, inputs: tuple[str, ...], b: Array, step: float) -> list[Array]:
+def _within(part: Component, inputs: list[str], b: Array, step: float) -> list[Array]:
     """Return B in the middle of each internal step; the one of the communication points where it is the same."""
     now = part.t
     part.step_end = now + step
