@@ -10,12 +10,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from exported import record_from_series
 from fmpy import read_model_description
 from masters import apart
 
 from gyrobench.engine.session import Session, run
 from gyrobench.exchange.container import export_container
-from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.exchange.ssp_import import read_ssp
 from gyrobench.record.record import Record

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported import record_from_series
 from masters import apart
 
 import gyrobench as gb
 from gyrobench.engine.session import run
 from gyrobench.exchange.container import export_container
-from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.system.system import System, load_system
 

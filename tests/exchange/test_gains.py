@@ -11,12 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from exported import record_from_series
 from fmpy import read_model_description
 from masters import apart
 
 from gyrobench.engine.session import run
 from gyrobench.exchange.container import export_container
-from gyrobench.exchange.external_record import find_series, record_from_series
+from gyrobench.exchange.external_record import find_series
 from gyrobench.exchange.result_files import ResultFile
 from gyrobench.exchange.ssp_export import ExportError, export_ssp
 from gyrobench.exchange.ssp_import import read_ssp

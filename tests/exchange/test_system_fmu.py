@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported import record_from_series
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 from gyrobench.engine.session import run
-from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import ExportError
 from gyrobench.exchange.system_fmu import export_fmu
 from gyrobench.system.system import System, load_system

@@ -12,9 +12,9 @@ from masters import Array, Names, PeerError, run_in
 
 from gyrobench.engine.session import run
 from gyrobench.errors import GyrobenchError
-from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import prepare, recorded
-from gyrobench.record.record import Record
+from gyrobench.record.record import WHOLE, Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.step_effect import step_effects
 from gyrobench.result import Coefficient, Result
 from gyrobench.system.system import System, load_system
@@ -23,6 +23,27 @@ ROUNDING = 1e-12  # in the units of reports
 #: systems that measure their noise: the same draws at the same step, others at another one
 NOISY = {"drift_compensation", "drift_record", "estimator_bench"}
 LATE = 200  # steps by which a tool that couples in parallel may come to the end later: some in each phase
+
+
+def record_from_series(system: System, series: Mapping[str, Array], run: RunDocument | None = None) -> Record:
+    """Return the record of a run that another tool did.
+
+    series: "slot.output" -> samples at every communication step, for the watched output and all columns of
+    ``system.windows``.  A window is complete where the watched output changes, as in runs of the bench.  Raises
+    KeyError naming the series that are missing.
+    """
+    assert system.windows is not None, f"{system.name} has no windows"
+    names = [system.windows.watch, *system.windows.columns.values()]
+    missing = [n for n in names if n not in series]
+    if missing:
+        raise KeyError(f"series missing: {', '.join(missing)}")
+    count = np.asarray(series[system.windows.watch], dtype=float)
+    at = np.flatnonzero(np.diff(count) != 0.0) + 1
+    columns = {}
+    for name, source in system.windows.columns.items():
+        column = np.asarray(series[source], dtype=float)[at]
+        columns[name] = column.astype(np.int64) if name in WHOLE else column
+    return Record(columns, {}, run or RunDocument())
 
 
 def at_step(name: str, values: Mapping[str, Any], step: float | None = None, noise: bool = False) -> System:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from archives import LAG, bound, real, write_archive
 from commanding import Command
+from exported import record_from_series
 from masters import run_in
 
 import gyrobench as gb
 from gyrobench.engine.session import run
-from gyrobench.exchange.external_record import record_from_series
 from gyrobench.exchange.ssp_export import export_ssp
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.system import Slot, System
