@@ -11,7 +11,8 @@ from gyrobench.packaging import load_part
 
 PARTS = sorted(Bench(BENCH).parts())
 SHARED = (BENCH / "docs" / "shared_ports.md").read_text(encoding="utf-8")
-LINK = re.compile(r"\(../../docs/shared_ports.md#([\w-]+)\)\):([^.]+)\.")
+#: to a kind of parts, or to another part
+LINK = re.compile(r"\(\.\./(?:\.\./docs/shared_ports\.md#([\w-]+)|(\w+)/README\.md#\w+)\)\)?:([^.]+)\.")
 
 
 def rows_of(text):
@@ -34,10 +35,11 @@ KINDS = {title.lower().replace(" ", "-"): rows_of(text)
 def test_readme(name):
     text = (BENCH / "components" / name / "README.md").read_text(encoding="utf-8")
     rows = rows_of(text)
-    for kind, names in LINK.findall(text):
+    for kind, part, names in LINK.findall(text):
+        there = KINDS[kind] if kind else rows_of((BENCH / "components" / part / "README.md").read_text("utf-8"))
         for each, shape in re.findall(r"`(\w+)(\[[^`]*\])?`", names):
             assert each not in rows, f"{each} stands twice"
-            rows[each] = KINDS[kind][each]
+            rows[each] = there[each]
             assert rows[each][0] == f"`{each}{shape}`"
     declared = load_part(name, BENCH).declarations.values()
     for d in declared:
