@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from gyrobench.report.page_model import (
     text_cell,
 )
 from gyrobench.report.report_files import write_files
-from gyrobench.report.style import BLUE, HALF, MUTED, VERMILION, axis_label, chart, figure, styled, svg
+from gyrobench.report.style import BLUE, HALF, MUTED, VERMILION, axis_label, chart, styled, svg
 from gyrobench.units import display
 
 NAMES = {kind: f"bearing.{kind}" for kind in FORMATS}
@@ -98,8 +99,7 @@ def restriction(beta: float, sigma: float) -> float:
 
 def general(d: BearingDesign) -> str:
     """Return B over xi for several s (Hu 1981, fig. 5-23)."""
-    fig, axes = figure(HALF, 70)
-    ax, b = axes[0, 0], d.bearing
+    (fig, ax), b = chart(HALF, 70), d.bearing
     own = b.ambient / b.supply
     for s in [own, *(s for s in SIGMAS if abs(s - own) > 0.04)]:
         beta = np.linspace(s + 1e-4, 1.0 - 1e-4, 200)
@@ -110,12 +110,7 @@ def general(d: BearingDesign) -> str:
     beta_0 = b.pressure_ratio(b.gap)
     ax.plot([restriction(beta_0, own)], [beta_0], "o", color=VERMILION, zorder=4)
     ax.set_xlim(LEFT, 300.0)
-    ticks = [0.1, 1, 10, 100]
-    ax.set_xticks(ticks, [str(t) for t in ticks])
-    ax.set_xticks([], minor=True)
-    ax.set_xlabel(axis_label("restriction ξ", "1"))
-    ax.set_ylabel(axis_label("pressure ratio B", "1"))
-    return svg(fig, "general")
+    return _drawn(fig, ax, "general", ("restriction ξ", "1"), ("pressure ratio B", "1"), (0.1, 1, 10, 100))
 
 
 def load_curve(d: BearingDesign) -> str:
@@ -124,9 +119,7 @@ def load_curve(d: BearingDesign) -> str:
     eps = np.linspace(0.0, FULL, 37)
     ax.plot(eps, [d.bearing.load(float(e)) for e in eps], color=BLUE)
     ax.plot([d.eccentricity], [d.load], "o", color=VERMILION)
-    ax.set_xlabel(axis_label("eccentricity ε", "1"))
-    ax.set_ylabel(axis_label("load W", "N"))
-    return svg(fig, "load")
+    return _drawn(fig, ax, "load", ("eccentricity ε", "1"), ("load W", "N"))
 
 
 def stiffness_curve(d: BearingDesign) -> str:
@@ -135,21 +128,23 @@ def stiffness_curve(d: BearingDesign) -> str:
     gaps = np.geomspace(3e-6, 1e-4, 41)
     ax.semilogx(gaps * 1e6, [replace(d.bearing, gap=float(h)).stiffness() * 1e-6 for h in gaps], color=BLUE)
     ax.plot([d.bearing.gap * 1e6], [d.bearing.stiffness() * 1e-6], "o", color=VERMILION)
-    ticks = [3, 5, 10, 20, 50, 100]
-    ax.set_xticks(ticks, [str(t) for t in ticks])
-    ax.set_xticks([], minor=True)
-    ax.set_xlabel(axis_label("gap", "µm"))
-    ax.set_ylabel(axis_label("stiffness", "N/µm"))
-    return svg(fig, "stiffness")
+    return _drawn(fig, ax, "stiffness", ("gap", "µm"), ("stiffness", "N/µm"), (3, 5, 10, 20, 50, 100))
 
 
 def slope_curve(d: BearingDesign) -> str:
     """Return dW/de over eps."""
-    fig, axes = figure(HALF, 70)
-    ax, b, step = axes[0, 0], d.bearing, 1e-3
+    (fig, ax), b, step = chart(HALF, 70), d.bearing, 1e-3
     eps = np.linspace(0.0, FULL - step, 37)
     slope = [(b.load(float(e) + step) - b.load(float(e))) / (step * b.gap) * 1e-6 for e in eps]
     ax.plot(eps, slope, color=BLUE)
-    ax.set_xlabel(axis_label("eccentricity ε", "1"))
-    ax.set_ylabel(axis_label("stiffness dW/de", "N/µm"))
-    return svg(fig, "slope")
+    return _drawn(fig, ax, "slope", ("eccentricity ε", "1"), ("stiffness dW/de", "N/µm"))
+
+
+def _drawn(fig: Any, ax: Any, name: str, x: tuple[str, str], y: tuple[str, str], ticks: Sequence[float] = ()) -> str:
+    """Return the SVG of a curve; x, y: quantity and unit of the axes; ticks: of a logarithmic one."""
+    if ticks:
+        ax.set_xticks(ticks, [str(t) for t in ticks])
+        ax.set_xticks([], minor=True)
+    ax.set_xlabel(axis_label(*x))
+    ax.set_ylabel(axis_label(*y))
+    return svg(fig, name)
