@@ -16,41 +16,26 @@ from gyrobench.frames import G0
 if TYPE_CHECKING:
     from gyrobench.workflow.instruments import Instrument
 
-#: figure -> unit
-RATE_GYRO: dict[str, str] = {
-    "range": "rad/s",
-    "resolution": "rad/s",
-    "bandwidth": "Hz",
-    "output_rate": "Hz",
-    "noise_density": "rad/s/sqrt(Hz)",
-    "angle_random_walk": "rad/sqrt(s)",
-    "bias_instability": "rad/s",
-    "bias": "rad/s",
-    "bias_temperature": "rad/s/K",
-    "scale_error": "1",
-    "scale_temperature": "1/K",
-    "nonlinearity": "1",
-    "misalignment": "rad",
-    "cross_axis": "1",
-    "g_sensitivity": "rad.s/m",
+#: figure -> its unit of a rate gyro and of the accelerometers of a unit; "": it has none
+RATES_AND_FORCES = {
+    "range": ("rad/s", "m/s2"),
+    "resolution": ("rad/s", "m/s2"),
+    "bandwidth": ("Hz", "Hz"),
+    "output_rate": ("Hz", "Hz"),
+    "noise_density": ("rad/s/sqrt(Hz)", "m/s2/sqrt(Hz)"),
+    "angle_random_walk": ("rad/sqrt(s)", ""),
+    "velocity_random_walk": ("", "m/s/sqrt(s)"),
+    "bias_instability": ("rad/s", "m/s2"),
+    "bias": ("rad/s", "m/s2"),
+    "bias_temperature": ("rad/s/K", "m/s2/K"),
+    "scale_error": ("1", "1"),
+    "scale_temperature": ("1/K", "1/K"),
+    "nonlinearity": ("1", "1"),
+    "misalignment": ("rad", "rad"),
+    "cross_axis": ("1", "1"),
+    "g_sensitivity": ("rad.s/m", ""),
 }
-#: figure of the accelerometers of a unit -> unit
-ACCELEROMETERS: dict[str, str] = {
-    "range": "m/s2",
-    "resolution": "m/s2",
-    "bandwidth": "Hz",
-    "output_rate": "Hz",
-    "noise_density": "m/s2/sqrt(Hz)",
-    "velocity_random_walk": "m/s/sqrt(s)",
-    "bias_instability": "m/s2",
-    "bias": "m/s2",
-    "bias_temperature": "m/s2/K",
-    "scale_error": "1",
-    "scale_temperature": "1/K",
-    "nonlinearity": "1",
-    "misalignment": "rad",
-    "cross_axis": "1",
-}
+RATE_GYRO, ACCELEROMETERS = ({n: units[k] for n, units in RATES_AND_FORCES.items() if units[k]} for k in (0, 1))
 #: figure of a floated gyro -> its unit and parameter
 COEFFICIENTS = tuple(f"D_{n}" for n in ("F", "I", "O", "S", "II", "OO", "SS", "IO", "OS", "IS"))
 FLOATED: dict[str, tuple[str, str]] = {
