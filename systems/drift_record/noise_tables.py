@@ -157,7 +157,8 @@ def gauss_markov(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
         f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all. The "
-        "intervals hold for every likely number of processes: one may stand for several"
+        "intervals hold for every likely number of processes: one may stand for several, then τ is of any of them with "
+        "a quarter of their variance, σ of all within the interval of τ together"
     )
     return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
 

@@ -8,6 +8,8 @@ rate, of a Butterworth filter that white noise and flicker B pass (all: a mean i
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 
+Of a process that is found tau and sigma are those of the true one nearest in log tau, each counted once; "sigma
+together" is of all true ones within its interval of tau.
 agree: part of the records whose model agrees with them, so that something is stated; the rest is counted over those.
 """
 
@@ -105,6 +107,8 @@ def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
                 sigma, tau = left.pop(min(range(len(left)), key=lambda k: abs(math.log(left[k][1] / g.tau.value))))
                 inside["sigma"].append(g.sigma.low <= sigma <= g.sigma.high)
                 inside["tau"].append(g.tau.low <= tau <= g.tau.high)
+                if those := [s for s, t in truth["markov"] if g.tau.low <= t <= g.tau.high]:
+                    inside["sigma together"].append(g.sigma.low <= math.hypot(*those) <= g.sigma.high)
         print(f"{name}, {n} samples {' '.join(kinds)}: agree {np.mean(agreed):.3f}, "
               f"{(time.process_time() - began) / records:.2f} s")  # fmt: skip
         print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} of {len(v)}" for k, v in inside.items()))

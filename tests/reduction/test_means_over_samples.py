@@ -38,7 +38,8 @@ def test_drift_under_a_mean_over_whole_samples() -> None:
     truth = coverage.TRUTHS["mean of 3, three processes"]
     model = fit_noise(coverage.simulated(10_000, truth, [], np.random.default_rng([11, 12, 10_000])), 1.0, means=False)
     assert model.filter_words() == "mean over 3 samples"
-    assert model.processes[0].tau.low < 11.0 and model.processes[0].tau.high < 35.0
+    tau = model.processes[0].tau  # may stand for the first two: its upper end is no sign of the average
+    assert tau.low < 11.0 and tau.value < 20.0
 
 
 @pytest.mark.long

@@ -23,7 +23,7 @@ from scipy import fft, ndimage, special
 
 from gyrobench.arrays import Array
 
-FALSE = 0.02  # samples of a record that are called wild by chance
+FALSE = 0.002  # samples of a record that are called wild by chance; with estimates of noise and scatter 0.004
 LOWEST, CHANCE = 3.7, 0.03  # limit in a record of many wild samples: part of them that may be the noise's own
 BULK = 0.97  # of the samples, by which the scatter is measured
 CORE = 3.0  # standard deviations of samples that no wild one is among
@@ -206,7 +206,7 @@ def limit_of(size: Array) -> float:
     tail = np.sort(size[size > LOWEST])
     own = 2.0 * m * special.ndtr(-tail)
     exceed = tail.size - np.arange(tail.size)
-    good = np.flatnonzero(own <= CHANCE * exceed)
+    good = np.flatnonzero((own <= CHANCE * exceed) & (exceed > 1))  # of a single one FALSE decides
     return min(highest, float(tail[good[0]]) - 1e-9) if good.size else highest
 
 
@@ -395,6 +395,7 @@ def _wildest(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -> N
     if not np.all(scale > 0.0):  # most samples are the same
         return np.zeros(z.size, dtype=bool)
     size /= scale
-    limit = max(limit_of(size[~gone]), LEAKS * float(size.max()))
+    inner = slice(ENDS, -ENDS) if z.size > 4 * ENDS else slice(None)  # what exceeds it at the ends is judged by itself
+    limit = max(limit_of(size[inner][~gone[inner]]), LEAKS * float(size.max()))
     out: NDArray[np.bool_] = (size > limit) & (size >= ndimage.maximum_filter1d(size, 7))
     return out

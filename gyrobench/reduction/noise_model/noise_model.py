@@ -26,7 +26,9 @@ ABSENT = 0.025  # probability of its absence below which a term is determined
 class Process:
     """Gauss-Markov process x' = -x/tau + w as a Kalman filter takes it: rms sigma in the unit of the rate, tau in s.
 
-    present: probability that the record has such a process, by the evidence of the models with one near this tau.
+    It may stand for several: then tau is of any of them with a quarter of their variance, sigma of all within the
+    interval of tau together.  present: probability that the record has such a process, by the evidence of the models
+    with one near this tau.
     """
 
     sigma: Estimate
