@@ -27,6 +27,10 @@ class BlockMeans:
         self.data = {n: np.empty(1 << 16) for n in self.names}
         self.opened = {n: np.empty(0) for n in self.names}
 
+    def first_halved_by(self, samples: int) -> bool:
+        """Return whether what is held, every sample up to here, is averaged for the first time by so many more."""
+        return self.factor == 1 and self.count + samples > MOST
+
     def skip(self, samples: int) -> None:
         """Add a gap."""
         while samples > 0:

@@ -6,7 +6,8 @@ full turn or a power of two of counts: then it is unwrapped.  Rate from angle: t
 between two samples; its amplitude at f is that of the rate times sin(pi f step)/(pi f step).  [RED-RATE; Hu 1981,
 eq. 4-1..4-11]
 
-The means that are held are bounded, see gyrobench.record.block_means; ``observers`` get every sample before that.
+The means that are held are bounded, see gyrobench.record.block_means; where they are of several samples ``observers``
+get every sample.
 
 Not modelled: dead time; jitter of the samples themselves (time stamps more than 1 % off the grid are warned of).
 """
@@ -291,8 +292,10 @@ class DriftReader:
         observers: Sequence[Observer],
     ) -> None:  # fmt: skip
         """Hand on samples with gaps of LONG at most between them."""
-        self.held.skip(int(place[0]) - self.position)
         size = int(place[-1] - place[0]) + 1
+        if self.held.first_halved_by(int(place[0]) - self.position + size):
+            self._tell(0, self.held.data, self.position, observers)
+        self.held.skip(int(place[0]) - self.position)
         gap_free = size == place.size
         at = place - place[0]
         dense = {}
@@ -304,13 +307,18 @@ class DriftReader:
             dense[n] = self._filled(n, v) if n in others else v
         for k in range(0, size, 1 << 18):
             self.held.add({n: v[k : k + (1 << 18)] for n, v in dense.items()})
+        if self.held.factor > 1:
+            self._tell(int(place[0]), dense, size, observers)
+        self.position = int(place[-1]) + 1
+
+    def _tell(self, first: int, values: Mapping[str, Array], size: int, observers: Sequence[Observer]) -> None:
+        """Hand the first ``size`` values on to observers; first: index on the grid."""
         for n in (s.name for s in self.signals if observers):
-            v = dense[n]
+            v = values[n][:size]
             edges = np.flatnonzero(np.diff(np.isfinite(v).astype(np.int8), prepend=0, append=0))
             for a, b in edges.reshape(-1, 2).tolist():
                 for observer in observers:
-                    observer(n, int(place[0]) + a, v[a:b])
-        self.position = int(place[-1]) + 1
+                    observer(n, first + a, v[a:b])
 
     def _filled(self, name: str, v: Array) -> Array:
         """Return a slow quantity with its gaps filled by the last value: a thermometer is logged less often."""
