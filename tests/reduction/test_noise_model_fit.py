@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model import treatment
-from gyrobench.reduction.noise_model.agreement import compare, with_spectrum
+from gyrobench.reduction.noise_model.agreement import compare, squares_of_spectrum, with_spectrum
 from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
@@ -143,7 +143,7 @@ def test_a_walk_leaves_short_averaging_times_their_degrees_of_freedom(walk: floa
     x = rng.normal(size=14400) + np.cumsum(walk * rng.normal(size=14400))
     own = deviations(x, 1.0, ("allan",), fine=True)["allan"]
     size = np.log([1.0, walk**2])
-    found = with_spectrum(own, (NoiseTerm("white"), NoiseTerm("walk")), size)
+    found = with_spectrum(own, squares_of_spectrum(own.tau, (NoiseTerm("white"), NoiseTerm("walk")), size))
     short = own.tau <= 8.0
     assert found.edf[short] == pytest.approx(own.edf[short], rel=0.2)
 
@@ -159,7 +159,8 @@ def test_a_wrong_model_is_refused_though_it_is_near() -> None:
     x = rng.normal(size=n) + band / band.std()
     parts = (NoiseTerm("white"), NoiseTerm("resonance"))
     truth = np.array([0.0, 0.0, math.log(30.0), math.log(omega)])
-    own = with_spectrum(deviations(x, 1.0, ("allan",), fine=True)["allan"], parts, truth)
+    own = deviations(x, 1.0, ("allan",), fine=True)["allan"]
+    own = with_spectrum(own, squares_of_spectrum(own.tau, parts, truth))
 
     def agrees(p: np.ndarray) -> bool:
         return compare(own, np.sqrt(allan(parts, p, own.tau)), n).holds

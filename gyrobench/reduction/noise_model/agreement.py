@@ -88,26 +88,34 @@ def compare(own: Deviation, implied: Array, samples: int) -> DeviationAgreement:
     return DeviationAgreement(own.tau[k], own.deviation[k], own.low[k], own.high[k], implied[k])
 
 
-def with_spectrum(own: Deviation, model: Model, p: Array, spread: float = 1.0) -> Deviation:
-    """Return a deviation with the intervals that a spectrum S allows, where it is narrower than a power law.
+def with_spectrum(own: Deviation, squares: Array, spread: float = 1.0) -> Deviation:
+    """Return a deviation with the intervals that a spectrum allows, where it is narrower than a power law.
 
-    Of n differences with the transfer function H, degrees of freedom n <S H>^2/<(S H)^2>, sigma^2 = <S H>: a resonance,
-    or noise that rises more steeply than a power law, makes fewer of them.
-    spread: variance of the mean square of the noise over that of even normal noise; as many times fewer.
+    squares (k,): of :func:`squares_of_spectrum` at its tau, or more.  spread: variance of the mean square of the noise
+    over that of even normal noise; as many times fewer degrees of freedom.
     """
-    longest = 4.0 * float(own.tau[-1])
+    edf = np.minimum(own.edf, own.count * own.deviation**4 / squares[: own.tau.size])
+    edf = np.maximum(edf / max(spread, 1.0), 1.0)
+    low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
+    return replace(own, low=low, high=high, edf=edf)
+
+
+def squares_of_spectrum(tau: Array, model: Model, p: Array) -> Array:
+    """Return <(S H)^2> (k,) of the spectrum S of a model, H that of the differences over tau.
+
+    Of n differences there are n <S H>^2/<(S H)^2> degrees of freedom, sigma^2 = <S H>: a resonance, or noise that
+    rises more steeply than a power law, makes fewer of them.
+    """
+    longest = 4.0 * float(tau[-1])
     edges = np.unique(np.concatenate([np.geomspace(np.pi / longest, np.pi, LOW_CELLS), np.linspace(0.0, np.pi, CELLS)]))
     omega, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     y = spectrum(model, p, Grid(omega)) / np.sin(0.5 * omega) ** 2
-    edf = own.edf.copy()
-    for i, m in enumerate(own.tau.tolist()):
+    out = np.empty(tau.size)
+    for i, m in enumerate(tau.tolist()):
         # the mean of sin^8(m omega/2) over each cell, which may hold many of its periods
         wave = np.array([np.cos(k * m * omega) * np.sinc(0.5 * k * m * width / np.pi) for k in (1, 2, 3, 4)])
         eighth = (35.0 - 56.0 * wave[0] + 28.0 * wave[1] - 8.0 * wave[2] + wave[3]) / 128.0
         # at low frequency the sum cancels to rounding errors, which y of a random walk magnifies; the cells are narrow
         eighth = np.where(m * omega < NARROW, np.sin(0.5 * m * omega) ** 8, np.maximum(eighth, 0.0))
-        fourth = float(np.sum(width * y * y * eighth)) * 4.0 / (np.pi * m**4)
-        edf[i] = min(edf[i], own.count[i] * own.deviation[i] ** 4 / fourth)
-    edf = np.maximum(edf / max(spread, 1.0), 1.0)
-    low, high = (own.deviation * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
-    return replace(own, low=low, high=high, edf=edf)
+        out[i] = float(np.sum(width * y * y * eighth)) * 4.0 / (np.pi * m**4)
+    return out

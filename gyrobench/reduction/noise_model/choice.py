@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
-from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, with_spectrum
+from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, squares_of_spectrum, with_spectrum
 from gyrobench.reduction.noise_model.maximum import Fitted
 from gyrobench.reduction.noise_model.noise_model import ABSENT
 from gyrobench.reduction.noise_model.ordinates import allan, filtered
@@ -52,8 +52,8 @@ class Judge:
 
     def __init__(self, found: ModelSearch, scaled: Scaled, treated: Treated) -> None:
         self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
-        terms, p = found.whole
-        self.own, self.clean = (with_spectrum(d, terms, p, treated.spread) for d in (scaled.own, scaled.clean))
+        squares = squares_of_spectrum(scaled.own.tau, *found.whole)
+        self.own, self.clean = (with_spectrum(d, squares, treated.spread) for d in (scaled.own, scaled.clean))
         self.plain, self.removed = scaled.own, scaled.removed
         self.below = treated.below / self.own.tau  # is in the samples and not in the model
         peaks = found.resonances
