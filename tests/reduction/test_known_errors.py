@@ -159,5 +159,5 @@ def test_errors_far_above_the_noise_leave_estimate_and_type_a_alone(size: float)
     found = with_set_up(plain, lambda _: stated)
     np.testing.assert_allclose(found.gain @ X, np.eye(2), atol=1e-6)
     np.testing.assert_allclose(found.value, plain.value, atol=0.1 * plain.u.min())
-    np.testing.assert_allclose(found.u, plain.u, rtol=0.01)
+    np.testing.assert_allclose(found.u, plain.u, rtol=0.02)  # its own part is taken out by the likeliest noise alone
     np.testing.assert_allclose(found.reported.half_width, plain.reported.half_width, rtol=0.1)

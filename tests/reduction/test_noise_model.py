@@ -81,7 +81,7 @@ def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
     """A matrix of 10,000 x 10,000 would take 800 MB.
 
     u is that of white noise, 0.1/sqrt(10,000), and by what the slowest drift may add that the record cannot show:
-    a tenth for Gauss-Markov drift, another for power laws.
+    a tenth for Gauss-Markov drift, two for power laws.
     """
     t0 = 10.0 * np.arange(10_000)
     y = 1.0 + 0.1 * np.random.default_rng(1).normal(size=t0.size)
@@ -93,7 +93,7 @@ def test_memory_of_the_fit_grows_with_the_rows_not_their_square() -> None:
     finally:
         tracemalloc.stop()
     assert peak < 30e6
-    assert 0.1 / 100.0 < e.u[0] < 1.25 * 0.1 / 100.0 and e.gain[0] == pytest.approx(1e-4, rel=0.2)
+    assert 0.1 / 100.0 < e.u[0] < 1.35 * 0.1 / 100.0 and e.gain[0] == pytest.approx(1e-4, rel=0.2)
 
 
 def test_two_windows_by_hand() -> None:
@@ -188,7 +188,7 @@ def test_unbounded_correlation_time_is_said() -> None:
     t0, t1, X = mc.plan(36, 5)
     y = next(mc.samples(t0, t1, 500.0, 1.0, 1, 3))
     e = noise_mixture_fit.fit(X, y, drift.terms(9), t0, t1)  # a random walk as far as the record shows
-    assert "rises towards low frequencies as that of flicker noise or faster" in e.noise.unbounded
+    assert "confounded with the constant term" in e.noise.unbounded
     e = noise_mixture_fit.fit(np.ones((30, 1)), y[:30], ["mean"], t0[:30], t1[:30])  # too short to weigh power laws
     assert "not bounded by this record" in e.noise.unbounded
 

@@ -67,11 +67,11 @@ def test_flicker_falls_as_its_frequency() -> None:
 
 def test_candidates_are_between_white_noise_and_the_law_alone() -> None:
     """At the reciprocal of the record and at the highest frequency the densities over the white one are inside the
-    range: cells begin half a cell inside.  Weights add up to 1; three in four are without white noise.
+    range: cells begin half a cell inside.  Weights add up to 1; one in three is without white noise.
     """
     t0 = 10.0 * np.arange(200)
     slope, share, prior = power_law.candidates(t0, t0 + 10.0)
-    assert prior.sum() == pytest.approx(1.0) and prior[share == 1.0].sum() == pytest.approx(0.75)
+    assert prior.sum() == pytest.approx(1.0) and prior[share == 1.0].sum() == pytest.approx(1.0 / 3.0)
     ends = np.array([2.0 * math.pi / 2000.0, math.pi / 10.0])
     for a in power_law.SLOPES:
         odds = (share / np.maximum(1.0 - share, 1e-300))[(slope == a) & (share < 1.0)]
@@ -122,8 +122,9 @@ def test_intervals_hold_under_power_laws(slope: float, least: float) -> None:
 
 @pytest.mark.long
 def test_flicker_that_white_noise_hides_is_warned_of() -> None:
-    """Densities alike at 10 over the record of 100 windows: 0.90 of 800 means hold, not 0.95, as ten ordinates tell
-    little of what is below them; 0.95 of the records say that drift may be slower, and its interval then holds 0.97.
+    """Densities alike at 10 over the record of 100 windows: 0.926 of 1600 means hold, not 0.95, as ten ordinates tell
+    little of what is below them; 0.985 of the records say that drift may be slower, and its interval then holds 0.98.
+    With three of four power laws without white noise before the record is seen 0.90 held, and 0.95 warned.
 
     A step of :func:`flicker` has the density 2/(4 n 8 f) at f, a window of white noise 8 w^2: w^2 = 1/160.
     """
@@ -135,7 +136,7 @@ def test_flicker_that_white_noise_hides_is_warned_of() -> None:
         half, off = float(e.half_width[0]), abs(float(e.beta[0]))
         rows.append([off <= half, off <= max(half, slow), bool(e.noise.unbounded) or slow > half])
     held, held_if_slow, warned = np.mean(rows, axis=0)
-    assert held > 0.86 and held_if_slow > 0.94 and warned > 0.91
+    assert held > 0.89 and held_if_slow > 0.95 and warned > 0.96
 
 
 def test_a_short_record_does_not_ask_for_power_laws() -> None:

@@ -31,9 +31,10 @@ from gyrobench.reduction.estimation.window_means import mean_gain, mean_variance
 #: most DECADE apart.
 SHORTEST, LONGEST, DECADE = 0.1, 1.0, 10.0
 #: Exponents a, one as often as the other (steeper spectra are those of the slowest Gauss-Markov processes, gentler ones
-#: of flicker with white noise), ALONE of them without white noise.  Where there is some the odds are log-uniform: from
-#: FAINTEST of its density at the reciprocal of the record to LOUDEST at the highest frequency that windows show.
-SLOPES, ALONE = (1.0, 1.5), 0.75
+#: of flicker with white noise), ALONE of them without white noise, as of Gauss-Markov drift (noise.FAMILIES).  Where
+#: there is some the odds are log-uniform: from FAINTEST of its density at the reciprocal of the record to LOUDEST at
+#: the highest frequency that windows show.
+SLOPES, ALONE = (1.0, 1.5), 1.0 / 3.0
 FAINTEST, LOUDEST, ODDS = 0.1, 10.0, 4
 NUMBERS = 1 << 16  # held of gains and whitened data at a time
 
