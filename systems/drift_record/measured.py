@@ -34,7 +34,6 @@ from gyrobench.system.values import InvalidValueError
 
 ATTITUDE = "at rest"
 EXACT = 1e-15  # of an angle: to which decimals of a file are exact
-LONG = 1 << 22  # missing samples from which on a deviation does not reach across a gap
 NUMBERS = ("deviation", "low", "high", "edf", "count", "exponent")  # of a deviation
 TEMPLATE = """\
 # Drift record of a gyro at rest: one row a sample, evenly spaced; CSV or Parquet, any number of rows.
@@ -155,11 +154,8 @@ class _Every:
 
     def add(self, first: int, values: Array) -> None:
         """Add samples without a gap between them; first: index on the grid."""
-        missing = first - self.next
-        if missing > LONG:
-            self.sums.gap()
-        elif missing > 0 and self.next:
-            self.sums.add(np.full(missing, np.nan))
+        if self.next:
+            self.sums.add(np.full(first - self.next, np.nan))
         self.sums.add(values)
         self.next = first + values.size
 

@@ -31,7 +31,7 @@ from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, j
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
@@ -340,6 +340,3 @@ def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) ->
         if v is not None:
             out[name] = math.exp(0.5 * float(v[0]))
     return out
-
-
-__all__ = ["PEAKS", "fit_noise"]

@@ -159,6 +159,3 @@ def size_of(term: str) -> Callable[[Model, Array], Array | None]:
         return np.logaddexp.reduce(parts, axis=0) if parts else None
 
     return figure
-
-
-__all__ = ["Cloud", "draw", "quantile", "resampled", "size_of", "weighted"]
