@@ -6,8 +6,8 @@ full turn or a power of two of counts: then it is unwrapped.  Rate from angle: t
 between two samples; its amplitude at f is that of the rate times sin(pi f step)/(pi f step).  [RED-RATE; Hu 1981,
 eq. 4-1..4-11]
 
-The means that are held are bounded, see gyrobench.record.block_means; where they are of several samples ``observers``
-get every sample.
+The means that are held are bounded, see gyrobench.record.block_means; where they are of several samples an
+``observer`` gets every sample.
 
 Not modelled: dead time; jitter of the samples themselves (time stamps more than 1 % off the grid are warned of).
 """
@@ -122,13 +122,14 @@ class DriftReader:
         self.ends = {s.name: RangeEnds() for s in signals}
         self.steps = {name: [math.inf, -math.inf, 0.0] for name in self.angles}  # least, largest; largest angle
 
-    def read(self, observers: Sequence[Observer] = (), progress: Progress | None = None) -> dict[str, Array]:
+    def read(self, observer: Observer | None = None, progress: Progress | None = None) -> dict[str, Array]:
         """Return the means that are held, NaN in gaps: time, rates in rad/s, other columns in SI.  Raises DataError."""
+        self.observer = observer or (lambda name, first, values: None)
         start, rows, told = time.monotonic(), 0, 0.0
         for block in self.table.blocks(self.columns):
             first = next(iter(block.values()))
             try:
-                self._add(block, rows, observers)
+                self._add(block, rows)
             except ValueError as error:
                 raise DataError(self.table.source, [str(error)]) from None
             rows += first.size
@@ -140,7 +141,7 @@ class DriftReader:
         return self.held.columns()
 
     # ------------------------------------------------------------------ block by block
-    def _add(self, block: Mapping[str, Array], rows: int, observers: Sequence[Observer]) -> None:
+    def _add(self, block: Mapping[str, Array], rows: int) -> None:
         about = self.about
         size = next(iter(block.values())).size
         row = self.table.head.line + 1 + rows + np.arange(size)
@@ -167,7 +168,7 @@ class DriftReader:
         values[TIME] = t if self.timed else about.step * number.astype(float)
         self.equal.add(values[TIME] - about.first, {s.name: block[s.name][good] for s in self.signals})
         about.samples += place.size
-        self._put(place, values, others, observers)
+        self._put(place, values, others)
 
     def _places(self, t: Array, row: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the index of each sample on the grid.  Raises ValueError for time that does not fit one."""
@@ -267,13 +268,7 @@ class DriftReader:
         if (kept := self.beginning[s.name]).size < BEGINNING:
             self.beginning[s.name] = np.append(kept, value[np.isfinite(value)])[:BEGINNING]
 
-    def _put(
-        self,
-        place: NDArray[np.int64],
-        values: dict[str, Array],
-        others: dict[str, Array],
-        observers: Sequence[Observer],
-    ) -> None:
+    def _put(self, place: NDArray[np.int64], values: dict[str, Array], others: dict[str, Array]) -> None:
         """Hand on runs without a gap; what lies between is missing, of a long gap LONG samples."""
         steps = np.diff(np.concatenate([[self.position - 1], place]))
         self.about.missing += int(np.sum(steps - 1))
@@ -283,18 +278,15 @@ class DriftReader:
             for part in np.split(np.arange(place.size), np.flatnonzero(steps > LONG)):
                 if part.size:
                     taken = {n: v[part] for n, v in values.items()}
-                    self._run(place[part], taken, {n: v[part] for n, v in others.items()}, observers)
+                    self._run(place[part], taken, {n: v[part] for n, v in others.items()})
         else:
-            self._run(place, values, others, observers)
+            self._run(place, values, others)
 
-    def _run(
-        self, place: NDArray[np.int64], values: dict[str, Array], others: dict[str, Array],
-        observers: Sequence[Observer],
-    ) -> None:  # fmt: skip
+    def _run(self, place: NDArray[np.int64], values: dict[str, Array], others: dict[str, Array]) -> None:
         """Hand on samples with gaps of LONG at most between them."""
         size = int(place[-1] - place[0]) + 1
         if self.held.first_halved_by(int(place[0]) - self.position + size):
-            self._tell(0, self.held.data, self.position, observers)
+            self._tell(0, self.held.data, self.position)
         self.held.skip(int(place[0]) - self.position)
         gap_free = size == place.size
         at = place - place[0]
@@ -308,17 +300,16 @@ class DriftReader:
         for k in range(0, size, 1 << 18):
             self.held.add({n: v[k : k + (1 << 18)] for n, v in dense.items()})
         if self.held.factor > 1:
-            self._tell(int(place[0]), dense, size, observers)
+            self._tell(int(place[0]), dense, size)
         self.position = int(place[-1]) + 1
 
-    def _tell(self, first: int, values: Mapping[str, Array], size: int, observers: Sequence[Observer]) -> None:
-        """Hand the first ``size`` values on to observers; first: index on the grid."""
-        for n in (s.name for s in self.signals if observers):
+    def _tell(self, first: int, values: Mapping[str, Array], size: int) -> None:
+        """Hand the first ``size`` values on to the observer; first: index on the grid."""
+        for n in (s.name for s in self.signals):
             v = values[n][:size]
             edges = np.flatnonzero(np.diff(np.isfinite(v).astype(np.int8), prepend=0, append=0))
             for a, b in edges.reshape(-1, 2).tolist():
-                for observer in observers:
-                    observer(n, first + a, v[a:b])
+                self.observer(n, first + a, v[a:b])
 
     def _filled(self, name: str, v: Array) -> Array:
         """Return a slow quantity with its gaps filled by the last value: a thermometer is logged less often."""

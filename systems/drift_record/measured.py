@@ -84,7 +84,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     if problems:
         raise DataError(data, problems)
     every = {s.name: _Every(reader) for s in signals}
-    columns = reader.read([lambda name, first, values: every[name].add(first, values)], progress)
+    columns = reader.read(lambda name, first, values: every[name].add(first, values), progress)
     about = reader.about
     length = about.step * reader.held.factor
     middle = columns.pop(TIME)

@@ -42,7 +42,7 @@ def read(
     table = open_table(file)
     reader = DriftReader(table, find_signals(table, channel, scale, increments), regressors, sampling)
     runs: list[tuple[str, int, Any]] = []
-    columns = reader.read([lambda name, first, values: runs.append((name, first, values.copy()))])
+    columns = reader.read(lambda name, first, values: runs.append((name, first, values.copy())))
     return reader, columns, runs
 
 
