@@ -5,6 +5,7 @@
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
 rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place), before a readout of 0.003.
+rounded: to a multiple of.
 wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
 missing: a tenth of the samples.
 
@@ -37,6 +38,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
     "all noise through a mean of 3, flicker": {"N": 1.0, "B": 0.12, "all": 3},
     "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
+    "mean of 2, rounded": {"N": 1.0, "mean": 2, "markov": [(0.125, 100.0), (0.042, 3000.0)], "rounded": 0.042},
 }
 
 
@@ -78,6 +80,8 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = x + sd * (np.arange(n) > rng.integers(n // 10, 9 * n // 10))
     if "line" in kinds:
         x = x + 0.3 * sd * np.sin(2.0 * math.pi * 0.2317 * np.arange(n) + 1.0)
+    if step := truth.get("rounded", 0.0):
+        x = step * np.rint(x / step)
     if "missing" in kinds:
         x = np.where(rng.random(n) < 0.1, math.nan, x)
     return np.asarray(x)

@@ -32,7 +32,7 @@ from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.steps import largest_step
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
-from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, treat
+from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
@@ -85,10 +85,11 @@ def fit_noise(
     scale = scale_of(rate, tau0, means)
     raw = rate if raw is None else np.asarray(raw, dtype=float)
     rate, raw = (rate - scale.level) / scale.size, raw / scale.size
-    fitted = _fit(treat(rate, remove_lines, find_wild), raw, means)
+    rounding = output_step(raw) ** 2 / 12.0
+    fitted = _fit(treat(rate, rounding, remove_lines, find_wild), raw, means)
     if not fitted.agrees and not all(x.steady for x in fitted.treated.lines):
         # two lines for one that wanders leave holes in what may be a narrow band of noise
-        again = _fit(treat(rate, remove_lines, find_wild, wandering=False), raw, means)
+        again = _fit(treat(rate, rounding, remove_lines, find_wild, wandering=False), raw, means)
         fitted = again if again.agrees else fitted
     treated, found, clouds, at, ramp = fitted.treated, fitted.found, fitted.clouds, fitted.at, fitted.ramp
     whole, clean = fitted.agreements

@@ -40,6 +40,10 @@ ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
 SMOOTH = 0.03  # of the frequency
 WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
+EVEN = (
+    0.2  # of the residuals independent, at least, for their core to be known: where they hang together by a gap of the
+)
+# spectrum, smaller wild samples are found
 BELOW = 0.5  # of the power of the wild samples: the most that is wild below the limit; where it is more, the tails are
 # continuous and the noise's own.  Of wild samples of normal sizes, 3.4 times the noise or more, it is less
 FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
@@ -290,23 +294,16 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         lost, noise = _lacking(P, at, kept, AVERAGED * draws, rng) if kept.size else (np.zeros(x.size), None)
         stays = stays or not kept.size
     excess = 0.0
-    if wild.any():  # what is wild but below the limit is white noise of the samples as they are
+    if wild.any() and P.diagonal**2 > EVEN * float(np.mean(P.S**-2.0)):
+        # what is wild but below the limit is white noise of the samples as they are
         excess = core_excess((z / local_scale(z, missing, wild))[~(missing | wild)]) / P.diagonal
         if excess > BELOW * float(np.sum((x[wild] - y[wild]) ** 2)) / x.size:
             excess = 0.0
         excess = min(excess, WHITE * float(P.S.min()))  # no more than is there
     white = fft.idct(Y / np.sqrt(P.S), norm="ortho")
     white[missing | wild] = np.nan
-    return Completed(
-        y,
-        lost - excess if noise is not None else None,
-        np.flatnonzero(wild),
-        int(missing.sum()),
-        white,
-        noise,
-        stays,
-        excess,
-    )
+    extra = lost - excess if noise is not None else None
+    return Completed(y, extra, np.flatnonzero(wild), int(missing.sum()), white, noise, stays, excess)
 
 
 def _lacking(

@@ -124,18 +124,19 @@ class Ordinates:
     """Ordinates of the stretches of a record in unit time, and what the likelihood needs of them.
 
     stretches: each (n,), NaN nowhere, n >= SHORTEST; extras: what is added to the powers of each, or None.
-    weight: part of the samples that are information.  means: see :mod:`terms`.
+    weight: part of the samples that are information.  means: see :mod:`terms`.  rounding: variance of the errors that
+    the step of the output makes, 0 where none is known.
     """
 
     def __init__(self, stretches: Sequence[Array], means: bool = False, extras: Sequence[Array | None] = (),
-                 weight: float = 1.0) -> None:  # fmt: skip
+                 weight: float = 1.0, rounding: float = 0.0) -> None:  # fmt: skip
         times = [np.arange(x.size) - 0.5 * (x.size - 1) for x in stretches]
         length = sum(float(t @ t) for t in times)
         self.slope = sum(float(t @ x) for t, x in zip(times, stretches, strict=True)) / length
         parts = [p for i, (t, x) in enumerate(zip(times, stretches, strict=True))
                  for p in _parts(x - self.slope * t, extras[i] if extras else None)]  # fmt: skip
         self.n = np.array([p.n for p in parts])
-        self.samples = int(self.n.sum() // 2)
+        self.samples, self.rounding = int(self.n.sum() // 2), rounding
         self.odd = np.array([p.odd for p in parts])
         k = np.array([np.arange(1 if p.odd else 2, 2 * LOW + 1, 2) for p in parts])
         self.low_omega = np.pi * k / self.n[:, None]  # (g, LOW)

@@ -26,6 +26,10 @@ FILTERS = {
     "butterworth": [(0.02, 30.0), (0.5, 12.0)],
     "cascade": [(0.02, 30.0), (0.5, 12.0)],
 }
+AS_KNOWN = 0.05  # of the logarithm of the variance of rounding errors, a twelfth of the square of the step
+NO_ROUNDING = 0.05  # probability that an output in steps has none: sums of what was rounded, or a remainder is carried
+FITS = 0.8  # of the rounding errors, what the spectrum has at least where there are any
+SQRT_2PI = math.sqrt(2.0 * math.pi)
 HARD = 1e3  # slope of the walls, of the square of what is beyond
 
 
@@ -34,7 +38,9 @@ class Prior:
 
     Of a variance v: density of log v ~ v/(v + v0) up to vmax: even in log v above v0, even in v below, where v0 is what
     the record just shows (standard deviation of v about zero under a smoothed spectrum) and vmax what exceeds the
-    spectrum.  log tau is even between the shortest and the length of the record.
+    spectrum.  log tau is even between the shortest and the length of the record.  Readout noise is the rounding of the
+    output, where its step is known and its errors show: a filter does not see them, and no slow noise may stand for
+    them.
     """
 
     def __init__(self, data: Ordinates) -> None:
@@ -61,6 +67,10 @@ class Prior:
         self.markov = np.array([self._range(NoiseTerm("gauss_markov"), np.array([t])) for t in self.taus])
         self.others = {name: self._range(NoiseTerm(name), np.empty(0))
                        for name in ("white", "readout", "quantization", "flicker", "walk")}  # fmt: skip
+        least, shown = float(np.min(self.level)), math.exp(self.others["readout"][0])
+        self.rounding = math.log(data.rounding) if shown < data.rounding < least / FITS else None
+        #: likely size of readout noise
+        self.readout = math.log(least) if self.rounding is None else self.rounding
 
     def _range(self, term: NoiseTerm, rest: Array) -> Array:
         """Return log v0, log vmax of a term with the other parameters given."""
@@ -104,14 +114,21 @@ class Prior:
         beyond = np.maximum(p - high, 0.0) + np.maximum(low - p, 0.0)
         out = -HARD * np.sum(beyond**2, axis=-1)
         taus = []
+        names = [t.name for t in model]
+        if self.rounding is not None and any(t.filter != "none" for t in model) and "readout" not in names:
+            out = out + math.log(NO_ROUNDING)  # white noise that passed no filter has it in itself
         for term, q in split(model, p):
             if term.name in PEAKS:  # anywhere
                 out = out - math.log(self.samples / 20.0)
                 continue
             v0, most = self.ranges(term, q)
-            out = out - np.log1p(np.exp(-np.clip(q[..., 0] - v0, -40.0, 40.0)))
-            out = out - np.log(np.log1p(np.exp(np.minimum(most - v0, 40.0))))
-            out = out - 10.0 * np.maximum(q[..., 0] - most, 0.0) ** 2
+            size = -np.log1p(np.exp(-np.clip(q[..., 0] - v0, -40.0, 40.0)))
+            size = size - np.log(np.log1p(np.exp(np.minimum(most - v0, 40.0))))
+            size = size - 10.0 * np.maximum(q[..., 0] - most, 0.0) ** 2
+            if term.name == "readout" and self.rounding is not None:
+                known = -0.5 * ((q[..., 0] - self.rounding) / AS_KNOWN) ** 2 - math.log(AS_KNOWN * SQRT_2PI)
+                size = np.logaddexp(size + math.log(NO_ROUNDING), known + math.log1p(-NO_ROUNDING))
+            out = out + size
             if term.name == "gauss_markov":
                 taus.append(q[..., 1])
                 out = out - math.log(self.longest - math.log(SHORTEST_TAU))

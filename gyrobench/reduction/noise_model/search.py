@@ -128,7 +128,10 @@ class ModelSearch:
                         yield (*model, other), [np.append(less, size)]
             elif term in (B, K) and names.count(GM.name) < MOST_MARKOV:
                 tau = self.prior.longest - 2.0
-                yield (*model, GM), [np.append(less, [q[0] + (tau - math.log(2.0)) * (term is K), tau])]
+                slow = np.append(less, [q[0] + (tau - math.log(2.0)) * (term is K), tau])
+                yield (*model, GM), [slow]
+                if term is B and filtered and W not in at.model:  # it fills what the filter holds back, too
+                    yield (*model, GM, W), [np.append(slow, self.prior.readout)]
 
     def filters(self, at: Fitted, names: tuple[str, ...]) -> Iterator[tuple[Model, list[Array]]]:
         """Yield models with another filter of the white noise."""
@@ -145,6 +148,9 @@ class ModelSearch:
             new = NoiseTerm("white", f"mean{whole}+{behind}" if behind else f"mean{whole}")
             made = joined([(new, np.delete(q, 1)), *rest])
             yield made[0], [made[1]]
+        if behind:
+            made = joined([(NoiseTerm("white", first), q[: 1 + (first == "average")]), *rest])
+            yield made[0], [made[1]]
         for after in BEHIND if (first == "average" or first.startswith("mean")) and not behind else ():
             new = NoiseTerm("white", f"{first}+{after}")  # a mean of what has passed a filter already
             for guess in STARTS.get(after, [[0.0] * (new.size - q.size)]):
@@ -154,7 +160,7 @@ class ModelSearch:
             if name == term.filter or (name == "none" and W in at.model):
                 continue
             new = NoiseTerm("white", name)
-            least = [(W, np.array([math.log(float(np.min(self.prior.level)))]))]  # shows in a stop band
+            least = [(W, np.array([self.prior.readout]))]  # shows in a stop band
             others = rest + least if name in DIGITAL and W not in at.model else rest
             for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
                 made = joined([(new, np.append(q[0], guess)), *others])

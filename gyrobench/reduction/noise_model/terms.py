@@ -48,6 +48,7 @@ FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
 FASTEST = 1e-300  # pole
+SIMPSON = ((1.0 / 6.0, -1.0), (2.0 / 3.0, 0.0), (1.0 / 6.0, 1.0))
 LEAST_PASSED = 1e12  # of the power, what a digital low-pass holds back at most
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
@@ -132,6 +133,13 @@ def _second(p: Array, grid: Grid) -> Array:
     return out
 
 
+def _fejer(k: Any, grid: Grid) -> Array:
+    """Return sin^2(k omega/2)/(k sin^2(omega/2)), of bins by Simpson's rule: about zeros a parabola."""
+    rows = SIMPSON if grid.half_width.any() else ((1.0, 0.0),)
+    halves = [(share, 0.5 * (grid.omega + at * grid.half_width)) for share, at in rows]
+    return np.asarray(sum(share * (np.sin(k * half) / np.sin(half)) ** 2 for share, half in halves) / k)
+
+
 def _average_parts(p: Array) -> tuple[Array, Array, Array]:
     """Return m = floor(w) and the shares of the triangles over m and m + 1 in max(0, 1 - |h|/w), h whole, p: log w."""
     w = np.maximum(np.exp(p[..., 0:1]), 1.0)
@@ -143,22 +151,18 @@ def _average_parts(p: Array) -> tuple[Array, Array, Array]:
 def _average(p: Array, grid: Grid) -> Array:
     """Mean of white noise over w samples, w any real number from 1 on: covariance max(0, 1 - |h|/w)."""
     m, lower, upper = _average_parts(p)
-    s = np.sin(0.5 * grid.omega) ** 2
-    fejer = [np.sin(0.5 * k * grid.omega) ** 2 / (k * s) for k in (m, m + 1.0)]
-    out: Array = (lower * fejer[0] + upper * fejer[1]) / (lower * m + upper * (m + 1.0))
+    out: Array = (lower * _fejer(m, grid) + upper * _fejer(m + 1.0, grid)) / (lower * m + upper * (m + 1.0))
     return out
 
 
 def _mean(count: int) -> Callable[[Array, Grid], Array]:
     def mean(p: Array, grid: Grid) -> Array:
         """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
-        s = np.sin(0.5 * grid.omega) ** 2
-        fejer = np.sin(0.5 * count * grid.omega) ** 2 / (count * s)
         h = np.arange(1.0, count)[:, None]
         wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
         leak = -2.0 * np.sum((1.0 - h / count) * wave, axis=0) / grid.samples
-        out: Array = np.broadcast_to((fejer + np.maximum(leak, 0.0)) / count, (*p.shape[:-1], grid.omega.size))
-        return out
+        out = (_fejer(count, grid) + np.maximum(leak, 0.0)) / count
+        return np.broadcast_to(out, (*p.shape[:-1], grid.omega.size))
 
     return mean
 

@@ -31,6 +31,7 @@ LEAST = 64  # samples of a record
 LEVELS = 32  # parts of a record whose noise is compared
 ENDS = 256  # samples of an end of a stretch that do not tell of the level
 CHUNK = 1 << 17  # samples of a sine computed at a time
+DISTINCT, OFF_STEP = 0.2, 0.05  # values of the samples of an output in steps; how far from a multiple, in steps
 
 
 PlacedStep = tuple[int, LevelStep]  # and the place of its stretch
@@ -54,7 +55,7 @@ class Treated:
 
     spread: variance of the mean square of the noise over that of even normal noise, 1 where the level is even; levels
     (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of
-    them.
+    them; rounding: variance of what the step of the output makes, 0 where it has none.
     """
 
     samples: int
@@ -65,6 +66,7 @@ class Treated:
     levels: Array
     p_level: float
     find_wild: bool
+    rounding: float = 0.0
 
     def without(self, steps: Sequence[PlacedStep]) -> Treated:
         """Return the record with steps taken out and their stretches completed anew.
@@ -125,7 +127,7 @@ class Treated:
                 y[s.done.wild] += s.own[s.done.wild] - s.done.x[s.done.wild]
             x.append(y)
             extra.append(None if keep_wild else s.done.extra)
-        return Ordinates(x, means, extra, weight)
+        return Ordinates(x, means, extra, weight, self.rounding)
 
     def cleaned(self) -> Array:
         """Return the record (samples,) without lines, wild samples and steps, NaN where nothing is or was taken out."""
@@ -150,9 +152,23 @@ def stretches_of(rate: Array, long: int = LONG) -> list[slice]:
     return sorted(sorted(found, key=lambda s: s.start - s.stop)[:MOST], key=lambda s: s.start)
 
 
-def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True, wandering: bool = True) -> Treated:
-    """Return a rate (n,), NaN where a sample is missing, ready for its model; wandering: lines that wander are taken
-    out too.
+def output_step(x: Array) -> float:
+    """Return the step of which the samples (n,) are whole multiples, from any origin; 0.0 where they have none."""
+    levels = np.unique(x[np.isfinite(x)])
+    if not 2 < levels.size < DISTINCT * x.size:
+        return 0.0
+    gaps = np.diff(levels)
+    count = np.cumsum(np.rint(gaps / gaps.min()))
+    step = float((levels[-1] - levels[0]) / count[-1])
+    off = np.abs(levels[1:] - levels[0] - step * count)
+    return step if float(off.max()) < OFF_STEP * step else 0.0
+
+
+def treat(
+    rate: Array, rounding: float = 0.0, remove_lines: bool = True, find_wild: bool = True, wandering: bool = True
+) -> Treated:
+    """Return a rate (n,), NaN where a sample is missing, ready for its model; rounding: variance of what the step of
+    the output makes; wandering: lines that wander are taken out too.
 
     Raises SeriesError for fewer samples than LEAST in stretches without long gaps, and for a constant record.
     """
@@ -177,7 +193,7 @@ def treat(rate: Array, remove_lines: bool = True, find_wild: bool = True, wander
             y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
         done = [complete(y, find_wild) for y in own]
     stretches = tuple(TreatedStretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True))
-    return Treated(rate.size, stretches, lines, full, *_levels(stretches), find_wild)
+    return Treated(rate.size, stretches, lines, full, *_levels(stretches), find_wild, rounding)
 
 
 def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
