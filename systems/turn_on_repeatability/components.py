@@ -8,8 +8,11 @@ unbalanced one-way designs (Weerahandi 1993) with n_0 = (n - sum n_d2/n)/(D - 1)
 
     r' (on2 + V)^-1 r = C_1,     day2 = (S_day/C_2 - on2 - v)/n_0        C: chi-squared by chance, v: variance of a bias
 
-V is not that of equal, independent noises where the biases share the error of a scale factor, by their sense.  Negative
-ones count as 0.  Estimates are those with the degrees of freedom in place of C.
+V is not that of equal, independent noises where the biases share the error of a scale factor, by their sense.  Each
+noise model that the record allows has its own V, from which on2 is drawn by its weight: their mean, of some models with
+slow drift that moves a bias by more than the biases differ, held sigma_on in 0.925.  Negative ones count as 0; the
+upper end is that of the others, or of biases without noise where these are hardly any: it is not 0.  Estimates are
+those with the degrees of freedom in place of C, the median over the noise models.
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ from gyrobench.result import Coefficient
 from gyrobench.units import DPH
 
 DRAWS, POINTS = 20_000, 4000
+SEEN = 100  # draws above 0 of which the upper end is taken
+ALONE = np.ones(1)
 Numbers = np.ndarray[Any, np.dtype[np.intp]]  # of the day of each bias, from 0
 
 
@@ -48,10 +53,14 @@ class Spread:
     slope: tuple[float, float] | None = None
 
 
-def spread(bias: Array, day: Array, noise: Array, temperature: Array | None = None) -> Spread:
-    """Return the components of biases (n,) on days (n,) with the covariance (n, n) of their noise."""
-    days, number = np.unique(day, return_inverse=True)
-    n, D = bias.size, days.size
+def spread(
+    bias: Array, day: Array, noise: Array, temperature: Array | None = None, weight: Array = ALONE
+) -> Spread:  # fmt: skip
+    """Return the components of biases (n,) on days (n,) with the covariance (n, n) of their noise; or of biases (g, n)
+    and covariances (g, n, n) under noise models of this weight (g,).
+    """
+    n, days, number = day.size, *np.unique(day, return_inverse=True)
+    bias, noise, D = bias.reshape(-1, n), noise.reshape(-1, n, n), days.size
     X = np.zeros((n, D))
     X[np.arange(n), number] = 1.0
     slope = None
@@ -59,28 +68,34 @@ def spread(bias: Array, day: Array, noise: Array, temperature: Array | None = No
         T = temperature - temperature.mean()
         within = T - _of_days(T, number, D)[number]
         if np.any(np.abs(within) > 1e-9):
-            k = float(within @ bias / (within @ within))
-            bias = bias - k * T
+            k = bias @ within / (within @ within)
+            bias = bias - np.outer(k, T)
             X = np.column_stack([X, T])
-            left = bias - _of_days(bias, number, D)[number]
-            slope = (k, math.sqrt(float(left @ left) / (n - D - 1) / float(within @ within)))
+            mean = weight @ bias
+            left = mean - _of_days(mean, number, D)[number]
+            slope = (float(weight @ k), math.sqrt(float(left @ left) / (n - D - 1) / float(within @ within)))
     dof = n - X.shape[1]
-    apart = float(noise.sum() - np.trace(noise)) / (n * (n - 1))
-    v = max(float(np.trace(noise)) / n - apart, 0.0)
-    rng = np.random.default_rng(1)
-    mean = _of_days(bias, number, D)
     if dof < 1:
         return Spread(None, None, slope)
+    rng = np.random.default_rng(1)
     within = np.linalg.svd(X)[0][:, X.shape[1] :]
-    on_2 = _pivot(within.T @ bias, within.T @ noise @ within, np.append(rng.chisquare(dof, DRAWS), dof))
-    on = _component(float(on_2[-1]), on_2[:-1], dof)
-    if D < 2:
-        return Spread(on, None, slope)
     count = np.bincount(number)
-    n_0 = (n - float(np.sum(count**2)) / n) / (D - 1)
-    s_day = float(np.sum(count * (mean - float(bias.mean())) ** 2))
-    drawn = (s_day / rng.chisquare(D - 1, DRAWS) - on_2[:-1] - v) / n_0
-    return Spread(on, _component((s_day / (D - 1) - float(on_2[-1]) - v) / n_0, drawn, D - 1), slope)
+    n_0 = max((n - float(np.sum(count**2)) / n) / max(D - 1, 1), 1.0)
+    drawn, own = [], []
+    for k, draws in enumerate(rng.multinomial(DRAWS, weight)):
+        if draws:
+            diagonal = float(np.trace(noise[k]))
+            v = max((n * diagonal - float(noise[k].sum())) / (n * (n - 1)), 0.0)
+            C_1, C_2 = (np.append(rng.chisquare(d, draws), d) for d in (dof, max(D - 1, 1)))
+            r = within.T @ bias[k]
+            on_2 = _pivot(r, within.T @ noise[k] @ within, C_1)
+            s_day = float(np.sum(count * (_of_days(bias[k], number, D) - float(bias[k].mean())) ** 2))
+            each = np.array([on_2, (s_day / C_2 - on_2 - v) / n_0, r @ r / C_1, s_day / C_2 / n_0])
+            drawn.append(each[:, :-1])
+            own.append(np.tile(each[:2, -1:], draws))
+    value, of_all = np.median(np.concatenate(own, axis=1), axis=1), np.concatenate(drawn, axis=1)
+    on, between = (_component(float(value[k]), of_all[k::2], d) for k, d in enumerate((dof, D - 1)))
+    return Spread(on, between if D > 1 else None, slope)
 
 
 def _pivot(r: Array, V: Array, chi: Array) -> Array:
@@ -100,8 +115,10 @@ def _of_days(x: Array, number: Numbers, D: int) -> Array:
 
 
 def _component(value: float, drawn: Array, dof: int) -> VarianceComponent:
-    low, high = np.sqrt(np.maximum(np.quantile(drawn, [0.025, 0.975]), 0.0)).tolist()
-    return VarianceComponent(math.sqrt(max(value, 0.0)), low, high, dof)
+    """Return the component; drawn (2, m): its variances, and what they would be without noise of the biases."""
+    above = drawn[0][drawn[0] > 0.0]
+    low, high = np.quantile(drawn[0], 0.025), np.quantile(above if above.size > SEEN else drawn[1], 0.975)
+    return VarianceComponent(math.sqrt(max(value, 0.0)), math.sqrt(max(low, 0.0)), math.sqrt(high), dof)
 
 
 def coefficient(name: str, meaning: str, part: VarianceComponent, truth: float | None) -> Coefficient:

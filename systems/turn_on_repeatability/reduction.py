@@ -210,7 +210,10 @@ class Reduction(DriftReduction[TurnOnSetup]):
         if "temperature" in self.windows:
             every = np.asarray(self.windows["temperature"], dtype=float)
             T = np.array([every[self.turn == k][-1] for k in range(self.count)])
-        return spread(self.biases, self.day[first], self.shared, T)
+        if self.single:
+            return spread(self.biases, self.day[first], self.shared, T)
+        m, n = self.found.est.mixture, self.count
+        return spread(self.biases + m.off[:, :n], self.day[first], m.covariance[:, :n, :n], T, m.weight)
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth, s = self.setup.truth or {}, self.spread()

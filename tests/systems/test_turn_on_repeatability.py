@@ -68,6 +68,23 @@ def test_components_by_hand_and_their_coverage() -> None:
     assert np.mean(held) == pytest.approx(0.95, abs=0.02)
 
 
+def test_components_under_noise_models_that_differ() -> None:
+    """Biases -1, 0, 1 of a day, r'r = 2, two degrees of freedom: 1 - 0.01 under the likely model.  One of 0.1 with a
+    slow drift of 25 leaves the median and only the lowest tenth of the draws is not above 0: mean noise 2.5 > 1 would
+    leave nothing.  Of noise beyond the scatter alone the upper end is that without noise, 2/-2 ln 0.975 = 39.50
+    (chi-squared of two degrees of freedom at 0.025: -2 ln 0.975).
+    """
+    bias, day = np.array([-1.0, 0.0, 1.0]), np.ones(3, dtype=int)
+    V = np.array([0.01 * np.eye(3), 25.0 * np.eye(3)])
+    found = components.spread(np.array([bias, bias]), day, V, weight=np.array([0.9, 0.1])).turn_on
+    assert found is not None and found.low == 0.0
+    assert found.rms == pytest.approx(math.sqrt(1.0 - 0.01))
+    assert found.high == pytest.approx(math.sqrt(39.5 - 0.01), rel=0.1)  # of draws by chance
+    found = components.spread(bias, day, 25e3 * np.eye(3)).turn_on
+    assert found is not None and (found.rms, found.low) == (0.0, 0.0)
+    assert found.high == pytest.approx(math.sqrt(39.5), rel=0.1)
+
+
 def test_time_until_it_is_warm() -> None:
     """One exponential: tau ln(A/limit); two of opposite sign cross the limit late, once more after zero."""
     assert Warming(np.array([5.0]), np.array([100.0])).time_until(1.0, 1e6) == pytest.approx(100.0 * math.log(5.0))
