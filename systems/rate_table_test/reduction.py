@@ -129,10 +129,24 @@ class Reduction(DriftReduction[RateTableSetup]):
         ways = {"reached from below": self.d >= 0.0, "reached from above": self.d < 0.0}
         shown = [Group(f"rate error, {n}", at, w[at] / DEG, "rate", "°/s") for n, at in ways.items() if at.any()]
         kept = {n: np.asarray(v)[self.large] for n, v in self.windows.items()}
-        candidates = nuisances.common(kept) if self.setup.nuisances else ()
+        candidates = [*nuisances.common(kept), *self._dead_band()] if self.setup.nuisances else ()
         return Regression(
             wanted, X, y - w, self.t0[self.large], self.t1[self.large], shown, "rate error", candidates=candidates
         )
+
+    @property
+    def sense(self) -> Array:
+        """Sense of the rates of the sweep: 1, -1, 0 at rest."""
+        table = self.table[self.large]
+        return np.where(np.abs(table) > small_rates.SMALL * self.full, np.sign(table), 0.0)
+
+    def _dead_band(self) -> list[nuisances.Candidate]:
+        """Return what a gyro with a dead band lacks at all rates, which would pass for scale factor and cubic; where
+        every small rate is answered, nothing.
+        """
+        if self.small.answered:
+            return []
+        return [nuisances.Candidate.of("dead band", "rate that the gyro lacks in either sense", "deg/h", -self.sense)]
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: what the stated rate is wrong by, times 1 + e, is in the data."""
@@ -161,6 +175,13 @@ class Reduction(DriftReduction[RateTableSetup]):
             "shape of the scale factor", "the scale factor has a shape beyond asymmetry and cubic",
             "no shape beyond asymmetry and cubic",
         )  # fmt: skip
+        if self.small.answered:
+            found.f_test(
+                "dead_band", "sense of the rate", self.sense[:, None], "dead band",
+                "the gyro lacks a rate in either sense, as by a dead band: e and c are not of small rates; measure "
+                "small rates, too",
+                "no dead band",
+            )  # fmt: skip
         found.f_test(
             "hysteresis.rate", "way to the rate times the rate", (self.d * np.abs(x))[:, None],
             "hysteresis", "the hysteresis changes with the rate: h is of no rate",

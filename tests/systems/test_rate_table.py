@@ -211,6 +211,30 @@ def test_hysteresis_that_changes_with_the_rate_is_said(tmp_path: Path) -> None:
     assert {"residuals.contradict", "hysteresis.rate"} <= {r.id for r in result.reasons}
 
 
+def test_a_dead_band_is_not_read_as_a_scale_factor(tmp_path: Path) -> None:
+    """A dead band d takes d off all rates beyond it.  Of the levels x = 1/4, 1/2, 3/4 twice and 1 once least squares
+    make of it e x + c x3 with e = -(d/R) (4 * 1.3877 - 2.125 * 1.7656)/(2.75 * 1.3877 - 1.7656^2) = -2.574 d/R (sums of
+    x, x6, x3, x4, x2): -1030 ppm of d = 0.02 deg/s, R = 50 deg/s.  Small rates of which one has no answer let it into
+    the model; without them an F test names it.
+    """
+    rng = np.random.default_rng(3)
+    rate, _ = lab(rng)
+    earth, small = frames.EARTH_RATE * 0.5 / DEG, [0.01, 0.1, 0.3]
+    for given in ([], small):
+        every = np.append(rate, np.repeat([s * r - earth for r in given for s in (1.0, -1.0, -1.0, 1.0)], 2))
+        w = every + earth
+        passed = np.sign(w) * np.maximum(np.abs(w) - 0.02, 0.0)
+        mean = 1.001 * passed + 3.0 / 3600.0 + 0.01 * rng.normal(size=w.size)
+        result = measured(write(tmp_path / "a.csv", every, mean))
+        e, ids = found(result)["e"], {r.id for r in result.reasons}
+        if given:
+            assert e.interval[0] < 1000.0 < e.interval[1] and e.u < 400.0
+            assert not {"fifth", "dead_band"} & ids
+        else:
+            assert {"dead_band", "residuals.contradict"} <= ids
+            assert e.estimate == pytest.approx(1000.0 - 1030.0, abs=3.0 * e.u)
+
+
 def exchanged(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The rates of the second and the third step, in the two readings of each."""
     return rate[[0, 1, 4, 5, 2, 3, *range(6, rate.size)]], mean

@@ -74,6 +74,11 @@ class SmallRates:
         return bool(np.any(self.ratio + self.margin < HALF))
 
     @property
+    def answered(self) -> bool:
+        """Whether every rate is surely answered."""
+        return bool(np.all(self.ratio - self.margin > HALF))
+
+    @property
     def bounds(self) -> tuple[float, float] | None:
         """Largest rate surely without and least rate surely with half of the response; 0 and infinity where none is;
         None where a rate above one that responds does not, or the readings do not say it of any.
