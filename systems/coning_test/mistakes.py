@@ -9,7 +9,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_columns, exchanged_rows
+from gyrobench.reduction.diagnosis.handling_candidates import exchanged_columns, exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
 from gyrobench.result import Reason
@@ -26,8 +26,6 @@ PART = 0.02
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
     """Columns of two axes exchanged, readings or cones of two rows exchanged, times in another unit."""
-    if not record.run.measured:
-        return
     columns = [f"drift_{a}" for a in AXES]
     pairs = [(columns[0], columns[1]), (columns[1], columns[2]), (columns[0], columns[2])]
     for pair in pairs:
@@ -35,9 +33,7 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
         yield from exchanged_columns(record, [pair], words)
     yield from exchanged_rows(record, columns, "the readings of rows", far=0)
     yield from exchanged_rows(record, ["frequency", "half_angle"], "the cones of rows", far=12)
-    w = record.windows
-    for words, f in TIME.items():
-        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+    yield from other_times(record)
 
 
 def other_chain(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) -> Iterator[Reason]:

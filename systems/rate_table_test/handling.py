@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows, shifted
+from gyrobench.reduction.diagnosis.handling_candidates import changed, exchanged_rows, other_times, shifted
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
 from gyrobench.result import Coefficient, Reason
@@ -40,8 +40,7 @@ def candidates(record: Record) -> Iterator[HandlingCandidate]:
         yield from _transitions(record)
     yield from shifted(record, ["mean"], "the reading")
     yield from exchanged_rows(record, ["mean"], "the readings of rows", far=0)
-    for words, f in TIME.items():
-        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+    yield from other_times(record)
 
 
 def _reversed_steps(record: Record) -> Iterator[HandlingCandidate]:

@@ -146,7 +146,9 @@ class Reduction(DriftReduction[RateTableSetup]):
         """
         if self.small.answered:
             return []
-        return [nuisances.Candidate.of("dead band", "rate that the gyro lacks at large rates, in either sense", "deg/h", -self.sense)]
+        return [
+            nuisances.Candidate.of("dead band", "rate lacking at large rates in either sense", "deg/h", -self.sense)
+        ]
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: what the stated rate is wrong by, times 1 + e, is in the data."""

@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
+from gyrobench.reduction.diagnosis.handling_candidates import exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
 from gyrobench.result import Reason
@@ -27,13 +27,9 @@ REST = 0.5  # m/s2 at rest: gravity is still there
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
     """Readings or motions of two rows exchanged, times in another unit."""
-    if not record.run.measured:
-        return
     yield from exchanged_rows(record, ["acceleration"], "the readings of rows", far=0)
     yield from exchanged_rows(record, ["frequency", "angle", "vibration"], "the motions of rows", far=12)
-    w = record.windows
-    for words, f in TIME.items():
-        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+    yield from other_times(record)
 
 
 def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Array]) -> Iterator[Reason]:

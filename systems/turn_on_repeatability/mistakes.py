@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
+from gyrobench.reduction.diagnosis.handling_candidates import TIME, changed, exchanged_rows, other_times, scaled
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 
 MOST = 20  # turn-ons up to which each is tried
@@ -16,13 +16,9 @@ MOST = 20  # turn-ons up to which each is tried
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
     """Readings of two rows exchanged; times, or times since the turn-on, in another unit; a gyro that had stayed on."""
-    if not record.run.measured:
-        return
-    w = record.windows
     yield from exchanged_rows(record, ["mean"], "the readings of rows", far=0)
-    for words, f in TIME.items():
-        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
-        yield HandlingCandidate(f"{words} (since)", changed(record, since=w["since"] * f))
+    yield from other_times(record)
+    yield from scaled(record, ["since"], {f"{words} (since)": f for words, f in TIME.items()}, 0.0)
     yield from _stayed_on(record)
 
 

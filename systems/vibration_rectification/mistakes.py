@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.diagnosis.handling_candidates import TIME, TIMES, changed, exchanged_rows
+from gyrobench.reduction.diagnosis.handling_candidates import changed, exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
 from gyrobench.result import Coefficient, Reason
@@ -18,16 +18,13 @@ FAR = 1e5  # ppm, scale factor error from which on something else than the accel
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:
     """Levels or readings of two rows exchanged, up and down reversed, times in another unit."""
-    if not record.run.measured:
-        return
     w = record.windows
     yield from exchanged_rows(record, ["level"], "the levels of rows", far=12)
     yield from exchanged_rows(record, [n for n in ("rate", "force") if n in w], "the readings of rows", far=0)
     if np.unique(w["up"]).size == 2:
         yield from exchanged_rows(record, ["up"], "the positions of rows", far=12)
         yield HandlingCandidate("up and down exchanged", changed(record, up=-np.asarray(w["up"])))
-    for words, f in TIME.items():
-        yield HandlingCandidate(words, changed(record, **{n: w[n] * f for n in TIMES}))
+    yield from other_times(record)
 
 
 def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Reason]:

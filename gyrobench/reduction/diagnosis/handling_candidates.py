@@ -139,6 +139,11 @@ def scaled(
         yield HandlingCandidate(words, changed(record, **{n: record.windows[n] * f for n in columns}), f**power)
 
 
+def other_times(record: Record) -> Iterator[HandlingCandidate]:
+    """Times in another unit, of data that do not hold them."""
+    return scaled(record, TIMES, TIME, 0.0)
+
+
 def scaled_in_attitudes(
     record: Record, columns: Sequence[str], factors: Mapping[str, float]
 ) -> Iterator[HandlingCandidate]:
