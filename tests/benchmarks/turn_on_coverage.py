@@ -1,10 +1,11 @@
 """How often the 95 % intervals of turn-ons contain the true value, of records written straight from the equations.
 
-    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [--runs 300] [--seed 1]
+    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [signs] [--runs 300] [--seed 1]
 
 y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + white noise, over 1 to 2 days of 3 to 5 turn-ons of 300 s in
 readings of 5 s; no part, no simulation.  one, two: exponentials of 1 to 5 deg/h, tau of 10 to 40 s and four times that;
-hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses.  Where one
+hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses; signs: two of sizes
+of either sign.  Where one
 is found of two, A stands for their sum and tau for the time after which 1/e of it is left.
 """
 
@@ -22,7 +23,7 @@ from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
 from systems.turn_on_repeatability.warming import Warming, means
 
 DPH = math.pi / 648000.0
-KINDS = ("one", "two", "hardly", "turning")
+KINDS = ("one", "two", "hardly", "turning", "signs")
 LIMIT, READING, EACH = 0.3, 5.0, 60  # deg/h, s
 
 
@@ -31,6 +32,8 @@ def written(rng: np.random.Generator, kind: str) -> tuple[dict[str, Array], dict
     days, of_day, tau = int(rng.integers(1, 3)), int(rng.integers(3, 6)), rng.uniform(10.0, 40.0)
     second = {"one": 0.0, "two": rng.uniform(1.0, 5.0), "hardly": rng.uniform(-0.5, 0.5)}.get(kind, rng.uniform(1, 5))
     size, taus = np.array([rng.uniform(1.0, 5.0), second]), np.array([tau, 4.0 * tau])
+    if kind == "signs":
+        size *= rng.choice([-1.0, 1.0], 2)
     white = 0.18 / math.sqrt(READING) * rng.uniform(0.2, 5.0)  # 0.003 deg/sqrt(h) = 0.18 deg/h sqrt(s)
     on, between, E = rng.uniform(0.0, 0.5), rng.uniform(0.0, 0.5), rng.uniform(1e-4, 1e-3)
     n = days * of_day
