@@ -4,9 +4,9 @@
 
 y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + white noise, over 1 to 2 days of 3 to 5 turn-ons of 300 s in
 readings of 5 s; no part, no simulation.  one, two: exponentials of 1 to 5 deg/h, tau of 10 to 40 s and four times that;
-hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses; signs: two of sizes
-of either sign.  Where one
-is found of two, A stands for their sum and tau for the time after which 1/e of it is left.
+hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses; signs:
+two of sizes of either sign.  Where one is found of two, A stands for their sum and tau for the time after which 1/e of
+it is left.
 """
 
 from __future__ import annotations
