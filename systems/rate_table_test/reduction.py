@@ -129,7 +129,8 @@ class Reduction(DriftReduction[RateTableSetup]):
         ways = {"reached from below": self.d >= 0.0, "reached from above": self.d < 0.0}
         shown = [Group(f"rate error, {n}", at, w[at] / DEG, "rate", "°/s") for n, at in ways.items() if at.any()]
         kept = {n: np.asarray(v)[self.large] for n, v in self.windows.items()}
-        candidates = [*nuisances.common(kept), *self._dead_band()] if self.setup.nuisances else ()
+        weighed = [*nuisances.common(kept), *self._dead_band(), *self._scale_trend(w)]
+        candidates = weighed if self.setup.nuisances else ()
         return Regression(
             wanted, X, y - w, self.t0[self.large], self.t1[self.large], shown, "rate error", candidates=candidates
         )
@@ -149,6 +150,15 @@ class Reduction(DriftReduction[RateTableSetup]):
         return [
             nuisances.Candidate.of("dead band", "rate lacking at large rates in either sense", "deg/h", -self.sense)
         ]
+
+    def _scale_trend(self, w: Array) -> list[nuisances.Candidate]:
+        """Return a scale factor that changes in time, where each sense comes once and only the shape tells it from an
+        asymmetry; where they come again an F test looks for it.
+        """
+        if np.count_nonzero(np.diff(self.sense[self.sense != 0.0])) > 1:
+            return []
+        hours = nuisances.trend(self.t0[self.large], self.t1[self.large]).columns
+        return [nuisances.Candidate.of("scale trend", "change of the scale factor in time", "ppm/h", w * hours)]
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: what the stated rate is wrong by, times 1 + e, is in the data."""

@@ -235,6 +235,22 @@ def test_a_dead_band_is_not_read_as_a_scale_factor(tmp_path: Path) -> None:
             assert e.estimate == pytest.approx(1000.0 - 1030.0, abs=3.0 * e.u)
 
 
+@pytest.mark.parametrize("cycles", [1, 2])
+def test_a_scale_factor_that_changes_is_no_asymmetry(tmp_path: Path, cycles: int) -> None:
+    """One cycle at 30 ppm a reading: the middles of the senses are 44 readings apart, 1320 ppm of asymmetry that is not
+    there; it read -1120 with u = 200 and no word.  Of two cycles an F test says so.
+    """
+    rng = np.random.default_rng(5)
+    rate = np.repeat(STEPS.sweep(50.0, 11, cycles), 2)
+    earth = frames.EARTH_RATE * 0.5 / DEG
+    scale = 1.0 + 30e-6 * np.arange(rate.size)
+    result = measured(write(tmp_path / "a.csv", rate, scale * (rate + earth) + 0.01 * rng.normal(size=rate.size)))
+    a = found(result)["a"]
+    assert ("scale.time" in {r.id for r in result.reasons}) == (cycles == 2)
+    assert cycles == 2 or a.interval[0] < 0.0 < a.interval[1]
+    assert ("scale trend" in found(result)) == (cycles == 1)
+
+
 def exchanged(rate: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The rates of the second and the third step, in the two readings of each."""
     return rate[[0, 1, 4, 5, 2, 3, *range(6, rate.size)]], mean
