@@ -1,7 +1,7 @@
 """One figure of each system's report, for the README:  python reports/gallery.py [SYSTEM ...]
 
-Runs each system (some minutes in all), takes a figure out of its report.html and puts it, on white, into
-reports/gallery/<system>.svg.
+Runs each system (some minutes in all), takes a figure out of its report.html and puts it, without a background and in
+colours that read on light and dark pages, into reports/gallery/<system>.svg.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from gyrobench.report.style import THEMED
+from gyrobench.report.style import BLUE, GRID, INK, MUTED, ORANGE, PAPER, PURPLE, SHADE, THEMED
 
 HERE = Path(__file__).parent
 FIGURE = re.compile(r'<figure class="picture.*?(<svg.*?</svg>).*?<figcaption>(.*?)</figcaption>', re.S)
@@ -33,6 +33,20 @@ SHOWN = {
     "table_supervision": "Recorded channels",
     "table_rate_test": "largest change of rate",
 }
+#: colour of a figure -> one that reads on white and on #14171a, or lets the page through
+ON_ANY_PAGE = {
+    INK: "#767676", MUTED: "#767676", GRID: "#80808060", SHADE: "#80808020", PAPER: "#80808000",
+    BLUE: "#2a86c8", PURPLE: "#c06a98", ORANGE: "#c08300",
+    "#000000": "#767676", "#b0b0b0": "#80808060", "#ffffff": "none",  # of matplotlib's own style
+    "#1b6ca8": "#2a86c8", "#3b7d3a": "#4b914a", "#4c4c4c": "#767676", "#333333": "#767676", "#999999": "#868686",
+}  # fmt: skip
+
+
+def on_any_page(svg: str) -> str:
+    """Return a picture of its own, for a page of any colour."""
+    for colour, shown in ON_ANY_PAGE.items():
+        svg = svg.replace(colour, shown)
+    return svg.replace("<svg ", f'<svg fill="{ON_ANY_PAGE[INK]}" ', 1)
 
 
 def figure(system: str) -> str:
@@ -44,7 +58,7 @@ def figure(system: str) -> str:
     svg = next(picture for picture, caption in FIGURE.findall(page) if SHOWN.get(system, "") in caption)
     for colour, variable in THEMED.items():
         svg = svg.replace(variable, colour)
-    svg = svg.replace("<svg ", '<svg style="background: white" ', 1)
+    svg = on_any_page(svg)
     return svg if "xmlns=" in svg else svg.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
 
 

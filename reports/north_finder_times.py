@@ -19,6 +19,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from reports.gallery import on_any_page
 from systems.north_finder import plans
 
 DEG = math.pi / 180.0
@@ -55,6 +56,7 @@ def main() -> None:
     figure.legend(handles=[*keys, *grades], loc="outside lower center", ncols=7, fontsize=8, frameon=False)
     plt.rcParams["svg.hashsalt"] = "north"
     figure.savefig(target, metadata={"Date": None})
+    target.write_text(on_any_page(target.read_text(encoding="utf-8")), encoding="utf-8")
     print(target)
 
 

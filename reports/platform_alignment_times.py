@@ -20,6 +20,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from reports.gallery import on_any_page
 from systems.platform_alignment import planning, plans
 
 DEG, ARCMIN = math.pi / 180.0, math.pi / 10800.0
@@ -59,6 +60,7 @@ def main() -> None:
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     plt.rcParams["svg.hashsalt"] = "alignment"
     figure.savefig(target, metadata={"Date": None})
+    target.write_text(on_any_page(target.read_text(encoding="utf-8")), encoding="utf-8")
     print(target)
 
 

@@ -89,7 +89,7 @@ def gyrobench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command)
 def test_an_exception_in_the_reduction_names_its_line_and_the_record(gyrobench: Command, raises: str) -> None:
     line, message = FAILURES[raises]
     place = f"{Path('systems/own/system.py').resolve()}:{line}: {message}"
-    next_step = "the record is kept in {0}; after correcting the cause: gyrobench report {0}"
+    next_step = "the record is kept in {0}\nafter correcting the cause: gyrobench report {0}"
     code, out, err = gyrobench("run", "own", "--set", f"raises={raises}", "--out", "r")
     assert (code, out) == (3, "")
     assert place in err and next_step.format("r") in err and "Traceback" not in err
@@ -138,7 +138,7 @@ def test_a_template_of_the_users_own_that_fails(gyrobench: Command) -> None:
 def test_the_user_stops_the_reduction(gyrobench: Command) -> None:
     code, _, err = gyrobench("run", "own", "--set", "raises=stop", "--out", "r")
     assert code == 130
-    assert err == "gyrobench: interrupted; the record is kept in r; to reduce it: gyrobench report r\n"
+    assert err == "gyrobench: interrupted; the record is kept in r\nto reduce it: gyrobench report r\n"
 
 
 @pytest.mark.long

@@ -192,7 +192,7 @@ def test_a_specification_that_does_not_fit_keeps_the_record(gyrobench: Command, 
     code, _, err = gyrobench("run", NAME, *TINY, "--out", "r", "--spec", "s.toml")
     assert code == 3
     assert "D_I is given in 'mA'; the report uses '°/h/g'" in err
-    assert "the record is kept in r; after correcting the cause: gyrobench report r" in err
+    assert "the record is kept in r\nafter correcting the cause: gyrobench report r" in err
     assert gyrobench("report", "r", figures=False)[0] == 0
 
 

@@ -37,7 +37,6 @@ def open_loop(t: LoopIdentification) -> str:
     axes[0, 0].semilogx(f, size, color=VERMILION, linewidth=0.9, zorder=5, label="curve through the points")
     axes[1, 0].semilogx(f, phase, color=VERMILION, linewidth=0.9, zorder=5)
     _about_limits(axes)
-    _plain(axes[1, 0].xaxis)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
     return svg(fig, "open-loop")
 
@@ -58,7 +57,6 @@ def plant(t: LoopIdentification) -> str:
         fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
     axes[0, 0].set_ylabel(f"|P| / dB re {unit}")
     axes[1, 0].set_xlabel(axis_label("frequency", "Hz"))
-    _plain(axes[1, 0].xaxis)
     return svg(fig, "plant")
 
 
@@ -84,21 +82,12 @@ def _bode(axes: Any, g: MeasuredResponse, which: NDArray[np.bool_], factor: floa
     axes[1, 0].set_ylim(float(turn.min(initial=0.0)) - 30.0, float(turn.max(initial=0.0)) + 30.0)
     axes[0, 0].set_ylabel(axis_label("|L|", "dB"))
     axes[1, 0].set(ylabel=axis_label("phase", "°"), xlabel=axis_label("frequency", "Hz"))
-    _plain(axes[1, 0].xaxis)
     return np.asarray(turn)
 
 
 def _about_limits(axes: Any) -> None:
     zero_line(axes[0, 0])
     axes[1, 0].axhline(-180.0, color=MUTED, linewidth=0.8, zorder=1)
-
-
-def _plain(axis: Any) -> None:
-    """Write the numbers of a logarithmic axis as such, not as powers; after all is drawn, which sets them anew."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def sensitivities(t: LoopIdentification) -> str:
@@ -120,7 +109,6 @@ def sensitivities(t: LoopIdentification) -> str:
         bottom = float(decibel(np.abs(g.value[which])).min(initial=0.0))
         ax.set_ylim(max(-80.0, bottom - 5.0), max(6.0, float(decibel(np.abs(dense)).max(initial=0.0)) + 4.0))
     axes[1, 0].set_xlabel(axis_label("frequency", "Hz"))
-    _plain(axes[1, 0].xaxis)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.6)
     return svg(fig, "sensitivities")
 
@@ -173,7 +161,5 @@ def distortion(t: LoopIdentification) -> str:
         style = {"marker": marker, "linestyle": "", "markersize": 3.2, "color": colour, "alpha": 0.8}
         ax.loglog(d.f, np.maximum(d.size, LOWEST) / factor, **style, label=f"{d.kind}, left out")
     ax.set(xlabel=axis_label("frequency", "Hz"), ylabel=axis_label("output, amplitude", units.display(unit)))
-    _plain(ax.xaxis)
-    _plain(ax.yaxis)
     fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.4)
     return svg(fig, "distortion")

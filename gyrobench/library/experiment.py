@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from gyrobench.bench import UsageError
+from gyrobench.bench import Bench, UsageError
 from gyrobench.boundary import checked
 from gyrobench.notebook import html
 from gyrobench.reading import shorten
 from gyrobench.record.record import Record
+from gyrobench.report.language import ENGLISH, reports_in
 from gyrobench.report.notebook_html import fragment, paragraph, table_html
 from gyrobench.report.page_model import Column, PageTable, Row, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
@@ -64,10 +65,11 @@ class Run:
         return self.folder.name if self.folder is not None else named
 
     @checked
-    def report(self, folder: File | None = None, force: bool = False) -> dict[str, Path]:
+    def report(self, folder: File | None = None, force: bool = False, language: str = ENGLISH) -> dict[str, Path]:
         """Write result.json, report.html and report.pdf, into another folder with the record; return the files.
 
-        folder: default that of the run.  force: replace another run that is there.  Raises UsageError, ReportError.
+        folder: default that of the run.  force: replace another run that is there.  language: of the pages, en or zh.
+        Raises UsageError, ReportError.
         """
         target = Path(folder) if folder is not None else self.folder
         if target is None:
@@ -80,7 +82,8 @@ class Run:
             kept = self.record.folder
             self.record.save(target)
             self.record.folder = kept
-        return write_report(result, target, self.record, None)
+        with reports_in(language, result.system, Bench.find().folder):
+            return write_report(result, target, self.record, None)
 
     def __str__(self) -> str:
         return format_result(self._result) if self._result is not None else repr(self.record)

@@ -284,13 +284,18 @@ class Language:
         return self.catalogue.texts.get(whole) or self.text(text)
 
 
+def reports_there(code: str, system: str, bench: Path | None = None) -> bool:
+    """Return whether the report of a test has its texts in a language.  Raises UsageError for no language."""
+    return check_code(code) == ENGLISH or catalogue(code, system_folder(system, bench)).reports
+
+
 @contextmanager
 def reports_in(code: str, system: str, bench: Path | None = None) -> Iterator[None]:
     """Make a language that of the reports written within.
 
     Raises UsageError for one that there is not, and before anything is run where the test has no texts of its report.
     """
-    if check_code(code) != ENGLISH and not catalogue(code, system_folder(system, bench)).reports:
+    if not reports_there(code, system, bench):
         raise UsageError(
             f"--language {code}: the report of {system} has no translation, it would be half English; its certificate "
             f"has (gyrobench certificate RUN --language {code})"

@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import Any
 
 from gyrobench.report.language import in_use
-from gyrobench.report.numbers import write_number
 from gyrobench.report.style import (
     BLUE,
     CYCLE,
@@ -232,12 +231,11 @@ def psd(data: PowerSpectrum, key: str) -> str:
 
 def plain_log(ax: Any, ratio: float) -> None:
     """Decades as plain numbers or powers of ten; 2 and 5 between them where the axis is short."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
+    from matplotlib.ticker import LogLocator
 
     low, high = ax.get_xlim()
     for axis, span in ((ax.xaxis, high / low), (ax.yaxis, ratio)):
         axis.set_major_locator(LogLocator(subs=(1.0,) if span > 200 else (1.0, 3.0) if span > 15 else (1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
     ax.minorticks_off()  # nothing of them is shown, and there are many
 
 

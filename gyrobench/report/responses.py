@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import (
     CollapsedBlocks,
     PageTable,
@@ -210,9 +209,8 @@ def _phase_axis(ax: Any) -> None:
 
 
 def _frequency_axis(ax: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator
+    from matplotlib.ticker import LogLocator
 
     low, high = ax.get_xlim()
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 300 else (1.0, 2.0, 5.0), numticks=12))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
     ax.minorticks_off()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import Any
 
 from gyrobench.report.fonts import Font, MissingFontError, fonts_for
 from gyrobench.report.language import in_use
+from gyrobench.report.numbers import MINUS, superscript, write_number
 
 MM = 1.0 / 25.4
 WIDE = 170 * MM  # the text width of A4, inch
@@ -33,6 +35,8 @@ SHADE = "#eef1f4"
 PAPER = "#fdfdfd"  # behind labels that cross lines
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 MARKERS = "os^Dv<"
+PLAIN = (1e-4, 1e6)  # the largest number of an axis that needs no power of ten
+ALIKE = 1e-5  # of the largest number: a range that is shorter is counted from a number within it
 
 # in HTML the neutral colours follow the reader's light or dark setting
 THEMED = {
@@ -76,7 +80,6 @@ _RC: Any = {
     "ytick.color": INK,
     "axes.titlelocation": "left",
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 6),
     "axes.unicode_minus": True,
     "lines.linewidth": 1.2,
     "lines.markersize": 3.0,
@@ -136,18 +139,21 @@ def chart(width: float, height_mm: float) -> tuple[Any, Any]:
 def svg(fig: Any, key: str, zoom: Any = None) -> str:
     """Return the figure as an SVG element that can stand inside a page: ids prefixed by ``key``, no style of its own.
 
-    ``zoom`` is the axes whose x axis the page's script may zoom; its limits are written into the element.
+    ``zoom`` is the axes whose x axis the page's script may zoom; its limits, as the numbers there, are written into
+    the element.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     _in_language(fig)
+    _name_the_powers(fig)
     _in_any_script(fig)
     buffer = io.StringIO()  # not by savefig, which draws everything twice
     canvas: Any = FigureCanvasSVG(fig)
     canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
     text = clean_svg(buffer.getvalue(), key)
     if zoom is not None:
-        low, high = (float(v) for v in zoom.get_xlim())
+        offset, power = _left_out(*zoom.get_xlim())
+        low, high = (float(v - offset) / 10.0**power for v in zoom.get_xlim())
         text = text.replace("<svg ", f'<svg data-x0="{low!r}" data-x1="{high!r}" ', 1)
     return text
 
@@ -166,6 +172,56 @@ def _in_language(fig: Any) -> None:
             axis.set_major_formatter(FuncFormatter(lambda x, pos, named=named: language.text(named(x, pos))))
     for text in fig.findobj(Text):
         text.set_text(language.text(text.get_text()))
+
+
+def _name_the_powers(fig: Any) -> None:
+    """Put what the numbers of a linear axis leave out into its label; those of a logarithmic axis have their power.
+
+    A power of ten, and a number that all have in common: "time − 1700000000 / (10⁻³ s)".  Matplotlib would write both
+    over the axis, alone.
+    """
+    from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter, ScalarFormatter
+
+    for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis)):
+        numbers = axis.get_major_formatter()
+        if isinstance(numbers, LogFormatter):
+            axis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
+            axis.set_minor_formatter(NullFormatter())
+        elif isinstance(numbers, ScalarFormatter):
+            numbers.offset, power = _left_out(*axis.get_view_interval())
+            numbers.set_scientific(power != 0)
+            numbers.set_powerlimits((power, power))
+            axis.offsetText.set_visible(False)
+            if not axis.get_tick_params().get("labelbottom" if axis is axis.axes.xaxis else "labelleft", True):
+                continue  # of axes that are one, the last has the numbers
+            if label := axis.get_label_text():
+                axis.set_label_text(_with_power(label, numbers.offset, power))
+            elif numbers.offset or power:  # a channel has its name as title
+                title = axis.axes.get_title(loc="left")
+                axis.axes.set_title(_with_power(title, numbers.offset, power), loc="left", pad=3)
+
+
+def _left_out(low: float, high: float) -> tuple[float, int]:
+    """Return the offset and the power of ten that the numbers of an axis with these limits leave out."""
+    low, high, offset = min(low, high), max(low, high), 0.0
+    if high - low < ALIKE * max(-low, high):
+        place = 10.0 ** math.ceil(math.log10(high - low))
+        offset = place * round(0.5 * (low + high) / place)
+    largest = max(abs(low - offset), abs(high - offset))
+    return offset, 0 if PLAIN[0] <= largest < PLAIN[1] else 3 * math.floor(math.log10(largest) / 3.0)
+
+
+def _with_power(label: str, offset: float, power: int) -> str:
+    """Return the label of an axis ("rate / (°/h)") whose numbers leave out an offset and a power of ten."""
+    if not offset and not power:
+        return label
+    name, slash, unit = label.rpartition(" / ") if " / " in label else (label, "", "1")
+    if offset:
+        name += f" {MINUS if offset > 0.0 else '+'} {abs(offset):.15g}"
+    if not power:
+        return f"{name}{slash}{unit if slash else ''}"
+    factor = f"10{superscript(power)}"
+    return axis_label(name, factor if unit == "1" else f"{factor} {unit.removeprefix('(').removesuffix(')')}")
 
 
 def _said(text: str) -> str:

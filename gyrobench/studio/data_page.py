@@ -14,7 +14,7 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from gyrobench import reading, units
-from gyrobench.bench import UsageError, display_path
+from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 from gyrobench.reading import visible
@@ -82,6 +82,7 @@ class _Mapping:
         return JobRequest(
             self.proposal.test.name, values=dict(self.stated), data=display_path(self.proposal.file),
             columns=display_path(self.map_file), place=Path(*self.proposal.file.parts[-2:]).as_posix(),
+            language=say.of_report(self.proposal.test.name, Bench.find().folder),
         )  # fmt: skip
 
     def write(self) -> JobRequest:

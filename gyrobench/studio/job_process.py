@@ -14,11 +14,12 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
+from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import FolderInUseError, FolderLock, write_whole
 from gyrobench.studio.request import CommandRequest, JobRequest, first_shown, read_request
@@ -123,6 +124,13 @@ class _Writer:
 
 def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     """Return the outcome of a request, as the workflow gives it."""
+    from gyrobench.report.language import reports_in
+
+    with reports_in(request.language, request.system, Bench.find().folder):
+        return _in_language(request, resume, writer)
+
+
+def _in_language(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     from gyrobench.system.suite import Suite
     from gyrobench.workflow.feedback import Feedback
     from gyrobench.workflow.inputs import load_test
@@ -132,7 +140,6 @@ def _execute(request: JobRequest, resume: bool, writer: _Writer) -> Any:
     feedback = Feedback(writer.notes, writer.progress)
     spec = request.spec or None
     if request.data:
-        from gyrobench.bench import UsageError
         from gyrobench.workflow.measured_run import reduce_measured
 
         system = load_test(request.system)
@@ -162,11 +169,23 @@ def _resumed(request: JobRequest, writer: _Writer) -> Any:
         return _execute(request, False, writer)
 
 
+def _outcome(request: JobRequest, resume: bool, writer: _Writer) -> Any:
+    """Return the outcome of a request; a report that would be half in its language is written in English."""
+    from gyrobench.report.language import ENGLISH, UntranslatedError
+    from gyrobench.workflow.user_errors import PostRunError
+
+    try:
+        return _resumed(request, writer) if resume else _execute(request, False, writer)
+    except PostRunError as error:
+        if not isinstance(error.__cause__, UntranslatedError):
+            raise
+        writer.notes([error.__cause__.text])
+        return _resumed(replace(request, language=ENGLISH), writer)
+
+
 def _command(report: JobReport, request: CommandRequest, writer: _Writer) -> None:
     """Execute a command and keep the lines that it prints as notes; exit code 1 is an answer, too."""
     import subprocess
-
-    from gyrobench.bench import Bench
 
     command = [sys.executable, "-m", "gyrobench", *request.words]
     with subprocess.Popen(
@@ -197,7 +216,7 @@ def _finish(report: JobReport, request: JobRequest | CommandRequest, resume: boo
     try:
         if isinstance(request, CommandRequest):
             return _command(report, request, writer)
-        outcome = _resumed(request, writer) if resume else _execute(request, False, writer)
+        outcome = _outcome(request, resume, writer)
         report.folder = str(outcome.folder or "")
         report.verdict = getattr(outcome, "verdict", "") or getattr(outcome.result, "verdict", "") or ""
         stopped = outcome.stopped

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 from urllib.parse import quote, urlencode
 
+from gyrobench.report.language import ENGLISH
+
 FIRST = 4  # signals shown at first
 KEPT = "kept"  # in an address: the columns as the map beside the file has them
 
@@ -18,7 +20,7 @@ class JobRequest:
 
     values: option or slot.parameter -> text with its unit.  parts: slot -> part or FMU.  maps: slot -> mapping file.
     data: measured file; columns: its column map, "" for a file of the template's layout.  spec: "" for none.
-    place: of the file below the files of the studio.
+    place: of the file below the files of the studio.  language: of the report.
     """
 
     system: str
@@ -30,6 +32,7 @@ class JobRequest:
     data: str = ""
     columns: str = ""
     place: str = ""
+    language: str = ENGLISH
 
     @property
     def form(self) -> str:
@@ -64,6 +67,7 @@ class JobRequest:
             words += [w for name, value in given.items() for w in (option, f"{name}={value}")]
         words += ["--seed", str(self.seed)] if self.seed is not None else []
         words += ["--spec", self.spec] if self.spec else []
+        words += ["--language", self.language] if self.language != ENGLISH else []
         return shlex.join([*words, *(["--resume"] if resume else [])])
 
     def python(self, suite: bool = False) -> str:
@@ -85,7 +89,8 @@ class JobRequest:
             lines.append(f"run = test.run({', '.join([*seed, *spec])})")
         lines.append("print(run)")
         if not suite:
-            lines.append("run.report('report')  # record, result.json, report.html, report.pdf")
+            language = f", language={self.language!r}" if self.language != ENGLISH else ""
+            lines.append(f"run.report('report'{language})  # record, result.json, report.html, report.pdf")
         return "\n".join(lines)
 
 

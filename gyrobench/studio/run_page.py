@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -140,9 +141,10 @@ def _add_run_page(studio: Studio) -> None:
             document = await asyncio.to_thread(read_run, folder)
             entry = next((r for r in await asyncio.to_thread(list_runs, studio.bench.out) if r.place == place), None)
             _head(document, place, entry)
+            quoted = shlex.quote(display_path(folder))
             lines_of = (
-                f"gyrobench report {display_path(folder)}\ngyrobench record {display_path(folder)} --to csv",
-                f'import gyrobench as gb\n\nrun = gb.open_run("{display_path(folder)}")\nprint(run.result)',
+                f"gyrobench report {quoted}\ngyrobench record {quoted} --to csv",
+                f"import gyrobench as gb\n\nrun = gb.open_run({display_path(folder)!r})\nprint(run.result)",
             )
             if isinstance(document, SuiteDocument):
                 _tests(document, place)

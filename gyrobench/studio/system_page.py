@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
+from gyrobench.bench import Bench
 from gyrobench.component.declarations import Declaration
 from gyrobench.errors import GyrobenchError
 from gyrobench.report import wiring_figure
@@ -80,7 +81,7 @@ class _Choice:
 
     def __init__(self, test: System | Suite, lines: CopyLines) -> None:
         self.test, self.lines = test, lines
-        self.request = JobRequest(test.name)
+        self.request = JobRequest(test.name, language=say.of_report(test.name, Bench.find().folder))
         self.wrong: dict[str, str] = {}  # name -> why its text is no value
         self.changed: list[Callable[[], None]] = []
 

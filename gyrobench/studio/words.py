@@ -13,7 +13,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from gyrobench.report.language import ENGLISH, Language, catalogue, check_code, codes, system_folder
+from gyrobench.report.language import ENGLISH, Language, catalogue, check_code, codes, reports_there, system_folder
 
 HERE = Path(__file__).parent
 NAMES = {"en": "English", "zh": "中文"}
@@ -38,6 +38,10 @@ class _Words:
         """The language that follows in the switch."""
         every = codes()
         return every[(every.index(self.code) + 1) % len(every)]
+
+    def of_report(self, system: str, bench: Path) -> str:
+        """Return the language of the reports of a test: that of the pages, where they are translated."""
+        return self.code if reports_there(self.code, system, bench) else ENGLISH
 
     def __call__(self, text: str, system: str = "") -> str:
         """Return a text in the language; one that the catalogue lacks stays."""

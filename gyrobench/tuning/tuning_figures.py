@@ -103,21 +103,12 @@ def open_loop(t: LoopTuning) -> str:
     axes[1, 0].axhline(-180.0, color=MUTED, linewidth=0.8, zorder=1)
     axes[0, 0].set_ylabel(axis_label("|L|", "dB"))
     axes[1, 0].set(ylabel=axis_label("phase", "°"), xlabel=axis_label("frequency", "Hz"), xlim=near(t))
-    _frequencies(axes[1, 0])
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.6)
     return svg(fig, "open-loop")
 
 
 def _of(k: int) -> str | None:
     return "nominal" if k == 0 else "spread" if k == 1 else None
-
-
-def _frequencies(ax: Any) -> None:
-    """Write frequencies as numbers, not as powers."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
 
 
 def sensitivities(t: LoopTuning) -> str:
@@ -155,7 +146,6 @@ def sensitivities(t: LoopTuning) -> str:
         ax.set_ylabel(axis_label(name, "dB"))
         ax.set_ylim(max(-90.0, ax.get_ylim()[0]), max(6.0, ax.get_ylim()[1]))
     bottom.set(xlabel=axis_label("frequency", "Hz"), xlim=near(t))
-    _frequencies(bottom)
     handles = dict(zip(*reversed(top.get_legend_handles_labels()), strict=True))
     fig.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=4, handlelength=1.6)
     return svg(fig, "sensitivities")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -118,7 +119,8 @@ def _run(
         kept = save_partial_record(error.record, folder)
         message = f"{error.text}\nthe record until then is kept in {display_path(kept)}"
         if isinstance(error, RunInterrupted):
-            reducing = Advice("reduce", f"gyrobench report {display_path(kept)} reduces it, or lists what is missing")
+            report = f"gyrobench report {shlex.quote(display_path(kept))}"
+            reducing = Advice("reduce", f"{report} reduces it, or lists what is missing")
             raise CommandInterrupted(message, error.record).advised(*error.advice, reducing) from None
         there = checkpoints is not None and checkpoints.is_there
         going_on = [Advice("resume", f"{RESUMING} goes on from its last checkpoint")] if there else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gyrobench.bench import Bench, display_path, standard_folder
-from gyrobench.errors import GyrobenchError
+from gyrobench.errors import Advice, GyrobenchError
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
@@ -74,7 +75,7 @@ def user_message(error: BaseException, at_shell: bool = True) -> str:
         from gyrobench.report import ReportError  # after an error only: every command starts with this module
 
         if isinstance(error, ReportError):
-            lines = [f"  - {name}: {user_message(cause)}" for name, cause in error.failures.items()]
+            lines = [f"  - {name}: {user_message(cause, at_shell)}" for name, cause in error.failures.items()]
             return "\n".join(["report not complete:", *lines])
         return str(error) if at_shell else error.text
     place = content_location(error)
@@ -111,13 +112,15 @@ def record_kept(
             if isinstance(error, GyrobenchError):
                 raise
             save()
-        if folder is None:
-            kept = "the record is kept in memory, in the attribute 'record' of this error"
-            if isinstance(error, KeyboardInterrupt):
-                raise CommandInterrupted(f"interrupted; {kept}", record) from error
-            raise PostRunError(f"{user_message(error)}\n{kept}", record) from error
-        kept = f"the record is kept in {display_path(folder)}"
-        go_on = f"gyrobench report {display_path(folder)}"
+        kind: type[PostRunError]
         if isinstance(error, KeyboardInterrupt):
-            raise CommandInterrupted(f"interrupted; {kept}; to reduce it: {go_on}", record) from error
-        raise PostRunError(f"{user_message(error)}\n{kept}; after correcting the cause: {go_on}", record) from error
+            kind, said, when = CommandInterrupted, "interrupted; ", "to reduce it"
+        else:
+            kind, said, when = PostRunError, f"{user_message(error, at_shell=False)}\n", "after correcting the cause"
+        advice = getattr(error, "advice", ())
+        if folder is None:
+            kept = "in memory, in the attribute 'record' of this error"
+        else:
+            kept = f"in {display_path(folder)}"
+            advice += (Advice("reduce", f"{when}: gyrobench report {shlex.quote(display_path(folder))}"),)
+        raise kind(f"{said}the record is kept {kept}", record).advised(*advice) from error

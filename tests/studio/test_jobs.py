@@ -12,16 +12,21 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from short_plans import SHORT as SHORT_PLANS
 
 from gyrobench.bench import Bench, UsageError
+from gyrobench.report import report_files
+from gyrobench.report.language import Language, catalogue
+from gyrobench.report.page_model import Page
 from gyrobench.studio import job_process
 from gyrobench.studio.job_process import LIVE, REQUEST, STARTED, JobReport
 from gyrobench.studio.jobs import StudioJob, StudioJobs
 from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
+from gyrobench.workflow.user_errors import PostRunError, record_kept
 
 SHORT = JobRequest("fixed_position", {"dwell": "60s"}, seed=3)
 LONG = JobRequest("fixed_position", {"dwell": "20000000s"})  # hours
@@ -198,6 +203,39 @@ def test_a_run_that_failed_after_a_checkpoint_goes_on() -> None:
         return StudioJob("k", JobRequest("a"), False, 0.0, "failed", JobReport(state="failed", advice=[*advice]))
 
     assert failed("resume").resumable and not failed().resumable and not failed("reduce").resumable
+
+
+def test_a_report_goes_into_the_language_of_the_studio(jobs: StudioJobs, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In Chinese as its command says; where a sentence has no translation in English, and it is said."""
+    asked = replace(SHORT, language="zh")
+    assert shlex.split(asked.command())[-2:] == ["--language", "zh"]
+    assert "run.report('report', language='zh')" in asked.python()
+
+    def end() -> JobReport:
+        """Run it in this process."""
+        jobs.most = 0
+        key = jobs.submit(asked)
+        assert job_process.main(jobs.folder / key) == 0
+        return jobs.find(key).report
+
+    page = Path(end().folder, "report.html")
+    assert '<html lang="zh-CN"' in page.read_text(encoding="utf-8")
+    shutil.rmtree(page.parent)
+    monkeypatch.setattr(
+        report_files, "page_in", lambda *_: Language(catalogue("zh")).page(Page("An own title", "", [], []))
+    )
+    report = end()
+    assert '<html lang="en"' in page.read_text(encoding="utf-8")
+    assert any("1 sentence without a translation (zh)" in note for note in report.notes)
+
+
+def test_what_fails_after_the_run_names_no_command_in_the_studio(tmp_path: Path) -> None:
+    """The message of the page and the line of the shell are one error."""
+    for cause in (KeyError("x"), KeyboardInterrupt()):
+        with pytest.raises(PostRunError) as stopped, record_kept(tmp_path / "a b"):
+            raise cause
+        assert "the record is kept in" in stopped.value.text and "gyrobench report" not in stopped.value.text
+        assert str(stopped.value).endswith(f": gyrobench report '{tmp_path / 'a b'}'")
 
 
 def test_lines_of_a_request() -> None:

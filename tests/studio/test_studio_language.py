@@ -98,6 +98,11 @@ def test_every_system_is_said_in_chinese(chinese: None, name: str) -> None:
     assert [text for text in texts if words.say.find(text, name) is None] == []
 
 
+def test_a_report_without_a_translation_is_asked_for_in_english(chinese: None, tmp_path: Path) -> None:
+    (tmp_path / "systems" / "own").mkdir(parents=True)
+    assert [words.say.of_report(name, tmp_path) for name in ("own", "fixed_position")] == ["en", "zh"]
+
+
 def test_what_a_comparison_remarks_is_said_in_chinese(chinese: None) -> None:
     said = words.say(
         "runs of different systems (servo_polar, tumble_two_axis): equal names may not mean equal quantities"
@@ -149,6 +154,8 @@ def test_no_english_label_on_a_page_in_chinese(page: Any, studio: tuple[str, Pat
             settled(page)
             assert page.evaluate("document.documentElement.lang") == "zh-CN"
             fits(page, 390)
+            if path.startswith("/system"):
+                assert page.locator(".code").first.inner_text().endswith("--language zh")
             found = {w for text in page.evaluate(TEXTS) for w in WORD.findall(text)}
             left[path] = found - STAY - slots - VALUES - {"English", "reports", "out", "run"}
         assert {path: found for path, found in left.items() if found} == {}

@@ -273,9 +273,6 @@ def distances(lot: Json) -> list[Picture]:
     ax.axhline(limit, color=MUTED, linestyle="--", linewidth=0.9)
     if max(d for _, d, _ in found) > 8.0 * limit:
         ax.set_yscale("log")
-        from matplotlib.ticker import FuncFormatter
-
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: write_number(float(v), significant=2).text))
         ax.minorticks_off()
     ax.set_xlabel("measurement")
     ax.set_ylabel("robust distance / 1")
