@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from commanding import Command
 
 from gyrobench.workflow import manifest
 from gyrobench.workflow.manifest import SigningError, VerificationError
@@ -107,6 +108,22 @@ def test_keys(folder: Path, tmp_path: Path) -> None:
         manifest.verify(folder, locked)
     with pytest.raises(SigningError, match="no private Ed25519 key"):
         manifest.sign(folder, locked.with_suffix(".pub"))
+
+
+def test_a_key_with_a_passphrase_by_commands(folder: Path, gyrobench: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def prompt(text: str, **how: bool) -> str:
+        asked.append((text, how["hide_input"], how["confirmation_prompt"]))
+        return "secret"
+
+    monkeypatch.setattr("typer.prompt", prompt)
+    assert gyrobench("sign", "--new-key", "lab.key", "--passphrase")[0] == 0
+    code, _, err = gyrobench("sign", folder, "--key", "lab.key")
+    assert code == 2 and "lab.key: has a passphrase, which is needed\n--passphrase asks for it" in err
+    assert gyrobench("sign", folder, "--key", "lab.key", "--passphrase")[0] == 0
+    assert "signed by lab.pub" in gyrobench("verify", folder, "--key", "lab.pub")[1]
+    assert asked == [("passphrase", True, True), ("passphrase", True, False)], "a new one twice, never shown"
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl here")

@@ -60,7 +60,8 @@ class Multisine:
     def __str__(self) -> str:
         period = self.signal.size * self.step
         f = self.lines / period
-        size, top = (units.format_quantity(float(f"{x:.4g}"), self.unit) for x in (self.rms, np.abs(self.signal).max()))
+        sizes = np.array([self.rms, np.abs(self.signal).max()]) / units.unit(self.unit).factor
+        size, top = (units.format_quantity(float(f"{x:.4g}"), self.unit) for x in sizes)
         return (
             f"{self.lines.size} odd lines from {f[0]:.4g} Hz to {f[-1]:.4g} Hz, period {period:.6g} s, rms {size}, "
             f"peak {top}, crest factor {self.crest:.3g}"
@@ -75,7 +76,7 @@ def multisine(
     Raises UsageError for what cannot be had.
     """
     samples = round(period * rate)
-    if not (low > 0.0 and high > low and peak > 0.0):
+    if not (min(low, period, rate, peak) > 0.0 and high > low):
         raise UsageError("multisine: band, period, rate and peak must be above 0, the band must rise")
     if abs(samples - period * rate) > 1e-6 * samples:
         raise UsageError(f"multisine: a period of {period:g} s is {period * rate:.6g} samples, not a whole number")
@@ -122,6 +123,7 @@ def parse_multisine(band: str, peak: str, period: str, rate: str, seed: int = 1)
             raise units.UnitError(f"{band}: write LOW..HIGH, such as 0.5Hz..80Hz")
         limits = units.parse_quantity(low, "Hz"), units.parse_quantity(high, "Hz")
         seconds, samples = units.parse_quantity(period, "s"), units.parse_quantity(rate, "Hz")
-        return multisine(*limits, seconds, samples, units.parse_quantity(peak, unit), unit, seed)
+        largest = units.parse_quantity(peak, unit) * units.unit(unit).factor
+        return multisine(*limits, seconds, samples, largest, unit, seed)
     except units.UnitError as error:
         raise UsageError(f"multisine: {error}") from None

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench import reading
-from gyrobench.errors import GyrobenchError
+from gyrobench.errors import Advice, GyrobenchError
 from gyrobench.files import sha256, write_whole
 from gyrobench.record.run_document import FILE as RUN
 from gyrobench.workflow.run_folders import MANIFEST, RECORD, REPORT, SIGNATURE
@@ -149,8 +149,10 @@ def _private_key(key: Path, passphrase: str | None) -> Ed25519PrivateKey:
     try:
         private: Any = serialization.load_pem_private_key(key.read_bytes(), passphrase.encode() if passphrase else None)
     except TypeError:
-        need = "has a passphrase, which is needed" if passphrase is None else "has no passphrase"
-        raise SigningError(f"{key}: {need}") from None
+        if passphrase is None:
+            asking = Advice("sign", "--passphrase asks for it")
+            raise SigningError(f"{key}: has a passphrase, which is needed").advised(asking) from None
+        raise SigningError(f"{key}: has no passphrase") from None
     except ValueError:
         private = None
     if not isinstance(private, ed25519.Ed25519PrivateKey):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commanding import Command
 from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
 from scipy import linalg
 
@@ -188,6 +189,20 @@ def test_a_multisine(tmp_path: Path) -> None:
     assert "crest factor" in str(made)
 
 
+def test_a_multisine_at_the_clock_of_the_laboratory(gyrobench: Command) -> None:
+    """Two periods of 2 s at 2.5 kHz are 10,000 samples, 0.4 ms apart; 10 mA are 10 in the file and 0.01 A in SI."""
+    code, out, _ = gyrobench("multisine", "r.csv", "--band", "1Hz..100Hz", "--peak", "10mA", "--period", "2s",
+                             "--rate", "2.5kHz", "--periods", "2")  # fmt: skip
+    assert code == 0 and "period 2 s" in out and "peak 10 mA" in out
+    assert Path("r.csv").read_text().splitlines()[1] == "time [s],excitation [mA]"
+    time, excitation = np.loadtxt("r.csv", delimiter=",", skiprows=2).T
+    assert time == pytest.approx(4e-4 * np.arange(10_000), rel=1e-12)
+    assert excitation[:5000] == pytest.approx(excitation[5000:], abs=1e-12)
+    assert np.abs(excitation).max() == pytest.approx(10.0)
+    made = gb.multisine("1Hz..100Hz", "10mA")
+    assert np.abs(made.signal).max() == pytest.approx(0.01) and made.rms == pytest.approx(0.01 / made.crest)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -197,6 +212,8 @@ def test_a_multisine(tmp_path: Path) -> None:
         (("1Hz..50Hz", "1beauty"), "beauty"),
         (("50Hz..1Hz", "1V"), "the band must rise"),
         (("1Hz..50Hz", "1V", "0.9999s", "999Hz"), "not a whole number"),
+        (("1Hz..50Hz", "1V", "-4s"), "period, rate and peak must be above 0"),
+        (("1Hz..50Hz", "1V", "4s", "0Hz"), "period, rate and peak must be above 0"),
     ],
 )
 def test_multisines_that_cannot_be(given: tuple[str, ...], words: str) -> None:
