@@ -45,14 +45,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.boundary import faults_of
+from gyrobench.record.clock_times import DATED, HALF_DAY, moment
 from gyrobench.record.column_numbers import write_numbers
-from gyrobench.record.csv_reader import DataError, regular, row_list
+from gyrobench.record.csv_reader import HEAD_ROWS, DataError, regular, row_list, thousands
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.row_faults import NOTHING
 
 Empty = Literal["missing", "skip", "previous"]
-HALF_DAY = 43200.0  # s
-DATED = re.compile(r"%[djyYxcmbB]")
 BINARY_KINDS = {b"PK": "a spreadsheet or an archive", b"PA": "a Parquet file", b"\xd0\xcf": "an old spreadsheet"}
 BINARY = tuple(BINARY_KINDS)
 COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
@@ -225,9 +224,7 @@ class MappedRows:
                 elif names.count(source) == 1:
                     places.append(names.index(source))
                 else:
-                    many = (
-                        "no such column" if source not in names else "several columns have this name: give its number"
-                    )
+                    many = "several columns have this name: give its number" if source in names else "no such column"
                     near = f"; {suggest_names(source, [n for n in names if n])}" if source not in names else ""
                     problems.append(f"columns.{name}: from = '{source}': {many} in row {self.map.skip + 1}{near}")
         if problems:
@@ -257,12 +254,12 @@ class MappedRows:
     def _value(self, number: int, name: str, c: MappedColumn, text: str) -> str:
         if c.time:
             try:
-                moment = datetime.strptime(text, c.time)
+                now = moment(text, c.time)
             except ValueError:
                 self._fault(f"column '{name}': not of the form {c.time}", text, number)
                 return text
-            self.origin = self.origin or moment
-            t = (moment - self.origin).total_seconds()
+            self.origin = self.origin or now
+            t = (now - self.origin).total_seconds()
             if not DATED.search(c.time):
                 last = self.clock.get(name, 0.0)
                 while t < last - HALF_DAY:
@@ -373,14 +370,18 @@ def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
     if columns.table and not is_log(file):
         raise DataError(file, [f"table = '{columns.table}': a text file has one table; leave it out"])
     text = as_text(file, columns.table) if is_log(file) else file
-    if _quick(text, done, to):
-        return done
-    done = MappedRows(columns, file)
-    with to.open("w", encoding="utf-8", newline="\n") as out:
-        for line in done.lines(cells_of_file(text, columns.encoding, columns.delimiter)):
-            out.write(line + "\n")
+    if not _quick(text, done, to):
+        done = MappedRows(columns, file)
+        with to.open("w", encoding="utf-8", newline="\n") as out:
+            for line in done.lines(cells_of_file(text, columns.encoding, columns.delimiter)):
+                out.write(line + "\n")
     if not done.read:
         raise DataError(file, [f"no names of columns in row {columns.skip + 1} (skip = {columns.skip})"])
+    lines, above = cells_of_file(text, columns.encoding, columns.delimiter), columns.skip + 1 + columns.below
+    rows = [cells for _, cells in itertools.islice(lines, above, above + HEAD_ROWS)]
+    numbers = [(name, places[0]) for name, c, _, places in done.read if not c.time]
+    if wrong := [p for name, k in numbers for p in thousands(name, (r[k] for r in rows if len(r) > k))]:
+        raise DataError(file, wrong)
     return done
 
 
@@ -390,9 +391,8 @@ def _quick(file: Path, done: MappedRows, to: Path) -> bool:
     if any(c.time or c.next for c in m.columns.values()):
         return False
     head = m.skip + 1 + m.below
-    above = list(itertools.islice(cells_of_file(file, m.encoding, m.delimiter), head))
     with to.open("wb") as out:
-        for line in done.lines(above):
+        for line in done.lines(itertools.islice(cells_of_file(file, m.encoding, m.delimiter), head)):
             out.write(line.encode() + b"\n")
         places = [places[0] for _, _, _, places in done.read]
         factors = [c.factor for _, c, _, _ in done.read]

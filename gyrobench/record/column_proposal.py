@@ -13,11 +13,11 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 from gyrobench import units
 from gyrobench.bench import UsageError
+from gyrobench.record.clock_times import moment
 from gyrobench.record.column_map import BINARY, cells_of_file
 from gyrobench.record.csv_reader import DECIMAL_COMMA, regular
 from gyrobench.record.row_faults import NOTHING
@@ -25,8 +25,13 @@ from gyrobench.record.row_faults import NOTHING
 SAMPLE = 1 << 22  # bytes that are looked at
 LONG = 2000  # rows from which on a file is taken for time series
 DAYS = ("%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y")
-CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M")
+CLOCKS = (
+    "%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M", "%I:%M:%S %p", "%I:%M:%S.%f %p", "%I:%M %p", "%H:%M:%S%z",
+    "%H:%M:%S.%f%z",
+)  # fmt: skip
 FORMATS = (*(f"{d}{joint}{c}" for d in DAYS for joint in (" ", "T") for c in CLOCKS), *DAYS, *CLOCKS)
+STAMP = r"\d[\d.:,/T -]*(Z|[+-]\d\d:?\d\d|[AaPp][Mm])?"
+GROUPED = r"\d{1,3}([.,'’ \u00a0\u202f]\d{3})+([.,]\d*)?"  # with separators of thousands: the reader refuses them
 NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))\s*")
 #: how a row of units writes the form of a date or clock time: TT.MM.JJJJ hh:mm:ss
@@ -108,7 +113,7 @@ def find_encoding(data: bytes) -> str:
 def _share(cells: Sequence[str]) -> float:
     """Return which part of the cells that are not empty are numbers, dates or clock times."""
     there = [c for c in cells if c not in NOTHING]
-    like = [c for c in there if NUMBER.fullmatch(c) or (c[0].isdigit() and re.fullmatch(r"[\d.:,/T -]+", c))]
+    like = [c for c in there if NUMBER.fullmatch(c) or re.fullmatch(rf"{STAMP}|[-+−]?{GROUPED}", c)]
     return len(like) / len(there) if there else 0.0
 
 
@@ -208,7 +213,7 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
 
 def _fits(text: str, form: str) -> bool:
     with suppress(ValueError):
-        datetime.strptime(text, form)
+        moment(text, form)
         return True
     return False
 

@@ -30,9 +30,12 @@ from gyrobench.reading import require_regular
 from gyrobench.record.circumstances import Keys, Statement, faults, statement, values_of
 
 MAX_LISTED = 8  # row numbers listed before "and n more"
+HEAD_ROWS = 2000  # that tell whether numbers have separators of thousands
 SCANNED = 50  # lines below the header that tell the decimal sign
 DECIMAL_POINT = re.compile(r"[-+]?\d*\.\d+([eE][-+]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+
+GROUPS = re.compile(r"[-+−]?[1-9]\d{0,2}([.,]\d{3})+")
 
 
 class DataError(GyrobenchError):
@@ -202,6 +205,29 @@ def _decimal_comma(cells: Iterable[str]) -> bool:
     return found
 
 
+def thousands(name: str, cells: Iterable[str]) -> list[str]:
+    """Return the problem of a column with separators of thousands: 1.070 beside 965, of no other form.
+
+    A column of decimals with three places would have them in all cells (%.3f), or fewer in some (%g).
+    """
+    marked, plain = [], []
+    for c in cells:
+        if "." in c or "," in c:
+            if not GROUPS.fullmatch(c):
+                return []
+            marked.append(c)
+        elif (digits := c.lstrip("+-−")).isdecimal():
+            if len(digits) > 3:
+                return []
+            plain += [c] if len(digits) == 3 else []
+    if len(marked) < 3 or not plain:
+        return []
+    return [
+        f"column '{name}': '{marked[0]}' beside '{plain[0]}': separators of thousands, which could be decimal signs; "
+        f"write the numbers without them (where they are decimals: {plain[0]}{marked[0][-4]}000)"
+    ]
+
+
 def not_utf8(row: int) -> str:
     return f"row {row}: not UTF-8 text; save the table as CSV (UTF-8), or gyrobench fit writes a column map for it"
 
@@ -227,6 +253,7 @@ def read_measured(
         raise DataError(file, ["no header line"])
     delimiter, header = _split_header(table[0][1])
     rows = [(n, cells_of(line, delimiter)) for n, line in table[1:]]
+    as_written = rows
     if delimiter != "," and _decimal_comma(c for _, cells in rows for c in cells):
         rows = [(n, [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in cells]) for n, cells in rows]
     said = [s for s in stated if s is not None]
@@ -241,6 +268,7 @@ def read_measured(
     rows = [(n, r) for n, r in rows if len(r) == len(header)]
     columns_si = {}
     for name, (k, factor) in places.items():
+        problems += thousands(name, (r[k] for _, r in as_written if len(r) == len(header)))
         values, invalid = _numbers(name, [(n, r[k]) for n, r in rows], expected[name].whole)
         columns_si[name] = values if expected[name].whole else factor.to_si(values)
         problems += invalid

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -9,9 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gyrobench.record.circumstances import statement
-from gyrobench.record.csv_reader import Factor, Head, cells_of, row_list
+from gyrobench.record.csv_reader import HEAD_ROWS, Factor, Head, cells_of, row_list, thousands
 
 DATE = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\s*\d{1,2}:\d{2}:")
+#: 1,069.61 and 1.069,61; 1'069; 1.069.610: not 1,069, which may be a decimal comma
+SEPARATED = re.compile(
+    r"[-+−]?[1-9]\d{0,2}(([.,'’ \u00a0\u202f])\d{3}(\2\d{3})*(?!\2)[.,]\d*"
+    r"|(['’ \u00a0\u202f]\d{3})+|([.,])\d{3}(\5\d{3})+)"
+)
 NOTHING = ["", "nan", "NaN", "NAN", "NA", "n/a", "null", "-", "--", "#N/A"]  # cells without a value
 ROWS = 2_000_000  # examined of a file whose header is wrong already
 
@@ -68,6 +74,12 @@ def row_faults(
     return _sentences(head, count, late, cells_wrong, (time, back))
 
 
+def grouped(file: Path, head: Head, places: Mapping[str, tuple[int, Factor]]) -> list[str]:
+    """Return which columns are written with separators of thousands, by the first rows."""
+    rows = [cells_of(text, head.delimiter) for _, text in itertools.islice(_lines(file, head, 0), HEAD_ROWS)]
+    return [p for name, (k, _) in places.items() for p in thousands(name, (r[k] for r in rows if len(r) > k))]
+
+
 def _number(cell: str, comma: bool) -> float | None:
     """Return a cell as a number, NaN for one without a value, None for anything else."""
     if cell in NOTHING:
@@ -98,6 +110,8 @@ def _sentences(
             n = len(fault.rows)
             text = fault.first[:40]
             why = sign if any(c.isdigit() for c in text) else f"a missing value? column map: absent = ['{text}']"
+            if SEPARATED.fullmatch(text):
+                why = "separators of thousands: write the numbers without them"
             if DATE.match(text):
                 why = "a date: write seconds from the first sample on"
             problems.append(

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.record.circumstances import statement
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head, check_utf8, for_arrow, header_places
-from gyrobench.record.row_faults import NOTHING, ROWS, row_faults
+from gyrobench.record.row_faults import NOTHING, ROWS, grouped, row_faults
 from gyrobench.record.sampling import Successive
 
 Block = Mapping[str, Array]
@@ -46,6 +46,7 @@ def read_blocks(file: Path, head: Head, columns: Sequence[CsvColumn]) -> Iterato
     import pyarrow as pa
 
     places, problems = header_places(head.names, {c.name: c for c in columns})
+    problems += grouped(file, head, places)
     if problems:
         raise DataError(file, problems + row_faults(file, head, places, most=ROWS))
     check_utf8(file)  # pyarrow would print the failure of its own decoding

@@ -178,6 +178,10 @@ def map_text(
         if name == "t_start" and "t_end" in wanted and "t_end" not in found:
             lines += ["", "[columns.t_end]  # readings without a pause; else from = the column with their end",
                       'next = "t_start"', '# last = "60s"  # length of the last one, else left out']  # fmt: skip
+    for c in found.values():
+        if c.name and (others := [o for o in layout.columns if o.name == c.name and o != c]):
+            numbers = ", ".join(str(o.sources[0]) for o in others)
+            problems.append(f"column {c.sources[0]} is taken for '{c.name}'; others are called so, too: {numbers}")
     used = {s for c in found.values() for s in c.sources}
     unused = [c.name for c in layout.columns if not used & {*c.sources}]
     lines += [
