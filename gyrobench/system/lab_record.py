@@ -45,6 +45,7 @@ ELSEWHERE = {
     "(gyrobench reduce NAME --template) and leave this key out"
 }
 OF_SERIES = ("window", "samples", "bandwidth")  # keys of time series
+STATED = (*WITH_POLARITY, *OF_SERIES)  # what a record may say beside the options of its test
 
 
 def explained(template: str, options: Iterable[str] = ()) -> str:

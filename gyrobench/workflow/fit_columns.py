@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
@@ -165,7 +166,7 @@ def map_text(
     empty = sum(c.empty for c in found.values())
     series = "t_start" not in wanted
     lines = [
-        f"# Column map of {file.name}: gyrobench reduce {test.name} --data {file.name} --columns MAP",
+        f"# Column map of {file.name}: gyrobench reduce {test.name} --data {shlex.quote(file.name)} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
         *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
         f"skip = {layout.skip}  # lines above the names of the columns",

@@ -171,6 +171,17 @@ def test_what_is_refused_before_anything_runs(asked: dict[str, Any], problem: st
         make_plan(from_mapping(asked))
 
 
+def test_what_a_measured_record_may_say_can_be_said_of_a_lot(tmp_path: Path) -> None:
+    """As of one file by ``reduce --set``; of simulated runs it says nothing, and any other name is refused at once."""
+    (tmp_path / "a.csv").write_text("1.0\n", encoding="utf-8")
+    lot = {"system": "weighing", "data": str(tmp_path / "*.csv")}
+    said = {"type_b": "none", "arrangement": "checked", "operator": "Li"}
+    assert make_plan(from_mapping({**lot, "set": said})).runs[0].values == said
+    for asked in ({**lot, "set": {"type_c": "none"}}, {"system": "weighing", "set": {"type_b": "none"}}):
+        with pytest.raises(UsageError, match="type_"):
+            make_plan(from_mapping(asked))
+
+
 LOOP = {"system": "platform_single_axis", "over": {"platform.J": "2,4 kg.m2"}, "set": {"hold": "10s"}}
 
 

@@ -23,6 +23,7 @@ from gyrobench.campaign.execution.bundle import Assigned, Bundle, digest_of, too
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.files import sha256
 from gyrobench.packaging.own_controller import is_controller
+from gyrobench.system.lab_record import STATED
 from gyrobench.system.parameters import followed
 from gyrobench.system.part_files import resolve_parts
 from gyrobench.system.suite import Suite, load_test
@@ -225,8 +226,9 @@ class _Planner:
 
     def _require_names(self) -> None:
         """Raise UsageError for a name that is neither an option nor of a slot."""
+        said = STATED if self.definition.data is not None else ()  # of a measured record, the reader knows which
         for name in self.names:
-            if name in self.test.options:
+            if name in self.test.options or name in said:
                 continue
             problems = [self._problem_of(name, *suite) for suite in self._suites()] or [self._problem_of(name)]
             if all(problems):
