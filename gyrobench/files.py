@@ -7,6 +7,7 @@ import errno
 import functools
 import hashlib
 import os
+import secrets
 import shutil
 import sys
 import tempfile
@@ -28,10 +29,9 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: 
     content: of the file, or a function that writes it to the path it is given.  durable: the content is on the disk
     before its name, and both are when this returns, whatever happens to the machine; not for what is made again.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    os.close(handle)
-    temporary = Path(name)
+    temporary = path.with_name(f"{path.name}{secrets.token_hex(4)}.part")
     try:
+        temporary.touch(0o600, exist_ok=False)
         if isinstance(content, bytes):
             temporary.write_bytes(content)
         else:
@@ -43,7 +43,8 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: 
         if durable and os.name != "nt":  # there a folder cannot be opened
             to_disk(path.parent)
     except OSError as error:
-        error.filename = error.filename or str(path)  # for the message: a full disk, a limit of the size
+        if error.filename in (None, str(temporary)):
+            error.filename = str(path)  # for the message: a full disk, a limit of the size, a folder that is read only
         raise
     finally:
         temporary.unlink(missing_ok=True)

@@ -36,6 +36,7 @@ from gyrobench.exchange.external_record import row_steps
 from gyrobench.exchange.gains import INPUT, Gains, gain_fmu, gains_of, varying
 from gyrobench.exchange.ssp_annotation import annotate, annotate_gains
 from gyrobench.exchange.ssp_values import SSC, SSD, SSV
+from gyrobench.files import write_whole
 from gyrobench.system.binding import Bound
 from gyrobench.system.loop_plan import LoopPlan
 from gyrobench.system.parameters import Starts, defaults, resolve
@@ -156,11 +157,11 @@ def export_ssp(
     annotate_gains(root, gains.parts)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(path.suffix + ".part")
-    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in ("SystemStructure.ssd", _xml(root)), *files.items():
             archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
-    temporary.replace(path)
+    write_whole(path, content.getvalue())
     return notes
 
 

@@ -18,12 +18,12 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench.component import Component, Scalar
+from gyrobench.files import write_whole
 from gyrobench.packaging.instance import Instance, Plain, make
 from gyrobench.packaging.loading import load_part
 
@@ -146,9 +146,7 @@ def write_reference(
     writer.writerow(["time", *inputs, *outputs])
     for k, t in enumerate(time):
         writer.writerow([repr(x) for x in (t, *(column[k] for column in inputs.values()), *table[k])])
-    temporary = path.with_suffix(".part")
-    temporary.write_text(text.getvalue(), encoding="utf-8")
-    os.replace(temporary, path)
+    write_whole(path, text.getvalue().encode())
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -15,6 +16,7 @@ from pathlib import Path
 import pytest
 from commanding import Command
 
+from gyrobench import files
 from gyrobench.engine import checkpoint
 from gyrobench.engine.checkpoint import FILE
 from gyrobench.engine.run_driver import Interrupts
@@ -195,3 +197,21 @@ def test_an_ignored_hangup_stays_ignored() -> None:
             assert ended.pressed
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_a_folder_that_takes_no_file_is_told_by_the_name_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not by that of the temporary one; what was there stays, and nothing is left beside it."""
+    (tmp_path / "a.csv").write_text("old")
+
+    def full(path: Path, *_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    for name in ("touch", "write_bytes"):
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, name, full)
+            with pytest.raises(OSError, match="No space left") as stopped:
+                files.write_whole(tmp_path / "a.csv", b"new")
+        assert stopped.value.filename == str(tmp_path / "a.csv")
+    assert [f.name for f in tmp_path.iterdir()] == ["a.csv"] and (tmp_path / "a.csv").read_text() == "old"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import queue
+import threading
 import time
 import uuid
 from collections import Counter, deque
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 SECONDS = 1.0  # of work in a chunk
 WRITE = 2.0  # s between two writes
+LEAVE = 2.0  # s for workers to answer that they let go of a campaign
 AHEAD = 2  # chunks for each worker: one it works on, one it has
 UNSEEN = 20  # times that a worker with a run may vanish and leave no trace
 PATIENCE = 60.0  # s until the machine of a worker that vanished is given up
@@ -206,8 +208,13 @@ class _Execution:
                 for future in self.flying:
                     future.release()
                 self.flying.clear()
-                with contextlib.suppress(Exception):  # the scheduler may be gone
-                    self.client.unregister_worker_plugin(self.plugin.name)
+                leaving = threading.Thread(target=self._leave, daemon=True)
+                leaving.start()
+                leaving.join(LEAVE)  # a worker in the middle of a long run answers when it is done
+
+    def _leave(self) -> None:
+        with contextlib.suppress(Exception):  # the scheduler may be gone
+            self.client.unregister_worker_plugin(self.plugin.name)
 
     def keep_extremes(self) -> list[str]:
         """Run again, with record and report, the runs with the smallest and largest estimate of each coefficient."""

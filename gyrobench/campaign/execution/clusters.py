@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
@@ -90,8 +91,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
             # in place of dask's
             loaded = ["distributed", "gyrobench.campaign.execution.worker", "scipy.stats", "scipy.signal"]
             get_mp_context().set_forkserver_preload(loaded)
-        with (
-            LocalCluster(
+        with _stop_of_this_process():
+            made = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
@@ -100,10 +101,28 @@ def local_cluster(workers: int) -> Iterator[Client]:
                 env=dict(os.environ),  # as it is now, not as it was when the first cluster began
                 silence_logs=logging.CRITICAL,
                 security=Security.temporary(),
-            ) as cluster,
-            Client(cluster, set_as_default=False) as client,
-        ):
+            )
+        with made as cluster, Client(cluster, set_as_default=False) as client:
             yield client
+
+
+@contextlib.contextmanager
+def _stop_of_this_process() -> Iterator[None]:
+    """Keep Ctrl-C, which a terminal sends to all its processes, from those that are started here: this one ends them.
+
+    They inherit that the signal is held back; here it comes as soon as they are there.
+    """
+    from multiprocessing import resource_tracker
+
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # started within, it would let the signal through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
