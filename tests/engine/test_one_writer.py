@@ -205,7 +205,7 @@ def test_a_folder_that_takes_no_file_is_told_by_the_name_of_the_file(
     """Not by that of the temporary one; what was there stays, and nothing is left beside it."""
     (tmp_path / "a.csv").write_text("old")
 
-    def full(path: Path, *_: object) -> None:
+    def full(path: Path, *_: object, **how: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     for name in ("touch", "write_bytes"):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import queue
-import threading
 import time
 import uuid
 from collections import Counter, deque
@@ -22,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from gyrobench.bench import Bench
 from gyrobench.campaign.execution.bundle import tool_digest
 from gyrobench.campaign.execution.campaign_plan import MEASURED, CampaignPlan, PlannedRun, make_plan
-from gyrobench.campaign.execution.clusters import connect, has_own_processes, is_local
+from gyrobench.campaign.execution.clusters import connect, has_own_processes, is_local, is_temporary
 from gyrobench.campaign.execution.definition import Definition
 from gyrobench.campaign.execution.store import Campaign, CampaignError, CampaignStore
 from gyrobench.notebook import MissingPackageError
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
 SECONDS = 1.0  # of work in a chunk
 WRITE = 2.0  # s between two writes
-LEAVE = 2.0  # s for workers to answer that they let go of a campaign
 AHEAD = 2  # chunks for each worker: one it works on, one it has
 UNSEEN = 20  # times that a worker with a run may vanish and leave no trace
 PATIENCE = 60.0  # s until the machine of a worker that vanished is given up
@@ -190,6 +188,7 @@ class _Execution:
         """Execute runs and store their rows."""
         self.client.register_plugin(self.plugin)
         self.waiting.extend(sorted(runs, key=lambda r: (r.setup, r.index)))
+        stopped = True
         try:
             self._look()
             while self.waiting or self.alone or self.flying or self.lost:
@@ -201,6 +200,7 @@ class _Execution:
                     self._look()
                     if self.lost:
                         self._inquire()
+            stopped = False
         finally:
             try:
                 self._write()
@@ -208,13 +208,9 @@ class _Execution:
                 for future in self.flying:
                     future.release()
                 self.flying.clear()
-                leaving = threading.Thread(target=self._leave, daemon=True)
-                leaving.start()
-                leaving.join(LEAVE)  # a worker in the middle of a long run answers when it is done
-
-    def _leave(self) -> None:
-        with contextlib.suppress(Exception):  # the scheduler may be gone
-            self.client.unregister_worker_plugin(self.plugin.name)
+                if not (stopped and is_temporary(self.client)):  # it would wait for the runs under way
+                    with contextlib.suppress(Exception):  # the scheduler may be gone
+                        self.client.unregister_worker_plugin(self.plugin.name)
 
     def keep_extremes(self) -> list[str]:
         """Run again, with record and report, the runs with the smallest and largest estimate of each coefficient."""

@@ -16,6 +16,7 @@ from gyrobench.files import cores, temporary_folder
 if TYPE_CHECKING:
     from distributed import Client
 
+TEMPORARY = "gyrobench"
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
@@ -102,7 +103,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
                 silence_logs=logging.CRITICAL,
                 security=Security.temporary(),
             )
-        with made as cluster, Client(cluster, set_as_default=False) as client:
+        with made as cluster, Client(cluster, set_as_default=False, name=TEMPORARY) as client:
             yield client
 
 
@@ -143,6 +144,11 @@ def _without_main() -> Iterator[None]:
 def has_own_processes(client: Client) -> bool:
     """Return whether the workers are processes of their own, which a run may end."""
     return os.getpid() not in client.run(os.getpid).values()
+
+
+def is_temporary(client: Client) -> bool:
+    """Return whether the client is one of :func:`local_cluster`, which ends with the command."""
+    return f"-{TEMPORARY}-" in client.id
 
 
 def is_local(client: Client) -> bool:
