@@ -18,11 +18,16 @@ SECTIONS = ("parameter", "input", "output")
 
 @dataclass(frozen=True)
 class ExposedVariable:
-    """A variable to expose.  section: its causality.  ends: (slot, variable) of what it stands for."""
+    """A variable to expose.  section: its causality.  ends: (slot, variable) of what it stands for.
+
+    unit, doc: of an option; else those of the part's variable.
+    """
 
     name: str
     section: str
     ends: tuple[tuple[str, str], ...]
+    unit: str = ""
+    doc: str = ""
 
 
 class _Chooser:
@@ -80,7 +85,8 @@ class _Chooser:
             ends = changed
         if not ends or any(not slot or f"{slot}.{variable}" in self.wired for slot, variable in ends):
             return None  # it changes nothing, a time of the run, or an input with a wire
-        return ExposedVariable(name, "parameter", tuple(sorted(ends)))
+        o = self.system.options[name]
+        return ExposedVariable(name, "parameter", tuple(sorted(ends)), o.unit if isinstance(o.unit, str) else "", o.doc)
 
     def settings(self, system: System) -> dict[tuple[str, str], Any]:
         """Return what is set in the parts, the factors of wires and the times of a system, by (slot, variable)."""

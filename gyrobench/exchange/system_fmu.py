@@ -11,6 +11,7 @@ Inputs reach the outputs with the next step.  Not offered: directional derivativ
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
@@ -124,7 +125,9 @@ def _exposed(
         ends = [(slot, scalars[f"{slot}.{variable}"]) for slot, variable in choice.ends]
         slot, scalar = ends[0]
         start = float(given.get((slot, scalar.reference), scalar.start))
-        new = dataclasses.replace(scalar, name=choice.name, section=choice.section, start=start)
+        decl = copy.copy(scalar.decl)
+        decl.unit, decl.doc = choice.unit or decl.unit, choice.doc or decl.doc
+        new = dataclasses.replace(scalar, name=choice.name, section=choice.section, start=start, decl=decl)
         named[choice.name] = Exposed(new, tuple((slot, s.reference) for slot, s in ends))
     order = [e for section in SECTIONS for e in named.values() if e.scalar.section == section]
     return [dataclasses.replace(e, scalar=dataclasses.replace(e.scalar, reference=i)) for i, e in enumerate(order)]

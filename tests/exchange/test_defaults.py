@@ -48,6 +48,17 @@ def test_windows_need_no_option(tmp_path: Path) -> None:
     assert estimates(found) == estimates(test.run(check_step=False))
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_option_has_its_unit_and_meaning_in_the_fmu(tmp_path: Path, fmi: int) -> None:
+    """A torque and a rate, which set sizes of phases that may be anything: "1" in the part."""
+    system = load_system("platform_single_axis")
+    export_fmu(system, tmp_path / "p.fmu", fmi=fmi)
+    variables = read_model_description(str(tmp_path / "p.fmu")).modelVariables
+    found = {v.name: (v.unit, v.description, float(v.start)) for v in variables if v.causality == "parameter"}
+    assert found["load_step"] == ("N.m", system.options["load_step"].doc, 1.0)
+    assert found["command"] == ("rad/s", system.options["command"].doc, 1e-3)
+
+
 def test_a_loop_test_stops_where_its_plan_ends(tmp_path: Path) -> None:
     """A stage is rounded to a step, so that the plan of 3 phases may take 9 steps of 1 ms more; then whole seconds."""
     system = load_system(LOOP).with_values(SHORT)
