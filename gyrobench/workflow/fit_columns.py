@@ -214,7 +214,8 @@ def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str
     elif unit not in ("", "1"):
         lines.append(f"# unit = {_quoted(unit)}")
         said = f"'{c.written}' is unknown" if c.written else "the file tells none"
-        problems.append(f"column '{name}': its unit: {said}; write unit = {_quoted(unit)}, or what it is")
+        counts = " (of counts: unit and factor = the size of one)" if c.written else ""
+        problems.append(f"column '{name}': its unit: {said}; write unit = {_quoted(unit)}, or what it is{counts}")
     return lines
 
 
