@@ -80,6 +80,8 @@ class BaseMotion(Component):
     turn_s = Discrete([[0.0] * 8] * 4, "1", "sines of the preset: sine of it")
     h_turned = Discrete(0.0, "s", "step of turn_c and turn_s")
     turned = Discrete(0.0, "1", "steps since the sines were made anew")
+    earth_north = Discrete(0.0, "rad/s", "Earth rate towards north")
+    earth_up = Discrete(0.0, "rad/s", "Earth rate upwards")
     own = Discrete(0.0, "1", "1 while there are sines of the user's own")
     lines = Discrete(0.0, "1", "1 while there is a preset of sines")
     piece = Discrete(0.0, "1", "point of the profile that was passed last, from 0; -1 before the first")
@@ -120,6 +122,8 @@ class BaseMotion(Component):
                     self.line_w[i][k] = mode * sqrt(sqrt(-1.25 / log(power)))
                     self.line_p[i][k] = 2.0 * pi * (shift - floor(shift))
         self.make()
+        self.earth_north = self.earth_rate * cos(self.latitude)
+        self.earth_up = self.earth_rate * sin(self.latitude)
         self.piece = -1.0
         if self.preset == PROFILE:
             self.refuse(self.points < 3.0, "a recorded profile needs 3 points or more, points = {points}")
@@ -249,8 +253,8 @@ class BaseMotion(Component):
         sh = sin(q[2])
         ch = cos(q[2])
         g = self.gravity + heave
-        north = self.earth_rate * cos(self.latitude)
-        up = self.earth_rate * sin(self.latitude)
+        north = self.earth_north
+        up = self.earth_up
         # C = R2(roll) R1(pitch) R3(heading): its columns N and U
         east = (cr * sh + sr * sp * ch) * north - sr * cp * up
         earth = vector([east, cp * ch * north + sp * up, (sr * sh - cr * sp * ch) * north + cr * cp * up])

@@ -126,13 +126,6 @@ class Exciter(Component):
                 self.stage = DONE
 
     def outputs(self) -> None:
-        for k in range(3):
-            self.torque[k] = 0.0
-            self.command[k] = 0.0
-            self.test[k] = 0.0
-            self.motion_angle[k] = 0.0
-            self.motion_rate[k] = 0.0
-            self.motion_acceleration[k] = 0.0
         self.phase = self.now
         self.gate = 1.0 if self.stage == OPEN else 0.0
         self.done = 1.0 if self.stage == DONE else 0.0
@@ -178,13 +171,11 @@ class Exciter(Component):
         if self.stage == DONE:
             size = 0.0
         axis = self.axes[index(self.now - 1.0)] - 1.0
-        if kind == TORQUE:
-            self.torque[index(axis)] = size * y
-        elif kind == COMMAND:
-            self.command[index(axis)] = size * y
-        elif kind == TEST:
-            self.test[index(axis)] = size * y
-        elif kind == MOTION:
-            self.motion_angle[index(axis)] = size * y
-            self.motion_rate[index(axis)] = size * v
-            self.motion_acceleration[index(axis)] = size * a
+        for k in range(3):
+            moved = kind == MOTION and k == axis
+            self.torque[k] = size * y if kind == TORQUE and k == axis else 0.0
+            self.command[k] = size * y if kind == COMMAND and k == axis else 0.0
+            self.test[k] = size * y if kind == TEST and k == axis else 0.0
+            self.motion_angle[k] = size * y if moved else 0.0
+            self.motion_rate[k] = size * v if moved else 0.0
+            self.motion_acceleration[k] = size * a if moved else 0.0

@@ -38,8 +38,10 @@ class LoadTorque(Component):
 
     def outputs(self) -> None:
         for k in range(3):
-            wave = self.amplitude[k] * sin(2.0 * pi * self.frequency[k] * self.t + self.phase[k])
-            self.M[k] = self.torque[k] + self.constant[k] + wave
+            self.M[k] = self.torque[k] + self.constant[k]
+            if self.amplitude[k] != 0.0:
+                wave = self.amplitude[k] * sin(2.0 * pi * self.frequency[k] * self.t + self.phase[k])
+                self.M[k] = self.M[k] + wave
         self.M[0] = self.M[0] + self.noise.white_x
         self.M[1] = self.M[1] + self.noise.white_y
         self.M[2] = self.M[2] + self.noise.white_z

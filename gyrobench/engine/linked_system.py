@@ -60,7 +60,10 @@ def assignments(group: VariableGroup, part: int, source: Mapping[int, str]) -> l
 
 
 def checks_inputs(part: PartProgram) -> bool:
-    """Return whether a part has to check its inputs: a factor may take one beyond what a double holds."""
+    """Return whether a part has to check its inputs: a factor may take one beyond what a double holds.
+
+    In a block of quick steps that raises a flag of the processor like any other number that is not finite.
+    """
     return any(g.scaled for g in part.sets)
 
 
@@ -73,10 +76,9 @@ def system_text(program: Program) -> str:
     steps = []
     for i, p in enumerate(program.parts):
         lines = [line for g in p.sets for line in assignments(g, i, source)]
-        step = f"((step2_function)r->parts[{i}].step)(instances[{i}], t, r->h, 1)"
-        if not checks_inputs(p):
-            function = f"quick ? r->parts[{i}].quick_step : r->parts[{i}].step"
-            step = f"((linked_function)({function}))(instances[{i}], t, r->h)"
+        kind, last = ("step2_function", ", 1") if checks_inputs(p) else ("linked_function", "")
+        slow = f"(({kind})r->parts[{i}].step)(instances[{i}], t, r->h{last})"
+        step = f"quick ? ((linked_function)r->parts[{i}].quick_step)(instances[{i}], t, r->h) : {slow}"
         lines += [f"at->part = {i};", f"if (failed(r, {step})) return FAILED;", f"LAP({i});"]
         steps.append("\n".join([f"    /* {p.slot} */", *(f"    {line}" for line in lines)]))
 

@@ -207,20 +207,16 @@ static inline void advance(Part *p, double h) {
     int i, j;
 #if RK4_SUBSTEPS > 0
     double t = p->n.v.t, dt = h / RK4_SUBSTEPS, x0[N_X], k1[N_X], k2[N_X], k3[N_X];
-    for (j = 0; j < RK4_SUBSTEPS; j++) {
-        memcpy(x0, x, sizeof x0);
+    for (j = 0; j < RK4_SUBSTEPS; j++) { /* copied one by one, as flow has stored them: see SCALAR in compiler.py */
         p->n.v.t = t + j * dt;
         flow(p);
-        memcpy(k1, f, sizeof k1);
         p->n.v.t = t + (j + 0.5) * dt;
-        for (i = 0; i < N_X; i++) x[i] = x0[i] + 0.5 * dt * k1[i];
+        for (i = 0; i < N_X; i++) { x0[i] = x[i]; k1[i] = f[i]; x[i] = x0[i] + 0.5 * dt * k1[i]; }
         flow(p);
-        memcpy(k2, f, sizeof k2);
-        for (i = 0; i < N_X; i++) x[i] = x0[i] + 0.5 * dt * k2[i];
+        for (i = 0; i < N_X; i++) { k2[i] = f[i]; x[i] = x0[i] + 0.5 * dt * k2[i]; }
         flow(p);
-        memcpy(k3, f, sizeof k3);
         p->n.v.t = t + (j + 1) * dt;
-        for (i = 0; i < N_X; i++) x[i] = x0[i] + dt * k3[i];
+        for (i = 0; i < N_X; i++) { k3[i] = f[i]; x[i] = x0[i] + dt * k3[i]; }
         flow(p);
         for (i = 0; i < N_X; i++) x[i] = x0[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + f[i]);
     }

@@ -14,8 +14,9 @@ from gyrobench.engine.run_errors import RunError, RunInterrupted
 from gyrobench.engine.session import Session, run
 from gyrobench.packaging import CompilerError
 from gyrobench.record.record import Record
+from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.suite import Suite, load_test
-from gyrobench.system.system import System
+from gyrobench.system.system import System, load_system
 from gyrobench.system.values import InvalidValueError
 
 STEPS = 64
@@ -104,6 +105,26 @@ def test_a_number_that_is_not_finite_ends_the_run_at_its_step(
     assert linked.same_data(reference)
     linked_blocks, by_calls = repeated  # the reference engine has no such count
     assert linked_blocks > by_calls == 0
+
+
+@pytest.mark.long
+def test_an_input_that_its_factor_takes_beyond_a_double_ends_the_run_at_its_step(
+    repeated: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step of 2 rad/s times 1e308 is infinite; in a block of quick steps nothing looks at the input itself."""
+    system = load_system("stabilizer_sdf", standard_folder())
+    phase = LoopPhase("step", "command", "step", amplitude=2.0, settle=0.01, dwell=0.01)
+    monkeypatch.setattr(type(system), "plan", lambda self: LoopPlan([phase]))
+    for key, value in {"factors": {"exciter.command[1] -> gyro.i": 1e308}, "loops": ()}.items():
+        monkeypatch.setattr(type(system), key, value)
+    told = []
+    for engine in ("linked", "native"):
+        with Session(system, engine=engine, child=False) as session, pytest.raises(RunError) as failed:
+            session.run(seed=5)
+        told.append(str(failed.value).replace(engine, "ENGINE"))
+    assert "input i is inf at t = 0.009 s" in told[0]  # the step that ends at 10 ms
+    assert told[0] == told[1]
+    assert repeated == [1, 0]
 
 
 SPILL = """
