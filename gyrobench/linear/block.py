@@ -16,6 +16,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.component import Component
+from gyrobench.linear.held_input import held
 from gyrobench.linear.multirate import multirate_step
 from gyrobench.linear.part_linearization import jacobians
 from gyrobench.linear.sampled_model import sampled_step, undelayed
@@ -49,15 +50,10 @@ class LinearBlock:
         return self._held[step]
 
     def _transition(self, step: float) -> tuple[Array, Array]:
-        from scipy.linalg import expm
-
-        n, m = self.b.shape
-        ad, bd = np.eye(n), np.zeros((n, m))
+        ad, bd = np.eye(len(self.a)), np.zeros(self.b.shape)
         for b in self.within:
-            augmented = np.zeros((n + m, n + m))
-            augmented[:n, :n], augmented[:n, n:] = self.a, b
-            transition = expm(augmented * (step / len(self.within)))
-            ad, bd = transition[:n, :n] @ ad, transition[:n, :n] @ bd + transition[:n, n:]
+            a, driven = held(self.a, b, step / len(self.within))
+            ad, bd = a @ ad, a @ bd + driven
         return ad, bd
 
 

@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
+from gyrobench.linear.held_input import held
 
 Complex = NDArray[np.complex128]
 GRID = 2000  # frequencies of a curve
@@ -81,12 +82,12 @@ class AnalogPlant:
         """Return (F, G, C) of x+ = F x + G u, y = C x at the period T, s; past inputs are states of it."""
         n, d = self.A.shape[0], math.floor(self.delay / T * (1.0 + 1e-12))
         m = max(self.delay - d * T, 0.0)
-        forward, held = _held(self.A, self.B, T - m)
-        late = forward @ _held(self.A, self.B, m)[1]
+        forward, early = held(self.A, self.B, T - m)
+        late = forward @ held(self.A, self.B, m)[1]
         past = d + 1 if m > 1e-12 * T else d
         F, G = np.zeros((n + past, n + past)), np.zeros(n + past)
-        F[:n, :n] = _held(self.A, self.B, T)[0]
-        for k, column in ((d, held), (d + 1, late)):  # u(k) back: the newest past input is the last state
+        F[:n, :n] = held(self.A, self.B, T)[0]
+        for k, column in ((d, early), (d + 1, late)):  # u(k) back: the newest past input is the last state
             if k == 0:
                 G[:n] = column
             elif k <= past:
@@ -241,14 +242,3 @@ class DigitalLoop:
             float(moduli.min(initial=math.inf)),
             float(crossings[best]) if best >= 0 else math.inf,
         )
-
-
-def _held(A: Array, B: Array, t: float) -> tuple[Array, Array]:
-    """Return e^(A t) and int_0^t e^(A s) ds B."""
-    from scipy.linalg import expm
-
-    n = A.shape[0]
-    both = np.zeros((n + 1, n + 1))
-    both[:n, :n], both[:n, n] = A, B
-    both = expm(both * t)
-    return both[:n, :n], both[:n, n]

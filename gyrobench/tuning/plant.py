@@ -14,6 +14,7 @@ from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
 from gyrobench.component import Component
 from gyrobench.linear.block import LinearBlock
+from gyrobench.linear.held_input import held
 from gyrobench.linear.linear_model import Linear, operating_point
 from gyrobench.record.frequency_response import Complex, reached
 from gyrobench.record.run_document import LinearModel
@@ -162,13 +163,7 @@ class HeldController:
     @staticmethod
     def _sampled(a: Array, b: Array, c: Array, d: float, step: float) -> tuple[Array, Array, Array, float]:
         """Return x+ = a x + b u, y = c x + d u: y at the end of the step in which u is held."""
-        from scipy.linalg import expm
-
-        n = len(a)
-        whole = np.zeros((n + 1, n + 1))
-        whole[:n, :n], whole[:n, n:] = a * step, b * step
-        both = expm(whole)
-        a, b = both[:n, :n], both[:n, n:]
+        a, b = held(a, b, step)
         return a, b, c @ a, float((c @ b)[0, 0]) + d
 
     def response(self, z: Complex) -> Complex:
