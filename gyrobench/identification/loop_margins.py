@@ -8,7 +8,8 @@ makes none.  With g = ln|L|, p = arg L, slopes over f, and equal and independent
     peaks          u2(max)           = u2                      (the slope is 0 there)
 
 Where the curve is flat at a crossing, all places at which it is not told from the limit may be it, and the interval
-reaches over the values there.
+reaches over the values there.  So it does where the curve comes near the limit and goes back, and a crossing there
+would be the smaller margin.
 
 Source: Seiler 2020 (disk margin), Skogestad 2005, 2.4.5; the propagation is of first order.
 """
@@ -72,7 +73,8 @@ def margins(c: LoopCurve) -> tuple[list[Margin], list[str]]:
             "margin may lie between two of them; a longer period, or a longer record, brings them closer together"
         ]
     known = c.u_L < LARGEST_U
-    found, why = [*_phase_margins(c, known), *_gain_margins(c, known)], []
+    why: list[str] = []
+    found = [*_phase_margins(c, known, why), *_gain_margins(c, known, why)]
     names = {m.name for m in found}
     span = (
         f"between {c.f[known][0]:.3g} and {c.f[known][-1]:.3g} Hz, where it is known" if np.any(known) else "anywhere"
@@ -94,7 +96,7 @@ def margins(c: LoopCurve) -> tuple[list[Margin], list[str]]:
     return found, why
 
 
-def _phase_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
+def _phase_margins(c: LoopCurve, known: NDArray[np.bool_], why: list[str]) -> Iterator[Margin]:
     size, turn = np.log(np.abs(c.L)), np.angle(-c.L)
     found = []
     for k, f in _crossings(size, c.u_L, known, c.f):
@@ -111,14 +113,20 @@ def _phase_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
         found.append((f, phase, late, of_f, of_phase, of_late))
     if not found:
         return
+    may = _touches(size, c.u_L, known)
+    lates = turn % TURN / (TURN * c.f)
     f, phase, _, of_f, of_phase, _ = min(found, key=lambda m: abs(m[1]))
+    smaller = may & (np.abs(turn) < abs(phase))
+    of_f, of_phase = _reaching(of_f, c.f[smaller]), _reaching(of_phase, turn[smaller])
     yield Margin("phase margin", phase, *of_phase, f, "rad")
     yield Margin("crossover", f, *of_f, f, "Hz")
     f, _, late, _, _, of_late = min(found, key=lambda m: m[2])
-    yield Margin("delay margin", late, *of_late, f, "s")
+    sooner = may & (lates < late)
+    yield Margin("delay margin", late, *_reaching(of_late, lates[sooner]), f, "s")
+    why += _doubt(c.f, smaller | sooner, "|L| is not told from 1", "phase and delay margin")
 
 
-def _gain_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
+def _gain_margins(c: LoopCurve, known: NDArray[np.bool_], why: list[str]) -> Iterator[Margin]:
     size, turn = np.log(np.abs(c.L)), np.angle(-c.L)
     counts = known & (np.abs(turn) < 0.25 * TURN)
     found = []
@@ -129,10 +137,37 @@ def _gain_margins(c: LoopCurve, known: NDArray[np.bool_]) -> Iterator[Margin]:
             near = _near(turn, c.u_L, counts, k)
             found.append((abs(log), log, f, _interval(log, NORMAL * u * abs(slope.real / slope.imag), -size[near],
                                                       NORMAL * u)))  # fmt: skip
+    may = _touches(turn, c.u_L, counts)
     for name, up in (("gain margin", True), ("gain-reduction margin", False)):
         if of_side := [m for m in found if (m[1] > 0.0) == up]:
-            _, log, f, (low, high) = min(of_side)
+            least, log, f, interval = min(of_side)
+            smaller = may & ((size < 0.0) == up) & (np.abs(size) < least)
+            low, high = _reaching(interval, -size[smaller])
             yield Margin(name, math.exp(log), math.exp(low), math.exp(high), f, "factor")
+            why += _doubt(c.f, smaller, "the phase of L is not told from −180°", name)
+
+
+def _touches(value: Array, u: Array, counts: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the places that may be a crossing of 0, at 95 %, between two that are told from it to the same side."""
+    told = np.abs(value) >= TOLD * u
+    side, place = np.where(counts & told, np.sign(value), 0.0), np.arange(value.size)
+    stops = told | ~counts
+    before = np.maximum.accumulate(np.where(stops, place, 0))
+    after = np.minimum.accumulate(np.where(stops, place, value.size - 1)[::-1])[::-1]
+    same = (side[before] == side[after]) & (side[before] != 0.0)
+    return np.asarray(counts & same & (np.abs(value) <= NORMAL * u))
+
+
+def _reaching(interval: tuple[float, float], values: Array) -> tuple[float, float]:
+    """Return the interval with values that the margin may have, too."""
+    return min(interval[0], float(values.min(initial=math.inf))), max(interval[1], float(values.max(initial=-math.inf)))
+
+
+def _doubt(f: Array, where: NDArray[np.bool_], what: str, margin: str) -> list[str]:
+    if not np.any(where):
+        return []
+    at = float(np.exp(np.mean(np.log(f[where]))))
+    return [f"about {at:.3g} Hz {what}: it may cross there, and the interval of the {margin} reaches to that"]
 
 
 def _near(value: Array, u: Array, counts: NDArray[np.bool_], k: int) -> slice:
