@@ -44,6 +44,10 @@ PILED = 3.0  # times as many samples at the largest value as at the next: not th
 AT_LIMIT = "a signal is at its limit for a part of the time"
 DRIFT = 1.0  # rms of the response: more drift than that is said
 KNOWN = 0.5  # of the frequencies of a band at which L is determined
+OF_ITSELF = (
+    "of itself, or a block is missing there whose jump of the output is within the noise; then the response at "
+    "frequencies that are missing with it is that of the jump, and margins there are none of the loop"
+)
 STRONG = 0.01  # of the excited lines: with more distortion the margins may be others at another amplitude
 
 
@@ -153,9 +157,10 @@ def _check(record: LoopRecord) -> None:
 
 def _longest_piece(record: LoopRecord) -> tuple[LoopRecord, list[str]]:
     """Return the longest piece of a record with nothing missing in it, and what there is to say of it."""
-    behind = missing_blocks(record)
+    behind, doubtful = missing_blocks(record)
     if not behind:
-        return record, []
+        at = ", ".join(f"{x * record.step:.6g} s" for x in doubtful)
+        return record, [f"the excitation jumps {at} after the first sample: {OF_ITSELF}"] if doubtful else []
     edges = [0, *behind, record.r.size]
     k = int(np.argmax(np.diff(edges)))
     first, last = edges[k], edges[k + 1]

@@ -7,8 +7,8 @@ it, of output and excitation, predict, at the very sample at which the excitatio
 Predictors by least squares over the record; what is usual are medians, so that a few jumps do not count.
 
 Not seen: a block where the excitation goes on as if nothing were missing (whole periods of it: the loop's transient is
-all that is wrong), is as random as from one sample to the next, or where the noise is as large as the jump; what is
-wrong then is among the noise, and in the intervals.
+all that is wrong), or is as random as from one sample to the next; what is wrong then is among the noise, and in the
+intervals.  Where the noise is as large as the jump of the output, the excitation alone jumps: that is in doubt.
 """
 
 from __future__ import annotations
@@ -23,25 +23,28 @@ from gyrobench.identification.loop_record import LoopRecord
 ORDER = 24
 ROWS = 50_000  # of the record, that the predictors are fitted to
 JUMP = 30.0  # times the median of what the excitation is off its prediction
+ALONE = 5.0  # times what it is off in the samples before: the end of a sweep is off in all of them
 NOISE = 5.0  # standard deviations of what the output is off: one in a million, of MOST samples that are asked
 LEAST = 1e-6  # of the rms: rounding
 MOST = 5  # jumps: more are of an excitation that jumps of itself, and each is asked for
 
 
-def missing_blocks(record: LoopRecord) -> list[int]:
-    """Return the first samples behind missing blocks, of MOST at most."""
+def missing_blocks(record: LoopRecord) -> tuple[list[int], list[int]]:
+    """Return the first samples behind missing blocks, and those at which the excitation alone jumps; MOST at most."""
     r, y = record.r, record.y
     if r.size < 8 * ORDER:
-        return []
+        return [], []
     alone = _off(r, r[:, None])
     size = np.abs(alone)
     limit = max(JUMP * float(np.median(size)), LEAST * float(np.std(r)))
     jumps = _heads(np.flatnonzero(size > limit)) + ORDER
     if not 0 < jumps.size <= MOST:
-        return []
+        return [], []
     rest = _off(y, np.column_stack([y, r]))
     usual = max(float(np.median(np.abs(rest))) / 0.6745, LEAST * float(np.std(y)))
-    return [int(k) for k in jumps if abs(rest[k - ORDER]) > NOISE * usual]
+    both = np.abs(rest[jumps - ORDER]) > NOISE * usual
+    alike = [size[max(k - 2 * ORDER, 0) : k - ORDER].max(initial=0.0) * ALONE > size[k - ORDER] for k in jumps]
+    return jumps[both].tolist(), jumps[~both & ~np.array(alike)].tolist()
 
 
 def _heads(at: NDArray[np.intp]) -> NDArray[np.intp]:
