@@ -155,13 +155,23 @@ def _environment(folder: Path) -> Any:
     """Return jinja2 with the templates of a folder, compiled once and again when they change."""
     import jinja2
 
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),  # from its file, which then stands in a traceback
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["whole_options"] = _whole_options
+    return environment
+
+
+def _whole_options(text: str) -> Any:
+    """Return a text whose options of the command line (--step) are not broken behind their hyphens."""
+    import markupsafe
+
+    escaped = str(markupsafe.escape(text))
+    return markupsafe.Markup(re.sub(r"--[a-z][a-z-]*", r'<span class="option">\g<0></span>', escaped))
 
 
 class _Attributes(dict[str, Any]):
