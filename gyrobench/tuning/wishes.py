@@ -16,14 +16,14 @@ from gyrobench.bench import UsageError, suggest_names
 FACTOR = ""  # unit of a ratio of amplitudes: a number, or dB
 #: measure -> unit, least (True) or most (False) wanted, meaning
 MEASURES: dict[str, tuple[str, bool, str]] = {
-    "phase margin": ("rad", True, "phase that a gain crossover lies away from -180 degrees, the smallest"),
+    "phase margin": ("rad", True, "phase that a gain crossover lies away from −180°, the smallest"),
     "gain margin": (FACTOR, True, "factor up or down that brings the loop to its limit, the smaller one"),
     "delay margin": ("s", True, "further delay that brings the loop to its limit"),
     "disk margin": ("1", True, "1 / largest |S - 1/2|: gain and phase together"),
     "bandwidth": (
         "Hz",
         True,
-        "up to it |S| is below that of an integrator that crosses there: -3 dB, and 20 dB a decade down",
+        "up to it |S| is below that of an integrator that crosses there: −3 dB, and 20 dB a decade down",
     ),
     "peak S": (FACTOR, False, "largest |S|, S = 1/(1 + L)"),
     "peak T": (FACTOR, False, "largest |T|, T = L/(1 + L)"),
