@@ -206,14 +206,12 @@ class Reduction(DriftReduction[TurnOnSetup]):
     def spread(self) -> Spread:
         """Return the components of variance of the biases."""
         first = [int(np.flatnonzero(self.turn == k)[0]) for k in range(self.count)]
-        T = None
-        if "temperature" in self.windows:
-            every = np.asarray(self.windows["temperature"], dtype=float)
-            T = np.array([every[self.turn == k][-1] for k in range(self.count)])
+        warm = np.asarray(self.windows.get("temperature", []), dtype=float)
+        T = np.array([warm[self.turn == k][-1] for k in range(self.count)]) if warm.size else None
         if self.single:
             return spread(self.biases, self.day[first], self.shared, T)
-        m, n = self.found.est.mixture, self.count
-        return spread(self.biases + m.off[:, :n], self.day[first], m.covariance[:, :n, :n], T, m.weight)
+        m, every = self.found.est.mixture, slice(self.count)
+        return spread(self.biases + m.off[:, every], self.day[first], m.covariance[:, every, every], T, m.weight)
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth, s = self.setup.truth or {}, self.spread()
