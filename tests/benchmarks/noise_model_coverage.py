@@ -1,6 +1,10 @@
 """Coverage of the noise model on simulated records: intervals of N, Gauss-Markov processes, K, Q; absent terms stated.
 
     python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing] [part of a name]
+    python tests/benchmarks/noise_model_coverage.py RECORDS 1e4..1e6 any [part of a name]
+
+RECORDS: how many, or a range such as 200..399 of their seeds.  SAMPLES: a number, or a range in which the logarithm is
+even.  any: nothing or one of the four faults by chance, each as likely.
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
@@ -44,6 +48,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
 
 FINE = 8  # steps of an oscillator to a sample
 KINDS = ("wild", "step", "line", "missing")
+MIXED = "any"
 
 
 def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Generator) -> Array:
@@ -87,14 +92,19 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
     return np.asarray(x)
 
 
-def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
+def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str = "") -> None:
     for name, truth in TRUTHS.items():
         if only not in name:
             continue
         inside, stated = defaultdict(list), defaultdict(list)
         agreed, began = [], time.process_time()
-        for i in range(records):
-            model = fit_noise(simulated(n, truth, kinds, np.random.default_rng([11, i, n])), 1.0, means=False)
+        for i in seeds:
+            n, these = round(lengths[0]), kinds
+            if lengths[1] > lengths[0]:
+                n = round(lengths[0] * (lengths[1] / lengths[0]) ** np.random.default_rng([12, i]).random())
+            if MIXED in kinds:
+                these = [k for k in [np.random.default_rng([13, i]).choice(["", *KINDS])] if k]
+            model = fit_noise(simulated(n, truth, these, np.random.default_rng([11, i, n])), 1.0, means=False)
             agreed.append(model.agrees)
             if not model.agrees:  # nothing is stated
                 continue
@@ -113,13 +123,29 @@ def main(records: int, n: int, kinds: list[str], only: str = "") -> None:
                 inside["tau"].append(g.tau.low <= tau <= g.tau.high)
                 if those := [s for s, t in truth["markov"] if g.tau.low <= t <= g.tau.high]:
                     inside["sigma together"].append(g.sigma.low <= math.hypot(*those) <= g.sigma.high)
-        print(f"{name}, {n} samples {' '.join(kinds)}: agree {np.mean(agreed):.3f}, "
-              f"{(time.process_time() - began) / records:.2f} s")  # fmt: skip
-        print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} of {len(v)}" for k, v in inside.items()))
+        seconds = (time.process_time() - began) / len(seeds)
+        among = f"{lengths[0]:.0f} to {lengths[1]:.0f} samples {' '.join(kinds)}"
+        print(f"{name}, {among}: agree {sum(agreed)} of {len(agreed)}, {seconds:.2f} s")
+        print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} ({sum(v)} of {len(v)})" for k, v in inside.items()))
         stating = max(sum(agreed), 1)
-        print("   stated:", ", ".join(f"{k} {np.sum(v) / stating:.3f}" for k, v in stated.items()), flush=True)
+        print(
+            "   stated:", ", ".join(f"{k} {np.sum(v) / stating:.3f} ({sum(v)})" for k, v in stated.items()), flush=True
+        )
+
+
+def numbers(text: str) -> tuple[float, float]:
+    """Return both ends of A..B, or one number twice."""
+    first, _, last = text.partition("..")
+    return float(first), float(last or first)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(float(sys.argv[2])), [k for k in sys.argv[3:] if k in KINDS],
-         " ".join(k for k in sys.argv[3:] if k not in KINDS))  # fmt: skip
+    first, last = numbers(sys.argv[1])
+    seeds = range(int(first), int(last) + 1) if ".." in sys.argv[1] else range(int(first))
+    words = (*KINDS, MIXED)
+    main(
+        seeds,
+        numbers(sys.argv[2]),
+        [k for k in sys.argv[3:] if k in words],
+        " ".join(k for k in sys.argv[3:] if k not in words),
+    )
