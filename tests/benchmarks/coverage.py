@@ -22,6 +22,7 @@ of system and case:
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -131,7 +132,7 @@ def counts(frame: Any) -> dict[str, Count]:
 
 def key(case: str) -> str:
     """Name of a case in docs/figures.toml."""
-    return f"coverage.{case.replace(', ', '_')}"
+    return f"coverage.{re.sub('[, ]+', '_', case)}"
 
 
 def write(case: str, found: dict[str, Count], runs: int, corner: str) -> None:
