@@ -196,7 +196,8 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         elif not written:
             name, written = _unit_at_end(name)
         cells = [r[k] for r in rows if r[k] not in NOTHING]
-        time = next((f for f in FORMATS if cells and all(_fits(c, f) for c in cells[:200])), "")
+        dated = cells and not NUMBER.fullmatch(cells[0])  # no form of a date or clock time is a number
+        time = next((f for f in FORMATS if dated and all(_fits(c, f) for c in cells[:200])), "")
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text else k + 1
         found.append(FileColumn((source,), name, unit, written, time, len(rows) - len(cells)))

@@ -35,7 +35,7 @@ def _by_length(arrays: Mapping[str, Any]) -> Tables:
     for name, array in arrays.items():
         if getattr(array, "ndim", 0) == 2 and 1 in array.shape:
             array = array.reshape(-1)
-        if getattr(array, "ndim", 0) == 2 and array.shape[0] < array.shape[1] < 64:
+        if getattr(array, "ndim", 0) == 2 and array.shape[0] < array.shape[1]:  # a record is longer than it is wide
             array = array.T
         if getattr(array, "ndim", 0) not in (1, 2) or array.dtype.kind not in "biufM" or array.size == 0:
             continue
@@ -96,8 +96,11 @@ def _hdf5(file: Path) -> Tables:
         group, _, name = path.rpartition("/")
         if found.dtype.names:  # a table of its own
             groups[path] = {n: found[n] for n in found.dtype.names}
-        elif found.ndim in (1, 2):
-            groups.setdefault(group, {})[_named(name, unit)] = found[()]
+        elif found.ndim in (1, 2) and found.attrs.get("MATLAB_class") != b"char":
+            # MATLAB writes column by column, so that what is there are the rows of its matrix
+            groups.setdefault(group, {})[_named(name, unit)] = (
+                found[()].T if "MATLAB_class" in found.attrs else found[()]
+            )
 
     content = h5py.File(file, "r")
     content.visititems(visit)

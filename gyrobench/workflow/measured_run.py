@@ -55,7 +55,7 @@ def reduce_measured(
         try:
             record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
         except DataError as error:
-            raise error.advised(*_fitting(system, data)) from None
+            raise DataError(data, error.problems).advised(*_fitting(system, data)) from None
     with (data / RUN if data.is_dir() else data).open("rb") as content:
         digest = hashlib.file_digest(content, "sha256")
     record.run.data = DataFile(file=data.name, sha256=digest.hexdigest())

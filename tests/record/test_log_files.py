@@ -176,6 +176,26 @@ def test_every_number_comes_back_as_it_was_written(end: str, tmp_path: Path) -> 
         assert len(tables_of(file)) == 1
 
 
+@pytest.mark.parametrize("shape", [(90, 4), (4, 90)])
+def test_a_matrix_of_matlab_has_a_column_for_each_channel(shape: tuple[int, int], tmp_path: Path) -> None:
+    """MATLAB 7.3 writes column by column: HDF5 holds the transpose.  Channels may be its columns or its rows."""
+    import h5py
+
+    channels = np.arange(360.0).reshape(90, 4)
+    file = tmp_path / "log.mat"
+    with h5py.File(file, "w", userblock_size=512) as content:
+        content["imu"], content["note"] = (
+            (channels if shape == (90, 4) else channels.T).T,
+            np.array([[72, 105]], dtype=np.uint16),
+        )
+        content["imu"].attrs["MATLAB_class"] = np.bytes_(b"double")
+        content["note"].attrs["MATLAB_class"] = np.bytes_(b"char")
+    with file.open("r+b") as data:
+        data.write(b"MATLAB 7.3 MAT-file".ljust(512))
+    assert tables_of(file) == ["90 rows"]
+    assert as_text(file).read_text(encoding="utf-8").splitlines()[:2] == ["imu_1,imu_2,imu_3,imu_4", "0,1,2,3"]
+
+
 @pytest.mark.long
 def test_a_sheet_is_read_as_it_stands(tmp_path: Path) -> None:
     file = tmp_path / "log.xlsx"
@@ -241,3 +261,8 @@ def test_columns_of_the_bench_need_no_map(gyrobench: Command, tmp_path: Path) ->
     assert code == 0 and json.loads(out)["provenance"]["data"]["file"] == "log.parquet", err
     code, _, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--columns", "none.toml")
     assert code == 2 and "none.toml" in err
+    parquet.write_table(
+        pa.table({"time [s]": made["time [s]"], "rate": made["rate [deg/s]"]}), tmp_path / "bare.parquet"
+    )
+    code, _, err = gyrobench("reduce", "drift_record", "--data", "bare.parquet")
+    assert code == 2 and "bare.parquet: not usable" in err and "gyrobench-temporary" not in err
