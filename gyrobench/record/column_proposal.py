@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from gyrobench import units
@@ -78,6 +79,7 @@ class FileColumn:
     written: str  # unit as it is written
     time: str  # format
     empty: int
+    rises: bool = False  # from row to row
 
     @property
     def exponents(self) -> object:
@@ -200,7 +202,7 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         time = next((f for f in FORMATS if dated and all(_fits(c, f) for c in cells[:200])), "")
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text else k + 1
-        found.append(FileColumn((source,), name, unit, written, time, len(rows) - len(cells)))
+        found.append(FileColumn((source,), name, unit, written, time, len(rows) - len(cells), _rises(cells)))
     joined: list[FileColumn] = []
     for c in found:
         last = joined[-1] if joined else None
@@ -210,6 +212,13 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         else:
             joined.append(c)
     return tuple(joined)
+
+
+def _rises(cells: Sequence[str]) -> bool:
+    with suppress(ValueError):
+        numbers = [float(c.replace(",", ".")) for c in cells]
+        return len(numbers) > 9 and all(a < b for a, b in pairwise(numbers))
+    return False
 
 
 def _fits(text: str, form: str) -> bool:

@@ -139,15 +139,25 @@ def _is(column: FileColumn, unit: str) -> bool:
     return units.same_dimension(column.unit or "1", unit)
 
 
+def _timed(column: FileColumn) -> bool:
+    """Return whether a column has a form of times, their unit or, without a unit, their name."""
+    called = re.fullmatch(CALLED["time"], re.sub(r"\W+", "_", column.name).strip("_"), re.I)
+    return bool(column.time or _is(column, "s") or (called and not column.unit))
+
+
 def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
     """Return the columns of a drift record, and their names with units that fit: time, then rates, angles and
     temperatures under their own names, those without a unit by what they are called."""
     found: dict[str, FileColumn] = {}
     wanted = []
+    first, *others = layout.columns
+    times = [c for c in layout.columns if _timed(c)]
+    if not times and first.rises and others and first.name.endswith("_1"):  # a matrix has no names
+        times = [first]
     for c in layout.columns:
         name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
         likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")
-        timed = c.time or _is(c, "s") or (not c.unit and re.fullmatch(CALLED["time"], name, re.I))
+        timed = c in times
         kind = next((k for k in KINDS if c.unit and _is(c, k)), likely if not c.unit else "")
         if timed and "time" not in found:
             name, kind = "time", "s"

@@ -266,3 +266,13 @@ def test_columns_of_the_bench_need_no_map(gyrobench: Command, tmp_path: Path) ->
     )
     code, _, err = gyrobench("reduce", "drift_record", "--data", "bare.parquet")
     assert code == 2 and "bare.parquet: not usable" in err and "gyrobench-temporary" not in err
+
+
+@pytest.mark.long
+def test_the_first_column_of_a_matrix_may_be_its_time(gyrobench: Command, tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    for name, first in (("stamped", np.arange(600) * 0.01), ("bare", random.normal(size=600))):
+        np.savez(tmp_path / f"{name}.npz", gyro=np.column_stack([first, random.normal(size=(600, 2))]))
+        _, text, _ = gyrobench("fit", f"{name}.npz", "--system", "drift_record")
+        assert ('[columns.time]\nfrom = "gyro_1"' in text) == (name == "stamped"), text
+        assert '[columns.gyro_2]\nfrom = "gyro_2"' in text
