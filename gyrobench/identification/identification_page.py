@@ -54,9 +54,10 @@ def page(t: LoopIdentification) -> Page:
     ]
     with styled():
         sections = [
-            Section("Margins", "margins", [_margins(t), *_verdicts(t), *_notes(t), *_near(t)]),
-            Section("Open loop", "open-loop-section", _open_loop(t)),
-            Section("Sensitivities", "sensitivities-section", _sensitivities(t)),
+            Section(
+                "Margins", "margins", [_margins(t), *_verdicts(t), *_notes(t), *(_near(t) if t.record.closed else [])]
+            ),
+            *(_loop(t) if t.record.closed else []),
             Section("Plant", "plant-section", _plant(t)),
             *([Section("Nonlinearity", "nonlinearity", _distortion(t))] if t.distortions else []),
             Section("Responses", "responses", [_responses(t)]),
@@ -102,6 +103,13 @@ def _near(t: LoopIdentification) -> list[Any]:
         Picture("nyquist", draw.nyquist(t), "L near −1, each point with the circle that holds 95 % of gain and phase.",
                 "Nyquist plot of the open loop", half=True),
     )  # fmt: skip
+
+
+def _loop(t: LoopIdentification) -> list[Section]:
+    return [
+        Section("Open loop", "open-loop-section", _open_loop(t)),
+        Section("Sensitivities", "sensitivities-section", _sensitivities(t)),
+    ]
 
 
 def _open_loop(t: LoopIdentification) -> list[Any]:
@@ -157,21 +165,23 @@ def _db(x: float) -> float:
 
 def _responses(t: LoopIdentification) -> PageTable:
     unit, factor = t.plant_unit
-    which = np.flatnonzero(t.responses["L"].determined)
+    shown = ("L", "S", "P") if t.record.closed else ("P",)
+    which = np.flatnonzero(t.responses[shown[0]].determined)
     if which.size > SHOWN:
         even = np.geomspace(t.f[which[0]], t.f[which[-1]], SHOWN)
         which = which[np.unique([int(np.argmin(np.abs(t.f[which] - x))) for x in even])]
     rows = []
     for k in which:
         cells = [f"{t.f[k]:.4g}"]
-        for name, scale in (("L", 1.0), ("S", 1.0), ("P", factor)):
-            g = t.responses[name]
+        for name in shown:
+            g, scale = t.responses[name], factor if name == "P" else 1.0
             cells += [f"{_db(scale * abs(g.value[k])):.2f}", f"{np.degrees(np.angle(g.value[k])):.1f}"]
-            if name == "L":
+            if name == shown[0]:
                 cells.append(f"{_db(1.0 + 1.96 * g.u[k]):.2g}")
         rows.append(Row([text_cell(minus(c)) for c in cells]))
-    heads = columns(("frequency", "Hz"), ("|L|", "dB"), ("phase", "°"), ("U of L", "dB"), ("|S|", "dB"), ("phase", "°"),
-                    (f"|P| re {unit}", "dB"), ("phase of P", "°"))  # fmt: skip
+    first = [("|L|", "dB"), ("phase", "°"), ("U of L", "dB"), ("|S|", "dB"), ("phase", "°")] if t.record.closed else []
+    last = [] if t.record.closed else [("U of P", "dB")]
+    heads = columns(("frequency", "Hz"), *first, (f"|P| re {unit}", "dB"), ("phase of P", "°"), *last)
     return PageTable(heads, rows, "Responses at some of the frequencies; all are in identification.json.", small=True)
 
 

@@ -131,6 +131,8 @@ def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.i
     seen = type(s)(*(getattr(s, n)[known] for n in ("f", "value", "u", "dof", "center", "radius")))
     curve = loop_curve(seen)
     found, missing = margins(curve)
+    if not record.closed:
+        found, missing = [], ["the input is the excitation itself: no loop is closed, and P alone is identified"]
     limited = _clipped(record)
     notes += _drift(record, samples) + limited
     count = periods_used(record.r.size, samples) if samples else 0
@@ -254,15 +256,21 @@ def _about(kinds: list[Distortion], lines: LineAmplitudes, period: float) -> lis
 
 
 def _drift(record: LoopRecord, samples: int) -> list[str]:
-    notes = []
-    for name, x in (("input", record.u), ("output", record.y)):
-        length = samples or max(record.r.size // 10, 1)
-        means = x[: x.size // length * length].reshape(-1, length).mean(axis=1)
-        moved = float(np.ptp(means))
-        if moved > DRIFT * float(np.std(x[:length])) > 0.0:
-            notes.append(f"the {name} drifts by {moved / float(np.std(x[:length])):.2g} times its response; mean and "
-                         "slope are taken out, what is left is seen as noise")  # fmt: skip
-    return notes
+    length = samples or max(record.r.size // 10, 1)
+
+    def moved(x: Array) -> float:
+        """Return how far the means of the pieces lie apart, over the rms of a piece."""
+        pieces = x[: x.size // length * length].reshape(-1, length)
+        response = math.sqrt(float(np.mean(np.var(pieces, axis=1))))
+        return float(np.ptp(pieces.mean(axis=1))) / response if response else 0.0
+
+    if moved(record.r) > DRIFT:  # slow itself: what moves is the response
+        return []
+    return [
+        f"the {name} drifts by {size:.2g} times its response; mean and slope are taken out, the rest is seen as noise"
+        for name, x in (("input", record.u), ("output", record.y))
+        if (size := moved(x)) > DRIFT
+    ]
 
 
 def _clipped(record: LoopRecord) -> list[str]:

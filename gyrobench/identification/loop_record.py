@@ -66,6 +66,11 @@ class LoopRecord:
         """Return the length, s."""
         return self.r.size * self.step
 
+    @property
+    def closed(self) -> bool:
+        """Return whether there is a loop: without one the input is the excitation itself."""
+        return not np.array_equal(self.u, self.r)
+
 
 def read_loop(file: Path, at: str = "", period: str = "", columns: Path | None = None) -> LoopRecord:
     """Return the record of a file; at, period: replace what its comments state.  columns: a column map.

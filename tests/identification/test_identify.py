@@ -395,6 +395,20 @@ def test_a_block_that_is_missing_is_found(steady: LoopRecord, stated: float) -> 
     assert whole["phase margin"].value in found["phase margin"]
 
 
+def test_without_a_loop_the_plant_alone_is_identified() -> None:
+    """J = 2 kg·m², c = 4 N·m·s driven by a step in the middle of noise: |P| at 4 Hz by hand, no margin, no drift."""
+    rng, h = np.random.default_rng(2), 1e-3
+    r = np.repeat(rng.standard_normal(400), 50) + np.arange(20000) // 10000
+    y = signal.lfilter([0.0, h / 2.0], [1.0, -(1.0 - 2.0 * h)], r) + 1e-5 * rng.standard_normal(r.size)
+    found = identify_record(LoopRecord("own", h, r, r, y, PLACES[0], UNITS))
+    assert not found.margins and found.notes[0].startswith("the input is the excitation itself")
+    assert not any("drifts" in n for n in found.notes)
+    k = int(np.argmin(np.abs(found.f - 4.0)))
+    exact = 1.0 / abs(4.0 + 2.0j * 2.0 * np.pi * found.f[k])  # 1/(c + jωJ)
+    assert abs(found.responses["P"].value[k]) == pytest.approx(exact, rel=0.01)
+    assert [s.title for s in page(found).sections][:2] == ["Margins", "Plant"]
+
+
 def test_nothing_passes_at_a_limit(steady: LoopRecord) -> None:
     """A fifth of the time there, by the limit of the input; a coarse signal, of 30 steps, is not at one."""
     top = float(np.quantile(np.abs(steady.u), 0.8))
