@@ -2,6 +2,7 @@
 
 python log_contents.py FILE                 the tables of a log, JSON to standard output
 python log_contents.py FILE TABLE OUT.csv   one of them as text: names with units, then numbers
+python log_contents.py FILE FOLDER          the first rows of the first tables, as FOLDER/0.csv, 1.csv ...
 
 A table is what has common rows: a group, a topic, a sheet, arrays of one length.  Code 1 with the reason, the last line
 of standard error, where the file cannot be read; code 4 with the name of a package that is missing.
@@ -20,6 +21,17 @@ from pathlib import Path
 from typing import Any
 
 MISSING = 4
+HEADS, ROWS = 40, 3000  # tables and rows of each in a folder
+#: topics of PX4 -> field -> name and unit of its message
+PX4 = {
+    "sensor_combined": {"gyro_rad": ("gyro", "rad/s"), "accelerometer_m_s2": ("acc", "m/s2")},
+    "sensor_gyro": {a: (f"gyro_{a}", "rad/s") for a in "xyz"} | {"temperature": ("temperature", "degC")},
+    "sensor_accel": {a: (f"acc_{a}", "m/s2") for a in "xyz"} | {"temperature": ("temperature", "degC")},
+    "vehicle_angular_velocity": {"xyz": ("gyro", "rad/s")},
+    "vehicle_acceleration": {"xyz": ("acc", "m/s2")},
+}
+#: beginning of a name in messages of ROS -> unit of their definition
+ROS = {"angular_velocity.": "rad/s", "linear_acceleration.": "m/s2"}
 Columns = dict[str, Any]  # name, with its unit in brackets -> array of one dimension
 Tables = Iterator[tuple[str, Callable[[], Columns]]]
 
@@ -150,9 +162,17 @@ def _ulog(file: Path) -> Tables:
 
     topics = ULog(str(file)).data_list
     many = {t.name for t in topics if t.multi_id}
+
+    def named(field: str, topic: Any) -> str:
+        name, _, index = field.rstrip("]").partition("[")  # an element of an array: gyro_rad[0]
+        name, unit = PX4.get(topic.name, {}).get(name, (name, "us" if name == "timestamp" else ""))
+        of_three = f"{field.partition('[')[0]}[2]" in topic.data and f"{field.partition('[')[0]}[3]" not in topic.data
+        ending = "_xyz"[1 + int(index)] if index and of_three else index
+        return _named(f"{name}_{ending}" if ending else name, unit)
+
     for topic in topics:
         name = f"{topic.name} {topic.multi_id}" if topic.name in many else topic.name
-        yield name, lambda t=topic: {("timestamp [us]" if n == "timestamp" else n): v for n, v in t.data.items()}  # type: ignore[misc]
+        yield name, lambda t=topic: {named(n, t): v for n, v in t.data.items()}  # type: ignore[misc]
 
 
 def _bag(file: Path) -> Tables:
@@ -179,9 +199,13 @@ def _bag(file: Path) -> Tables:
             for _, stamp, raw in reader.messages([connection]):
                 message = reader.deserialize(raw, connection.msgtype)
                 rows.append(dict(numbers(message)))
-                times.append(stamp)
+                sampled = getattr(getattr(message, "header", None), "stamp", None)  # else when it was received
+                times.append(
+                    sampled.sec * 10**9 + sampled.nanosec if sampled and (sampled.sec or sampled.nanosec) else stamp
+                )
             ns = np.asarray(times, dtype=np.int64)
-            made = {n: np.array([r.get(n, np.nan) for r in rows]) for n in (rows[0] if rows else {})}
+            units = {n: next((u for k, u in ROS.items() if n.startswith(k)), "") for n in (rows[0] if rows else {})}
+            made = {_named(n, u): np.array([r.get(n, np.nan) for r in rows]) for n, u in units.items()}
             return {"time [s]": (ns - ns[0]) / 1e9, **made} if rows else {}
 
         yield connection.topic, columns
@@ -241,9 +265,12 @@ def main() -> None:
     try:
         with contextlib.redirect_stdout(sys.stderr):  # what readers say of their own
             tables = list(READERS[file.suffix.lower()](file))
-            if len(sys.argv) > 2:
+            if len(sys.argv) == 4:
                 _write(dict(tables)[sys.argv[2]](), Path(sys.argv[3]))
                 return
+            for k, (_, columns) in enumerate(tables[:HEADS] if len(sys.argv) == 3 else []):
+                with contextlib.suppress(SystemExit):  # no column of numbers
+                    _write({n: v[:ROWS] for n, v in columns().items()}, Path(sys.argv[2]) / f"{k}.csv")
     except ImportError as error:
         print(error.name or error, file=sys.stderr)
         sys.exit(MISSING)

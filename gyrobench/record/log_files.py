@@ -38,6 +38,13 @@ def tables_of(file: Path) -> list[str]:
     return names
 
 
+def heads_of(file: Path) -> dict[str, Path]:
+    """Return the first rows of the first tables with numbers of a log, by their names, as CSV.  Raises DataError."""
+    folder = temporary_folder()
+    names: list[str] = json.loads(_read(file, str(folder)))
+    return {n: head for k, n in enumerate(names) if (head := folder / f"{k}.csv").is_file()}
+
+
 def as_text(file: Path, table: str = "") -> Path:
     """Return a CSV file of a table of a log; "": the only one.  It lasts as long as the process.  Raises DataError."""
     names = tables_of(file)

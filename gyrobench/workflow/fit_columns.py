@@ -6,7 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,17 +22,18 @@ from gyrobench.record.column_proposal import (
     match_columns,
     series_columns,
 )
-from gyrobench.record.log_files import as_text, is_log, tables_of
+from gyrobench.record.log_files import as_text, heads_of, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
 from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
-MOST_TABLES = 40  # of a log that are looked at
 OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
-LIKELY = {r"gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*": "deg/s", r"acc.*|beschl.*|[af]_?[xyz]": "m/s2", r".*temp.*": "degC"}
+OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
+LIKELY = {OTHER + r"(gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*)": "deg/s", OTHER + r"(acc.*|beschl.*|[af]_?[xyz])": "m/s2",
+          r".*temp.*": "degC"}  # fmt: skip
 
 
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:
@@ -91,22 +92,23 @@ def propose_columns(file: Path, system: str) -> ColumnProposal:
     if not file.is_file():
         raise UsageError(f"{file}: no such file")
     test = load_test(system)
-    tables = tables_of(file)[:MOST_TABLES] if is_log(file) else [""]
-    if len(tables) == 1:
-        tables = [""]
+    tables = tables_of(file) if is_log(file) else []
+    if len(tables) < 2:
+        return _proposal(file, test, "", as_text(file) if tables else file)
     proposals = []
-    for table in tables:
-        with suppress(UsageError) if len(tables) > 1 else nullcontext():
-            proposals.append(_proposal(file, test, table))
+    for table, head in heads_of(file).items():
+        with suppress(UsageError):
+            proposals.append(_proposal(file, test, table, head))
     if not proposals:
         raise UsageError(f"{file}: no table of numbers with names in {', '.join(tables)}")
-    return max(proposals, key=lambda p: len(p.found))
+    known = {id(p): sum(bool(c.unit or c.time) for c in p.found.values()) for p in proposals}
+    return max(proposals, key=lambda p: (known[id(p)], len(p.found), p.layout.rows))
 
 
-def _proposal(file: Path, test: System | Suite, table: str) -> ColumnProposal:
-    """Return the map of a table of a file, "" of the only one."""
+def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> ColumnProposal:
+    """Return the map of a table of a file, "" of the only one.  text: its rows, or the first of them."""
     wanted, stated = wanted_columns(test)
-    layout = find_layout(as_text(file, table) if is_log(file) else file)
+    layout = find_layout(text)
     if "channel" in test.options:
         found, wanted = _any_names(layout)
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import struct
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -83,12 +84,12 @@ def write_tdms(file: Path) -> None:
         log.write_segment([ChannelObject("climate", "temperature", TEMPERATURE)])
 
 
+def message(kind: bytes, body: bytes) -> bytes:
+    return struct.pack("<H", len(body)) + kind + body
+
+
 def write_ulog(file: Path) -> None:
     """Write the header, two formats, a subscription each, and the data, by the format's description."""
-
-    def message(kind: bytes, body: bytes) -> bytes:
-        return struct.pack("<H", len(body)) + kind + body
-
     out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
     out += message(b"F", b"sensor_gyro:uint64_t timestamp;double rate;")
     out += message(b"F", b"climate:uint64_t timestamp;double temperature;")
@@ -98,6 +99,20 @@ def write_ulog(file: Path) -> None:
         out += message(b"D", struct.pack("<HQd", 0, round(t * 1e6), rate))
     for t, temperature in zip(T, TEMPERATURE, strict=False):
         out += message(b"D", struct.pack("<HQd", 1, round(t * 1e6), temperature))
+    file.write_bytes(out)
+
+
+def write_flight_log(file: Path) -> None:
+    """Write a log of PX4: a status, and gyros and accelerometers as arrays of three beside what is no rate."""
+    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    out += message(b"F", b"status:uint64_t timestamp;float[4] gyro_priority;")
+    out += message(b"F", b"sensor_combined:uint64_t timestamp;float[3] gyro_rad;float gyro_integral_dt;"
+                         b"float[3] accelerometer_m_s2;")  # fmt: skip
+    out += message(b"A", b"\0" + struct.pack("<H", 0) + b"status")
+    out += message(b"A", b"\0" + struct.pack("<H", 1) + b"sensor_combined")
+    for k in range(600):
+        out += message(b"D", struct.pack("<HQ4f", 0, 4000 * k, 1, 2, 3, 4))
+        out += message(b"D", struct.pack("<HQ7f", 1, 4000 * k, 0.25, 0.5, k / 1024, 4000, 1, 2, 9.75))
     file.write_bytes(out)
 
 
@@ -152,7 +167,7 @@ FORMATS: dict[str, tuple[Callable[[Path], None], str, tuple[str, str]]] = {
     ".mf4": (write_mdf, "1 Python", ("time [s]", "rate [rad/s]")),
     ".tdms": (write_tdms, "imu", ("time [s]", "rate [rad/s]")),
     ".ulg": (write_ulog, "sensor_gyro", ("timestamp [us]", "rate")),
-    ".mcap": (write_mcap, "", ("time [s]", "angular_velocity.x")),
+    ".mcap": (write_mcap, "", ("time [s]", "angular_velocity.x [rad/s]")),
 }
 
 
@@ -266,6 +281,19 @@ def test_columns_of_the_bench_need_no_map(gyrobench: Command, tmp_path: Path) ->
     )
     code, _, err = gyrobench("reduce", "drift_record", "--data", "bare.parquet")
     assert code == 2 and "bare.parquet: not usable" in err and "gyrobench-temporary" not in err
+
+
+def test_a_flight_log_needs_no_hand(gyrobench: Command, tmp_path: Path) -> None:
+    """Of two topics the one whose messages tell units; time of integration is no rate.  gyro_z of row 7: 7/1024."""
+    write_flight_log(tmp_path / "log.ulg")
+    code, text, err = gyrobench("fit", "log.ulg", "--system", "drift_record")
+    assert code == 0 and "by hand" not in err, err
+    made = tomllib.loads(text)
+    assert made["table"] == "sensor_combined"
+    assert {n: c["unit"] for n, c in made["columns"].items()} == {
+        "time": "us", **{f"gyro_{a}": "rad/s" for a in "xyz"}, **{f"acc_{a}": "m/s2" for a in "xyz"}
+    }  # fmt: skip
+    assert arrow.read_csv(as_text(tmp_path / "log.ulg", "sensor_combined"))["gyro_z [rad/s]"][7].as_py() == 7 / 1024
 
 
 @pytest.mark.long
