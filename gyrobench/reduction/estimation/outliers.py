@@ -147,7 +147,8 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     listed = "; ".join(f"{row + 1} ({off}{deviations})" for row, off, deviations in shown)
     more = f" and {rows.size - LISTED} more" if rows.size > LISTED else ""
     both = _common(found, rest)
-    a, b = max(both, key=lambda ab: abs(rest.value[ab[1]] - found.value[ab[0]]) / rest.u[ab[1]])
+    moves = {(a, b): abs(rest.value[b] - found.value[a]) / rest.u[b] for a, b in both if rest.u[b] > 0.0}
+    a, b = max(moves, key=moves.__getitem__, default=both[0])  # u of a quantity that is none is 0
     q = found.quantities[a]
     values = f"{rest.value[b] / q.scale:.6g}{q.unit and ' '}{q.unit} (u = {rest.u[b] / q.scale:.2g})"
     plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})"
