@@ -32,8 +32,11 @@ OPTIONAL = ("std", "n", "flagged")
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
-LIKELY = {OTHER + r"(gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*)": "deg/s", OTHER + r"(acc.*|beschl.*|[af]_?[xyz])": "m/s2",
-          r".*temp.*": "degC"}  # fmt: skip
+LIKELY = {
+    OTHER + r"(([xyz]_)?gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*)": "deg/s",
+    OTHER + r"(([xyz]_)?acc.*|beschl.*|[af]_?[xyz])": "m/s2",
+    r".*temp.*": "degC",
+}
 
 
 def wanted_columns(test: System | Suite) -> tuple[list[tuple[str, str]], dict[str, str]]:

@@ -13,7 +13,7 @@ from gyrobench.record.column_map import MappedRows, read_map, translate
 from gyrobench.record.column_proposal import find_encoding, find_layout
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import load_system
-from gyrobench.workflow.fit_columns import write_columns
+from gyrobench.workflow.fit_columns import propose_columns, write_columns
 from gyrobench.workflow.measured_run import reduce_measured
 
 
@@ -313,6 +313,15 @@ def test_units_at_the_end_of_a_name_and_the_way_to_a_map(tmp_path: Path, command
     own = "# type_b = none\ntime [s],rate [deg/h]\n0,x\n1,2\n"  # the names of the bench: a map would change nothing
     code, _, err = command("reduce", "drift_record", "--data", written(tmp_path / "own.csv", own))
     assert code == 2 and "gyrobench fit" not in err, err
+
+
+def test_what_belongs_to_a_rate_and_is_none(tmp_path: Path) -> None:
+    """Columns without units, as evaluation boards and autopilots call them."""
+    text = (
+        "Sample,Time,X_GYRO_OUT,Z_ACCL_OUT,TEMP_OUT,gyro_integral_dt,acc_count,gyro_status\n" + "1,2,3,4,5,6,7,8\n" * 9
+    )
+    found = propose_columns(written(tmp_path / "log.csv", text), "drift_record").found
+    assert set(found) == {"time", "X_GYRO_OUT", "Z_ACCL_OUT", "TEMP_OUT"}
 
 
 def written(file: Path, text: str) -> Path:
