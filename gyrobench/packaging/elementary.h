@@ -117,18 +117,32 @@ static EF_ALWAYS doubled sine(int n, double r, double error) {
     return of;
 }
 
+/* Below half a step of the table, n = 0: the bits that turn and sine find, without their tables and zeros. */
+#define EF_NEAR_ZERO(x) (fabs(x) < 0.0122)
+static EF_ALWAYS double sin_near_zero(double x) {
+    const double z = x * x;
+    return EF_RARE(fabs(x) < 0x1p-27) ? x : x + (x * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)));
+}
+static EF_ALWAYS double cos_near_zero(double x) {
+    const double z = x * x;
+    return 1.0 + z * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)));
+}
+
 static EF_VALUE double f_sin(double x) {
     turned t;
     doubled s;
-    if (EF_RARE(fabs(x) < 0x1p-27)) return x;
+    if (EF_NEAR_ZERO(x)) return sin_near_zero(x);
     t = turn(x);
     s = sine(t.n, t.r, t.error);
     return s.v + s.rest;
 }
 
 static EF_VALUE double f_cos(double x) {
-    const turned t = turn(x);
-    const doubled s = sine(t.n + 64, t.r, t.error);
+    turned t;
+    doubled s;
+    if (EF_NEAR_ZERO(x)) return cos_near_zero(x);
+    t = turn(x);
+    s = sine(t.n + 64, t.r, t.error);
     return s.v + s.rest;
 }
 
@@ -136,11 +150,16 @@ static EF_VALUE double f_cos(double x) {
    WebAssembly a complex number is returned in memory: there each is a value of its own. */
 #if defined(__GNUC__) && !defined(__wasm__)
 static EF_VALUE double _Complex pair_of(double x) {
-    const turned t = turn(x);
-    const doubled s = sine(t.n, t.r, t.error), c = sine(t.n + 64, t.r, t.error);
     double _Complex of;
-    __real__ of = EF_RARE(fabs(x) < 0x1p-27) ? x : s.v + s.rest;
-    __imag__ of = c.v + c.rest;
+    if (EF_NEAR_ZERO(x)) {
+        __real__ of = sin_near_zero(x);
+        __imag__ of = cos_near_zero(x);
+    } else {
+        const turned t = turn(x);
+        const doubled s = sine(t.n, t.r, t.error), c = sine(t.n + 64, t.r, t.error);
+        __real__ of = s.v + s.rest;
+        __imag__ of = c.v + c.rest;
+    }
     return of;
 }
 static inline double f_paired_sin(double x) { return __real__ pair_of(x); }
