@@ -23,9 +23,10 @@ from gyrobench.component.blocks.platform import (
     motor_slope,
     moved_base,
     rigid,
+    turned_on,
     with_unbalance,
 )
-from gyrobench.component.math import clip, cos, fabs, minimum, pi, sin, sqrt, vector
+from gyrobench.component.math import Vector, clip, cos, fabs, minimum, pi, sin, sqrt, vector
 
 ONES = [1.0, 1.0, 1.0]
 
@@ -117,6 +118,9 @@ class PlatformThreeAxis(Component):
     heavy = Discrete(0.0, "1", "1: there is unbalance")
     bump = Discrete(0.0, "N.m.s/rad", "damping of the pitch stop")
     pitch = Discrete(0.0, "rad", "pitch, for messages")
+    q_kept = Discrete(NONE, "rad", "joint angles at the end of the step before")
+    c_kept = Discrete(ONES, "1", "their cosines")
+    s_kept = Discrete(NONE, "1", "their sines")
     rate_before = Discrete(NONE, "rad/s", "omega_b at the end of the communication step before")
     rise_before = Discrete(NONE, "rad/s2", "alpha_b then")
     f_before = Discrete(NONE, "m/s2", "f_b then")
@@ -156,6 +160,22 @@ class PlatformThreeAxis(Component):
         beyond = fabs(self.pitch) > self.pitch_stop
         self.refuse(beyond, "theta_0[1] = {pitch} rad must be within the pitch stop, +-{pitch_stop} rad")
         self.hand_over()
+        self.keep_angles()
+
+    def keep_angles(self) -> None:
+        self.q_kept = self.q
+        for k in range(3):
+            self.c_kept[k] = cos(self.q[k])
+            self.s_kept[k] = sin(self.q[k])
+
+    def joints(self) -> Vector:
+        """Return cosine and sine of each joint angle, A order."""
+        found = [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]
+        for k in range(3):
+            near = turned_on(self.c_kept[k], self.s_kept[k], self.q[k] - self.q_kept[k])
+            found[k][0] = near[0]
+            found[k][1] = near[1]
+        return vector(found)
 
     def hand_over(self) -> None:
         self.rate_before = self.omega_b
@@ -186,12 +206,13 @@ class PlatformThreeAxis(Component):
             push = self.stop_stiffness * over + self.bump * self.dq[PITCH]
             t[PITCH] = t[PITCH] - (push if push * over > 0.0 else 0.0)  # the stop pushes back, it does not pull
 
-        cr = cos(self.q[ROLL])
-        sr = sin(self.q[ROLL])
-        cf = cos(self.q[PITCH])
-        sf = sin(self.q[PITCH])
-        ca = cos(self.q[AZ])
-        sa = sin(self.q[AZ])
+        turn = self.joints()
+        cr = turn[ROLL][0]
+        sr = turn[ROLL][1]
+        cf = turn[PITCH][0]
+        sf = turn[PITCH][1]
+        ca = turn[AZ][0]
+        sa = turn[AZ][1]
         wb = vector(self.omega_b)
         ab = vector(self.alpha_b)
         y = left(self.t, self.step_start, self.step_end)
@@ -251,6 +272,7 @@ class PlatformThreeAxis(Component):
                 )  # fmt: skip
                 self.anchor[k] = moved[0]
                 self.slipping[k] = moved[1]
+        self.keep_angles()
         if self.t >= self.step_end:
             self.hand_over()
 
@@ -268,12 +290,13 @@ class PlatformThreeAxis(Component):
                 self.saturated = 1.0
         self.lock = 1.0 if fabs(self.q[PITCH]) > self.lock_angle else 0.0
         self.at_stop = 1.0 if fabs(self.q[PITCH]) > self.pitch_stop else 0.0
-        cr = cos(self.q[ROLL])
-        sr = sin(self.q[ROLL])
-        cf = cos(self.q[PITCH])
-        sf = sin(self.q[PITCH])
-        ca = cos(self.q[AZ])
-        sa = sin(self.q[AZ])
+        turn = self.joints()
+        cr = turn[ROLL][0]
+        sr = turn[ROLL][1]
+        cf = turn[PITCH][0]
+        sf = turn[PITCH][1]
+        ca = turn[AZ][0]
+        sa = turn[AZ][1]
         r = gimbal_y(cr, sr, self.dq[ROLL], self.der.dq[ROLL], self.omega_b, self.alpha_b)
         g = gimbal_x(cf, sf, self.dq[PITCH], self.der.dq[PITCH], r[0], r[1])
         p = gimbal_z(ca, sa, self.dq[AZ], self.der.dq[AZ], g[0], g[1])

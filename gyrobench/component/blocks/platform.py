@@ -5,7 +5,7 @@ from __future__ import annotations
 from gyrobench.component.component import Component
 from gyrobench.component.composition import sampled
 from gyrobench.component.declarations import Discrete, Input, Output, Parameter, State
-from gyrobench.component.math import Number, Vector, clip, fabs, vector
+from gyrobench.component.math import Number, Vector, clip, cos, fabs, sin, vector
 
 NONE = [0.0, 0.0, 0.0]
 PITCH, ROLL, AZ = 0, 1, 2  # the A order
@@ -13,6 +13,16 @@ X, Y, Z = 0, 1, 2
 
 
 # ------------------------------------------------------------------------------------------- rotations
+def turned_on(c: Number, s: Number, by: Number) -> Vector:
+    """Return cosine and sine of an angle that has turned by `by` since they were c and s.
+
+    The stages of a step turn little, and sines of small angles are cheap.
+    """
+    cb = cos(by)
+    sb = sin(by)
+    return vector([c * cb - s * sb, s * cb + c * sb])
+
+
 def about_x(c: Number, s: Number, v: Vector) -> Vector:
     """Return v in axes turned about x by the angle with cosine c and sine s (passive)."""
     return vector([v[X], c * v[Y] + s * v[Z], c * v[Z] - s * v[Y]])
