@@ -236,6 +236,10 @@ class Session:
             parts = {slot: {"sha256": digest} for slot, digest in sorted(self.hashes.items())}
             job |= {"parts": parts, "stop": system.stop, "every": schedule.every}
             checkpoints.check(job, self.program, self.assembly.descriptions)
+            if checkpoints.resume and self.foreign:
+                own = f"{', '.join(self.foreign)}: the run goes on from what the FMU saves of its state"
+                document.notes.append(f"{own} (one of PythonFMU: its registered variables alone)")
+                self._warn(system, document.notes[-1:])
         library, document.linked = self._library(system)
         ending = self._execute(Job(self.program, starts, schedule, library, checkpoints, document.units), progress)
         self._warn(system, ending.remarks)

@@ -20,6 +20,7 @@ from gyrobench.result import Coefficient, Reason, Specification, StepChange, Ste
 from gyrobench.system.system import System
 from gyrobench.workflow.ahead import importing
 from gyrobench.workflow.feedback import SILENT, Feedback
+from gyrobench.workflow.forecast import forecasting
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
 from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
 from gyrobench.workflow.saved_run import RunOutcome, write_report
@@ -110,6 +111,8 @@ def _run(
     feedback.notes([*session.notes, *(checkpoints.notes() if checkpoints else ())])
     try:
         with feedback.progress(session.system.name) as progress:
+            step = request.step or session.system.step
+            progress = forecasting(progress, session, step, folder is not None, feedback)
             if {"html", "pdf"} & set(request.formats) and folder is not None and session.system.has_reduction:
                 progress = importing(progress)
             record = session.run({}, request.seed, request.step, None, progress, checkpoints)

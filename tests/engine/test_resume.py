@@ -22,6 +22,7 @@ from gyrobench.engine.fmu_instance import FmuInstance
 from gyrobench.engine.run_driver import ProgressReport
 from gyrobench.engine.run_errors import RunInterrupted
 from gyrobench.engine.session import Session, run
+from gyrobench.packaging import build
 from gyrobench.record.record import Record
 from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError
@@ -78,6 +79,14 @@ def test_python_parts_save_their_state_too(small: System, tmp_path: Path) -> Non
     whole = run(small, values=QUICK, seed=5, engine="native")
     stop(small, tmp_path / "r", 0.333, **setup)
     assert run(small, values=QUICK, seed=5, out=tmp_path / "r", resume=True, **setup).same_data(whole)
+
+
+def test_a_resumed_run_names_the_foreign_fmus_whose_state_it_trusts(small: System, tmp_path: Path) -> None:
+    """PythonFMU saves registered variables alone: what else a step needs is lost, and no output shows it."""
+    setup: dict[str, Any] = {"parts": {"gyro": build("floated_gyro")}}
+    stop(small, tmp_path / "r", 0.333, **setup)
+    found = run(small, values=QUICK, seed=5, out=tmp_path / "r", resume=True, **setup)
+    assert [n for n in found.run.notes if n.startswith("gyro: the run goes on from what the FMU saves")]
 
 
 def test_a_session_resumes_among_other_runs(small: System, tmp_path: Path) -> None:
