@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gyrobench.errors import GyrobenchError
-from gyrobench.files import temporary_folder
+from gyrobench.files import missing, temporary_folder
 
 ROOMS = ("components", "systems", "reports")
 
@@ -177,4 +177,6 @@ class Bench:
         for root in (self.folder, standard_folder()):
             if name not in ("", "..") and Path(name).name == name and (root / room / name / file).is_file():
                 return root / room / name
+        if Path(name).is_dir():
+            raise BenchError(f"no {kind} '{name}', which is {missing(Path(name))}")
         raise BenchError(f"no {kind} '{name}'; {suggest_names(name, self._listing(room, file))}")

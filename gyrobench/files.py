@@ -23,6 +23,11 @@ LOCK = ".lock"
 TEMPORARY = "gyrobench-temporary-"  # no user names a folder so
 
 
+def missing(path: Path) -> str:
+    """Return why a path names no file, for a message."""
+    return "a folder, where a file is expected" if path.is_dir() else "no such file"
+
+
 def write_whole(path: Path, content: bytes | Callable[[Path], object], durable: bool = True) -> None:
     """Write a file under a temporary name beside ``path`` and rename it; a failure leaves the old file as it was.
 

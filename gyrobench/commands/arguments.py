@@ -8,6 +8,7 @@ from typing import Any
 
 from gyrobench import reading
 from gyrobench.bench import UsageError
+from gyrobench.files import missing
 from gyrobench.system.values import parse_number
 
 
@@ -77,7 +78,7 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
     maps = {k: Path(v) for k, v in parse_assignments(mapping, "--map", "gyro=vendor.toml").items()}
     for slot, file in maps.items():
         if not file.is_file():
-            raise UsageError(f"--map {slot}={file}: no such file")
+            raise UsageError(f"--map {slot}={file}: {missing(file)}")
     return parts, maps
 
 

@@ -28,7 +28,7 @@ from gyrobench.bench import Bench
 from gyrobench.exchange.ssp_annotation import read_annotation, read_gains, repeated
 from gyrobench.exchange.ssp_structure import ANY, Structure
 from gyrobench.exchange.ssp_values import NS, ArchiveError, Units, bound_values, schema_errors
-from gyrobench.files import check_size
+from gyrobench.files import check_size, missing
 from gyrobench.system.system import InvalidConfigurationError, Slot, System
 
 STRUCTURE = "SystemStructure.ssd"
@@ -70,7 +70,7 @@ def _is_intact(folder: Path, path: Path) -> bool:
 def open_archive(path: Path) -> tuple[Path, ET.Element]:
     """Return the folder of the unzipped archive and its description.  Raises InvalidConfigurationError."""
     if not path.is_file():
-        raise InvalidConfigurationError(path.name, ["no such file"])
+        raise InvalidConfigurationError(path.name, [missing(path)])
     try:
         folder = _unpack(path)
         return folder, reading.xml((folder / STRUCTURE).read_bytes(), STRUCTURE, ArchiveError)

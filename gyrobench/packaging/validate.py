@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench, BenchError
-from gyrobench.files import check_description
+from gyrobench.files import check_description, missing
 from gyrobench.packaging.compiler import command, this_platform
 from gyrobench.packaging.fmu import build
 from gyrobench.packaging.instance import Fmu, InstanceError, Plain, elements
@@ -38,7 +38,7 @@ def validate(what: str | Path, bench: Path | None = None) -> list[str]:
     if path.is_file():
         return _file(path, home)
     if path.suffix == ".fmu" or path.name != str(what):
-        raise BenchError(f"{what}: no such file")
+        raise BenchError(f"{what}: {missing(path)}")
     return _part(str(what), home)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gyrobench.bench import suggest_names
+from gyrobench.files import missing
 from gyrobench.system.system import InvalidConfigurationError, System
 
 
@@ -38,7 +39,7 @@ def resolve_parts(
         if str(part).endswith(".fmu"):
             paths[slot] = Path(part)
             if not paths[slot].is_file():
-                raise InvalidConfigurationError(system.name, [f"{slot}: no such file {part}"])
+                raise InvalidConfigurationError(system.name, [f"{slot}: {part}: {missing(paths[slot])}"])
             continue
         if prebuilt and str(part) in prebuilt:
             paths[slot] = prebuilt[str(part)]

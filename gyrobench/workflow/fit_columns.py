@@ -12,6 +12,7 @@ from pathlib import Path
 
 from gyrobench import units
 from gyrobench.bench import UsageError
+from gyrobench.files import missing
 from gyrobench.record.circumstances import statement, values_of
 from gyrobench.record.column_proposal import (
     CALLED,
@@ -93,7 +94,7 @@ class ColumnProposal:
 def propose_columns(file: Path, system: str) -> ColumnProposal:
     """Return a first column map of a file.  Raises UsageError where there is no such file, and no table in it."""
     if not file.is_file():
-        raise UsageError(f"{file}: no such file")
+        raise UsageError(f"{file}: {missing(file)}")
     test = load_test(system)
     tables = tables_of(file) if is_log(file) else []
     if len(tables) < 2:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.files import OversizedArchiveError
+from gyrobench.files import OversizedArchiveError, missing
 from gyrobench.result import Specification
 from gyrobench.system import suite as suites
 from gyrobench.system.suite import Suite
@@ -68,7 +68,7 @@ def check_fmu_files(parts: Mapping[str, str | Path]) -> None:
 
         try:
             if not Path(part).is_file():
-                raise ValueError("no such file")
+                raise ValueError(missing(Path(part)))
             read_description(Path(part))
         except OversizedArchiveError as error:
             raise UsageError(f"slot {slot}: {error}") from None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from gyrobench.bench import Bench, display_path, standard_folder
 from gyrobench.errors import Advice, GyrobenchError
+from gyrobench.files import missing
 
 if TYPE_CHECKING:
     from gyrobench.record.record import Record
@@ -80,7 +81,8 @@ def user_message(error: BaseException, at_shell: bool = True) -> str:
         return str(error) if at_shell else error.text
     place = content_location(error)
     if isinstance(error, OSError) and place is None:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror or str(error)
+        said = missing(Path(error.filename)) if isinstance(error, IsADirectoryError) else error.strerror
+        return f"{error.filename}: {said}" if error.filename else said or str(error)
     if place is None:
         inside = [f"{file}:{line}" for file, line in _frames(error) if file.startswith(str(TOOL) + os.sep)]
         place = inside[-1] if inside else "unknown place"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.component import Component
-from gyrobench.files import make_once, write_whole
+from gyrobench.files import make_once, missing, write_whole
 from gyrobench.packaging import compiler
 from gyrobench.packaging.own_controller import c_law
 from gyrobench.packaging.own_controller.declared_ports import Declarations, read_declarations
@@ -47,7 +47,7 @@ def allow(part: object) -> None:
     if is_controller(part):
         path = Path(str(part))
         if not path.is_file():
-            raise UsageError(f"{part}: no such file")
+            raise UsageError(f"{part}: {missing(path)}")
         _named.add(path.resolve())
 
 
