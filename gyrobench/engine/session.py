@@ -36,8 +36,6 @@ from gyrobench.system.values import InvalidValueError
 from gyrobench.system.wiring import Assembly, assemble
 
 TIMEOUT = 60.0  # s
-
-
 ENGINES = ("native", "linked", "reference")
 
 
@@ -87,10 +85,9 @@ class Session:
         self.gains = [(c.gain, c.offset) for c in self.assembly.connections]
         self.base = defaults(self.assembly)
         self.hashes = {slot: sha256(p) for slot, p in paths.items()}
-        foreign = [slot for slot in paths if slot not in self.built]
-        self.notes += [f"{s}: {paths[s].name} is not of this bench: SHA-256 {self.hashes[s]}" for s in foreign]
-        self.foreign = foreign
-        if found := preflight.problems(self.assembly, foreign):
+        self.foreign = [slot for slot in paths if slot not in self.built]
+        self.notes += [f"{s}: {paths[s].name} is not of this bench: SHA-256 {self.hashes[s]}" for s in self.foreign]
+        if found := preflight.problems(self.assembly, self.foreign):
             raise InvalidConfigurationError(self.system.name, found)
         self.engine = self._choose(engine)
         self.linkable = self.engine != "reference" and engine != "native" and not self._obstacle()
