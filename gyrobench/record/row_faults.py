@@ -18,7 +18,11 @@ SEPARATED = re.compile(
     r"[-+−]?[1-9]\d{0,2}(([.,'’ \u00a0\u202f])\d{3}(\2\d{3})*(?!\2)[.,]\d*"
     r"|(['’ \u00a0\u202f]\d{3})+|([.,])\d{3}(\5\d{3})+)"
 )
-NOTHING = ["", "nan", "NaN", "NAN", "NA", "n/a", "null", "-", "--", "#N/A"]  # cells without a value
+#: cells without a value; those with # are errors of a spreadsheet, in English and German
+NOTHING = [
+    "", "nan", "NaN", "NAN", "NA", "n/a", "null", "-", "--", "#N/A", "#DIV/0!", "#VALUE!", "#NUM!", "#REF!", "#NAME?",
+    "#NULL!", "#NV", "#WERT!", "#ZAHL!", "#BEZUG!",
+]  # fmt: skip
 ROWS = 2_000_000  # examined of a file whose header is wrong already
 
 

@@ -97,15 +97,21 @@ def find_faults(system: System, data: Path, values: Mapping[str, str], columns: 
 
 
 def _fitting(system: System, data: Path) -> list[Advice]:
-    """Return the command that proposes a column map, where one finds columns in a file under names of its own."""
+    """Return the command that proposes a column map, where one finds columns in a file with a layout of its own: other
+    names, rows above or below them, times of day.
+    """
+    from gyrobench.record.csv_reader import read_head
     from gyrobench.workflow.fit_columns import propose_columns
 
     with suppress(GyrobenchError):
-        found = propose_columns(data, system.name).found
-        if any(str(column.sources[0]).partition("[")[0].strip() != name for name, column in found.items()):
+        proposal = propose_columns(data, system.name)
+        layout, found = proposal.layout, proposal.found
+        named = all(str(column.sources[0]).partition("[")[0].strip() == name for name, column in found.items())
+        timed = any(column.time for column in found.values())
+        if not named or timed or layout.below or (found and read_head(data).line != layout.skip + 1):
             out = f"{data.stem}.toml"
             fit = shlex.join(["gyrobench", "fit", display_path(data), "--system", system.name, "--out", out])
-            return [Advice("fit", f"its columns have names of their own; {fit} proposes a column map for --columns")]
+            return [Advice("fit", f"the file has a layout of its own; {fit} proposes a column map for --columns")]
     return []
 
 

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from gyrobench.record.column_proposal import find_layout
 from gyrobench.record.csv_reader import DataError
 from gyrobench.system.system import load_system
+from gyrobench.workflow.measured_run import reduce_measured
 
 
 def problems(system: str, file: Path, text: str) -> list[str]:
@@ -77,3 +79,33 @@ def test_drift_record(tmp_path: Path) -> None:
         "(a missing value? column map: absent = ['off']; row 7)",
     ]
     assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
+
+
+def test_a_layout_of_its_own_is_pointed_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Units in a row of their own, a merged title above the names, times of day: ``fit`` reads what is refused here.
+    Where names and rows are those of the bench, a map would help nothing."""
+    monkeypatch.chdir(tmp_path)
+    rows = [f"{60 * k},{60 * k + 60},{0.02 + 1e-4 * (k % 3)}" for k in range(12)]
+    names, stamps = "t_start [s],t_end [s],mean [mA]", [f"29.11.2026 12:{k:02d}:00" for k in range(13)]
+    layouts = {
+        "units": ["t_start,t_end,mean", "s,s,mA", *rows],
+        "merged": ["Zeit,,Strom", names, *rows],
+        "stamps": [names, *(f"{stamps[k]},{stamps[k + 1]},0.0{k + 10}" for k in range(12))],
+        "word": [names, *rows, "720,780,off"],
+    }
+    advised = {}
+    for name, lines in layouts.items():
+        file = tmp_path / f"{name}.csv"
+        file.write_text("# operator = N. N.\n" + "\n".join(lines), encoding="utf-8")
+        with pytest.raises(DataError) as error:
+            reduce_measured(load_system("fixed_position"), file, {}, in_memory=True)
+        advised[name] = [a.action for a in error.value.advice]
+    assert advised == {"units": ["fit"], "merged": ["fit"], "stamps": ["fit"], "word": []}
+
+
+def test_errors_of_a_spreadsheet_are_cells_without_a_value(tmp_path: Path) -> None:
+    rows = [f"{k};0,02{k};{cell}" for k, cell in enumerate(["1", "#DIV/0!", "#WERT!", "n/a", "-", "2"])]
+    file = tmp_path / "a.csv"
+    file.write_text("time [s];current [mA];temperature [degC]\n" + "\n".join(rows), encoding="utf-8")
+    layout = find_layout(file)
+    assert [c.empty for c in layout.columns] == [0, 0, 4] and layout.rows == 6

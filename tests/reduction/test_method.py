@@ -324,4 +324,4 @@ def test_windows_of_two_channels() -> None:
     assert window_problems(w, need)[0].startswith("flagged windows (flagged_y)")
     del w["flagged_y"]
     assert window_problems(w, need) == []
-    assert window_problems({**w, "mean_y": t * np.nan}, need) == ["column mean_y: non-finite number in row 1, 2, 3"]
+    assert window_problems({**w, "mean_y": t * np.nan}, need) == ["column mean_y: non-finite number in window 1, 2, 3"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gyrobench.report.plain_text import WIDTH, format_result
-from gyrobench.result import Coefficient, LoopResult
+from gyrobench.result import Coefficient, LoopResult, Reason
 
 
 def test_measures_have_their_meanings_beside_them() -> None:
@@ -24,3 +24,20 @@ def test_measures_have_their_meanings_beside_them() -> None:
     assert lines[head + 1][at:] == "platform angle under the load, at rest"
     assert " ".join(line[at:] for line in lines[head + 2 :]).strip() == long.strip()  # wrapped beneath itself
     assert max(map(len, lines)) <= WIDTH
+
+
+def test_what_speaks_against_a_record_is_said_without_a_verdict_too() -> None:
+    """A doubt takes a verdict away; where none was asked for it is still said, but not what was left unstated, and not
+    twice where the reason of an inconclusive verdict has its words."""
+    reasons = [
+        Reason("noise.none", "The data lie on the model.", ("pass",), severity="doubt"),
+        Reason("type_b.unstated", "No type B.", ("pass",), severity="doubt"),
+        Reason("level.shift", "The level is another one.", ("pass",), severity="doubt"),
+        Reason("verdict.withheld:level.shift", "Inconclusive: The level is another one.", severity="error"),
+    ]
+    result = LoopResult(
+        system="s", title="Loop", method="", sources=[], conventions=[], responses=[], reasons=reasons,
+        coefficients=[Coefficient("S", "stiffness", "N·m/rad", 16439.0, 49.0, 1.96, (16343.0, 16535.0))],
+    )  # fmt: skip
+    warnings = [line for line in format_result(result).splitlines() if line.startswith("warning: ")]
+    assert warnings == ["warning: The data lie on the model.", "warning: Inconclusive: The level is another one."]

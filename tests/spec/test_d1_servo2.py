@@ -285,7 +285,7 @@ def test_refused_records(made: Any) -> None:
     nan[3] = math.nan
     cases = [
         (changed(made, plan=["mount 2", "mount 13"]), "'mount 13' is none of the mounts"),
-        (changed(made, inner_end=nan), "column inner_end: non-finite number in row 4"),
+        (changed(made, inner_end=nan), "column inner_end: non-finite number in window 4"),
         (changed(made, inner_end=w["inner_end"] + 0.7), r"gimbal lock: the inner angle reaches .*78\.5° is allowed"),
         (record((9, 10), PHI, 1.0, [0.0] * 9, [0.0] * 9, 600.0), "x channel: rank 5 of 9, not estimable: "),
         (changed(made, keep=w["phase"] == 1), r"phase 2 \(mount 4\) has no windows"),

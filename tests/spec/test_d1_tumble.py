@@ -198,14 +198,14 @@ def bad(change: Any) -> str:
 
 
 @pytest.mark.parametrize(("change", "text"), [
-    (put("mean", 7, math.nan), "column mean: non-finite number in row 8"),
-    (put("angle_end", 3, math.inf), "column angle_end: non-finite number in row 4"),
+    (put("mean", 7, math.nan), "column mean: non-finite number in window 8"),
+    (put("angle_end", 3, math.inf), "column angle_end: non-finite number in window 4"),
     (lambda w: w.pop("mean"), "column mean is missing"),
     (lambda w: cut(w, np.arange(0)), "no windows"),
-    (lambda w: cut(w, np.r_[0, 1, 1, 2:30]), "duplicate windows: row 3"),
+    (lambda w: cut(w, np.r_[0, 1, 1, 2:30]), "duplicate windows: window 3"),
     (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*row 3"),
-    (put("t_end", 4, 0.0), "windows without length.*row 5"),
-    (put("flagged", 9, 3), "flagged windows .saturated torquer.* in row 10"),
+    (put("t_end", 4, 0.0), "windows without length.*window 5"),
+    (put("flagged", 9, 3), "flagged windows .saturated torquer.* window 10"),
     (lambda w: cut(w, w["phase"] != 1), "phase 1 .static 3. is missing"),
     (lambda w: cut(w, w["phase"] != 4), "phase 4 .mount 2. is missing"),
     (lambda w: w.__setitem__("phase", np.where(w["phase"] == 4, 9, w["phase"])), "phase 9 is in the record"),

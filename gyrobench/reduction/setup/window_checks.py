@@ -31,7 +31,7 @@ def _list(rows: NDArray[np.intp], shown: int = 5) -> str:
 
 
 def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQUIRED) -> list[str]:
-    """Return what is wrong with the rows of a record, as sentences; rows count from 1.
+    """Return what is wrong with the rows of a record, as sentences; windows count from 1, wherever their rows stand.
 
     Columns ``required`` (t_start and t_end among them) in SI: all finite, times strictly increasing, no window twice,
     none flagged (saturated torquer, lost lock) in any column whose name begins with "flagged".
@@ -48,28 +48,30 @@ def window_problems(windows: Mapping[str, Array], required: Sequence[str] = REQU
     for c in required:
         invalid = np.flatnonzero(~np.isfinite(np.asarray(windows[c], dtype=float)))
         if invalid.size:
-            problems.append(f"column {c}: non-finite number in row {_list(invalid)}")
+            problems.append(f"column {c}: non-finite number in window {_list(invalid)}")
     if problems:
         return problems
     t0, t1 = np.asarray(windows["t_start"], dtype=float), np.asarray(windows["t_end"], dtype=float)
     length = t1 - t0
     invalid = np.flatnonzero(length <= 0.0)
     if invalid.size:
-        problems.append(f"windows without length (t_end <= t_start) in row {_list(invalid)}")
+        problems.append(f"windows without length (t_end <= t_start): window {_list(invalid)}")
     slack = 1e-6 * max(float(np.median(length)), 0.0)
     twice = np.flatnonzero(np.abs(np.diff(t0)) <= slack) + 1
     if twice.size:
-        problems.append(f"duplicate windows: row {_list(twice)} starts when the row before it starts")
+        problems.append(f"duplicate windows: window {_list(twice)} starts when the one before it starts")
     back = np.flatnonzero((np.diff(t0) < -slack) | ((t0[1:] < t1[:-1] - slack) & (np.diff(t0) > slack))) + 1
     if back.size:
-        problems.append(f"time does not increase or windows overlap: row {_list(back)}; give the rows in order of time")
+        problems.append(
+            f"time does not increase or windows overlap: window {_list(back)}; give the rows in order of time"
+        )
     problems += [p for axis in AXES if (p := _exchanged_ends(windows, t0, t1, axis))]
     for c in (c for c in windows if c.startswith("flagged")):
         invalid = np.flatnonzero(np.asarray(windows[c]) > 0)
         if invalid.size:
             channel = "" if c == "flagged" else f" ({c})"
             problems.append(
-                f"flagged windows{channel} (saturated torquer or lost lock) in row {_list(invalid)}; a flagged mean "
+                f"flagged windows{channel} (saturated torquer or lost lock): window {_list(invalid)}; a flagged mean "
                 "is no measurement: repeat the phase or leave these rows out"
             )
     return problems
