@@ -327,7 +327,7 @@ def test_cross_squares_are_refused_without_fold_and_fold_exactly_with_it() -> No
     (put("angle_end", 3, math.inf), "column angle_end: non-finite number in window 4"),
     (lambda w: w.pop("mean_x"), "column mean_x is missing"),
     (lambda w: cut(w, np.arange(0)), "no windows"),
-    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*row 3"),
+    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*window 3"),
     (put("flagged", 9, 3), "flagged windows .saturated torquer.* window 10"),
     (lambda w: cut(w, w["phase"] != 1), "phase 1 .static 3. is missing"),
     (lambda w: cut(w, w["phase"] != 4), "phase 4 .mount 2. is missing"),

@@ -216,7 +216,7 @@ def test_refused_records() -> None:
         ({"mean": -good["mean"]}, "turn its sign round"),
         ({"angle_end": good["angle_end"] + 1e-3}, "row 1: the head moved by 0.0573°"),
         ({"phase": good["phase"] + 4}, "phase 5: its mount is not given"),
-        ({"flagged": np.eye(8)[3]}, "flagged windows .* row 4"),
+        ({"flagged": np.eye(8)[3]}, "flagged windows .* window 4"),
         ({"mean": np.where(np.arange(8) == 2, np.nan, good["mean"])}, "non-finite number in window 3"),
         ({"mean": np.zeros(8)}, "no accelerometer was read"),
     ):

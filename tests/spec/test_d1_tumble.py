@@ -203,7 +203,7 @@ def bad(change: Any) -> str:
     (lambda w: w.pop("mean"), "column mean is missing"),
     (lambda w: cut(w, np.arange(0)), "no windows"),
     (lambda w: cut(w, np.r_[0, 1, 1, 2:30]), "duplicate windows: window 3"),
-    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*row 3"),
+    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*window 3"),
     (put("t_end", 4, 0.0), "windows without length.*window 5"),
     (put("flagged", 9, 3), "flagged windows .saturated torquer.* window 10"),
     (lambda w: cut(w, w["phase"] != 1), "phase 1 .static 3. is missing"),

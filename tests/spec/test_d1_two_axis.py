@@ -242,7 +242,7 @@ def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
     (put("mean", 7, math.nan), "column mean: non-finite number in window 8"),
     (lambda w: w.pop("inner_end"), "column inner_end is missing"),
     (lambda w: cut(w, np.arange(0)), "no windows"),
-    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*row 3"),
+    (lambda w: cut(w, np.r_[0, 2, 1, 3:30]), "time does not increase.*window 3"),
     (put("flagged", 9, 3), "flagged windows .saturated torquer.* window 10"),
     (put("inner_end", 5, 0.5), "row 6: the inner axis moves by .*at rest only"),
     (put("outer_end", 2, 0.5), "row 3: the outer axis moves"),
