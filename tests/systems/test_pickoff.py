@@ -181,7 +181,7 @@ def test_refused_records() -> None:
         ({}, {"gain": 0.0}, "gain H/C = 0"),
         ({"mean": -good["mean"]}, {}, "voltage falls as the angle rises"),
         ({"angle_end": good["angle_end"] + 1e-5}, {}, "row 1: the table moved by 2.06″"),
-        ({"flagged": np.eye(21)[4]}, {}, "flagged windows .* row 5"),
+        ({"flagged": np.eye(21)[4]}, {}, "flagged windows .* window 5"),
         ({"mean": np.where(np.arange(21) == 6, np.nan, good["mean"])}, {}, "non-finite number in window 7"),
         (made(n=9), {}, "9 angles: at least 10"),
     ):
