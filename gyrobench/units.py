@@ -201,7 +201,7 @@ def fitting(name: str) -> tuple[str, ...]:
     u = unit(name)
     compounds = [s for s in USUAL if unit(s).exponents == u.exponents]
     single = [*_TABLE.items(), *((s, (f, p)) for s, (f, _, p) in _OFFSET.items())]
-    return (u.dimension, *compounds, *(s for s, (_, p) in single if p == u.exponents and s != u.dimension))
+    return tuple(dict.fromkeys((u.dimension, *compounds, *(s for s, (_, p) in single if p == u.exponents))))
 
 
 def same_dimension(a: str, b: str) -> bool:

@@ -155,6 +155,7 @@ REFUSED = [
     (["run", NAME, "--spec", "floated_gyr"], "floated_gyr: no such file or acceptance specification; did you mean"),
     (["run", NAME, "--timeout", "1V"], "--timeout"),
     (["run", NAME, "--seed", "-1"], "--seed"),
+    (["run", "fixed_position", "--set", "dwell=1e300s"], "1e+300 s in steps of 0.001 s: more than 1e+12 steps"),
     (["run", NAME, "--engine", "fast"], "'linked', 'reference'"),
     (["run", NAME, "--out", "full"], "full: holds other files; name a new folder, for example full/run1"),
     (["run", NAME, "--out", "bad.fmu"], "bad.fmu: is a file"),

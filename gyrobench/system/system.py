@@ -370,6 +370,8 @@ class System(Configurable):
         """Raises InvalidConfigurationError when the plan or the values are impossible."""
         plan = self.plan()
         problems = (plan.problems() if plan.phases else []) + list(self.check())
+        if not (length := plan.duration()) < 1e12 * self.step:  # weeks at a million a second
+            problems.append(f"{length:.3g} s in steps of {self.step:.3g} s: more than 1e+12 steps")
         if problems:
             raise InvalidConfigurationError(self.name, problems)
 
