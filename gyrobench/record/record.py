@@ -283,11 +283,9 @@ def rows_to_columns(rows: list[AnyArray], names: list[str], time: bool) -> dict[
     blocks = [r if r.ndim == 2 else r[None, :] for r in rows]
     if len(blocks) > 1 and max(len(b) for b in blocks) == 1:  # of the reference engine
         blocks = [np.concatenate(blocks)]
-    table = [np.empty(sum(len(b) for b in blocks)) for _ in range(1 + len(names))]
-    at = 0
+    table, at = np.empty((1 + len(names), sum(len(b) for b in blocks))), 0
     for block in blocks:
-        for k, column in enumerate(table):
-            column[at : at + len(block)] = block[:, k]
+        table[:, at : at + len(block)] = block.T
         at += len(block)
     columns: dict[str, AnyArray] = {"time": table[0]} if time else {}
     for name, column in zip(names, table[1:], strict=True):
