@@ -129,20 +129,16 @@ static EF_ALWAYS double cos_near_zero(double x) {
 }
 
 static EF_VALUE double f_sin(double x) {
-    turned t;
-    doubled s;
     if (EF_NEAR_ZERO(x)) return sin_near_zero(x);
-    t = turn(x);
-    s = sine(t.n, t.r, t.error);
+    const turned t = turn(x);
+    const doubled s = sine(t.n, t.r, t.error);
     return s.v + s.rest;
 }
 
 static EF_VALUE double f_cos(double x) {
-    turned t;
-    doubled s;
     if (EF_NEAR_ZERO(x)) return cos_near_zero(x);
-    t = turn(x);
-    s = sine(t.n + 64, t.r, t.error);
+    const turned t = turn(x);
+    const doubled s = sine(t.n + 64, t.r, t.error);
     return s.v + s.rest;
 }
 
