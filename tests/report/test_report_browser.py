@@ -132,6 +132,15 @@ def contrast(a: str, b: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+def test_covers_of_a_table_have_the_ground_of_the_box_around_it() -> None:
+    """What hides the shades of a table that does not go on was white in a verdict that is green."""
+    css = read_content("templates/report.css")
+    boxes = re.findall(r"^\.answer(?:\.\w+)?[^{]*\{([^}]*)\}", css, flags=re.M)
+    grounds = [b for b in boxes if "border-left" in b]
+    assert len(grounds) == 4 and all("--ground: var(--" in b for b in grounds)
+    assert "var(--page) 40%" not in css and css.count("var(--ground) 40%") == 2
+
+
 @pytest.mark.parametrize("theme", [0, 1])
 def test_contrast_of_text_and_lines(theme):
     css = read_content("templates/report.css")
