@@ -154,6 +154,8 @@ REFUSED = [
     (["run", NAME, "--map", "gyro=no.toml"], "--map gyro=no.toml: no such file"),
     (["run", NAME, "--spec", "floated_gyr"], "floated_gyr: no such file or acceptance specification; did you mean"),
     (["run", NAME, "--timeout", "1V"], "--timeout"),
+    (["run", NAME, "--timeout", "0s"], "--timeout = 0s: must be > 0"),
+    (["run", NAME, "--step", "-1ms"], "--step = -1ms: must be > 0"),
     (["run", NAME, "--seed", "-1"], "--seed"),
     (["run", "fixed_position", "--set", "dwell=1e300s"], "1e+300 s in steps of 0.001 s: more than 1e+12 steps"),
     (["run", NAME, "--engine", "fast"], "'linked', 'reference'"),

@@ -9,7 +9,7 @@ from typing import Any
 from gyrobench import reading
 from gyrobench.bench import UsageError
 from gyrobench.files import missing
-from gyrobench.system.values import parse_number
+from gyrobench.system.values import InvalidValueError, parse_number
 
 
 def parse_assignments(values: list[str] | None, option: str, example: str) -> dict[str, str]:
@@ -83,5 +83,10 @@ def parse_swaps(part: list[str] | None, mapping: list[str] | None) -> tuple[dict
 
 
 def parse_time(option: str, text: str | None) -> float | None:
-    """Return the time given by an option in s.  Raises InvalidValueError."""
-    return parse_number(option, text, "s") if text else None
+    """Return the time given by an option in s.  Raises InvalidValueError, for one that is not > 0 too."""
+    if text is None:
+        return None
+    time = parse_number(option, text, "s")
+    if not time > 0.0:
+        raise InvalidValueError(f"{option} = {text}: must be > 0")
+    return time

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.engine.checkpoint import resume_obstacle
@@ -72,25 +73,19 @@ def shorter(system: System) -> dict[str, str]:
             halves[name] = value // 2
         if name in halves and option.min is not None and halves[name] < option.min:
             del halves[name]
-    whole = system.plan().duration()
-    least = _duration(system, halves)
-    if least is None or least > (1.0 - WORTH) * whole:
-        return {}
-    needed = {n: v for n, v in halves.items() if _saves(system, halves, n, least + WORTH * whole)}
-    return {n: str(v) if isinstance(v, int) else f"{v:g}s" for n, v in needed.items()}
 
-
-def _saves(system: System, halves: dict[str, Any], name: str, limit: float) -> bool:
-    """Return whether the test gets longer than a limit without one of the changes."""
-    without = _duration(system, {n: v for n, v in halves.items() if n != name})
-    return without is not None and without > limit
-
-
-def _duration(system: System, values: dict[str, Any]) -> float | None:
-    """Return the length of the plan with other values, s; None where the system refuses them."""
-    try:
-        other = system.with_values(values)
-        other.refuse()
+    def length(without: str = "") -> float:
+        """Return the length of the plan with the halves but one, s; infinite where the system refuses them."""
+        try:
+            other = system.with_values({n: v for n, v in halves.items() if n != without})
+            other.refuse()
+        except GyrobenchError:
+            return math.inf
         return other.plan().duration()
-    except GyrobenchError:
-        return None
+
+    spared = WORTH * system.plan().duration()
+    least = length()
+    if not least < system.plan().duration() - spared:
+        return {}
+    needed = {n: v for n, v in halves.items() if length(n) > least + spared}
+    return {n: str(v) if isinstance(v, int) else f"{v:g}s" for n, v in needed.items()}
