@@ -173,9 +173,11 @@ class Linear:
     # ------------------------------------------------------------------ models
     def continuous(self, break_at: str | None = None) -> LinearModel:
         """Return A, B, C, D from excitations to channels, or of the loop L opened at an input ("slot.variable")."""
+        from scipy.linalg import block_diag
+
         plain = {s: (p.a, p.b, p.c, p.d) for s, p in self.blocks.items()}
         of_parts = [self.undelayed.get(s) or plain[s] for s in self.order]
-        a, b, c, d = (_diagonal([of_part[m] for of_part in of_parts]) for m in range(4))
+        a, b, c, d = (block_diag(*(of_part[m] for of_part in of_parts)) for m in range(4))
         k, w = self.k.copy(), self.w
         return_row = np.zeros((0, len(self.outputs)))
         if break_at is not None:
@@ -247,15 +249,6 @@ class Linear:
         names = ([break_at], ["L"]) if break_at is not None else (self.outside, self.shown)
         states = [*all_states, *(f"{c} (step before)" for c in self.cut)]
         return _model(after[:, :n], after[:, n:], shown[:, :n], shown[:, n:], *names, states, self.step)
-
-
-def _diagonal(blocks: Sequence[Array]) -> Array:
-    """Return the block diagonal matrix; scipy's would cost a quarter of a second of imports before each run."""
-    found, row, column = np.zeros(np.sum([b.shape for b in blocks], axis=0)), 0, 0
-    for b in blocks:
-        found[row : row + b.shape[0], column : column + b.shape[1]] = b
-        row, column = row + b.shape[0], column + b.shape[1]
-    return found
 
 
 def _model(
