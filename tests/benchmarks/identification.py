@@ -43,6 +43,8 @@ class Count:
         self.all: Counter[str] = Counter()
         self.errors: dict[str, list[float]] = defaultdict(list)
         self.U: dict[str, list[float]] = defaultdict(list)
+        self.seed = 0
+        self.worst: dict[str, tuple[float, int]] = {}  # largest error over U, its seed
         self.seconds: list[float] = []
         self.notes: Counter[str] = Counter()
 
@@ -88,6 +90,9 @@ class Count:
             scale = {"rad": np.degrees(1.0), "factor": 20.0 / np.log(10.0) / m.value}.get(m.unit, 1.0 / m.value)
             self.errors[m.name].append(scale * (m.value - truth[m.name]))
             self.U[m.name].append(scale * 0.5 * (m.high - m.low))
+            self.worst[m.name] = max(
+                self.worst.get(m.name, (0.0, 0)), (abs(self.errors[m.name][-1]) / self.U[m.name][-1], self.seed)
+            )
 
     def show(self) -> None:
         for name, count in self.all.items():
@@ -96,6 +101,7 @@ class Count:
                 errors, U = np.array(self.errors[name]), np.array(self.U[name])
                 line += f"   rms {np.sqrt(np.mean(errors**2)):.3g}  U {np.median(U):.3g}"
                 line += f"  largest error / U {np.max(np.abs(errors) / U):.1f}"
+            line += f" (seed {self.worst[name][1]})" if name in self.worst else ""
             print(line)
         print(f"seconds each: mean {np.mean(self.seconds):.2f}, largest {np.max(self.seconds):.2f}")
         print(dict(self.notes))
@@ -121,7 +127,7 @@ def linear(runs: int, kind: str, noise: float, first: int) -> Count:
     """Count random platforms; noise: rms of the sensor's and of the disturbance, over that of the response."""
     counted = Count()
     for seed in range(first, first + runs):
-        rng = np.random.default_rng(seed)
+        rng, counted.seed = np.random.default_rng(seed), seed
         loop, at = random_platform(rng), PLACES[seed % 3]
         if not loop.stable() or margins_of(loop, *BAND)["peak S"] > 4.0:
             continue
@@ -160,6 +166,7 @@ def friction(runs: int, noise: float, first: int, periods: int = 6, realizations
     torque, sensor = (rng.standard_normal(r.shape) * noise * s for s in (np.ones(runs), y.std(axis=0)))
     u, y = platforms.run(r, torque, sensor)
     for k in range(runs):
+        counted.seed = k
         found = timed(LoopRecord("friction", H, r[:, k], u[:, k], y[:, k], "plant input", UNITS))
         s = S[np.round(found.f * samples * H).astype(int), k]
         counted.responses(found, {"L": 1.0 / s - 1.0, "S": s, "T": 1.0 - s})
