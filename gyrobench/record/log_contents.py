@@ -1,7 +1,7 @@
 """A program of its own that reads a log: readers of damaged or hostile files may end their process, or fill memory.
 
 python log_contents.py FILE                 the tables of a log, JSON to standard output
-python log_contents.py FILE TABLE OUT.csv   one of them as text: names with units, then numbers
+python log_contents.py FILE TABLE OUT.csv   the same; one of them, "" the only one, as text: names with units, numbers
 python log_contents.py FILE FOLDER          the first rows of the first tables, as FOLDER/0.csv, 1.csv ...
 
 A table is what has common rows: a group, a topic, a sheet, arrays of one length.  Code 1 with the reason, the last line
@@ -265,9 +265,10 @@ def main() -> None:
     try:
         with contextlib.redirect_stdout(sys.stderr):  # what readers say of their own
             tables = list(READERS[file.suffix.lower()](file))
-            if len(sys.argv) == 4:
-                _write(dict(tables)[sys.argv[2]](), Path(sys.argv[3]))
-                return
+            wanted = sys.argv[2] if len(sys.argv) == 4 else None
+            for name, columns in tables:
+                if name == wanted or (wanted == "" and len(tables) == 1):
+                    _write(columns(), Path(sys.argv[3]))
             for k, (_, columns) in enumerate(tables[:HEADS] if len(sys.argv) == 3 else []):
                 with contextlib.suppress(SystemExit):  # no column of numbers
                     _write({n: v[:ROWS] for n, v in columns().items()}, Path(sys.argv[2]) / f"{k}.csv")

@@ -30,8 +30,6 @@ def is_log(file: Path) -> bool:
 
 def tables_of(file: Path) -> list[str]:
     """Return the names of the tables of a log.  Raises DataError."""
-    if regular(file).stat().st_size > MOST:
-        raise DataError(file, [f"larger than {MOST >> 30} GB"])
     names: list[str] = json.loads(_read(file))
     if not names:
         raise DataError(file, ["no table of numbers in it"])
@@ -47,14 +45,15 @@ def heads_of(file: Path) -> dict[str, Path]:
 
 def as_text(file: Path, table: str = "") -> Path:
     """Return a CSV file of a table of a log; "": the only one.  It lasts as long as the process.  Raises DataError."""
-    names = tables_of(file)
+    out = temporary_folder() / f"{file.stem}.csv"
+    names: list[str] = json.loads(_read(file, table, str(out)))
+    if not names:
+        raise DataError(file, ["no table of numbers in it"])
     if not table and len(names) > 1:
         shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
         raise DataError(file, [f'several tables: {shown}; name one in a column map: table = "{names[0]}"'])
     if table and table not in names:
         raise DataError(file, [f"no table '{table}'; {suggest_names(table, names)}"])
-    out = temporary_folder() / f"{file.stem}.csv"
-    _read(file, table or names[0], str(out))
     return out
 
 
@@ -62,6 +61,8 @@ def _read(file: Path, *more: str) -> bytes:
     """Return what the program of its own prints of a log.  Raises DataError with the reason where it cannot read it."""
     from gyrobench.record import log_contents
 
+    if regular(file).stat().st_size > MOST:
+        raise DataError(file, [f"larger than {MOST >> 30} GB"])
     program = [sys.executable, "-P", str(Path(log_contents.__file__)), str(file), *more]
     done = subprocess.run(program, capture_output=True, check=False)
     if done.returncode == 0:
