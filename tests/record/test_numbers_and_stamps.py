@@ -115,3 +115,18 @@ def test_of_columns_of_one_name_the_one_that_is_taken_is_named(gyrobench: Comman
     Path("a.csv").write_text(f"time [s],rate [deg/s],rate [deg/s]\n{rows}", encoding="utf-8")
     code, _, err = gyrobench("fit", "a.csv", "--system", "drift_record", "--out", "m.toml")
     assert code == 0 and "column 2 is taken for 'rate'; others are called so, too: 3" in err
+
+
+def test_a_comma_beside_it_tells_that_a_point_separates_thousands(tmp_path: Path) -> None:
+    """6.070 in every row may be %.3f; with 21,5 in another column the point is no decimal sign: not read as 6.07.
+    Nothing tells it beside whole numbers or decimals with a point, and most such files are decimals: these are read."""
+    columns = (CsvColumn("rate", "rad/s", "rate"), CsvColumn("angle", "rad", "angle"))
+    file = tmp_path / "a.csv"
+    for beside, refused in (("21,5", True), ("21", False), ("21.5", False)):
+        rows = "".join(f"6.07{k};{beside}\n" for k in range(9))
+        file.write_text(f"rate [rad/s];angle [rad]\n{rows}", encoding="utf-8")
+        if refused:
+            with pytest.raises(DataError, match="'21,5' is not a finite number; the decimal sign is a point"):
+                read_measured(file, columns, time=None)
+        else:
+            assert read_measured(file, columns, time=None)[0]["rate"][1] == 6.071
