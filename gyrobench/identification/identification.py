@@ -124,7 +124,7 @@ class LoopIdentification:
             levels = " and ".join(
                 f"{20.0 * math.log10(max(d.floor, 1e-9)):.3g} dB ({d.kind})" for d in self.distortions
             )
-            lines += ["", f"no nonlinearity above the noise, which is {levels} of the excited lines"]
+            lines += ["", f"no nonlinearity above the noise, which is {levels} of the excited lines".replace("-", "−")]
         lines += ["", *(f"note: {n}" for n in self.notes)] if self.notes else []
         return "\n".join(lines)
 
