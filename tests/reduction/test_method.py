@@ -110,6 +110,7 @@ def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
     large = replace(c, estimate=263087.4, u=2979.0, k=1.96, unit="N·m/rad")
     assert plus_minus(large) == "263100 ± 5800 N·m/rad (95 %)"
     assert plus_minus(replace(large, estimate=-0.30012, u=0.00117, unit="°/h")) == "−0.3001 ± 0.0023 °/h (95 %)"
+    assert plus_minus(replace(large, estimate=-0.4, u=20.0, unit="°/h")) == "0 ± 39 °/h (95 %)"  # not −0: U = 39.2
 
 
 def test_merge_of_two_channels() -> None:

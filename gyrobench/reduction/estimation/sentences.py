@@ -35,7 +35,8 @@ def plus_minus(c: Coefficient) -> str:
         return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
     digits = 1 - math.floor(math.log10(U))
     shown = max(0, digits)
-    return f"{round(c.estimate, digits):.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
+    estimate = round(c.estimate, digits) + 0.0  # no negative zero
+    return f"{estimate:.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
 
 
 class Sentence(str):
