@@ -42,7 +42,7 @@ REFUSED = [
     ([*PLATFORM, "--part", "stabilizer=estimator_none"], "does not fit socket Stabilizer"),
     ([*PLATFORM, "--part", "gyro=gyro_2dof"], "i: missing (input, A: torquer current)"),
     ([*PLATFORM, "--part", "estimator=xyz"], "no part 'xyz'; gyrobench list shows all"),
-    ([*PLATFORM, "--step", "0"], "step = 0.0 s: must be > 0"),
+    ([*PLATFORM, "--step", "0"], "--step = 0: must be > 0"),
     ([*BENCH, "--part", "estimator=estimator_kalman_ar", "--set", "estimator.phi=[1.2,0.3,0.1]"], "not stationary"),
     ([*BENCH, "--part", "estimator=estimator_sage_husa", "--set", "estimator.b=1.5"], "parameter b = 1.5 "),
     (["run", "table_position_test", "--set", "mounts=0 inf"], "angles in deg with spaces between are expected"),
