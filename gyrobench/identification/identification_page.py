@@ -204,7 +204,8 @@ def _method(t: LoopIdentification) -> list[Any]:
     limits = [
         "All signals are taken at the same instants. An excitation that is held between samples while an analogue loop "
         "goes on needs a sampling rate of a hundred times the crossover.",
-        "Noise that grows or fades along the record, and a loop that changes within it, are not modelled.",
+        "Noise that grows or fades along the record, and a loop that changes within it, are not modelled; of a "
+        "periodic or random excitation, halves and stretches that differ are said.",
     ]
     sources = "Pintelon 2012, chapters 2, 4 and 7; Fieller 1954; McKelvey 2012; Seiler 2020."
     return [Text(text), BulletList(limits), Text(sources, quiet=True)]

@@ -25,12 +25,13 @@ from gyrobench.identification.line_spectrum import (
     periods_used,
 )
 from gyrobench.identification.loop_curve import loop_curve
-from gyrobench.identification.loop_doubts import CHANGED, LEVEL_END, halves, level_end
+from gyrobench.identification.loop_doubts import CHANGED, LEVEL_END, halves, halves_of_bands, level_end
 from gyrobench.identification.loop_margins import margins
 from gyrobench.identification.loop_record import LoopRecord, read_loop
 from gyrobench.identification.missing_blocks import missing_blocks
 from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.ratios import loop_responses
+from gyrobench.identification.strange_stretch import STRANGE, is_random, strange_stretch
 from gyrobench.identification.wanted_margins import parse_wanted
 from gyrobench.identification.written_identification import Identification
 from gyrobench.record.csv_reader import DataError
@@ -138,10 +139,14 @@ def identify_record(record: LoopRecord, band: tuple[float, float] = (0.0, math.i
     count = periods_used(record.r.size, samples) if samples else 0
     strong = [d for d in kinds if d.kind == "odd" and d.significant and d.level > STRONG]
     dependent = "odd harmonics show that the loop depends on its amplitude" if strong else ""
-    moved = halves(record, samples, lines.f[known]) if samples else ""
+    random = not samples and is_random(record)
+    moved = halves(record, samples, lines.f[known]) if samples else halves_of_bands(record, *band) if random else ""
+    strange = strange_stretch(record) if samples or random else ""
     end, doubted = level_end(seen)
-    notes = [*filter(None, (moved, end)), *notes]
-    dependent = dependent or (CHANGED if moved else LEVEL_END if doubted else AT_LIMIT if limited else "")
+    notes = [*filter(None, (strange, moved, end)), *notes]
+    dependent = dependent or (
+        STRANGE if strange else CHANGED if moved else LEVEL_END if doubted else AT_LIMIT if limited else ""
+    )
     return Identification(
         record, count, seconds, responses, found, kinds, curve, [*missing, *notes], np.abs(lines.z[:, 2]), dependent
     )

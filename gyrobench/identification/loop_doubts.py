@@ -5,6 +5,8 @@ second half of the periods differ by d_1, those of every other one by d_2; at th
 the output has noise and drift alone, by d_3.  Of one loop |d_1|^2 is as large as the larger of |d_2|^2 and |d_3|^2:
 F of 2 n and 2 m degrees of freedom.  The mean over periods hides what has changed in between.
 
+Of a random excitation the responses of both halves are compared, band by band.
+
 **End of L.** With S = u/r of an excitation at the plant input, an input in another unit or of another scale (S c),
 taken a sample late (S e^(-iwh)), or before the excitation is added (-T) makes of L, which falls, 1/c - 1 + L/c,
 e^(iwh) - 1 + ... or -2 - 1/L: none of them falls.  The other places of the excitation have the like.
@@ -13,6 +15,7 @@ e^(iwh) - 1 + ... or -2 - 1/L: none of them falls.  The other places of the exci
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +23,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.identification.line_spectrum import periods_used
+from gyrobench.identification.line_spectrum import broadband_lines, periods_used
 from gyrobench.identification.loop_record import LoopRecord
-from gyrobench.identification.ratios import MeasuredResponse
+from gyrobench.identification.ratios import MeasuredResponse, loop_responses
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Rows = NDArray[np.bool_]
@@ -33,6 +36,10 @@ FALLS = 0.7  # of |L| from an octave to the next, at least: a slope of -1 has 0.
 SEEN, STRONG = 0.05, 0.3  # |L| at the highest frequencies that is said, with which nothing passes
 FEW = 4  # lines, of an octave or more
 CHANGED = "the loop changed while it was recorded"
+CHANGE = CHANGED + (
+    ": the responses of its first and second half differ by {:.2g} %, more than noise and drift explain; the figures "
+    "are of neither"
+)
 LEVEL_END = "|L| does not fall towards the highest frequencies"
 
 
@@ -64,10 +71,29 @@ def halves(record: LoopRecord, period: int, f: Array) -> str:
     moved = math.sqrt(max(slow - quick, 0.0))
     if moved < MOVED or special.fdtrc(2.0 * f.size, 2.0 * dof, slow / max(quick, 1e-300)) > LEVEL:
         return ""
-    return (
-        f"{CHANGED}: the responses of its first and second half differ by {100.0 * moved:.2g} %, more than noise and "
-        "drift explain; the figures are of neither"
-    )
+    return CHANGE.format(100.0 * moved)
+
+
+def halves_of_bands(record: LoopRecord, low: float, high: float) -> str:
+    """Return that first and second half of a record of random excitation are of different loops, or "".
+
+    low, high: Hz.  The S of both halves differ by chi-squared of 2 degrees of freedom in each band, of noise that is
+    known with those of F; Fisher's sum of the logarithms of their p is chi-squared of 2 n.
+    """
+    middle = record.r.size // 2
+    parts = [replace(record, r=record.r[k], u=record.u[k], y=record.y[k])
+             for k in (slice(middle), slice(middle, 2 * middle))]  # fmt: skip
+    a, b = (loop_responses(broadband_lines(p, low, high), record.at)["S"] for p in parts)
+    _, i, j = np.intersect1d(a.f, b.f, return_indices=True)
+    noise = 2.0 * ((a.u[i] * np.abs(a.value[i])) ** 2 + (b.u[j] * np.abs(b.value[j])) ** 2)
+    size, change = np.abs(a.value[i] + b.value[j]) ** 2 / 4.0, np.abs(a.value[i] - b.value[j]) ** 2
+    if i.size < FEW:
+        return ""
+    p = special.fdtrc(2.0, a.dof[i] + b.dof[j], change / np.maximum(noise, 1e-300))
+    moved = math.sqrt(max(float(np.sum(change - noise) / np.sum(size)), 0.0))
+    if moved < MOVED or special.chdtrc(2.0 * i.size, -2.0 * float(np.sum(np.log(np.maximum(p, 1e-300))))) > LEVEL:
+        return ""
+    return CHANGE.format(100.0 * moved)
 
 
 def level_end(s: MeasuredResponse) -> tuple[str, bool]:

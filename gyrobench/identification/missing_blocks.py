@@ -6,9 +6,9 @@ it, of output and excitation, predict, at the very sample at which the excitatio
 
 Predictors by least squares over the record; what is usual are medians, so that a few jumps do not count.
 
-Not seen: a block where the excitation goes on as if nothing were missing (whole periods of it: the loop's transient is
-all that is wrong), or is as random as from one sample to the next; what is wrong then is among the noise, and in the
-intervals.  Where the noise is as large as the jump of the output, the excitation alone jumps: that is in doubt.
+Not seen: a block where the excitation goes on as if nothing were missing (whole periods of it), or is as random as from
+one sample to the next: these are for :mod:`gyrobench.identification.strange_stretch`.  Where the noise is as large as
+the jump of the output, the excitation alone jumps: that is in doubt.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ def missing_blocks(record: LoopRecord) -> tuple[list[int], list[int]]:
     r, y = record.r, record.y
     if r.size < 8 * ORDER:
         return [], []
-    alone = _off(r, r[:, None])
+    alone = left_over(r, r[:, None])
     size = np.abs(alone)
     limit = max(JUMP * float(np.median(size)), LEAST * float(np.std(r)))
     jumps = _heads(np.flatnonzero(size > limit)) + ORDER
     if not 0 < jumps.size <= MOST:
         return [], []
-    rest = _off(y, np.column_stack([y, r]))
+    rest = left_over(y, np.column_stack([y, r]))
     usual = max(float(np.median(np.abs(rest))) / 0.6745, LEAST * float(np.std(y)))
     both = np.abs(rest[jumps - ORDER]) > NOISE * usual
     alike = [size[max(k - 2 * ORDER, 0) : k - ORDER].max(initial=0.0) * ALONE > size[k - ORDER] for k in jumps]
@@ -52,13 +52,18 @@ def _heads(at: NDArray[np.intp]) -> NDArray[np.intp]:
     return at[np.diff(at, prepend=-2 * ORDER) > ORDER]
 
 
-def _off(x: Array, past: Array) -> Array:
-    """Return x from ORDER on less what the ORDER rows of ``past`` before predict of it, by least squares."""
+def left_over(x: Array, past: Array, now: Array | None = None) -> Array:
+    """Return x from ORDER on less what the ORDER rows of ``past`` before, and that of ``now``, predict of it.
+
+    By least squares over the record.
+    """
     rows = np.arange(ORDER, x.size, max(1, -(-(x.size - ORDER) // ROWS)))
-    before = np.concatenate([past[rows - k] for k in range(1, ORDER + 1)], axis=1)
+    same = np.zeros((x.size, 0)) if now is None else now
+    before = np.concatenate([past[rows - k] for k in range(1, ORDER + 1)] + [same[rows]], axis=1)
     scale = np.linalg.norm(before, axis=0) + 1e-300
     weights = np.linalg.lstsq(before / scale, x[rows], rcond=None)[0] / scale
-    found = x[ORDER:].copy()
-    for j, w in enumerate(weights.reshape(ORDER, -1).T):
+    count = ORDER * past.shape[1]
+    found = x[ORDER:] - same[ORDER:] @ weights[count:]
+    for j, w in enumerate(weights[:count].reshape(ORDER, -1).T):
         found -= signal.lfilter(w, [1.0], past[:, j])[ORDER - 1 : -1]
     return np.asarray(found)
