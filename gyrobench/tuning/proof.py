@@ -43,6 +43,7 @@ DIFFERENT = 0.05  # of a measure: less difference from the linear model has no c
 REST = "rest"  # phase without a test signal
 CUT = 1e-3  # of the time: more is said
 LOOSE = 0.25  # of what is wanted: with a larger U a measure tells nothing of it, unless all of its interval fulfils it
+STANDS = 3.0  # times what noise turns the platform by: less of a load step is not seen
 FEW = 6  # sines that count: fewer are no measurement
 
 
@@ -105,6 +106,29 @@ class ExpectedJitter:
 
 
 @dataclass(frozen=True)
+class LoadStep:
+    """Angle of the platform, rad, after a step of torque, N.m; noise: what noise alone turns it by in as long."""
+
+    t: Array
+    angle: Array
+    torque: float
+    noise: float
+
+    @property
+    def seen(self) -> bool:
+        """True where the platform turns by more than noise turns it."""
+        return float(np.abs(self.angle).max()) > STANDS * self.noise
+
+    def __str__(self) -> str:
+        peak = float(np.abs(self.angle).max())
+        noise = f"noise alone turns the platform by about {float(f'{1e6 * self.noise:.2g}'):g} µrad in as long"
+        if not self.seen:
+            return f"a load of {self.torque:g} N·m is not seen: {noise}"
+        more = f"; {noise}" if self.noise > DIFFERENT * peak else ""
+        return f"a load of {self.torque:g} N·m turns the platform by up to {1e6 * peak:.4g} µrad{more}"
+
+
+@dataclass(frozen=True)
 class Proof:
     """Measures of a run at a point of the spread.  why_not: why nothing was, else "".
 
@@ -118,8 +142,7 @@ class Proof:
     counted: int
     limits: str  # parts that were at a limit in the test sines
     friction: str
-    step: tuple[Array, Array] | None  # t, attitude (rad) after the load step
-    load: float  # N.m
+    step: LoadStep | None
     why_not: str = ""
     cut: float = 0.0
     lost: float = 0.0
@@ -252,11 +275,11 @@ def _read(
     noise = f"{ports.slot} (noise alone has its {what} {at_limit})"
     more = [noise + ", which takes gain from the loop"] if cut > CUT else []
     friction, limits = friction_of(record.run), ", ".join([*limits_hit(sines), *more])
-    step = next((_step(g, ports.angle) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
+    step = next((_step(g, ports.angle, load) for g in phases if g.kind == "torque" and ports.angle in g.channels), None)
     if len(points) < FEW:
         why = f"{len(points)} of {len(judged)} test sines stand above the noise ({FEW} are needed)"
         why += f"; the friction ({friction}) may hold the platform" if friction else ""
-        return Proof(at, (), tuple(points), len(points), limits, friction, step, load, why, cut)
+        return Proof(at, (), tuple(points), len(points), limits, friction, step, why, cut)
     lost = [p.f for p, counts in judged if not counts]
     of_loop = [
         _gain_margin(w, points, lost, f, L) if w.name == "gain margin" else _proven(w, points, f, L)
@@ -265,9 +288,7 @@ def _read(
     ]
     jitter = [_jitter(w, phases, sight) for w in wishes if w.name == JITTER and sight]
     lost_part = _lost(phases, sight) if sight else 0.0
-    return Proof(
-        at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, load, cut=cut, lost=lost_part
-    )
+    return Proof(at, (*of_loop, *jitter), tuple(points), len(points), limits, friction, step, cut=cut, lost=lost_part)
 
 
 def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
@@ -310,9 +331,13 @@ def _lost(phases: Sequence[Gate], sight: ExpectedJitter) -> float:
     return float(np.mean(rides[0] > 0.5)) if rides else 0.0
 
 
-def _step(gate: Gate, angle: str) -> tuple[Array, Array]:
+def _step(gate: Gate, angle: str, torque: float) -> LoadStep:
     rest = gate.rest(angle)
-    return gate.t - gate.t[0], gate[angle] - (float(rest.mean()) if rest.size else 0.0)
+    t, x = gate.t - gate.t[0], gate[angle]
+    if not rest.size:
+        return LoadStep(t, x, torque, 0.0)
+    longer = float(np.sqrt(max(x.size / rest.size, 1.0)))  # noise of a gyro walks
+    return LoadStep(t, x - rest.mean(), torque, longer * float(np.ptp(rest)))
 
 
 def _gain_margin(wish: Wish, points: Sequence[Point], lost: Sequence[float], f: Array, L: Complex) -> ProvenWish:

@@ -130,7 +130,7 @@ def tune(
             try:
                 proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
             except RunError as error:
-                proofs.append(Proof(at, (), (), 0, "", "", None, 0.0, f"the run did not end: {error}"))
+                proofs.append(Proof(at, (), (), 0, "", "", None, f"the run did not end: {error}"))
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
         tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,

@@ -8,11 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
+from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
@@ -81,6 +80,11 @@ class LoopTuning:
     def proven(self) -> bool:
         """True where it was, and the co-simulation does not contradict."""
         return self.had and bool(self.proofs) and all(p.holds for p in self.proofs)
+
+    @property
+    def measured(self) -> tuple[Point, ...]:
+        """Return L of the co-simulation at nominal values; none where it was not measured."""
+        return self.proofs[0].points if self.proofs and not self.proofs[0].why_not else ()
 
     @property
     def command(self) -> str:
@@ -202,8 +206,7 @@ def _lines(t: LoopTuning) -> list[str]:
         if p.limits:
             lines.append(f"  at its limit in the test sines: {p.limits}")
         if p.step is not None:
-            peak = float(np.abs(p.step[1]).max())
-            lines.append(f"  a load of {p.load:g} N·m turns the platform by up to {1e6 * peak:.4g} µrad")
+            lines.append(f"  {p.step}")
     if t.trade is not None:
         a, b = t.trade.wishes
         lines += ["", f"trade, worst case of the linear models: {a.name}, {b.name}"]

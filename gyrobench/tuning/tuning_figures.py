@@ -54,9 +54,9 @@ def nyquist(t: LoopTuning) -> str:
     fig, ax = chart(HALF, 78)
     for k, L in reversed(list(enumerate(t.loops))):
         ax.plot(L.real, L.imag, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
-    if t.proofs and t.proofs[0].points:
-        measured = np.array([p.value for p in t.proofs[0].points])
-        ax.plot(measured.real, measured.imag, **DOTS, label="co-simulation")
+    if t.measured:
+        at = np.array([p.value for p in t.measured])
+        ax.plot(at.real, at.imag, **DOTS, label="co-simulation")
     return loop_plane.nyquist(fig, ax, _named(t))
 
 
@@ -67,14 +67,17 @@ def nichols(t: LoopTuning) -> str:
     for k, L in reversed(list(enumerate(t.loops))):
         size, turn = _polar(L[pick], t.f[pick])
         ax.plot(turn, size, **(OTHER if k else LINE), label="nominal" if k == 0 else "spread" if k == 1 else None)
-    if t.proofs and t.proofs[0].points:
-        points = t.proofs[0].points
-        size, turn = _polar(np.array([p.value for p in points]), np.array([p.f for p in points]))
-        nominal = _polar(t.loops[0], t.f)[1]
-        there = np.interp([p.f for p in points], t.f, nominal)
-        turn = turn + 360.0 * np.round((there - turn) / 360.0)
+    if t.measured:
+        _, size, turn = _measured(t)
         ax.plot(turn, size, **DOTS, label="co-simulation")
     return loop_plane.nichols(fig, ax, _named(t))
+
+
+def _measured(t: LoopTuning) -> tuple[Array, Array, Array]:
+    """Return frequencies (Hz), |L| (dB) and phase (degrees, near that of the model) of the co-simulation."""
+    f, L = np.array([p.f for p in t.measured]), np.array([p.value for p in t.measured])
+    turn, there = np.degrees(np.angle(L)), np.interp(f, t.f, _polar(t.loops[0], t.f)[1])
+    return f, 20.0 * np.log10(np.abs(L)), turn + 360.0 * np.round((there - turn) / 360.0)
 
 
 def _polar(L: Complex, f: Array) -> tuple[Array, Array]:
@@ -92,13 +95,10 @@ def open_loop(t: LoopTuning) -> str:
         size, turn = _polar(L, t.f)
         for ax, y in zip(axes[:, 0], (size, turn), strict=True):
             ax.semilogx(t.f[pick], y[pick], **(OTHER if k else LINE), label=_of(k))
-    if t.proofs and t.proofs[0].points:
-        points = t.proofs[0].points
-        f = np.array([p.f for p in points])
-        axes[0, 0].plot(f, [20.0 * math.log10(abs(p.value)) for p in points], **DOTS, label="co-simulation, nominal")
-        there = np.interp(f, t.f, _polar(t.loops[0], t.f)[1])
-        turn = np.degrees(np.angle([p.value for p in points]))
-        axes[1, 0].plot(f, turn + 360.0 * np.round((there - turn) / 360.0), **DOTS)
+    if t.measured:
+        f, size, turn = _measured(t)
+        axes[0, 0].plot(f, size, **DOTS, label="co-simulation, nominal")
+        axes[1, 0].plot(f, turn, **DOTS)
     zero_line(axes[0, 0])
     axes[1, 0].axhline(-180.0, color=MUTED, linewidth=0.8, zorder=1)
     axes[0, 0].set_ylabel(axis_label("|L|", "dB"))
@@ -132,15 +132,10 @@ def sensitivities(t: LoopTuning) -> str:
             ax.axhline(20.0 * math.log10(w.value), **style, label="wanted")
         elif w.f and w.name != JITTER:
             top.plot([w.f], [20.0 * math.log10(w.value)], "v", color=VERMILION, markersize=6, label="wanted", zorder=5)
-    if t.proofs and t.proofs[0].points:
-        points = t.proofs[0].points
-        top.plot(
-            [p.f for p in points],
-            [-20.0 * math.log10(abs(1.0 + p.value)) for p in points],
-            **DOTS,
-            label="co-simulation",
-        )
-        bottom.plot([p.f for p in points], [20.0 * math.log10(abs(p.value / (1.0 + p.value))) for p in points], **DOTS)
+    if t.measured:
+        at, S = np.array([p.f for p in t.measured]), np.array([1.0 / (1.0 + p.value) for p in t.measured])
+        top.plot(at, 20.0 * np.log10(np.abs(S)), **DOTS, label="co-simulation")
+        bottom.plot(at, 20.0 * np.log10(np.abs(1.0 - S)), **DOTS)
     for ax, name in ((top, "|S|"), (bottom, "|T|")):
         zero_line(ax)
         ax.set_ylabel(axis_label(name, "dB"))
@@ -183,16 +178,16 @@ def trade(t: Trade) -> str:
 
 
 def load_step(t: LoopTuning) -> str:
-    """Return the platform's angle after a step of torque in the co-simulation; "" where the plan has none."""
-    shown = [p for p in t.proofs if p.step is not None]
+    """Return the platform's angle after a step of torque in the co-simulation; "" where none is seen."""
+    shown = [(p.values, p.step) for p in t.proofs if p.step is not None and p.step.seen]
     if not shown:
         return ""
     fig, ax = chart(WIDE * 0.8, 56)
-    for p, style in zip(shown, (LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--"}), strict=False):
-        assert p.step is not None
-        ax.plot(p.step[0], 1e6 * p.step[1], **style, label="worst point" if p.values else "nominal")
+    styles = LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--"}
+    for (at, step), style in zip(shown, styles, strict=False):
+        ax.plot(step.t, 1e6 * step.angle, **style, label="worst point" if at else "nominal")
     zero_line(ax)
     ax.set(xlabel=axis_label("time", "s"), ylabel=axis_label("platform angle", "µrad"))
-    if len(shown) > 1:
+    if len(shown) > 1 or shown[0][0]:
         fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.8)
     return svg(fig, "load-step")

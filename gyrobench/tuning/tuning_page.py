@@ -130,34 +130,40 @@ def _proofs(t: LoopTuning) -> list[Any]:
     rows: list[Row] = []
     for p in t.proofs:
         if p.why_not:
-            rows.append(Row([text_cell(x) for x in (where(p.values, t.spread), "not measured", p.why_not, "", "")]))
+            cells = where(p.values, t.spread), "all", p.why_not, ""
+            rows.append(Row([*(text_cell(x) for x in cells), text_cell("not measured", "warn")]))
         rows += [Row(_proven(where(p.values, t.spread), w)) for w in p.wishes]
     if not rows:
         return [Text("No run was made.")]
     heads = columns("point", "measure", "co-simulation (95 %)", "linear model", "", wide=["point"])
     caption = (
         "Measured with test sines in the co-simulation, noise, friction and limits as they are. The interval holds the "
-        "noise and what the interpolation between the sines does."
+        "noise and what the interpolation between the sines does. Or more: sines above the noise reach no further. Not "
+        "told: noise leaves open whether the wish is kept."
     )
     return [PageTable(heads, rows, caption)]
 
 
 def _proven(point: str, w: ProvenWish) -> list[Any]:
-    state = (w.verdict, "fail" if w.told else "warn") if w.verdict else ("holds", "pass")
+    state = (w.verdict.partition(":")[0], "fail" if w.told else "warn") if w.verdict else ("holds", "pass")
     if not w.verdict and not w.agrees:
         state = ("holds, unlike the linear model", "warn")
-    cells = [point, w.wish.name, minus(measured_text(w)), minus(w.wish.shown(w.expected))]
+    cells = [point, w.wish.name, minus(measured_text(w).partition(" (")[0]), minus(w.wish.shown(w.expected))]
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
 
 
 def _step(t: LoopTuning) -> list[Any]:
-    load = next((p.load for p in t.proofs if p.step is not None), 0.0)
-    caption = f"Angle of the platform after a load of {load:g} N·m, in the co-simulation."
+    steps = [p.step for p in t.proofs if p.step is not None]
+    load = steps[0].torque if steps else 0.0
+    caption = f"Angle of the platform after a load of {load:g} N·m, in the co-simulation, with its noise."
     return pictures(Picture("load-step", draw.load_step(t), caption, "platform angle after a load step"))
 
 
 def _notes(t: LoopTuning) -> list[Any]:
-    return [BulletList([f"{n[:1].upper()}{n[1:]}." for n in t.notes], warn=True)] if t.notes else []
+    hidden = [f"{where(p.values, t.spread)}: {p.step}" for p in t.proofs if p.step and not p.step.seen]
+    limited = [f"{where(p.values, t.spread)}: at its limit in the test sines: {p.limits}" for p in t.proofs if p.limits]
+    notes = [f"{n[:1].upper()}{n[1:]}." for n in (*hidden, *limited, *t.notes)]
+    return [BulletList(notes, warn=True)] if notes else []
 
 
 def _controller(t: LoopTuning) -> list[Any]:

@@ -91,7 +91,7 @@ def test_a_measure_that_tells_nothing_proves_nothing() -> None:
 
     def proof(value: float, U: float, bound: bool = False) -> Proof:
         measured = ProvenWish(wish, math.radians(value), math.radians(U), math.radians(66.0), bound)
-        return Proof({}, (measured,), (), 20, "", "", None, 0.0)
+        return Proof({}, (measured,), (), 20, "", "", None)
 
     assert [proof(*x).holds for x in ((66.0, 110.0), (66.0, 20.0), (45.0, 9.0), (30.0, 5.0))] == [
         False,

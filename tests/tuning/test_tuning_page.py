@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gyrobench as gb
-from gyrobench.report.loop_plane import disk
+from gyrobench.report.loop_plane import disk, nichols
+from gyrobench.report.style import chart
 from gyrobench.tuning.tuning_page import minus, page
 
 
@@ -37,6 +39,27 @@ def test_tuning_from_python_runs(tuned) -> None:
     run = gb.load("platform_single_axis", tuned.settings, hold="20s").run(check_step=False)
     promised = next(w.nominal for w in tuned.wishes if w.wish.name == "phase margin")
     assert run.result["PM"].estimate == pytest.approx(np.degrees(promised), abs=1.0)
+
+
+@pytest.mark.long
+def test_the_page_of_a_loop_that_was_not_measured_shows_no_points(tuned) -> None:
+    """Few sines that stand out are no measurement; a load step within three times the noise is not seen."""
+    first = tuned.proofs[0]
+    lost = replace(first, wishes=(), why_not="1 of 23 test sines stand above the noise",
+                   step=replace(first.step, noise=float(np.abs(first.step.angle).max()) / 2.9))  # fmt: skip
+    found = page(replace(tuned, proofs=(lost,)))
+    assert "load-step" not in [p.key for p in found.pictures]
+    assert "is not seen" in repr(found)
+    marks = {p.key: p.svg.count("<use") for p in page(tuned).pictures}  # ticks, and points
+    assert [marks[p.key] - p.svg.count("<use") > 0 for p in found.pictures] == [True] * 4
+    assert "load-step" in [p.key for p in page(replace(tuned, proofs=(replace(lost, step=first.step),))).pictures]
+
+
+def test_points_at_the_edge_of_a_nichols_plot_are_whole_and_those_beyond_it_not_drawn() -> None:
+    fig, ax = chart(60.0, 60.0)
+    ax.plot([-90.0, -90.0, -90.0], [40.0, 41.0, 0.0], marker="o", linestyle="")
+    nichols(fig, ax, [])
+    assert ax.lines[0].get_ydata().tolist() == [40.0, 0.0] and not ax.lines[0].get_clip_on()
 
 
 @pytest.mark.long
