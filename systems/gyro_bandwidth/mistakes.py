@@ -84,7 +84,8 @@ def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:
     for i, j in ((a, b) for k, a in enumerate(worst) for b in worst[k + 1 :]):
         gain, phase = r.gain.copy(), r.phase.copy()
         gain[[i, j]], phase[[i, j]] = gain[[j, i]], phase[[j, i]]
-        again = fitted(replace(r, gain=gain, phase=phase), found.curve.poles)
+        c = found.curve
+        again = fitted(replace(r, gain=gain, phase=phase), c.poles, c.p if c.resonant else None)
         if again is not None and again.chi2 < BETTER * found.curve.chi2:
             a, b = sorted((float(r.f[i]), float(r.f[j])))
             text = f"The points at {a:.4g} Hz and {b:.4g} Hz seem exchanged: the curve then fits. Check these rows."

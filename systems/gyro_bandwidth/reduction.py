@@ -17,11 +17,12 @@ from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
 from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
+from gyrobench.result import Reason
 from gyrobench.units import DEG
 
 from .mistakes import mistakes
 from .points import Points, points_of
-from .response import GyroResponse, figures, logarithm
+from .response import GyroResponse, figures
 from .truth import true_values
 
 #: name, meaning, unit, SI per unit
@@ -34,6 +35,7 @@ FIGURES = (
 )
 PLAIN = 1e-9  # Hz; finer than any figure
 STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
+NEAR = 2.0  # steps of the frequencies from a resonance, within which a crossing rests on the model
 NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
 
 
@@ -45,7 +47,7 @@ class Reduction(MeasureReduction):
 
     def measure(self) -> Account:
         points = points_of(self.record)
-        response = GyroResponse.of(points.f, points.value, points.u, points.held)
+        response = GyroResponse.of(points.f, points.value, points.u, points.held, points.known)
         found = figures(response)
         if found is None:
             raise ReductionError("no curve fits these points; more frequencies are needed")
@@ -63,7 +65,7 @@ class Reduction(MeasureReduction):
             equation="H(s) = K e^(-s T) \\/ product (1 + 2 zeta s\\/omega + s^2\\/omega^2)",
             conventions=[
                 "Gain and phase: rate indicated over rate of the table as read; a lag is negative.",
-                f"Curve: {found.curve.poles} poles and a delay, of the least Bayesian information criterion.",
+                f"Curve: {self._curve_named()}, of the least Bayesian information criterion.",
                 f"Table rate: amplitude {least:.4g} to {most:.4g} °/s.",
                 *_sampled(points),
             ],
@@ -102,7 +104,7 @@ class Reduction(MeasureReduction):
         self._doubts()
         span = np.geomspace(points.f[0], highest, 200)
         fitted = curve_of.at(span)
-        shown = curve(f"{curve_of.poles} poles and a delay", span, np.exp(fitted[0] + 1j * fitted[1]))
+        shown = curve(self._curve_named(), span, np.exp(fitted[0] + 1j * fitted[1]))
         measured = [Point(float(f), complex(v), float(u), 1.0) for f, v, u in
                     zip(points.f, response.value, response.u, strict=True)]  # fmt: skip
         caption = (
@@ -111,6 +113,11 @@ class Reduction(MeasureReduction):
         drawn = bode("frequency response", "loop", caption, measured, [shown], "gain", "1")
         found.responses.append(replace(drawn, coherence=[]))  # u of a point is by its periods
         found.tables.append(self._table())
+
+    def _curve_named(self) -> str:
+        c = self.figures.curve
+        more = f", a delay and a resonance at {c.resonance:.4g} Hz" if c.resonant else " and a delay"
+        return f"{c.poles} poles{more}"
 
     def _table(self) -> Table:
         r, fitted = self.response, self.figures.curve.at(self.response.f)
@@ -140,7 +147,7 @@ class Reduction(MeasureReduction):
         base = self.figures
         out = []
         for source, step, moved in self._sources():
-            again = figures(moved, lambda curves: next((c for c in curves if c.poles == base.curve.poles), curves[-1]))
+            again = figures(moved, lambda curves: next((c for c in curves if c.shape == base.curve.shape), curves[-1]))
             change = np.zeros(5) if again is None else (again.value - base.value) / step
             u = float(self.run.options.get(source.option, 0.0)) if source.option in self.run.options else 0.0
             out.append(Sensitivity(source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
@@ -151,11 +158,10 @@ class Reduction(MeasureReduction):
         r, c = self.response, self.figures.curve
 
         def of(p: Array) -> Array:
-            out: Array = logarithm(p, r.f, r.held) / r.u
+            out: Array = c.at(r.f, p) / r.u
             return out
 
-        size = np.array([1.0, 1.0 / c.highest, *np.ones(c.poles)])
-        return alike(of, c.p, size, np.vstack([r.gain, r.phase]) / r.u - of(c.p)) < LEAST
+        return alike(of, c.p, c.size, np.vstack([r.gain, r.phase]) / r.u - of(c.p)) < LEAST
 
     def _doubts(self) -> None:
         found, points, c = self.found, self.points, self.figures.curve
@@ -181,6 +187,17 @@ class Reduction(MeasureReduction):
             rise = 20.0 * peak / math.log(10.0)
             more = "Measure more frequencies there."
             found.warn("response.resonance", f"The gain rises to {rise:.3g} dB at {top:.3g} Hz: a resonance. {more}")
+        if c.resonant:
+            step = float(np.max(np.diff(np.log(points.f))))
+            f3, f90 = (
+                abs(math.log(float(f) / c.resonance)) < NEAR * step for f in self.figures.value[1:3]
+            )  # no NaN is
+            names = (*(("f_3dB", "order") if f3 else ()), *(("f_90",) if f90 else ()))
+            text = (
+                f"What the response does between the points, about the resonance at {c.resonance:.4g} Hz, decides on "
+                f"{', '.join(names)}. Measure more frequencies there."
+            )
+            found.reasons += [Reason("response.between", text, ("pass", "fail"), names, severity="doubt")] * bool(names)
 
 
 def _sampled(points: Points) -> list[str]:

@@ -2,8 +2,13 @@
 
     H(s) = K exp(-s T) / [(1 + s/a) ... (1 + 2 z s/b + (s/b)2) ...]                      0 to 5 poles
 
-by weighted least squares of ln H; the number of poles by the least Bayesian information criterion.  Of a gyro that
-holds a sample for the time P it is times sinc(f P) exp(-s P/2), which is known and which no poles are.  The figures are
+by weighted least squares of ln H; the number of poles by the least Bayesian information criterion, and so whether a
+resonance of a suspension stands in the band, a pair of poles with a pair of zeros near it, x = s/b:
+
+    [1 + (2 z + c) x + (1 - a) x2] / [1 + 2 z x + x2]
+
+Of a gyro that holds a sample for the time P the curve is times sinc(f P) exp(-s P/2), which is known and which no
+poles are.  The figures are
 those of this curve: the first frequency with |H| = K/sqrt(2), the first with arg H = -90 degrees, the delay -d arg H /
 d w at frequency zero, the order -2 d ln |H| / d ln f at -3 dB, which is n of a Butterworth low-pass of order n.
 
@@ -14,7 +19,7 @@ what one pole more changes beyond what noise explains.  [TEST-BANDWIDTH; Schwarz
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,6 +35,8 @@ ROOT = math.sqrt(0.5)
 DENSE = 2000  # frequencies at which crossings are looked for
 LIMIT = 60.0  # of the logarithm of a corner, rad/s
 GOOD = 2.0  # chi2 over degrees of freedom below which no other start is tried
+SEEN = 3.0  # u: what a resonance makes at a frequency that shows it
+DAMPING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of a resonance that is looked for
 WIDE = 1e3  # of the highest frequency: slower and faster poles than this are none
 
 
@@ -44,16 +51,17 @@ class GyroResponse:
     phase: Array
     u: Array
     held: float = 0.0
+    known: bool = True  # u; else only how the points compare
 
     @classmethod
-    def of(cls, f: Array, value: Complex, u: Array, held: float = 0.0) -> GyroResponse:
+    def of(cls, f: Array, value: Complex, u: Array, held: float = 0.0, known: bool = True) -> GyroResponse:
         """Return the response of complex points, of samples at their own times where they are held; the phase is
         continuous, that of the lowest within half a turn.
         """
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
         gain, phase = np.vstack([np.log(np.abs(value)), np.unwrap(np.angle(value))]) + hold(f, held)
-        return cls(f, gain, phase, u, held)
+        return cls(f, gain, phase, u, held, known)
 
     def moved(self, change: Complex) -> GyroResponse:
         """Return the response times exp(change), change complex (n,)."""
@@ -74,22 +82,35 @@ def hold(f: Array, time: float) -> Array:
     return np.vstack([np.log(np.abs(np.sinc(f * time))), -np.pi * f * time])
 
 
-def logarithm(p: Array, f: Array, held: float = 0.0) -> Array:
+def logarithm(p: Array, f: Array, held: float = 0.0, resonant: bool = False) -> Array:
     """Return ln |H| and arg H, rows (2, n), continuous in f.  p: ln K, T, then of each pair of poles ln b and ln z, and
-    ln a of a single one.
+    ln a of a single one; of a resonance, at the end, ln b, ln z, a, c.
     """
     s = 2j * np.pi * f
     gain, phase = np.full(f.size, p[0]), -2.0 * np.pi * f * p[1]
-    rest = np.clip(p[2:], -LIMIT, LIMIT)
-    for k in range(rest.size // 2):
-        x = s / np.exp(rest[2 * k])
-        factor = 1.0 + 2.0 * np.exp(rest[2 * k + 1]) * x + x * x
-        gain, phase = gain - np.log(np.abs(factor)), phase - np.angle(factor)
+    rest = np.clip(p[2:-4] if resonant else p[2:], -LIMIT, LIMIT)
+    factors = [_pair(s, *rest[k : k + 2]) for k in range(0, rest.size - 1, 2)]
     if rest.size % 2:
-        factor = 1.0 + s / np.exp(rest[-1])
+        factors.append(1.0 + s / np.exp(rest[-1]))
+    if resonant:
+        below = _pair(s, *p[-4:-2])
+        factors += [below, 1.0 / (below + p[-2:] @ _zeros(s, p[-4]))]
+    for factor in factors:
         gain, phase = gain - np.log(np.abs(factor)), phase - np.angle(factor)
     out: Array = np.vstack([gain, phase]) + hold(f, held)
     return out
+
+
+def _pair(s: Complex, b: Array, z: Array) -> Complex:
+    """Return 1 + 2 z x + x2, x = s/b, of ln b and ln z."""
+    x = s / np.exp(b)
+    return np.asarray(1.0 + 2.0 * np.exp(z) * x + x * x)
+
+
+def _zeros(s: Complex, b: Array) -> Complex:
+    """Return what a and c add to the numerator of a resonance, in that order."""
+    x = s / np.exp(b)
+    return np.array([-x * x, x])
 
 
 Logarithm = Callable[[Array], Array]  # frequencies (n,), Hz -> ln |H| and arg H, rows (2, n), continuous
@@ -121,7 +142,9 @@ def _crossing(of: Logarithm, row: int, grid: Array, y: Array, level: float) -> f
 
 @dataclass(frozen=True)
 class PoleCurve:
-    """A fitted response with n poles: parameters p and their covariance, chi2, degrees of freedom, criterion."""
+    """A fitted response with n poles and, perhaps, a resonance: parameters p and their covariance, chi2, degrees of
+    freedom, criterion.
+    """
 
     poles: int
     p: Array
@@ -131,78 +154,135 @@ class PoleCurve:
     criterion: float
     highest: float  # Hz
     held: float = 0.0  # s
+    resonant: bool = False
 
-    def at(self, f: Array) -> Array:
-        """Return ln |H| and arg H, rows (2, n)."""
-        return logarithm(self.p, f, self.held)
+    @property
+    def shape(self) -> tuple[int, bool]:
+        return self.poles, self.resonant
+
+    @property
+    def resonance(self) -> float:
+        """Frequency of the resonance, Hz."""
+        return math.exp(self.p[-4]) / (2.0 * math.pi) if self.resonant else math.nan
+
+    def at(self, f: Array, p: Array | None = None) -> Array:
+        """Return ln |H| and arg H, rows (2, n), of other parameters where they are given."""
+        return logarithm(self.p if p is None else p, f, self.held, self.resonant)
+
+    @property
+    def size(self) -> Array:
+        """Return of what size the parameters are at least."""
+        out = np.ones(self.p.size)
+        out[1] = 1.0 / self.highest
+        return out
 
     def values(self, p: Array) -> Array:
         """Return K, f3, f90, delay, order of parameters p."""
-        return read_off(lambda f: logarithm(p, f, self.held), self.highest)
+        return read_off(lambda f: self.at(f, p), self.highest)
 
     def variances(self) -> Array:
-        """Return the variances of the values by those of the points, to first order."""
-        size = np.maximum(np.abs(self.p), 1.0)
-        size[1] = 1.0 / self.highest
-        columns = []
-        for k in range(self.p.size):
-            step = np.zeros(self.p.size)
-            step[k] = 1e-5 * size[k]
-            columns.append((self.values(self.p + step) - self.values(self.p - step)) / (2.0 * step[k]))
-        J = np.column_stack(columns)
-        out: Array = np.einsum("ij,jk,ik->i", J, self.cov, J) * max(1.0, self.chi2 / max(self.dof, 1))
+        """Return the variances of the values by those of the points: to first order; where a resonance bends them the
+        mean square of the changes to n points p + sqrt(n) L and n points p - sqrt(n) L, cov = L L'.
+        """
+        more = max(1.0, self.chi2 / max(self.dof, 1))
+        if self.resonant:
+            steps = np.linalg.cholesky(self.cov * more * self.p.size).T
+            moved = np.array([self.values(self.p + d) for d in (*steps, *-steps)])
+            away = np.nan_to_num(moved - self.values(self.p))
+            return np.asarray(np.sum(away * away, axis=0) / np.maximum(np.sum(np.isfinite(moved), axis=0), 1))
+        steps = np.diag(1e-5 * np.where(self.size < 1.0, self.size, np.maximum(np.abs(self.p), 1.0)))
+        J = np.column_stack([(self.values(self.p + d) - self.values(self.p - d)) / (2.0 * d.sum()) for d in steps])
+        out: Array = np.einsum("ij,jk,ik->i", J, self.cov, J) * more
         return out
 
 
-def fitted(r: GyroResponse, poles: int) -> PoleCurve | None:
-    """Return the response with so many poles; None where there are too few points for it, or it does not converge."""
-    free = poles + 2
+def fitted(r: GyroResponse, poles: int, start: Array | None = None) -> PoleCurve | None:
+    """Return the response with so many poles; None where there are too few points for it, or it does not converge.
+
+    start: of a curve with a resonance, all of its parameters.
+    """
+    resonant = start is not None
+    free = poles + (6 if resonant else 2)
     dof = 2 * r.f.size - free
     if dof < 3:
         return None
     f, measured, u = r.f, np.vstack([r.gain, r.phase]), r.u
-    low = float(np.mean(r.gain[:3]))
-    fallen = np.flatnonzero(r.gain < low + math.log(ROOT))
-    corner = math.log(2.0 * math.pi * float(f[fallen[0]] if fallen.size else f[-1]))
     top = float(f[-1])
+    units = np.ones(free)
+    units[1] = 1.0 / top
 
     def off(x: Array) -> Array:
-        p = np.array([x[0], x[1] / top, *x[2:]])
-        return ((logarithm(p, f, r.held) - measured) / u).ravel()
+        return ((logarithm(x * units, f, r.held, resonant) - measured) / u).ravel()
 
     best = None
-    for spread in (0.3, -0.3, 1.0):
-        start = [low, 0.0]
-        for k in range(poles // 2):
-            start += [corner + spread * (k + 0.3), math.log(0.7) - 0.5 * k]
-        if poles % 2:
-            start.append(corner + 2.0 * abs(spread))
+    for begin in _starts(r, poles) if start is None else [start / units]:
         try:
-            found = optimize.least_squares(off, start, method="lm", x_scale="jac", max_nfev=40 * (free + 1))
+            found = optimize.least_squares(off, begin, method="lm", x_scale="jac", max_nfev=40 * (free + 1))
         except (ValueError, np.linalg.LinAlgError):
             continue
         if np.all(np.isfinite(found.x)) and (best is None or found.cost < best.cost):
             best = found
         if best is not None and 2.0 * best.cost < GOOD * dof:
             break
-    if best is None or _absent(best.x[2:], top):
+    if best is None or _absent(best.x[2 : 2 + poles], top):
         return None
     scale = np.linalg.norm(best.jac, axis=0)
     if not np.all(scale > 0.0) or np.linalg.cond(best.jac / scale) > 1e7:
         return None
     cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) / np.outer(scale, scale)
-    units = np.array([1.0, 1.0 / top, *np.ones(poles)])
     chi2 = 2.0 * float(best.cost)
-    return PoleCurve(
-        poles,
-        best.x * units,
-        cov * np.outer(units, units),
-        chi2,
-        dof,
-        chi2 + free * math.log(2 * f.size),
-        top,
-        r.held,
-    )
+    p, cov = best.x * units, cov * np.outer(units, units)
+    curve = PoleCurve(poles, p, cov, chi2, dof, _criterion(r, chi2, free), top, r.held, resonant)
+    return None if resonant and not _shown(r, curve) else curve
+
+
+def _criterion(r: GyroResponse, chi2: float, free: int) -> float:
+    """Return the Bayesian information criterion; where u is not known, with the scatter as one unknown more."""
+    n = 2 * r.f.size
+    return (chi2 if r.known else n * math.log(max(chi2, 1e-300))) + free * math.log(n)
+
+
+def _shown(r: GyroResponse, c: PoleCurve) -> bool:
+    """Return whether the resonance is in the band and no wild point: three frequencies show it."""
+    made = np.hypot(*(c.at(r.f) - logarithm(c.p[:-4], r.f, r.held))) / (r.u * math.sqrt(max(c.chi2 / c.dof, 1e-12)))
+    return bool(r.f[0] < c.resonance < r.f[-1] and np.count_nonzero(made > SEEN) >= 3)
+
+
+def _starts(r: GyroResponse, poles: int) -> Iterator[list[float]]:
+    """Yield first parameters, the delay over the time of the highest frequency: corners about the first -3 dB."""
+    low = float(np.mean(r.gain[:3]))
+    fallen = np.flatnonzero(r.gain < low + math.log(ROOT))
+    corner = math.log(2.0 * math.pi * float(r.f[fallen[0]] if fallen.size else r.f[-1]))
+    for spread in (0.3, -0.3, 1.0):
+        start = [low, 0.0]
+        for k in range(poles // 2):
+            start += [corner + spread * (k + 0.3), math.log(0.7) - 0.5 * k]
+        yield start + ([corner + 2.0 * abs(spread)] if poles % 2 else [])
+
+
+def _with_resonance(r: GyroResponse, c: PoleCurve, least: float) -> PoleCurve | None:
+    """Return a curve with the resonance that its residuals show best; None where none promises a criterion below least.
+
+    Small a and c are linear in them: of each frequency and damping by least squares beside the curve's own parameters.
+    """
+    left = ((np.vstack([r.gain, r.phase]) - c.at(r.f)) / r.u).ravel()
+    steps = np.diag(1e-5 * c.size)
+    J = np.column_stack([((c.at(r.f, c.p + d) - c.at(r.f, c.p - d)) / d.sum() / r.u).ravel() for d in steps])
+    own = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0]
+    corners = np.log(2.0 * math.pi * np.geomspace(r.f[0], r.f[-1], 4 * r.f.size))
+    b, z = (v.reshape(-1, 1) for v in np.meshgrid(corners, np.log(DAMPING)))
+    s = 2j * np.pi * r.f
+    made = _zeros(s, b) / _pair(s, b, z)  # (2, k, n) of a and c, of each of k resonances
+    X = np.concatenate([made.real / r.u, made.imag / r.u], axis=2)
+    X -= (X @ own) @ own.T
+    square, seen = np.einsum("ikn,jkn->kij", X, X), X @ left
+    square += 1e-9 * np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    a = np.linalg.solve(square, seen.T[..., None])[..., 0]
+    gained = np.sum(a * seen.T, axis=1)
+    k = int(np.argmax(gained))
+    if not _criterion(r, max(c.chi2 - float(gained[k]), 0.0), c.p.size + 4) < least:
+        return None
+    return fitted(r, c.poles, np.array([*c.p, *b[k], *z[k], *a[k]]))
 
 
 def _absent(rest: Array, top: float) -> bool:
@@ -228,13 +308,17 @@ class Figures:
 
 
 def curves(r: GyroResponse) -> list[PoleCurve]:
-    """Return the curves of 0 to POLES poles that can be fitted, up to two beyond the least criterion."""
+    """Return the curves of 0 to POLES poles that can be fitted, up to two beyond the least criterion, and those with a
+    resonance that it may take.
+    """
     found: list[PoleCurve] = []
     for poles in range(POLES + 1):
         best = min(found, key=lambda c: c.criterion).poles if found else poles
         curve = fitted(r, poles) if poles <= best + 2 else None
         found += [curve] if curve is not None else []
-    return found
+    least = min((c.criterion for c in found), default=0.0)
+    resonant = [_with_resonance(r, c, least) for c in found]
+    return [*found, *(c for c in resonant if c is not None)]
 
 
 def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | None = None) -> Figures | None:
@@ -244,7 +328,7 @@ def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | No
         return None
     best = choose(every) if choose else min(every, key=lambda c: c.criterion)
     value, variance = best.values(best.p), best.variances()
-    more = next((c for c in every if c.poles == best.poles + 1), None)
+    more = next((c for c in every if c.shape == (best.poles + 1, best.resonant)), None)
     shape = np.zeros(value.size)
     if more is not None:
         other, wider = more.values(more.p), more.variances()

@@ -25,6 +25,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.unshown_columns import intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
@@ -44,6 +45,7 @@ from gyrobench.reduction.toolkit import (
     told,
     window_problems,
 )
+from gyrobench.result import Reason
 from gyrobench.units import DEG, DPH
 
 from . import handling, tables
@@ -125,7 +127,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         ]  # fmt: skip
         closed = {"e": float(line[0]), "b": float(line[1])}
         wanted = [Quantity.of(n, m, unit, truth.get(n), closed.get(n)) for n, m, unit, _ in rows]
-        X = np.column_stack([column for *_, column in rows])
+        self.X = X = np.column_stack([column for *_, column in rows])
         ways = {"reached from below": self.d >= 0.0, "reached from above": self.d < 0.0}
         shown = [Group(f"rate error, {n}", at, w[at] / DEG, "rate", "°/s") for n, at in ways.items() if at.any()]
         kept = {n: np.asarray(v)[self.large] for n, v in self.windows.items()}
@@ -150,6 +152,22 @@ class Reduction(DriftReduction[RateTableSetup]):
         return [
             nuisances.Candidate.of("dead band", "rate lacking at large rates in either sense", "deg/h", -self.sense)
         ]
+
+    def _unmeasured(self, found: Sequence[Coefficient]) -> list[Reason]:
+        """Return what the coefficients may be with a dead band and a lock-in that no small rate has shown."""
+        if self.small.rate.size:
+            return []
+        still, w = self.sense == 0.0, self.w[self.large]
+        more = np.column_stack([self.sense, np.where(still, 0.0, 1.0 / np.where(still, 1.0, w)), still])
+        intervals = intervals_with(self.X, self.y[self.large] - w, more, found)
+        text = (
+            "No small rates were measured, and a dead band or a lock-in that the others do not show moves e, a, c and "
+            "b. Measure small rates."
+        )
+        blocked = ("pass", "fail")
+        return [Reason("threshold.unmeasured", text, blocked, severity="condition", intervals=intervals)] * bool(
+            intervals
+        )
 
     def _scale_trend(self, w: Array) -> list[nuisances.Candidate]:
         """Return a scale factor that changes in time, where each sense comes once and only the shape tells it from an
@@ -241,7 +259,7 @@ class Reduction(DriftReduction[RateTableSetup]):
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],
             correlation=result.correlation,
-            reasons=[*result.reasons, *reasons],
+            reasons=[*result.reasons, *reasons, *self._unmeasured(result.coefficients)],
         )
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:

@@ -27,6 +27,7 @@ from gyrobench import frames
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.unshown_columns import intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import GRAVITY, LATITUDE
 from gyrobench.reduction.toolkit import (
@@ -46,6 +47,7 @@ from gyrobench.reduction.toolkit import (
     told,
     window_problems,
 )
+from gyrobench.result import Reason
 from gyrobench.units import DPH
 
 from . import mistakes
@@ -55,6 +57,7 @@ GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
 LEAST = 3  # levels, rest included
 FADING = 1.0 / 3.0  # of a level that is not reached: from a reading to the next one
+FADES = (2.5, 10.0)  # time constants in a position, of what fades after it was taken
 UG = 1e-6 * G0
 EAST = "The axis x of the gyro points east, up and down alike, where it sees nothing of the Earth rate."
 
@@ -118,7 +121,6 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
     def regression(self) -> Regression:
         gyro = self.channel == GYRO
         read = np.asarray(self.windows[COLUMN[self.channel]], dtype=float)
-        y = read - (self.earth if gyro else self.f)
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
         shown = [
             Group(f"{self.setup.axis} {way}", np.flatnonzero(self.up == sign), self.s2[self.up == sign] / G0**2,
@@ -128,7 +130,7 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         unit = ("drift", "°/h", DPH) if gyro else ("departure of the specific force", "µg", UG)
         of = nuisances.DRIFT if gyro else nuisances.FORCE
         weighed = nuisances.common(self.windows, f" {self.channel}", of) if self.setup.nuisances else ()
-        X = self.columns(self.f, self.s2)
+        self.model = X, y = self.columns(self.f, self.s2), read - (self.earth if gyro else self.f)
         return Regression(self.quantities(), X, y, t0, t1, shown, *unit, candidates=weighed)
 
     def effects(self, found: Findings) -> list[Effect]:
@@ -168,6 +170,27 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
                 "the first readings of a level hold some of the level before: wait longer, or leave them out",
                 "each level was reached before its readings",
             )  # fmt: skip
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Add what the coefficients may be where something fades after the axis was turned over, as heat that another
+        attitude moves does: noise that drifts explains it as well.
+        """
+        if not self.both:
+            return result
+        turns = np.concatenate([[0], np.flatnonzero(np.diff(self.up)) + 1])
+        place = np.searchsorted(turns, np.arange(self.up.size), side="right") - 1
+        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
+        whole = np.append(t1[turns[1:] - 1], t1[-1]) - t0[turns]
+        since = ((t0 + t1) / 2.0 - t0[turns][place]) / whole[place]
+        fades = np.where(place > 0, self.up, 0.0)[:, None] * np.exp(-since[:, None] * np.array(FADES))
+        more = np.column_stack([fades, t0 - t0.mean()])
+        intervals = intervals_with(*self.model, more, result.coefficients)
+        text = (
+            "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift "
+            f"of the {self.channel}. Wait longer before the first reading of a position."
+        )
+        reason = Reason("turned.fades", text, ("pass", "fail"), severity="condition", intervals=intervals)
+        return replace(result, reasons=[*result.reasons, *([reason] if intervals else [])])
 
     def late(self) -> Array:
         """Return the step of the mean square that a reading would still hold some of, a third of the one before it."""

@@ -32,7 +32,18 @@ SAID = {
         "before or after it out.",
         "the motions of rows 8 and 9 exchanged",
     ),
+    "gyro_bandwidth": (
+        "What the response does between the points, about the resonance at 46.98 Hz, decides on f_3dB, order. Measure "
+        "more frequencies there.",
+        "Curve: 2 poles, a delay and a resonance at 46.98 Hz, of the least Bayesian information criterion.",
+    ),
+    "rate_table_test": (
+        "No small rates were measured, and a dead band or a lock-in that the others do not show moves e, a, c and b. "
+        "Measure small rates.",
+    ),
     "vibration_rectification": (
+        "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift of "
+        "the accelerometer. Wait longer before the first reading of a position.",
         "the first readings of a level hold some of the level before: wait longer, or leave them out",
         "the levels of rows 9 and 10 exchanged",
         "The gyro reads the same up and down, where the vertical Earth rate is 10.64 °/h: was it not turned over, or "

@@ -235,6 +235,26 @@ def test_a_dead_band_is_not_read_as_a_scale_factor(tmp_path: Path) -> None:
             assert e.estimate == pytest.approx(1000.0 - 1030.0, abs=3.0 * e.u)
 
 
+def test_a_lock_in_that_no_small_rate_shows(tmp_path: Path) -> None:
+    """sqrt(w2 - d2) of d = 0.5 deg/s lacks 0.01 deg/s, the noise, at 12.5 deg/s, and the Earth rate at rest: e is 4 u
+    off.  The interval with a dead band and a lock-in holds it; a record with small rates needs none.
+    """
+    rng = np.random.default_rng(8)
+    rate, _ = lab(rng)
+    earth = frames.EARTH_RATE * 0.5 / DEG
+    w = rate + earth
+    passed = np.sign(w) * np.sqrt(np.maximum(w * w - 0.5**2, 0.0))
+    result = measured(write(tmp_path / "a.csv", rate, 1.001 * passed + 3.0 / 3600.0 + 0.01 * rng.normal(size=w.size)))
+    (reason,) = [r for r in result.reasons if r.id == "threshold.unmeasured"]
+    low, high = reason.intervals["e"]
+    e = found(result)["e"]
+    assert not e.interval[0] < 1000.0 < e.interval[1] and low < 1000.0 < high
+    small = np.repeat([s * r - earth for r in (0.6, 0.8) for s in (1.0, -1.0, -1.0, 1.0)], 2)
+    every = np.append(rate, small)
+    result = measured(write(tmp_path / "b.csv", every, 1.001 * (every + earth) + 0.01 * rng.normal(size=every.size)))
+    assert "threshold.unmeasured" not in {r.id for r in result.reasons}
+
+
 @pytest.mark.parametrize("cycles", [1, 2])
 def test_a_scale_factor_that_changes_is_no_asymmetry(tmp_path: Path, cycles: int) -> None:
     """One cycle at 30 ppm a reading: the middles of the senses are 44 readings apart, 1320 ppm of asymmetry that is not

@@ -260,3 +260,18 @@ def test_a_gyro_that_was_not_turned_over_is_named() -> None:
     for table, said in ((flat, True), (turned, False)):
         found = reduced(table, {"axis": "x", "latitude": math.pi / 4.0})
         assert any("was it not turned over" in r.text for r in found.reasons if r.id == "gyro.same") == said
+
+
+def test_what_fades_after_turning_over_asks_a_verdict_to_hold_with_it() -> None:
+    """1 °/h that fades in 60 s of a position of 256 s puts G 7 u off, since noise that drifts explains it as well; the
+    intervals with exponentials hold G, and those of a record without it are of its own width."""
+    table = shaken()
+    turned = next(row[0] for row in table if row[2] < 0.0)
+    heat = [(t >= turned) * math.exp(-(t + 3.0 - turned) / 60.0) for t, *_ in table]
+    heated = [[*row[:4], row[4] + x, row[5]] for row, x in zip(table, heat, strict=True)]
+    for rows, holds in ((table, True), (heated, False)):
+        result = reduced(rows)
+        G = next(c for c in result.coefficients if c.name == "G")
+        assert (abs(G.estimate - 12.0) < 3.0 * G.u) == holds
+        low, high = next(r for r in result.reasons if r.id == "turned.fades" and "G" in r.intervals).intervals["G"]
+        assert low < 12.0 < high and high - low < 1.0

@@ -1,0 +1,44 @@
+"""Coverage intervals with columns in the model that a record hardly shows, and that could move its estimates far.
+
+Weighed as nuisances they would widen every u; as the intervals of a reason they ask a verdict to hold with them too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from gyrobench import units
+from gyrobench.arrays import Array
+from gyrobench.result import Coefficient
+
+
+def intervals_with(X: Array, y: Array, more: Array, found: Sequence[Coefficient]) -> dict[str, tuple[float, float]]:
+    """Return the hull of each coefficient's interval and that with the columns ``more`` (n, k), printed units.
+
+    X (n, p), y (n,): model and data, of the first p coefficients found.  The estimates are of plain least squares, and
+    U grows as u there.  Nothing where too few degrees of freedom are left, or a column is one of the model.
+    """
+    more = more[:, np.any(more != 0.0, axis=0)]
+    wide = np.column_stack([X, more])
+    own = wide / np.linalg.norm(wide, axis=0)
+    if wide.shape[0] < wide.shape[1] + 3 or np.linalg.cond(own) > 1e6:
+        return {}
+    (_, u), (other, u_other) = _least_squares(X, y), _least_squares(wide, y)
+    out = {}
+    for k, c in enumerate(found[: u.size]):
+        middle = float(other[k]) / units.factor(c.unit)
+        U = (c.interval[1] - c.estimate) * float(u_other[k] / u[k])
+        out[c.name] = (min(c.interval[0], middle - U), max(c.interval[1], middle + U))
+    return out
+
+
+def _least_squares(X: Array, y: Array) -> tuple[Array, Array]:
+    """Return the coefficients and their standard uncertainties under white noise."""
+    Q, R = np.linalg.qr(X)
+    back = np.linalg.inv(R)
+    left = y - Q @ (Q.T @ y)
+    sigma = max(float(np.linalg.norm(left)), 1e-300) / math.sqrt(y.size - X.shape[1])
+    return back @ (Q.T @ y), np.linalg.norm(back, axis=1) * sigma
