@@ -96,7 +96,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
     for name, truth in TRUTHS.items():
         if only not in name:
             continue
-        inside, stated = defaultdict(list), defaultdict(list)
+        inside, stated, missed = defaultdict(list), defaultdict(list), []
         agreed, began = [], time.process_time()
         for i in seeds:
             n, these = round(lengths[0]), kinds
@@ -111,6 +111,8 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
             for term in "NBKRQ":
                 e, true = model[term], truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
+                if not inside[term][-1]:
+                    missed.append(f"{term} {i} ({n} {' '.join(these)}: {e.low:.4g} to {e.high:.4g})")
                 stated[term].append(e.determined)
             stated["filter"].append(bool(model.filter_words()))
             left = list(truth.get("markov", []))
@@ -127,6 +129,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
         among = f"{lengths[0]:.0f} to {lengths[1]:.0f} samples {' '.join(kinds)}"
         print(f"{name}, {among}: agree {sum(agreed)} of {len(agreed)}, {seconds:.2f} s")
         print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} ({sum(v)} of {len(v)})" for k, v in inside.items()))
+        print("   missed:", ", ".join(missed) or "none")
         stating = max(sum(agreed), 1)
         print(
             "   stated:", ", ".join(f"{k} {np.sum(v) / stating:.3f} ({sum(v)})" for k, v in stated.items()), flush=True
