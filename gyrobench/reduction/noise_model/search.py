@@ -130,6 +130,10 @@ class ModelSearch:
                 tau = self.prior.longest - 2.0
                 slow = np.append(less, [q[0] + (tau - math.log(2.0)) * (term is K), tau])
                 yield (*model, GM), [slow]
+                if term is B and K not in at.model:  # for what comes back and what does not, one term is likelier alone
+                    walk = q[0] + math.log(2.0) - tau
+                    halfway = [np.append(less, [q[0], share * tau, walk]) for share in (0.4, 0.7)]
+                    yield (*model, GM, K), halfway
                 if term is B and filtered and W not in at.model:  # it fills what the filter holds back, too
                     yield (*model, GM, W), [np.append(slow, self.prior.readout)]
 
