@@ -6,8 +6,9 @@ samples is chi-squared of ORDER degrees of freedom; at a place at which samples 
 excitation, where a signal was at a limit, or a blow struck, it is far larger.  A controller that computes its output
 from the recorded samples leaves next to nothing, and shows every such place.
 
-False alarms: LEVEL a signal and record for normal noise of one size.  Noise that comes in bursts, as that of friction,
-has larger sums everywhere: BURSTS.  Not seen: what moves both signals by less than their noise.
+False alarms: LEVEL a signal and record for normal noise of one size.  Noise that comes in bursts, as that of friction
+(three times the sum that one stretch in twenty exceeds) and as a nonlinear loop makes it of a quiet input (ten times),
+has larger sums everywhere: BURSTS.  Not seen: what moves both signals by less than six times their noise.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.missing_blocks import LEAST, ORDER, left_over
 
 LEVEL = 1e-3  # of a record
-BURSTS = 4.0  # times the sum that one stretch in twenty exceeds
+BURSTS = 40.0  # times the sum that one stretch in twenty exceeds
 RANDOM = 0.05  # of the rms: an excitation that its past predicts better is not random
 LEAST_SAMPLES = 50 * ORDER  # of which there are 74 numbers to find
 STRANGE = "a stretch of the record is not of the loop of the rest"
