@@ -93,8 +93,9 @@ def logarithm(p: Array, f: Array, held: float = 0.0, resonant: bool = False) -> 
     if rest.size % 2:
         factors.append(1.0 + s / np.exp(rest[-1]))
     if resonant:
-        below = _pair(s, *p[-4:-2])
-        factors += [below, 1.0 / (below + p[-2:] @ _zeros(s, p[-4]))]
+        b, z = np.clip(p[-4:-2], -LIMIT, LIMIT)
+        below = _pair(s, b, z)
+        factors += [below, 1.0 / (below + p[-2:] @ _zeros(s, b))]
     for factor in factors:
         gain, phase = gain - np.log(np.abs(factor)), phase - np.angle(factor)
     out: Array = np.vstack([gain, phase]) + hold(f, held)
