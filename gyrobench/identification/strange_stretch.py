@@ -6,9 +6,10 @@ samples is chi-squared of ORDER degrees of freedom; at a place at which samples 
 excitation, where a signal was at a limit, or a blow struck, it is far larger.  A controller that computes its output
 from the recorded samples leaves next to nothing, and shows every such place.
 
-False alarms: LEVEL a signal and record for normal noise of one size.  Noise that comes in bursts, as that of friction
-(three times the sum that one stretch in twenty exceeds) and as a nonlinear loop makes it of a quiet input (ten times),
-has larger sums everywhere: BURSTS.  Not seen: what moves both signals by less than six times their noise.
+Noise that comes in bursts, as that of friction (three times the sum that one stretch in twenty exceeds) and as a
+nonlinear loop makes it of a quiet input (ten times), has larger sums everywhere: the limit is BURSTS times that sum,
+and where rounding alone is left the one of LEVEL.  Not seen: a jump of both signals at one sample by less than 38 times
+the normal noise that is left (the root of BURSTS times 36.4, chi-squared of ORDER), over ORDER samples by less than 8.
 """
 
 from __future__ import annotations

@@ -200,7 +200,8 @@ def _lines(t: LoopTuning) -> list[str]:
         if p.why_not:
             lines.append(f"  not measured: {p.why_not}")
         for w in p.wishes:
-            end = f"  ! {w.verdict}" if w.verdict else ""
+            end = " (as far as sines above the noise reach)" if w.bound else ""
+            end += f"  ! {w.verdict}" if w.verdict else ""
             end += "" if w.agrees else f"  ! the linear model says {w.wish.shown(w.expected)}"
             lines.append(f"  {w.wish.name}: {measured_text(w)}{end}")
         if p.limits:
@@ -224,5 +225,5 @@ def _lines(t: LoopTuning) -> list[str]:
 def measured_text(w: ProvenWish) -> str:
     """Return a measured wish as text, with its expanded uncertainty."""
     if w.bound:
-        return f"{w.wish.shown(w.value)} or more (as far as sines above the noise reach)"
+        return f"{w.wish.shown(w.value)} or more"
     return w.wish.shown(w.value, w.U if math.isfinite(w.value) else 0.0)

@@ -145,10 +145,10 @@ def _proofs(t: LoopTuning) -> list[Any]:
 
 
 def _proven(point: str, w: ProvenWish) -> list[Any]:
-    state = (w.verdict.partition(":")[0], "fail" if w.told else "warn") if w.verdict else ("holds", "pass")
+    state = ("not told", "warn") if not w.told else (w.verdict, "fail") if w.verdict else ("holds", "pass")
     if not w.verdict and not w.agrees:
         state = ("holds, unlike the linear model", "warn")
-    cells = [point, w.wish.name, minus(measured_text(w).partition(" (")[0]), minus(w.wish.shown(w.expected))]
+    cells = [point, w.wish.name, minus(measured_text(w)), minus(w.wish.shown(w.expected))]
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
 
 

@@ -117,7 +117,7 @@ def write_flight_log(file: Path) -> None:
 
 
 def write_mcap(file: Path) -> None:
-    """Write a ROS 2 bag: a topic with Imu messages, a stamp of 10 ms each."""
+    """Write a ROS 2 bag: a topic with Imu messages, sampled every 10 ms, that arrive in bursts."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -128,12 +128,12 @@ def write_mcap(file: Path) -> None:
         connection = log.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=store)
         vector, zeros = types["geometry_msgs/msg/Vector3"], np.zeros(9)
         for k, rate in enumerate(RATE):
-            stamp = types["builtin_interfaces/msg/Time"](0, k * 10_000_000)
+            stamp = types["builtin_interfaces/msg/Time"](5, k * 10_000_000)
             made = types["sensor_msgs/msg/Imu"](
                 types["std_msgs/msg/Header"](stamp, "imu"), types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
                 zeros, vector(rate, 0.0, 0.0), zeros, vector(0.0, 0.0, 9.8), zeros,
             )  # fmt: skip
-            log.write(connection, k * 10_000_000, store.serialize_cdr(made, "sensor_msgs/msg/Imu"))
+            log.write(connection, 5_100_000_000 + k // 2 * 20_000_000, store.serialize_cdr(made, "sensor_msgs/msg/Imu"))
     (found,) = folder.glob("*.mcap")
     found.rename(file)
 
