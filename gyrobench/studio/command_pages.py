@@ -225,9 +225,9 @@ def _asking(
     subject: the system or the file that the command is about, "" while none is chosen.  place: of the file.
     """
     with ui.element("div").classes("aside"):
-        lines = CopyLines()
-        go = ui.button(say("Start"), icon="play_arrow").mark("start")
+        go = ui.button(say("Start"), icon="play_arrow").mark("start")  # above what grows, as on the page of data
         go.set_visibility(not studio.read_only)
+        lines = CopyLines()
 
     def asked() -> CommandRequest:
         if not subject():

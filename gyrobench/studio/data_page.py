@@ -226,10 +226,10 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
         with ui.element("div") as left:
             pass
         with ui.element("div").classes("aside"):
-            faults = ui.element("section").classes("rows").props("role=status").props(spoken("What is wrong"))
-            with ui.element("div").classes("bar"):
+            with ui.element("div").classes("bar"):  # above what grows: no click counts where a button moved under it
                 check = ui.button(say("Check the file"), icon="rule")
                 go = ui.button(say("Reduce"), icon="play_arrow")
+            faults = ui.element("section").classes("rows").props("role=status").props(spoken("What is wrong"))
             mapping = _Mapping(proposal, CopyLines(), stated=pairs_in_address("set"))
             if KEPT in given_in_address("columns"):
                 mapping.restore()
