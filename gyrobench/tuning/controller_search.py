@@ -33,8 +33,10 @@ SIMPLEX = 150  # evaluations of one
 COSTLY = 64  # controllers that are computed: of the look, and of each simplex
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
 ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
-ACROSS = np.linspace(-3.0, 3.0, 31)  # of a resonance, in half widths, for its frequencies
-SHARP = 0.002  # damping of the sharpest resonance that the frequencies follow
+HALF = (0.15, 0.3, 0.5, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.5, 6.5, 10.0, 16.0, 27.0, 45.0)
+ACROSS = np.array([*(-x for x in HALF), 0.0, *HALF])  # of a resonance, in half widths, for its frequencies
+SHARP = 1e-5  # damping of the sharpest resonance that the frequencies follow
+NEIGHBOURS, RESOLVED = 0.1, 0.01  # modes so near share their frequencies, where they are damped more
 GRAZES = 0.9  # of |L| = 1
 CAP = np.log(100.0)  # more than that is no better
 
@@ -57,7 +59,22 @@ class TuningProblem:
 
     def of(self, count: int) -> TuningProblem:
         """Return the problem with the first plants alone."""
-        return replace(self, plants=self.plants[:count], evaluations=0, _responses=[], _past=[], _ways=[])
+        return replace(
+            self,
+            plants=self.plants[:count],
+            sights=self.sights[:count],
+            evaluations=0,
+            _responses=[],
+            _past=[],
+            _ways=[],
+        )
+
+    def add(self, plants: Sequence[Plant], sights: Sequence[SightModel]) -> None:
+        """Add points of the spread, with frequencies about their modes."""
+        self.plants.extend(plants)
+        self.sights.extend(sights)
+        self.f = frequencies(self.plants, self.box, self.wishes)
+        self._responses, self._past, self._ways = [], [], []
 
     def controller(self, x: Array) -> Controller:
         """Return the controller of decades x."""
@@ -275,16 +292,24 @@ def box(structure: ControllerStructure, wishes: Sequence[Wish], wanted: float | 
     return np.array([np.log10(2.0 * np.pi * np.array([min(ends[0], 0.5 * ends[1]), ends[1]])), *structure.ranges])
 
 
-def frequencies(plants: Sequence[Plant], decades: Array, wishes: Sequence[Wish], count: int = 400) -> Array:
-    """Return the grid for the loops of these plants."""
-    modes = sorted((m for p in plants for m in p.modes()), key=abs)
+def frequencies(
+    plants: Sequence[Plant], decades: Array, wishes: Sequence[Wish], count: int = 400, closed: Sequence[complex] = ()
+) -> Array:  # fmt: skip
+    """Return the grid for the loops of these plants, closer about modes.  closed: those of the closed loops."""
     apart: list[complex] = []
-    for m in modes:
-        if not apart or abs(m) > 1.1 * abs(apart[-1]):
+    for m in sorted([*(m for p in plants for m in p.modes()), *closed], key=abs):
+        wide = NEIGHBOURS if not apart or min(damping(m), damping(apart[-1])) > RESOLVED else 0.3 * damping(m)
+        if not apart or abs(m) > (1.0 + wide) * abs(apart[-1]):
             apart.append(m)
     low = float(10.0 ** decades[0, 0] / (2.0 * np.pi))
-    hertz = [abs(m) / (2.0 * np.pi) for m in apart[:6]]
-    found = grid(plants[0].step, min([low, *(w.f for w in wishes if w.f)]), hertz, count)
+    hertz = [abs(m) / (2.0 * np.pi) for m in apart]
+    own = [w.f for w in wishes if w.f]
+    found = grid(plants[0].step, min([low, *own]), hertz, count)
     # a resonance that a search pushes under 1 must not rise between two frequencies
-    peaks = [np.exp(max(-m.real / abs(m), SHARP) * ACROSS) * x for m, x in zip(apart, hertz, strict=False)]
-    return np.unique(np.concatenate([found, *(p[p < found[-1]] for p in peaks), [w.f for w in wishes if w.f]]))
+    peaks = np.ravel([x * (1.0 + damping(m) * ACROSS) for m, x in zip(apart, hertz, strict=True)])
+    return np.unique(np.concatenate([found, peaks[(peaks > found[0]) & (peaks < found[-1])], own]))
+
+
+def damping(mode: complex) -> float:
+    """Return the damping ratio of a pole in the s plane, at least SHARP."""
+    return max(-mode.real / abs(mode), SHARP)

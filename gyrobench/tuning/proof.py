@@ -158,7 +158,7 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
     upper = max(crossed, default=float(f[len(f) // 2]))
     gains = gain_limits(f, L)
     least = min((max(g, 1.0 / g) for _, g in gains), default=np.inf)
-    limits = [at for at, g in gains if at > upper / 20.0]
+    limits = [at for at, g in gains if upper / 20.0 < at < 0.2 / step]
     slow_limits = [at for at, g in gains if upper / SLOWEST < at <= upper / 20.0 and max(g, 1.0 / g) < NEXT * least]
     hump = float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])
     low, high = upper / 8.0, min(max([2.5 * upper, 1.3 * hump, *(1.2 * x for x in limits)]), 0.2 / step)

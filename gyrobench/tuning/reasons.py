@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -53,7 +54,7 @@ def reasons_of(
 
 def _alone(problem: TuningProblem, result: WishResult) -> str:
     """Return what the structure gives where only this wish, and stability, counts."""
-    one = TuningProblem(problem.structure, [result.wish], problem.plants, problem.box, problem.f, sights=problem.sights)
+    one = replace(problem, wishes=[result.wish], evaluations=0)
     best = max(result.ratio, float(np.exp(one.worst(search(one, quick=True)))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)

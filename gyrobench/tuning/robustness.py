@@ -18,6 +18,8 @@ from gyrobench.record.frequency_response import Complex
 from gyrobench.tuning.wishes import Wish
 
 LARGEST = 1e3  # factor of a gain margin that still counts
+REAL = 1e-6  # rad from -180 degrees: L is real
+FLAT, ALMOST = 0.05, 0.15  # slope of ln |L| over ln f and rad from -180 degrees at the lowest frequency: L(0) < 0
 HALF_POWER = 0.5**0.5
 FLOOR = 0.01  # of |S|: two decades below a bandwidth no more is asked for
 
@@ -48,17 +50,22 @@ def crossovers(f: Array, L: Complex) -> list[tuple[float, float]]:
 
 
 def gain_limits(f: Array, L: Complex) -> list[tuple[float, float]]:
-    """Return where the phase of L is -180 degrees: (Hz, factor on the gain to the limit)."""
+    """Return where the phase of L is -180 degrees: (Hz, factor on the gain to the limit).
+
+    At rest and at half the frequency of the steps L is real: where the phase ends there, no crossing shows the limit.
+    """
     size, phase = np.log(np.abs(L)), np.angle(-L)
     turn = _wrapped(np.diff(phase))
     after = phase[:-1] + turn
-    found = []
+    flat = abs(size[1] - size[0]) < FLAT * np.log(f[1] / f[0])
+    ends = [0] if flat and abs(phase[0]) < ALMOST else []
+    ends += [-1] if abs(phase[-1]) < REAL else []
+    found = [(float(f[k]), float(np.exp(-size[k]))) for k in ends]
     for k in np.flatnonzero(((phase[:-1] >= 0.0) != (after >= 0.0)) & (np.abs(phase[:-1]) < 1.5)):
         share = phase[k] / (phase[k] - after[k])
         factor = float(np.exp(-(size[k] + share * (size[k + 1] - size[k]))))
-        if 1.0 / LARGEST < factor < LARGEST:
-            found.append((float(f[k] * (f[k + 1] / f[k]) ** share), factor))
-    return found
+        found.append((float(f[k] * (f[k + 1] / f[k]) ** share), factor))
+    return [(at, factor) for at, factor in found if 1.0 / LARGEST < factor < LARGEST]
 
 
 def _wrapped(angle: Array) -> Array:
@@ -121,7 +128,7 @@ def measured(wishes: Sequence[Wish], f: Array, loops: Complex) -> Array:
 
 def grid(step: float, f: float, modes: Sequence[float] = (), count: int = 400) -> Array:
     """Return frequencies, Hz, up to half a step's: three decades below f and more, closer about modes."""
-    top = 0.499 / step
+    top = 0.5 / step
     whole = np.geomspace(min(1e-3 * f, 1e-3 * top), top, count)
     close = [m * np.geomspace(0.8, 1.25, 41) for m in modes if whole[0] < 0.8 * m and 1.25 * m < top]
     return np.unique(np.concatenate([whole, *close]))

@@ -26,7 +26,7 @@ from gyrobench.system.values import flatten
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.own_controllers import checked_structure, own_controller
-from gyrobench.tuning.plant import Plant, plants
+from gyrobench.tuning.plant import Plant, modes, plants
 from gyrobench.tuning.proof import ExpectedJitter, Proof, known_limit, proof_of
 from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
@@ -101,11 +101,12 @@ def tune(
     except ArithmeticError as error:
         raise TuningError(f"{system.name}: no controller of structure {shape.name} was found: {error}") from None
     seconds = time.perf_counter() - began
-    f = frequencies(problem.plants, problem.box, wishes, DENSE)
     held = problem.plants[0].with_controller(controller)
+    poles = held.poles(problem.plants)
+    f = frequencies(problem.plants, problem.box, wishes, DENSE, modes(poles.ravel() + 0j, models.step))
     responses = problem.plants[0].controller_response(controller, f)
     loops = np.array([p.response(f) * responses + p.past(f) for p in problem.plants])
-    if np.max(np.abs(held.poles(problem.plants))) > 1.0 + 1e-8:
+    if np.max(np.abs(poles)) > 1.0 + 1e-8:
         raise TuningError(
             f"{system.name}: no {shape.name} was found that holds the loop stable over the whole spread; take another "
             "structure, or a smaller spread"
@@ -291,8 +292,11 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
             return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
-            one = TuningProblem(problem.structure, problem.wishes, loop.plants([at(share)]), problem.box, problem.f,
-                                sights=loop.sights([at(share)]))  # fmt: skip
+            there = loop.plants([at(share)])
+            f = frequencies(there, problem.box, problem.wishes)
+            one = TuningProblem(
+                problem.structure, problem.wishes, there, problem.box, f, sights=loop.sights([at(share)])
+            )
             return float(one.judged(controller).min())
 
         found = minimize(
@@ -301,8 +305,7 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
         )  # fmt: skip
         if found.fun > ratios.min() - 2e-3:
             break
-        problem.plants.append(loop.plants([at(found.x)])[0])
-        problem.sights.extend(loop.sights([at(found.x)]))
+        problem.add(loop.plants([at(found.x)]), loop.sights([at(found.x)]))
         x = polished(problem, x)
     return x
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.tuning.controller_search import grazing
-from gyrobench.tuning.robustness import measure, peak
+from gyrobench.tuning.robustness import grid, measure, peak
 from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.wishes import parse_wishes
 
@@ -33,6 +33,20 @@ def test_a_loop_in_closed_form() -> None:
     assert got("delay margin=1s", L) == pytest.approx(np.radians(phase) / crossed, rel=1e-3)
     disk = control.disk_margins(plant, 2.0 * np.pi * np.geomspace(1e-3, 10.0, 40000), skew=0.0)[0]
     assert got("disk margin=0.5", L) == pytest.approx(float(disk), rel=1e-3)
+
+
+def test_a_limit_of_the_gain_at_half_the_frequency_of_the_steps() -> None:
+    """L = K h/(z - 1) is -K h/2 at z = -1, where its phase ends at -180 degrees: the limit is 2/(K h)."""
+    h, K = 1e-3, 40.0
+    f = grid(h, 5.0)
+    wish = parse_wishes(["gain margin=2", "bandwidth>1Hz"])[0]
+    assert measure(wish, f, K * h / (np.exp(2j * np.pi * f * h) - 1.0)) == pytest.approx(2.0 / (K * h), rel=1e-6)
+
+
+def test_a_limit_of_the_gain_at_rest() -> None:
+    """L = 3/(s - 1) needs a gain above 1/3; with 3/(s + 1) no gain is a limit."""
+    assert got("gain margin=2", 3.0 / (S - 1.0)) == pytest.approx(3.0, rel=1e-4)
+    assert got("gain margin=2", 3.0 / (S + 1.0)) == np.inf
 
 
 def test_the_peaks_of_a_second_order_loop() -> None:

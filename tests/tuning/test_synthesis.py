@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from gyrobench.bench import UsageError
 from gyrobench.tuning import synthesis
-from gyrobench.tuning.controller_search import TuningProblem, box, frequencies
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, search
 from gyrobench.tuning.plant import HeldController, Plant
-from gyrobench.tuning.reasons import _bode
+from gyrobench.tuning.reasons import _alone, _bode
 from gyrobench.tuning.sight_jitter import MovedSight, SightWays
 from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.synthesis import (
@@ -37,8 +39,6 @@ STEP = 1e-3
 
 def servo(delay: int = 2) -> Plant:
     """Return 100/(s (s + 5)) held over a step of 1 ms, with whole steps of delay."""
-    from scipy.signal import cont2discrete
-
     continuous = (
         np.array([[0.0, 1.0], [0.0, -5.0]]),
         np.array([[0.0], [1.0]]),
@@ -190,7 +190,6 @@ def test_the_w_plane_is_the_plant_and_its_reduction_keeps_the_integrator() -> No
 @pytest.mark.long
 def test_a_computed_controller_does_what_is_wanted(name: str) -> None:
     """The same wishes as a lead-lag network fulfils; of order 8 at most, stable by its discrete poles."""
-    from gyrobench.tuning.controller_search import search
 
     it = problem(name, ["phase margin=50deg", "gain margin=6dB", "bandwidth>5Hz"])
     x = search(it)
@@ -209,7 +208,6 @@ def test_hinf_without_slycot_says_what_to_install(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.long
 def test_a_trade_gives_one_wish_for_the_other() -> None:
     """More phase margin, less bandwidth, strictly; what was found for both lies on it or is no better."""
-    from gyrobench.tuning.controller_search import search
 
     it = problem("lead", ["phase margin=50deg", "bandwidth>20Hz", "gain margin=6dB"])
     x = search(it, quick=True)
@@ -228,6 +226,31 @@ def test_what_is_traded_is_wanted() -> None:
         traded(["bandwidth"], wishes)
     with pytest.raises(UsageError, match="--pareto jitter: is not among what is wanted"):
         traded(["jitter", "bandwidth"], wishes)
+
+
+def mode(hertz: float) -> Plant:
+    """Return w2/(s2 + 2 z w s + w2) with z = 0.001, held over a step of 0.1 ms."""
+    w = 2.0 * np.pi * hertz
+    matrices = np.array([[0.0, w], [-w, -2e-3 * w]]), np.array([[0.0], [w]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+    a, b, c, _, _ = cont2discrete(matrices, 1e-4)
+    return Plant(a, b, c, 1e-4, {})
+
+
+def test_sharp_modes_of_a_spread_stand_on_frequencies() -> None:
+    """Two modes 5 % apart, half widths of 0.1 %: each has its peak, 1/(2 z sqrt(1 - z2)) = 500."""
+    found = [mode(40.0), mode(42.0)]
+    wishes = parse_wishes(["gain margin=6dB", "bandwidth>1Hz"])
+    f = frequencies(found, np.array([[1.0, 2.0]]), wishes)
+    assert [np.abs(p.response(f)).max() for p in found] == pytest.approx([500.0, 500.0], rel=1e-3)
+
+
+def test_what_a_wish_alone_gives_holds_over_the_spread() -> None:
+    """A plant with 40 times the gain is in the spread: what is best at nominal values alone is unstable with it."""
+    one = problem("pi+lead", ["bandwidth>2Hz"])
+    nominal = one.plants[0]
+    both = replace(one, plants=[nominal, replace(nominal, c=40.0 * nominal.c)], corners=2)
+    text = _alone(both, WishResult(one.wishes[0], 0.1, 0.1, {}))
+    assert text.startswith("bandwidth alone: ") and "too little" not in text
 
 
 def test_no_controller_is_below_the_floor() -> None:
