@@ -65,12 +65,12 @@ class Plant:
 
     def modes(self) -> list[complex]:
         """Return its modes."""
-        return modes(np.linalg.eigvals(self.a) + 0j, self.step)
+        return modes(np.linalg.eigvals(self.a), self.step)
 
 
-def modes(z: Complex, step: float) -> list[complex]:
+def modes(z: Any, step: float) -> list[complex]:
     """Return the poles in the s plane with a damping below 0.3, upper half, by frequency.  z: those of steps."""
-    p = np.log(z[np.abs(z) > 1e-9]) / step
+    p = np.log(z[np.abs(z) > 1e-9] + 0j) / step
     return sorted((complex(x) for x in p if x.imag > 0.0 and -x.real < 0.3 * abs(x)), key=abs)
 
 

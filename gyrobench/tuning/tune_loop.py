@@ -103,7 +103,7 @@ def tune(
     seconds = time.perf_counter() - began
     held = problem.plants[0].with_controller(controller)
     poles = held.poles(problem.plants)
-    f = frequencies(problem.plants, problem.box, wishes, DENSE, modes(poles.ravel() + 0j, models.step))
+    f = frequencies(problem.plants, problem.box, wishes, DENSE, modes(poles.ravel(), models.step))
     responses = problem.plants[0].controller_response(controller, f)
     loops = np.array([p.response(f) * responses + p.past(f) for p in problem.plants])
     if np.max(np.abs(poles)) > 1.0 + 1e-8:
