@@ -1,11 +1,27 @@
 from __future__ import annotations
 
 from gyrobench.component import Component, Discrete, Input, Noise, Output, Parameter, sampled
-from gyrobench.component.math import Number, Vector, atan2, cos, exp, floor, index, log, pi, sin, sqrt, vector
+from gyrobench.component.math import (
+    Number,
+    Vector,
+    atan2,
+    cos,
+    exp,
+    floor,
+    index,
+    log,
+    maximum,
+    minimum,
+    pi,
+    sin,
+    sqrt,
+    vector,
+)
 
 LINES = 48  # sines of each axis
 POINTS = 24  # of a spectrum
-PARTS = 8  # of a line's band, over which its power is summed
+PEAKED = 2.0  # times the mean density of a band is its largest one: the sine stands where the power is
+HALVES = 30  # of a band, for its place
 GOLDEN = 0.6180339887498949
 REST = [0.0] * (POINTS - 2)
 NONE = [0.0, 0.0, 0.0]
@@ -19,17 +35,18 @@ class BaseVibration(Component):
 
     Each of the three components of n and of a is a sum of 48 sines.  The band from the first to the last frequency is
     cut into 48 of equal ratio; each has one sine of the power of its band, int S df, at a place within it that does not
-    repeat, with a phase by the seed of the run.  Between its points S goes straight in logarithms.  So the mean square
-    is the spectrum's in every band, and over a long time the same for every seed.
+    repeat, with a phase by the seed of the run; in a band with a peak, a place in its power: the sine is in the peak.
+    Between its points S goes straight in logarithms.  So the mean square is the spectrum's in every band, and over a
+    long time the same for every seed.
 
     It begins where the number of the running phase is `first`, and lasts to the end.
 
-    Not modelled: correlation between axes, peaks other than a Gaussian process has, lines of a rotor (give a narrow
-    band), the small angle of the vibration in f.
+    Not modelled: correlation between axes, peaks in time other than a Gaussian process has, lines of a rotor (give a
+    narrow band), the small angle of the vibration in f.
     Source: Shinozuka 1991 (sum of cosines with random phases).
     """
 
-    version = "1.0.0"
+    version = "1.1.0"
     long_loops = True
 
     step = Parameter(1e9, "s", "largest internal step: one sample for each communication step", above=0.0)
@@ -86,12 +103,21 @@ class BaseVibration(Component):
         """Choose the sines of one spectrum: 0 to 2 rates, 3 to 5 accelerations."""
         top = log(self.frequency[index(self.points - 1.0)] / self.frequency[0])
         for k in range(LINES):
-            power = 0.0
-            for j in range(PARTS):
-                f = self.frequency[0] * exp(top * (k + (j + 0.5) / PARTS) / LINES)
-                power = power + self.density(n, f) * f * top / (LINES * PARTS)
+            low = self.frequency[0] * exp(top * k / LINES)
+            high = self.frequency[0] * exp(top * (k + 1.0) / LINES)
+            power = self.between(n, low, high)
             place = GOLDEN * (LINES * n + k + 1.0)
-            f = self.frequency[0] * exp(top * (k + place - floor(place)) / LINES)
+            share = place - floor(place)
+            f = self.frequency[0] * exp(top * (k + share) / LINES)
+            if self.largest(n, low, high) * (high - low) > PEAKED * power:
+                below = low
+                above = high
+                for _ in range(HALVES):
+                    f = 0.5 * (below + above)
+                    if self.between(n, low, f) < share * power:
+                        below = f
+                    else:
+                        above = f
             size = self.scale * sqrt(2.0 * power)
             number = 2.0 * (LINES * n + k)
             angle = atan2(self.noise.phases[index(number)], self.noise.phases[index(number + 1.0)])
@@ -101,18 +127,49 @@ class BaseVibration(Component):
             if power > 0.0:
                 self.active[index(n)] = 1.0
 
-    def density(self, n: Number, f: Number) -> Number:
-        """Return the spectrum at f: straight in logarithms, in the density itself next to a 0."""
+    def at(self, n: Number, k: Number) -> Number:
+        """Return the density of a point."""
+        return self.rate_psd[index(n)][index(k)] if n < 3.0 else self.acceleration_psd[index(n - 3.0)][index(k)]
+
+    def between(self, n: Number, low: Number, high: Number) -> Number:
+        """Return the power from low to high: S = a (f / f_k)^p, or straight in log f next to a 0, in closed form."""
         found = 0.0
         for k in range(POINTS - 1):
-            if k + 1 < self.points and f >= self.frequency[k] and f <= self.frequency[k + 1]:
-                a = self.rate_psd[index(n)][k] if n < 3.0 else self.acceleration_psd[index(n - 3.0)][k]
-                b = self.rate_psd[index(n)][k + 1] if n < 3.0 else self.acceleration_psd[index(n - 3.0)][k + 1]
-                share = log(f / self.frequency[k]) / log(self.frequency[k + 1] / self.frequency[k])
+            if k + 1 < self.points and high > self.frequency[k] and low < self.frequency[k + 1]:
+                a = self.at(n, 1.0 * k)
+                b = self.at(n, k + 1.0)
+                x = maximum(low, self.frequency[k])
+                y = minimum(high, self.frequency[k + 1])
+                whole = log(self.frequency[k + 1] / self.frequency[k])
+                ahead = log(x / self.frequency[k])
+                wide = log(y / x)
                 if a > 0.0 and b > 0.0:
-                    found = exp((1.0 - share) * log(a) + share * log(b))
+                    p = log(b / a) / whole
+                    turn = (p + 1.0) * wide
+                    mean = 1.0 + 0.5 * turn
+                    if turn * turn > 1e-10:
+                        mean = (exp(turn) - 1.0) / turn
+                    found = found + a * exp(p * ahead) * x * wide * mean
                 else:
-                    found = (1.0 - share) * a + share * b
+                    slope = (b - a) / whole
+                    found = found + y * (a + slope * (ahead + wide - 1.0)) - x * (a + slope * (ahead - 1.0))
+        return found
+
+    def largest(self, n: Number, low: Number, high: Number) -> Number:
+        """Return the largest density from low to high: at one of the ends, or at a point between."""
+        found = 0.0
+        for k in range(POINTS - 1):
+            if k + 1 < self.points and high > self.frequency[k] and low < self.frequency[k + 1]:
+                a = self.at(n, 1.0 * k)
+                b = self.at(n, k + 1.0)
+                whole = log(self.frequency[k + 1] / self.frequency[k])
+                for end in range(2):
+                    f = maximum(low, self.frequency[k]) if end == 0 else minimum(high, self.frequency[k + 1])
+                    share = log(f / self.frequency[k]) / whole
+                    s = (1.0 - share) * a + share * b
+                    if a > 0.0 and b > 0.0:
+                        s = exp((1.0 - share) * log(a) + share * log(b))
+                    found = maximum(found, s)
         return found
 
     def add(self) -> None:

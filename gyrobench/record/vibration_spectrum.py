@@ -9,6 +9,7 @@ frequency [Hz],rate_x [deg2/s2/Hz],rate_z [deg2/s2/Hz],acceleration_z [m2/s4/Hz]
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.csv_reader import CsvColumn, DataError, read_measured
 
 POINTS = 24  # of the part base_vibration
+FEWEST = 200  # frequencies between two points
 _KINDS = {"rate": ("rad2/s2/Hz", "angular rate about"), "acceleration": ("m2/s4/Hz", "acceleration along")}
 _COLUMNS = (
     CsvColumn("frequency", "Hz", "frequency, rising"),
@@ -57,9 +59,19 @@ class VibrationSpectrum:
         inside = (f >= self.f[0]) & (f <= self.f[-1])
         return np.asarray(np.where(inside, found, 0.0))
 
+    def frequencies(self) -> Array:
+        """Return frequencies between which no density changes by more than 2 %: peaks as narrow as they are."""
+        found = []
+        for k, (low, high) in enumerate(pairwise(self.f)):
+            ends = np.vstack([self.rate, self.acceleration])[:, k : k + 2]
+            turns = np.abs(np.log(np.divide(*ends[np.all(ends > 0.0, axis=1)].T)))
+            steep = max(FEWEST, int(np.ceil(50.0 * max([np.log(high / low), *turns]))))
+            found.append(np.geomspace(low, high, steep + 1))
+        return np.unique(np.concatenate(found))
+
     def rms(self, kind: str, axis: int) -> float:
         """Return the root mean square over all frequencies, SI."""
-        f = np.geomspace(self.f[0], self.f[-1], 4000)
+        f = self.frequencies()
         return float(np.sqrt(np.trapezoid(self.density(kind, axis, f), f)))
 
     def parameters(self, slot: str = "vibration") -> dict[str, Any]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from gyrobench.arrays import Array
 
 #: one-sided power spectral density over frequencies in Hz
@@ -30,7 +32,7 @@ class SightSource:
 
 @dataclass(frozen=True)
 class LineOfSight:
-    """Sources of the jitter of a line of sight, from ``lowest`` Hz on.
+    """Sources of the jitter of a line of sight, from ``lowest`` Hz on.  f: Hz, with which the densities are followed.
 
     ride: label of the phase of the plan in which base and target move.  angles: loop -> channel of the angle whose
     jitter it is; {}: that which a load turns.  moved_by: slots of parts whose outputs are inputs of the linear model.
@@ -41,6 +43,7 @@ class LineOfSight:
 
     lowest: float
     sources: Sequence[SightSource]
+    f: Array = field(default_factory=lambda: np.zeros(0))
     ride: str = "ride"
     angles: Mapping[str, str] = field(default_factory=dict)
     moved_by: Sequence[str] = ()

@@ -53,7 +53,8 @@ class SightModel:
         use = f >= self.sources.lowest * (1.0 - 1e-9)
         g = f[use]
 
-        fine = finer(g)
+        narrow = self.sources.f[(self.sources.f > g[0]) & (self.sources.f < g[-1])]
+        fine = np.union1d(finer(g), narrow)
 
         def both(kind: str, axis: int) -> tuple[Complex, Complex]:
             """Return the ways of an excitation to the line of sight and to the input of the controller."""

@@ -83,6 +83,25 @@ def test_mean_square_is_that_of_the_spectrum() -> None:
                 assert here == pytest.approx(whole, rel=0.03, abs=1e-12), (name, axis, low)
 
 
+def test_a_peak_narrower_than_a_band_has_its_power_in_its_place() -> None:
+    """10 (f/f0)^(+-p) times the floor within +-0.5 % of 41.3 Hz, where a band is 10 % wide; 2000 a floor elsewhere.
+
+    ln 2000 = 7.601: each side has about the height times f0 0.005/7.601.
+    """
+    f0, high = 41.3, 0.02
+    spectrum = VibrationSpectrum(
+        np.array([1.0, f0 * 0.995, f0, f0 * 1.005, 100.0]), np.array([[1e-5, 1e-5, high, 1e-5, 1e-5]] * 3)
+    )
+    peak = high * 2.0 * f0 * 0.005 / math.log(2000.0)
+    assert spectrum.rms("rate", 0) ** 2 == pytest.approx(peak + 99e-5, rel=0.01)
+    h, n = 2e-3, 50000
+    out = moved(h, n, **{k.partition(".")[2]: v for k, v in spectrum.parameters().items()})["omega"]
+    assert np.mean(out**2, axis=0) == pytest.approx([peak + 99e-5] * 3, rel=0.03)
+    f, power = np.fft.rfftfreq(n, h), np.abs(np.fft.rfft(out, axis=0)) ** 2
+    inside = np.abs(f / f0 - 1.0) < 0.005
+    assert power[inside].sum(axis=0) / power[1:].sum(axis=0) == pytest.approx([peak / (peak + 99e-5)] * 3, abs=0.15)
+
+
 def test_alpha_is_the_derivative_of_omega_while_it_fades_in() -> None:
     h = 1e-4
     out = moved(h, 3000, onset=0.25)

@@ -181,7 +181,7 @@ class SightTest(LoopTest):
 
         squares = [np.zeros(3), np.zeros(3)]  # of rates and angles of the base
         if spectrum:
-            f = np.geomspace(spectrum.f[0], spectrum.f[-1], 2000)
+            f = spectrum.frequencies()
             density = np.array([spectrum.density("rate", k, f) for k in range(3)]) * scale
             squares = [np.atleast_1d(np.trapezoid(density / x**2, f, axis=1)) for x in (1.0, 2.0 * np.pi * f)]
         if recorded is not None:
@@ -190,7 +190,8 @@ class SightTest(LoopTest):
         free, slipping = self.slips(parameters, squares) if np.any(squares[0]) else ({}, {})
         base = [SightSource(f"motion of the base about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
         gyro = [SightSource("noise of the gyro", "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
-        return LineOfSight(self["jitter_from"], [*base, *gyro], free=free, slipping=slipping)
+        narrow = spectrum.frequencies() if spectrum else np.zeros(0)
+        return LineOfSight(self["jitter_from"], [*base, *gyro], narrow, free=free, slipping=slipping)
 
     def recorded_rates(self, parameters: Mapping[str, Any]) -> Array | None:
         """Return the rates of the base by its recorded motion in the ride, rad/s, (3, times); None: there is none."""
