@@ -107,6 +107,19 @@ def test_jitter_by_hand() -> None:
 
 
 @pytest.mark.long
+def test_acceleration_turns_an_unbalanced_line_of_sight(tmp_path) -> None:
+    """No mode: line of sight = u a / (s (J s + c) (1 + L)), u = 0.002 kg.m along y, a along z of 0.5 m2/s4/Hz."""
+    file = tmp_path / "shaken.csv"
+    file.write_text("frequency [Hz],acceleration_z [m2/s4/Hz]\n2,0.5\n80,0.5\n")
+    unbalance = {"platform.unbalance[2,2]": 0.002}
+    plant, sight, G, _ = models("pitch", bending=0.0, psd=str(file), **unbalance)
+    s, use = 2j * np.pi * F, (F >= 2.0) & (F <= 80.0)
+    way = 0.002 / (s * (0.05 * s + 0.01) * (1.0 + plant.response(F) * G))
+    by_hand = math.sqrt(np.trapezoid(np.abs(way[use]) ** 2 * 0.5, F[use]))
+    assert sight.at(F).sources(G)["acceleration by unbalance"] == pytest.approx(by_hand, rel=0.02, abs=0.0)
+
+
+@pytest.mark.long
 def test_a_line_of_the_base_that_is_narrower_than_the_grid(tmp_path) -> None:
     """A peak at 41.3 Hz, 1e4 high and 0.2 % wide at its foot: its way there times the root of what it has.
 

@@ -43,6 +43,7 @@ LOS = ("platform.los[1]", "platform.los[2]")
 THETA = ("platform.theta[1]", "platform.theta[2]")
 BASE = ("vibration.omega[1]", "vibration.omega[2]", "vibration.omega[3]")
 OF_BASE = tuple(f"motion of the base about {axis}" for axis in "xyz")  # sources of the budget
+BY_UNBALANCE = "acceleration by unbalance"
 INSIDE = ("pitch.e", "yaw.e")  # behind the summing points of the loops
 TORQUES = ("cogging", "cogging_order", "friction", "stiction")
 GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
@@ -246,7 +247,7 @@ def by_source(
         add(source, ways.base[:, :, k] / (2j * np.pi * f[:, None]), ride.base[k])
     lever = by_unbalance(p, ride.angles)
     for k in range(3) if np.any(lever) else ():
-        add("acceleration by unbalance", (ways.torque * at_the_body(p, f)[:, None, :]) @ lever[:, k], ride.force[k])
+        add(BY_UNBALANCE, (ways.torque * at_the_body(p, f)[:, None, :]) @ lever[:, k], ride.force[k])
     for name, pair in ride.torques.items():
         for k in PAIR:
             add(name, ways.torque[:, :, k], pair[k])

@@ -19,6 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.motion_profile import RECORDED, profile_rates
 from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import shortest, spectra
+from gyrobench.reduction.loops.sight_budget import BY_UNBALANCE, at_the_body, by_unbalance
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.base_spectra import SPECTRA
 from gyrobench.system.families.loop_test import LoopTest
@@ -189,6 +190,17 @@ class SightTest(LoopTest):
             squares = [old + np.var(new, axis=1) for old, new in zip(squares, (recorded, turned), strict=True)]
         free, slipping = self.slips(parameters, squares) if np.any(squares[0]) else ({}, {})
         base = [SightSource(f"motion of the base about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
+        lever = by_unbalance(parameters, (self["pitch"], self["yaw"]))
+
+        def torque(joint: int, base: VibrationSpectrum) -> Density:
+            def of(f: Array) -> Array:
+                moved = np.array([base.density("acceleration", k, f) for k in range(3)])
+                return np.asarray(scale * lever[joint] ** 2 @ moved * np.abs(at_the_body(parameters, f)[:, joint]) ** 2)
+
+            return of
+
+        if spectrum and np.any(lever):
+            base += [SightSource(BY_UNBALANCE, "torque", k, torque(two - 1, spectrum)) for two, k in AXES.values()]
         gyro = [SightSource("noise of the gyro", "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
         narrow = spectrum.frequencies() if spectrum else np.zeros(0)
         return LineOfSight(self["jitter_from"], [*base, *gyro], narrow, free=free, slipping=slipping)
