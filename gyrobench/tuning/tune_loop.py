@@ -84,7 +84,7 @@ def tune(
             shape = checked_structure(own, structure_of(structure or own.structure), ports.slot)
         ranges = parse_spread(over, lambda name: _known(session, nominal, name, ports.slot))
         for w in wishes:
-            if w.f >= HIGHEST / now.step:
+            if max(w.f, w.value if w.name == "bandwidth" else 0.0) >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
                                  f"{HIGHEST / now.step:g} Hz")  # fmt: skip
         sources = _line_of_sight(now, nominal, wishes, ports)
@@ -107,9 +107,11 @@ def tune(
     responses = problem.plants[0].controller_response(controller, f)
     loops = np.array([p.response(f) * responses + p.past(f) for p in problem.plants])
     if np.max(np.abs(poles)) > 1.0 + 1e-8:
+        slow = 10.0 ** problem.box[0, 0] / (2.0 * np.pi)
         raise TuningError(
-            f"{system.name}: no {shape.name} was found that holds the loop stable over the whole spread; take another "
-            "structure, or a smaller spread"
+            f"{system.name}: no {shape.name} that crosses at {slow:.3g} Hz or more holds the loop stable"
+            f"{' over the whole spread' if ranges else ''}; want less bandwidth, or take another structure"
+            f"{', or a smaller spread' if ranges else ''}"
         )
     ways = [s.at(f) for s in problem.sights]
     got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
@@ -139,8 +141,8 @@ def tune(
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
         best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
-        notes=(*implied, *about(quiet_one), *_slips(sources), *_driven(ways, responses, nominal, ports),
-               *_notes(proofs)),
+        notes=(*implied, *about(quiet_one), *_idle(problem, ranges), *_slips(sources),
+               *_driven(ways, responses, nominal, ports), *_notes(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
     )  # fmt: skip
 
@@ -219,6 +221,18 @@ def _line_of_sight(
             'what the loop is for, too, --want "bandwidth>1Hz" or --want "S at 0.1Hz<-40dB"'
         )
     found: LineOfSight = stated(nominal)
+    return found
+
+
+def _idle(problem: TuningProblem, ranges: Sequence[Range]) -> list[str]:
+    """Return which parameters of the spread do nothing to the loop by the linear model; none where a jitter counts."""
+    found = []
+    if not problem.sights:
+        corners = problem.responses()[1 : problem.corners]
+        for j, r in enumerate(ranges):
+            bit = 1 << (len(ranges) - 1 - j)  # of a corner's number
+            if all(np.array_equal(corners[k], corners[k | bit]) for k in range(len(corners)) if not k & bit):
+                found.append(f"{r.name} does nothing to the linear loop: its spread changes none of the margins")
     return found
 
 

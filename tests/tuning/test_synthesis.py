@@ -17,6 +17,7 @@ from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, 
 from gyrobench.tuning.plant import HeldController, Plant
 from gyrobench.tuning.reasons import _alone, _bode
 from gyrobench.tuning.sight_jitter import MovedSight, SightWays
+from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import ControllerStructure
 from gyrobench.tuning.synthesis import (
     StateSpace,
@@ -30,6 +31,7 @@ from gyrobench.tuning.synthesis import (
     w_plane,
 )
 from gyrobench.tuning.trade import trade, traded
+from gyrobench.tuning.tune_loop import _idle
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.wishes import parse_wishes
 
@@ -251,6 +253,16 @@ def test_what_a_wish_alone_gives_holds_over_the_spread() -> None:
     both = replace(one, plants=[nominal, replace(nominal, c=40.0 * nominal.c)], corners=2)
     text = _alone(both, WishResult(one.wishes[0], 0.1, 0.1, {}))
     assert text.startswith("bandwidth alone: ") and "too little" not in text
+
+
+def test_a_spread_that_does_nothing_is_named() -> None:
+    """Of two parameters, corners (low, low), (low, high), (high, low), (high, high), the second moves nothing."""
+    one = problem("gain", ["bandwidth>2Hz"])
+    nominal = one.plants[0]
+    other = replace(nominal, c=2.0 * nominal.c)
+    four = replace(one, plants=[nominal, nominal, nominal, other, other], corners=5)
+    names = [Range(n, 0.0, 1.0, "1") for n in ("part.a", "part.b")]
+    assert [n.split()[0] for n in _idle(four, names)] == ["part.b"]
 
 
 def test_no_controller_is_below_the_floor() -> None:
