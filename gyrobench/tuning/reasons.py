@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.controller_search import TuningProblem, search
+from gyrobench.tuning.controller_search import TuningProblem, frequencies, search
 from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import crossovers, gain_limits
 from gyrobench.tuning.tuned_loop import WishResult
@@ -19,6 +19,7 @@ from gyrobench.tuning.wishes import JITTER
 
 BINDS = 0.02  # of the worst ratio: wishes so near to it bind too
 FINER = 8  # of the communication step, for what the step costs
+SLOWER = 1.5  # decades of the crossover below what all wishes together leave
 NEAR = 1.35  # factor of frequency within which a mode limits
 
 
@@ -53,8 +54,11 @@ def reasons_of(
 
 
 def _alone(problem: TuningProblem, result: WishResult) -> str:
-    """Return what the structure gives where only this wish, and stability, counts."""
-    one = replace(problem, wishes=[result.wish], evaluations=0)
+    """Return what the structure gives where only this wish, and stability, counts: as slow a loop as it likes."""
+    decades = problem.box.copy()
+    decades[0, 0] -= SLOWER
+    one = replace(problem, wishes=[result.wish], box=decades).of(len(problem.plants))
+    one.f = frequencies(one.plants, decades, one.wishes)
     best = max(result.ratio, float(np.exp(one.worst(search(one, quick=True)))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)

@@ -255,6 +255,16 @@ def test_what_a_wish_alone_gives_holds_over_the_spread() -> None:
     assert text.startswith("bandwidth alone: ") and "too little" not in text
 
 
+def test_a_margin_alone_may_have_a_slower_loop() -> None:
+    """100/(s (s + 5)) crosses at 0.3 x 30 Hz or more for the bandwidth; without it 30 times slower, at 1.79 rad/s.
+
+    There it has 90 - atan(1.79/5) = 70.3 degrees, and 0.2 less by step and delays.
+    """
+    both = problem("gain", ["phase margin=80deg", "bandwidth>30Hz"])
+    text = _alone(both, WishResult(both.wishes[0], 0.1, 0.1, {}))
+    assert text == "phase margin alone: 70.1°, too little by itself"
+
+
 def test_a_spread_that_does_nothing_is_named() -> None:
     """Of two parameters, corners (low, low), (low, high), (high, low), (high, high), the second moves nothing."""
     one = problem("gain", ["bandwidth>2Hz"])
