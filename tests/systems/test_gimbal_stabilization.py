@@ -148,6 +148,17 @@ def test_refused(options: dict[str, Any], message: str) -> None:
         ridden(**options)
 
 
+def test_spectra_beyond_the_steps_and_beyond_the_record(tmp_path: Path) -> None:
+    """Steps of 0.2 ms carry up to 2500 Hz, a record every 1 ms up to 500 Hz."""
+    file = tmp_path / "mast.csv"
+    system: Any = load_system("gimbal_stabilization")
+    system.set("psd", str(file))
+    for top, refused, warned in ((400, 0, 0), (600, 0, 1), (3000, 1, 1)):
+        file.write_text(f"frequency [Hz],rate_x [deg2/s2/Hz]\n2,0.01\n{top},0.01\n")
+        assert (len(system.check()), len(system.warnings())) == (refused, warned)
+    assert "reaches up to 3000 Hz, and steps of 0.0002 s carry up to 2500 Hz" in system.check()[0]
+
+
 @pytest.mark.long
 def test_a_file_with_spectra(tmp_path: Path) -> None:
     """Rates about x alone, 0.01 (deg/s)2/Hz from 2 to 8 Hz: no vibration about z in the budget."""

@@ -324,13 +324,28 @@ class SightTest(LoopTest):
             )
         if str(self["psd"]) not in (*SPECTRA, "none") and not Path(str(self["psd"])).is_file():
             problems.append(f"psd = {self['psd']}: none of {', '.join(SPECTRA)}, none, and not a file")
+        elif self.highest() > 0.5 / self.step:
+            problems.append(
+                f"psd = {self['psd']}: reaches up to {self.highest():g} Hz, and steps of {self.step:g} s carry up to "
+                f"{0.5 / self.step:g} Hz: cut the spectrum there"
+            )
         return problems
 
+    def highest(self) -> float:
+        """Return the highest frequency of the vibration, Hz."""
+        spectrum = self.spectrum()
+        return float(spectrum.f[-1]) if spectrum else 0.0
+
     def warnings(self) -> list[str]:
-        inner = self[self.inner]
+        inner, found = self[self.inner], []
         if abs(inner) > 75 * DEG:
-            return [
+            found.append(
                 f"the inner joint begins at {math.degrees(inner):.3g}°, in the keyhole: the gain of the outer loop is "
                 "held at that of 75°, and its motor may reach its limit"
-            ]
-        return []
+            )
+        if self.highest() > 0.5 / self.channel_period:
+            found.append(
+                f"psd reaches up to {self.highest():g} Hz, and the base is recorded every {self.channel_period:g} s: "
+                f"what is above {0.5 / self.channel_period:g} Hz stands in the budget by source as a slower motion"
+            )
+        return found
