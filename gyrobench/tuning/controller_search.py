@@ -10,7 +10,7 @@ the corners and some inside; what is worse between them is added, and the search
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -197,14 +197,19 @@ def _computed(problem: TuningProblem) -> Array:
 
 
 def simplex_from(problem: TuningProblem, x: Array, size: float, most: int = SIMPLEX) -> Array:
+    """Return the best controller of the simplex method from x; as descend."""
+    return descend(lambda y: -problem.worst(y), x, problem.box, size, most)
+
+
+def descend(cost: Callable[[Array], float], x: Array, box: Array, size: float, most: int) -> Array:
     """Return the end of the simplex method from x; size: of the first simplex, share of the box; most: evaluations."""
     from scipy.optimize import minimize
 
-    low, high = problem.box.T
+    low, high = box.T
 
     def refused(x: Array) -> float:
         inside = np.clip(x, low, high)
-        return -problem.worst(inside) + float(np.sum(np.abs(x - inside)))
+        return cost(inside) + float(np.sum(np.abs(x - inside)))
 
     simplex = np.clip(np.vstack([x, x + size * np.diag(high - low)]), low, high)
     for k in range(len(x)):

@@ -37,6 +37,8 @@ PERIODS = 32  # of a sine; a third of them of one that is slower by SLOWER than 
 SLOWER = 40.0
 SLOWEST = 300.0  # below the crossover over this no sine is made for the bandwidth or a limit of the gain
 NEXT = 1.5  # times the smallest gain margin: limits of the gain up to it are measured, however slow
+HIGHEST = 0.2  # of the frequency of the steps: of a sine
+ENOUGH = 0.9  # of 1 over the gain margin that is wanted: down to it L is measured where no limit is told
 SAMPLES = 24  # of a period of the fastest sine
 AMPLITUDE = 1e-3  # of the test sines, where the system's own plan has none
 DIFFERENT = 0.05  # of a measure: less difference from the linear model has no consequence
@@ -156,12 +158,15 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
     """Return the sines, Hz: about the crossovers, the limits and the largest |S - 1/2|."""
     crossed = [at for at, _ in crossovers(f, L)]
     upper = max(crossed, default=float(f[len(f) // 2]))
-    gains = gain_limits(f, L)
+    gains = [(at, g) for at, g in gain_limits(f, L) if at < HIGHEST / step]
     least = min((max(g, 1.0 / g) for _, g in gains), default=np.inf)
-    limits = [at for at, g in gains if upper / 20.0 < at < 0.2 / step]
+    limits = [at for at, g in gains if at > upper / 20.0]
     slow_limits = [at for at, g in gains if upper / SLOWEST < at <= upper / 20.0 and max(g, 1.0 / g) < NEXT * least]
     hump = float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])
-    low, high = upper / 8.0, min(max([2.5 * upper, 1.3 * hump, *(1.2 * x for x in limits)]), 0.2 / step)
+    wanted = next((w.value for w in wishes if w.name == "gain margin"), 0.0)
+    told = not wanted or any(g > 1.0 for _, g in gains)
+    reach: Array = f[(f > upper) & (np.abs(L) * wanted < ENOUGH)][: 0 if told else 1]
+    low, high = upper / 8.0, min(max([2.5 * upper, 1.3 * hump, *reach, *(1.2 * x for x in limits)]), HIGHEST / step)
     at = [x * q for x in (*crossed, *limits, hump) for q in (0.93, 1.0, 1.07)]
     own = [w.f for w in wishes if w.f]
     if any(w.name == "gain margin" for w in wishes):
@@ -171,7 +176,7 @@ def sine_frequencies(f: Array, L: Complex, wishes: Sequence[Wish], step: float) 
         own += [x for x in (0.93 * slow, slow, 1.07 * slow) if x > max(upper / SLOWEST, float(f[0]))]
     asked = [*np.geomspace(low, high, SINES), *at, *own]
     found: list[float] = []
-    for x in sorted(float(x) for x in asked if upper / 20.0 <= x <= 0.2 / step or x in own):
+    for x in sorted(float(x) for x in asked if upper / 20.0 <= x <= HIGHEST / step or x in own):
         if not found or x > 1.02 * found[-1]:
             found.append(x)
     return found

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.tuning.controller_search import TuningProblem
+from gyrobench.tuning.controller_search import TuningProblem, descend
 from gyrobench.tuning.structures import Controller
 from gyrobench.tuning.wishes import JITTER
 
@@ -51,34 +51,21 @@ def quieted(problem: TuningProblem, x: Array) -> Quieting | None:
 
     Computed structures have a price of the voltage of their own, and a jitter holds the noise already.
     """
-    from scipy.optimize import minimize
-
     best = problem.worst(x)
     if best < SURPLUS or problem.structure.computed or any(w.name == JITTER for w in problem.wishes):
         return None
-    low, high = problem.box.T
     corners = problem.of(problem.corners)
     loud = effort(problem, problem.controller(x))
 
     def cost(y: Array) -> float:
-        inside = np.clip(y, low, high)
-        lacking = max(KEPT * best - corners.worst(inside), 0.0)
-        price = PRICE * lacking + float(np.sum(np.abs(y - inside)))
+        lacking = max(KEPT * best - corners.worst(y), 0.0)
         if lacking > KEPT * best:  # a wish is missed, or the loop is not stable
-            return price
-        return price + float(np.log(effort(corners, problem.controller(inside)) / loud))
+            return PRICE * lacking
+        return PRICE * lacking + float(np.log(effort(corners, problem.controller(y)) / loud))
 
     now = np.asarray(x, float)
     for size in SIZES:
-        simplex = np.vstack([now, now + size * np.diag(high - low)])
-        for k in range(len(now)):
-            if simplex[k + 1, k] > high[k]:
-                simplex[k + 1, k] = now[k] - size * (high - low)[k]
-        found = minimize(
-            cost, now, method="Nelder-Mead",
-            options={"initial_simplex": simplex, "maxfev": SIMPLEX, "xatol": 1e-3, "fatol": 1e-4},
-        )  # fmt: skip
-        now = np.clip(found.x, low, high)
+        now = descend(cost, now, problem.box, size, SIMPLEX)
     problem.evaluations += corners.evaluations
     less = loud / effort(problem, problem.controller(now))
     if less < WORTH or problem.worst(now) < 0.0:

@@ -14,7 +14,7 @@ from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, ax
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.tuned_loop import LoopTuning
-from gyrobench.tuning.wishes import JITTER, Wish
+from gyrobench.tuning.wishes import JITTER
 
 SPAN = 40.0  # figures over frequency show so much about the crossover
 LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.4, "zorder": 3}
@@ -146,32 +146,18 @@ def sensitivities(t: LoopTuning) -> str:
     return svg(fig, "sensitivities")
 
 
-def _number(wish: Wish, value: float) -> tuple[float, str]:
-    """Return a value in the unit of a figure, with this unit."""
-    match wish.unit:
-        case "rad" if wish.name == JITTER:
-            return 1e6 * value, "µrad"
-        case "rad":
-            return math.degrees(value), "°"
-        case "":
-            return 20.0 * math.log10(max(value, 1e-15)), "dB"
-        case "s":
-            return 1e3 * value, "ms"
-    return value, "" if wish.unit == "1" else wish.unit
-
-
 def trade(t: Trade) -> str:
     """Return one wish over the other, and where both are fulfilled."""
     fig, ax = chart(HALF, 78)
     points = [p for p in t.points if math.isfinite(p.first) and math.isfinite(p.second)]
-    xy = np.array([[_number(w, v)[0] for w, v in zip(t.wishes, (p.first, p.second), strict=True)] for p in points])
+    xy = np.array([[w.printed(v)[0] for w, v in zip(t.wishes, (p.first, p.second), strict=True)] for p in points])
     if len(points):
         ax.plot(*xy.T, **LINE, marker="o", markersize=3.2, label="best that was found")
         bad = np.array([not p.others for p in points])
         ax.plot(*xy[bad].T, **DOTS, label="other wishes not fulfilled" if bad.any() else None)
     for k, (wish, line) in enumerate(zip(t.wishes, (ax.axvline, ax.axhline), strict=True)):
-        line(_number(wish, wish.value)[0], color=GREEN, linestyle="--", linewidth=1.0, label="" if k else "wanted")
-    names = [axis_label(w.name, _number(w, w.value)[1]) for w in t.wishes]
+        line(wish.printed(wish.value)[0], color=GREEN, linestyle="--", linewidth=1.0, label="" if k else "wanted")
+    names = [axis_label(w.name, w.printed(w.value)[1].strip()) for w in t.wishes]
     ax.set(xlabel=names[0], ylabel=names[1])
     fig.legend(*ax.get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.8)
     return svg(fig, "trade")

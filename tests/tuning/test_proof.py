@@ -15,7 +15,7 @@ from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.system import load_system
 from gyrobench.tuning.loop_ports import loops_of
 from gyrobench.tuning.proof import Proof, ProvenWish, _gain_margin, _run, loop_plan, proof_of, sine_frequencies
-from gyrobench.tuning.robustness import gain_limits
+from gyrobench.tuning.robustness import gain_limits, grid
 from gyrobench.tuning.tuned_settings import quiet
 from gyrobench.tuning.wishes import parse_wishes
 
@@ -41,6 +41,17 @@ def test_a_slow_limit_that_counts_has_sines() -> None:
     assert sum(abs(math.log(x / slow[0])) < 0.1 for x in sines) >= 3
     without = [w for w in WISHES if w.name != "gain margin"]
     assert not any(abs(math.log(x / slow[0])) < 0.1 for x in sine_frequencies(F, L, without, 1e-4))
+
+
+def test_sines_reach_down_to_a_wanted_gain_margin_whose_limit_no_sine_reaches() -> None:
+    """K h/(z - 1), K = 40/s, with an integral: its limit is at 500 Hz, sines end at 200 Hz; |L| is 0.9/8 at 57 Hz."""
+    h = 1e-3
+    f = grid(h, 5.0)
+    step = h / (np.exp(2j * np.pi * f * h) - 1.0)
+    L = 40.0 * step * (1.0 + 30.0 * step)
+    assert [at for at, _ in gain_limits(f, L)] == pytest.approx([500.0])
+    tops = [max(sine_frequencies(f, L, parse_wishes([w, "S at 1Hz<-3dB"]), h)) for w in ("gain margin=8", "peak S<6dB")]
+    assert tops[0] == pytest.approx(57.0, rel=0.05) and tops[1] < 30.0
 
 
 def test_a_limit_in_noise_is_a_bound() -> None:
