@@ -20,7 +20,8 @@ from gyrobench.component.math import (
 
 LINES = 48  # sines of each axis
 POINTS = 24  # of a spectrum
-PEAKED = 2.0  # times the mean density of a band is its largest one: the sine stands where the power is
+PARTS = 8  # of a band
+PEAKED = 2.0  # times the mean power of a part is in one: the sine stands where the power is
 HALVES = 30  # of a band, for its place
 GOLDEN = 0.6180339887498949
 REST = [0.0] * (POINTS - 2)
@@ -109,7 +110,12 @@ class BaseVibration(Component):
             place = GOLDEN * (LINES * n + k + 1.0)
             share = place - floor(place)
             f = self.frequency[0] * exp(top * (k + share) / LINES)
-            if self.largest(n, low, high) * (high - low) > PEAKED * power:
+            peaked = 0.0
+            for j in range(PARTS):
+                begin = low + (high - low) * j / PARTS
+                if self.between(n, begin, begin + (high - low) / PARTS) > PEAKED * power / PARTS:
+                    peaked = 1.0
+            if peaked > 0.0:
                 below = low
                 above = high
                 for _ in range(HALVES):
@@ -153,23 +159,6 @@ class BaseVibration(Component):
                 else:
                     slope = (b - a) / whole
                     found = found + y * (a + slope * (ahead + wide - 1.0)) - x * (a + slope * (ahead - 1.0))
-        return found
-
-    def largest(self, n: Number, low: Number, high: Number) -> Number:
-        """Return the largest density from low to high: at one of the ends, or at a point between."""
-        found = 0.0
-        for k in range(POINTS - 1):
-            if k + 1 < self.points and high > self.frequency[k] and low < self.frequency[k + 1]:
-                a = self.at(n, 1.0 * k)
-                b = self.at(n, k + 1.0)
-                whole = log(self.frequency[k + 1] / self.frequency[k])
-                for end in range(2):
-                    f = maximum(low, self.frequency[k]) if end == 0 else minimum(high, self.frequency[k + 1])
-                    share = log(f / self.frequency[k]) / whole
-                    s = (1.0 - share) * a + share * b
-                    if a > 0.0 and b > 0.0:
-                        s = exp((1.0 - share) * log(a) + share * log(b))
-                    found = maximum(found, s)
         return found
 
     def add(self) -> None:
