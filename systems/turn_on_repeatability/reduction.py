@@ -4,9 +4,10 @@
 
 i: turn-on, w: rate of the table.  The time constants are found by least squares, as many exponentials as the record
 tells; the model, linear about them, is then fitted under an estimated noise model.  Intervals of sizes and time
-constants allow for a second exponential that is hardly seen (draws.py).  Of the biases b_i come the
-components of variance between turn-ons and between days, less their noise (components.py).  A record with one reading
-of each turn-on has no warm-up.  [TEST-TURN-ON; IEEE 952; Weerahandi 1993]
+constants allow for a second exponential that is hardly seen (draws.py), those of what comes after the readings (bias
+when warm, time until then) beside two for a third.  Of the biases b_i come the components of variance between turn-ons
+and between days, less their noise (components.py).  A record with one reading of each turn-on has no warm-up.
+[TEST-TURN-ON; IEEE 952; Weerahandi 1993]
 
 Not modelled: a warm-up that differs from turn-on to turn-on, biases that depend on the one before.
 """
@@ -42,7 +43,7 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import DPH
 
-from . import components, mistakes, temperature
+from . import components, mistakes, shape, temperature
 from .components import Spread, spread
 from .draws import Posterior
 from .labels import labelled, unknowns
@@ -54,11 +55,10 @@ FEW = 4  # readings of a turn-on from which on a warm-up is looked for
 MEANT = "time constant of the warm-up: after it 1/e is left"
 SECONDS = "s"
 ENDLESS = "longer than the record tells"
-ALIKE = (
-    "the warm-up differs from turn-on to turn-on: some began before the gyro was cold, or at another temperature",
-    "the warm-up of all turn-ons is the same",
+HIDDEN = (
+    "Intervals of the warm-up allow for a second exponential that the record does not exclude; of two, those of the "
+    "bias when warm and of the time until it is warm for a third."
 )
-HIDDEN = "Intervals of the warm-up allow for a second exponential that the record does not exclude."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +122,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         w = self.windows
         self.y, self.since, t0, t1 = (np.asarray(w[n], dtype=float) for n in ("mean", "since", "t_start", "t_end"))
         self.length = t1 - t0
-        self.read = float(np.max(self.since + 0.5 * self.length))
+        self.read, self.longest = float(np.max(self.since + 0.5 * self.length)), 20.0 * float(np.max(self.since))
         self.numbers, self.turn = np.unique(np.asarray(w["turn_on"]).astype(int), return_inverse=True)
         self.count = self.numbers.size
         self.single = self.count == self.y.size
@@ -163,9 +163,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         out = []
         for k, x in enumerate([*tau, *tau_E]):
             factor = self.w if k >= tau.size else 1.0
-            step = 1e-3
-            high, low = (means(self.since, self.length, np.array([x * math.exp(s)]))[:, 0] for s in (step, -step))
-            out.append(factor * size[k] * (high - low) / (2.0 * step))
+            high, low = (means(self.since, self.length, np.array([x * math.exp(s)]))[:, 0] for s in (1e-3, -1e-3))
+            out.append(factor * size[k] * (high - low) / 2e-3)
         return out
 
     def derived(self, found: Findings) -> Findings:
@@ -228,15 +227,21 @@ class Reduction(DriftReduction[TurnOnSetup]):
             added.append(temperature.coefficient(s.slope, dof, self.read, self.late, truth.get("b_T")))
         own = list(result.coefficients)
         if self.tau.size + self.tau_E.size and asked.whole():
-            self.drawn = self._draws()
+            q = self.tau.size
+            self.allowed = self._draws(q + int(q > 0 > self.setup.exponentials))
+            self.drawn = self.allowed if q < 2 else self._draws(q)
             self.endless = self._endless()
             own = [self._allowed(c) for c in own]
         warm = self._time(truth.get("t_w"))
-        return replace(result, coefficients=[*own, *([warm] if warm else []), *added])
+        reasons = list(result.reasons)
+        if warm and asked.whole() and not self.endless:
+            left = self._of_each(lambda w, _: w.left(self.read), self.allowed)
+            reasons += shape.extrapolated(left, self.read, self.setup.limit)
+        return replace(result, coefficients=[*own, *([warm] if warm else []), *added], reasons=reasons)
 
     def _time(self, truth: float | None) -> Coefficient | None:
         """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""
-        q, longest = self.tau.size, self._longest()
+        q, longest = self.tau.size, self.longest
         meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
         if not q:
             return None
@@ -246,7 +251,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         )
         if not asked.whole():
             return Coefficient("t_w", meaning, SECONDS, own, math.nan, NORMAL, (math.nan, math.nan))
-        times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t)))
+        times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t), self.allowed))
         low, high = (float(times[round(p * (times.size - 1))]) for p in (0.025, 0.975))
         if self.endless or not math.isfinite(own):
             return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
@@ -255,17 +260,14 @@ class Reduction(DriftReduction[TurnOnSetup]):
         u = (high - low) / (2.0 * NORMAL)
         return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
 
-    def _longest(self) -> float:
-        return 20.0 * float(np.max(self.since))
-
-    def _of_each(self, figure: Callable[[Warming, float], float]) -> Array:
+    def _of_each(self, figure: Callable[[Warming, float], float], drawn: tuple[Array, Array, Array]) -> Array:
         """Return a figure of every fourth of the warm-ups of the bias that the record allows."""
-        e, (size, tau, _) = self.tau_E.size, self.drawn
-        return np.array([figure(Warming(size[k, e:], tau[k, e:]), self._longest()) for k in range(0, len(size), 4)])
+        e, (size, tau, _) = self.tau_E.size, drawn
+        return np.array([figure(Warming(size[k, e:], tau[k, e:]), self.longest) for k in range(0, len(size), 4)])
 
-    def _draws(self) -> tuple[Array, Array, Array]:
-        """Return sizes (m, e + q) and time constants of warm-ups that the record allows, those of the scale factor
-        first, and mean biases (m,) when warm; of the bias two unless their number is given.
+    def _draws(self, count: int) -> tuple[Array, Array, Array]:
+        """Return sizes (m, e + count) and time constants of warm-ups that the record allows, those of the scale factor
+        first, and mean biases (m,) when warm; count: exponentials of the bias, as many as were found or one more.
 
         The noise is white there; its variance makes no interval of the fit under the estimated noise model wider than
         it would be here.
@@ -281,11 +283,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
         amplitude, u_tau = white[n : n + q + e], white[n + q + e : n + 2 * (q + e)]
         ratio = np.concatenate([reported[0::2] / amplitude, reported[1::2] / value[1::2] / u_tau])
         factor = max(1.0, float(np.max(ratio)))
-        doubtful = None
-        if q and self.setup.exponentials < 0:
-            doubtful = float(np.max(np.abs(value[0 : 2 * q : 2])))
-        of = [1] * e + [0] * (2 if doubtful else q)
-        posterior = Posterior(self.choice.curves, of, factor**2 * variance, doubtful)
+        doubtful = float(np.max(np.abs(value[0 : 2 * q : 2]))) if count > q else None
+        posterior = Posterior(self.choice.curves, [1] * e + [0] * count, factor**2 * variance, doubtful)
         start, order = np.log(np.concatenate([self.tau_E, self.tau])), np.r_[q : q + e, :q]
         drawn, log_tau, level = posterior.drawn(start, np.minimum(factor * u_tau[order], 0.5))
         return drawn, np.exp(log_tau), level
@@ -301,7 +300,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
     def _allowed(self, c: Coefficient) -> Coefficient:
         """Return a size or a time constant of the warm-up with the interval of the warm-ups that the record allows."""
-        q, e, (size, tau, level) = self.tau.size, self.tau_E.size, self.drawn
+        q, e, (size, tau, _) = self.tau.size, self.tau_E.size, self.drawn
         name, _, number = c.name.partition("_")
         if name not in ("b", "A", "E", "τ") or number == "T":
             return c
@@ -313,11 +312,11 @@ class Reduction(DriftReduction[TurnOnSetup]):
             size, tau = (np.take_along_axis(x, order, axis=1) for x in (size, tau))
         unit = next(x.scale for x in self.found.quantities if x.name == c.name)
         if name == "b":
-            sample = level
+            sample = self.allowed[2]
         elif name == "τ":
             sample = tau[:, k]
             if q == 1 and size.shape[1] == 2 and number != "E":
-                sample = self._of_each(Warming.time_constant)
+                sample = self._of_each(Warming.time_constant, self.drawn)
         else:
             sample = size.sum(axis=1) if q == 1 and name == "A" else size[:, k]
         low, high = (float(v) / unit for v in np.quantile(sample, (0.025, 0.975)))
@@ -350,7 +349,10 @@ class Reduction(DriftReduction[TurnOnSetup]):
     def test(self, found: Findings) -> None:
         if self.tau.size and not self.single and self.count > 1:
             own = found.X[:, : self.columns] * self._exponentials(self.tau[-1:])
-            found.f_test("warm_up.alike", "warm-up of each turn-on", own, "turn-ons that began warm", *ALIKE)
+            found.f_test("warm_up.alike", "warm-up of each turn-on", own, "turn-ons that began warm", *shape.ALIKE)
+        if not self.single and np.min(np.bincount(self.turn)) >= FEW:
+            words = "times since the turn-on", shape.bands(self.since), "a warm-up of another shape"
+            found.f_test("warm_up.shape", *words, *shape.OTHER)
         if "temperature" not in self.windows or self.single:
             return
         columns = temperature.lags(self.windows, found.est.X, self.read)

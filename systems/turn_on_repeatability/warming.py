@@ -35,6 +35,10 @@ class Warming:
     size: Array
     tau: Array
 
+    def left(self, t: float) -> float:
+        """Return the bias at a time less that in the end, rad/s."""
+        return float(np.exp(-t / self.tau) @ self.size)
+
     def time_until(self, limit: float, longest: float) -> float:
         """Return the time after which it stays within +-limit, s; 0 where it always is, inf beyond longest."""
         if not self.size.size:
@@ -49,7 +53,7 @@ class Warming:
             return math.inf
 
         def at(x: float) -> float:
-            return abs(float(np.exp(-x / self.tau) @ self.size)) - limit
+            return abs(self.left(x)) - limit
 
         return float(optimize.brentq(at, t[k], t[k + 1]))
 

@@ -171,6 +171,43 @@ def test_a_second_exponential_that_is_hardly_seen() -> None:
         assert sum(own) >= len(own) - 2, (name, own)
 
 
+def _of_curve(curve: Any, seed: int) -> Any:
+    """Result of 8 turn-ons of 300 s: a curve of the time since (s, deg/h), biases by chance, noise of 0.02 deg/h."""
+    rng = np.random.default_rng(seed)
+    since, turn = np.tile(5.0 + 10.0 * np.arange(30), 8), np.repeat(np.arange(8), 30)
+    inside = since[:, None] + np.linspace(-5.0, 5.0, 41)
+    y = np.trapezoid(curve(inside), inside, axis=1) / 10.0 + (0.05 * rng.normal(size=8))[turn]
+    y += 0.02 * rng.normal(size=240)
+    start = since - 5.0 + 5000.0 * turn
+    windows = {"t_start": start, "t_end": start + 10.0, "turn_on": turn + 1, "since": since, "mean": DPH * y}
+    return Reduction.reduce(windows, TurnOnSetup(limit=0.2 * DPH))
+
+
+@pytest.mark.long
+def test_a_warm_up_of_another_shape() -> None:
+    """Heat that spreads, 12 exp(-sqrt(t/40)), and three exponentials: two fit them within the record and leave 0.6 and
+    0.8 deg/h of the bias when warm out, with u = 0.05; t_w was 40 and 60 u too short.  Within 0.2 deg/h: of the first
+    at 40 ln(60)^2 = 670.6 s, since sqrt(t/40) = ln 60; of the others the slow one is left, 250 ln 15 = 677.0 s.
+    """
+    curves = {
+        670.6: lambda t: 12.0 * np.exp(-np.sqrt(t / 40.0)),
+        677.0: lambda t: 6.0 * np.exp(-t / 10.0) + 6.0 * np.exp(-t / 50.0) + 3.0 * np.exp(-t / 250.0),
+        360.1: lambda t: 8.0 * np.exp(-t / 30.0) + 4.0 * np.exp(-t / 120.0),  # 120 ln 20 = 359.5 and a little
+    }
+    for late, curve in curves.items():
+        result = _of_curve(curve, 1)
+        found = {c.name: c for c in result.coefficients}
+        for name, true, within in (("b", 0.0, 0.1), ("t_w", late, 0.0)):
+            low, high = found[name].interval
+            assert low - within < true < high + within, (late, name)
+        said = {r.id for r in result.reasons}
+        assert ("residuals.contradict" in said) == (late > 400.0)
+        assert "warm_up.extrapolated" in said  # at 300 s: 0.78, 0.90, 0.33 deg/h are left
+        assert any(t.id == "warm_up.shape" and ((t.p or 0.0) < 1e-3) == (late > 400.0) for t in result.tests)
+    short = _of_curve(lambda t: 12.0 * np.exp(-t / 40.0), 1)  # 12 exp(-7.5) = 0.007 deg/h: over within the record
+    assert not any(r.id == "warm_up.extrapolated" for r in short.reasons)
+
+
 def test_a_warm_up_longer_than_the_record() -> None:
     """3 exp(-t/2000) over 300 s is a slope: neither size nor time constant has a value, nor the time until warm."""
     since = np.tile(2.5 + 5.0 * np.arange(60), 2)
