@@ -18,6 +18,7 @@ from .tables import SCALES
 
 #: parameter of imu and imu_compensator -> the coefficients of its elements
 PARAMETERS = {"gyro_bias": "bg", "gyro_scale": "Sg", "g_sensitivity": "G", "acc_bias": "ba", "acc_scale": "Sa"}
+BEYOND = ("bgT4", "baT4", "SgT3", "SaT3")  # powers of the temperature that the part does not have
 UNITS = {"gyro_bias": "rad/s", "gyro_scale": "1", "g_sensitivity": "rad/s", "acc_bias": "m/s2", "acc_scale": "1"}
 
 
@@ -31,6 +32,11 @@ def values_of(result: Result) -> dict[str, tuple[Any, Any, str]]:
         raise UsageError(
             f"--fit-to imu_compensator: the record is in counts ({', '.join(counted)}); the part takes rad/s and m/s2. "
             "State the nominal scale factors in a column map"
+        )
+    if more := [n for n in by_name if n.partition("_")[0] in BEYOND]:
+        raise UsageError(
+            f"--fit-to imu_compensator: the record shows {', '.join(more)}, powers of the temperature that the part "
+            "does not have. Reduce it with nuisances = none (the nearest lower powers), or over narrower temperatures"
         )
 
     def of(name: str) -> tuple[float, float]:

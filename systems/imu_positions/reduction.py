@@ -54,6 +54,7 @@ from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
 LEAST_SPAN = 3.0  # K, from which on a record is one over temperature
+POWERS = ("", "", "²", "³", "⁴")
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
 
 
@@ -107,13 +108,28 @@ class ImuChannel(DriftReduction[ImuSetup]):
         )  # fmt: skip
 
     def _candidates(self) -> list[Candidate]:
-        """Return trend and temperature of the bias."""
+        """Return trend and temperature of the bias; over temperature the power beyond its order."""
         c = self.channel
         taken = "temperature" if self.thermal is not None else "-"  # the model has more of it
         rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items() if not n.startswith(taken)}
-        if c.gyro:
-            return nuisances.common(rows, f" {c.name}")
-        return [f for f in nuisances.common(rows, f" {c.name}", nuisances.FORCE) if not f.scatter]
+        of = nuisances.DRIFT if c.gyro else nuisances.FORCE
+        found = [f for f in nuisances.common(rows, f" {c.name}", of) if c.gyro or not f.scatter]
+        return found if self.thermal is None else [*found, *self._powers(self.thermal, of)]
+
+    def _powers(self, thermal: Thermal, of: nuisances.Read) -> list[Candidate]:
+        """Return the powers of bias and scale factor beyond their orders: what a lower one would take for its own."""
+        c, (bias, scale) = self.channel, thermal.orders
+        own = self.kinematics.felt[0 if c.gyro else 1][self.rows, c.axis]
+        kinds = [("b", "bias", bias + 1, of.unit, of.scale, thermal.higher())]
+        if self.scaled:
+            kinds.append(("S", "scale factor", scale + 1, "ppm", 1e-6, thermal.grown(own)))
+        return [
+            Candidate(
+                f"{kind}{c.kind}T{n if n > 1 else ''}_{c.letter}", f"{word} of the {c.words} by T to the power of {n}",
+                f"{unit}/K{POWERS[n]}", size, columns[:, 0],
+            )
+            for kind, word, n, unit, size, columns in kinds
+        ]  # fmt: skip
 
     def error(self, found: Findings, omega: Array, force: Array) -> Array:
         """Return the error of the data where rate and specific force are other ones by these (n, 3)."""
@@ -139,8 +155,8 @@ class ImuChannel(DriftReduction[ImuSetup]):
         return out
 
     def test(self, found: Findings) -> None:
-        """Add an F test of constants of each phase: errors of single positions, nonlinearity; over temperature one of
-        plays of another width.
+        """Add an F test of constants of each phase: errors of single positions, nonlinearity; over temperature those of
+        plays of another width, of higher powers, of misalignments that follow it.
         """
         phase = np.asarray(self.windows["phase"])[self.rows]
         block = np.array([phase == p for p in np.unique(phase)], dtype=float).T
@@ -154,6 +170,28 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "plays of a third and of three times the width",
                 "the hysteresis has another width than is stated (hysteresis_width), or the temperature is late",
                 "no hysteresis of another width is in the residuals",
+            )  # fmt: skip
+            c, more = self.channel, "take narrower temperatures, or higher orders"
+            omega, force = (v[self.rows] for v in self.kinematics.felt)
+            own, seen = (omega if c.gyro else force)[:, c.axis], [k for k in self.seen if k != c.axis]
+            found.f_test(
+                "thermal.bias", "higher powers of the bias", self.thermal.higher(), "powers beyond bias_order",
+                f"the bias follows the temperature by more than powers of this order; {more}",
+                "no higher powers of the bias are in the residuals",
+            )  # fmt: skip
+            if self.scaled:
+                found.f_test(
+                    "thermal.scale", "other terms of the scale factor", self.thermal.grown(own),
+                    "powers beyond scale_order, hysteresis, rate of change",
+                    f"the scale factor follows the temperature by more than powers of this order; {more}",
+                    "no other terms of the scale factor are in the residuals",
+                )  # fmt: skip
+            found.f_test(
+                "thermal.axes", "axes over the temperature",
+                self.thermal.turned(np.column_stack([omega[:, seen], force]) if c.gyro else force[:, seen]),
+                "misalignments, g-sensitivity that follow the temperature",
+                "misalignments or g-sensitivity change with the temperature, which the model has as constant",
+                "misalignments and g-sensitivity do not follow the temperature",
             )  # fmt: skip
 
     def account(self, found: Findings) -> Account:

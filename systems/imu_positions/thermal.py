@@ -88,6 +88,19 @@ class Thermal:
         grown = [own * p for p in self.powers[:scale]] if scaled else []
         return constant, np.column_stack(grown) if grown else np.empty((own.size, 0))
 
+    def higher(self) -> Array:
+        """Return two powers more of the bias (n, 2)."""
+        return np.column_stack([self.powers[0] ** (self.orders[0] + k) for k in (1, 2)])
+
+    def grown(self, own: Array) -> Array:
+        """Return two powers more, hysteresis and rate of change of the scale factor (n, 4); own: the input (n,)."""
+        T, n = self.powers[0], self.orders[1]
+        return np.column_stack([own * x for x in (T ** (n + 1), T ** (n + 2), self.way, self.slope)])
+
+    def turned(self, inputs: Array) -> Array:
+        """Return columns (n, k) of misalignments, or g-sensitivities, that change with T: inputs (n, k)."""
+        return np.asarray(self.powers[0][:, None] * inputs)
+
 
 def _play(start: Array, path: Array, end: Array, width: float) -> Array:
     """Return the mean of a play within -1 ... 1 over each window, 0 at the first start."""

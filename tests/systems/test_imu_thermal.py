@@ -16,6 +16,7 @@ from imu_world import FACES, Heat, Unit, World, plan
 from stated import with_sizes
 
 import gyrobench as gb
+from gyrobench.bench import UsageError
 from gyrobench.commands.arguments import read_settings
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import load_system
@@ -26,6 +27,7 @@ reduction: Any = importlib.import_module(".reduction", room)
 geometry: Any = importlib.import_module(".geometry", room)
 budget: Any = importlib.import_module(".budget", room)
 tables: Any = importlib.import_module(".tables", room)
+compensation: Any = importlib.import_module(".compensation", room)
 DPH = math.pi / 648000.0
 CYCLE = [*plan(FACES, rate=0.0, dwell=40.0, count=2), *plan((), rate=1.0, turns=2)]
 
@@ -124,6 +126,42 @@ def test_a_hysteresis_of_another_width_is_named(monkeypatch: pytest.MonkeyPatch)
         found = reduction.reduce(w, setup(thermal=(3, 2, width, 0.0)))
         said = [r.text for r in found.reasons if r.id == "residuals.contradict"]
         assert any("another width than is stated" in t for t in said) == (width == 10.0)
+
+
+def _of_gyro(seed: int, bias: float, scale: float, axes: float = 0.0, **more: Any) -> Any:
+    """Result of the gyro x, six cycles: a bias (rad/s) by (T/40 K)^4, a scale factor by (T/40 K)^3, an input axis that
+    leans towards y by T/40 K (rad), beside what the model has; and its true values.
+    """
+    w, truth = heated(seed, 6, white(seed))
+    exact = World().windows(CYCLE * 6, Unit(*(np.zeros(s) for s in (3, (3, 3), (3, 3), 3, (3, 3)))))
+    T = w["temperature"] / 40.0
+    w["mean_gx"] = w["mean_gx"] + bias * T**4 + scale * T**3 * exact["mean_gx"] + axes * T * exact["mean_gy"]
+    return reduction.Reduction(w, setup(**more)).of_channel("gx").result(), truth
+
+
+@pytest.mark.long
+def test_powers_beyond_the_orders() -> None:
+    """8 deg/h by T^4 and 100 ppm by T^3 at 40 K: bgT2 was 6 to 15 u off, SgT 14 to 18, the residuals ordinary in five
+    of six.  Weighed by the data, they leave both in 3 u, and where they are not there u is wider.
+    """
+    for bias, scale in ((8.0 * DPH, 0.0), (0.0, 1e-4), (0.0, 0.0)):
+        result, truth = _of_gyro(20, bias, scale, nuisances=True)
+        for c in result.coefficients:
+            if c.name in truth:
+                si = tables.SCALES[c.unit]
+                assert abs(c.estimate * si - truth[c.name]) < 3.5 * c.u * si, (c.name, bias, scale)
+        names = {c.name for c in result.coefficients}
+        assert ("bgT4_x" in names, "SgT3_x" in names) == (bias > 0.0, scale > 0.0)
+    with pytest.raises(UsageError, match="bgT4_x, powers of the temperature that the part does not have"):
+        compensation.values_of(_of_gyro(20, 8.0 * DPH, 0.0, nuisances=True)[0])
+
+
+def test_a_model_that_leaves_out_what_follows_the_temperature_is_named() -> None:
+    """Not weighed (nuisances = none): a scale factor of 100 ppm by T^3, an axis that leans by 1 mrad at 40 K."""
+    for scale, axes, named in ((1e-4, 0.0, "thermal.scale"), (0.0, 1e-3, "thermal.axes"), (0.0, 0.0, "")):
+        result, _ = _of_gyro(1, 0.0, scale, axes)
+        assert {t.id for t in result.tests if t.id.startswith("thermal.") and (t.p or 0.0) < 1e-3} == {named} - {""}
+        assert any(r.id == "residuals.contradict" for r in result.reasons) == bool(named)
 
 
 VALUES: dict[str, Any] = {
