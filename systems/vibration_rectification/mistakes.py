@@ -10,6 +10,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import changed, exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
+from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.result import Coefficient, Reason
 
 NOTHING = 0.1  # of gravity, up less down: not that axis, or not turned over; a unit of a thousandth is below it, too
@@ -36,6 +37,18 @@ def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Re
                 "was it not turned over, or does another axis stand up?"
             )
             yield Reason("gyro.same", text, ("pass", "fail"), severity="doubt")
+
+
+def heated(found: Findings, channel: str) -> list[Reason]:
+    """Return that a temperature goes by the level, or the way, so that no fit separates what it does."""
+    for h in found.hidden:
+        if h.candidate.name.startswith("temperature") and "aliased with" in h.reason:
+            text = (
+                f"The temperature goes by the levels and ways alone ({h.reason}): what it does to the {channel} is in "
+                "these coefficients. Take levels again at another temperature, or wait until it is the same at all."
+            )
+            return [Reason("temperature.aliased", text, ("pass", "fail"), severity="doubt")]
+    return []
 
 
 def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:

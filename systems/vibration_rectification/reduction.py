@@ -219,6 +219,7 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
                 *([EAST] if self.channel == GYRO and self.setup.axis != "x" else []),
                 *([] if self.both else [one_way]),
             ],
+            reasons=mistakes.heated(found, self.channel),
             random="noise of the instrument",
         )
 

@@ -175,6 +175,21 @@ def reduced(table: list[list[float]], setup: dict[str, Any] | None = None, **col
     return Reduction.reduce(windows, VibrationSetup(**said))
 
 
+def test_a_temperature_that_goes_by_the_level_is_named() -> None:
+    """1 K per g2 and 0.5 deg/h/K: G2 was 3.5 for 3 deg/h/g2, 129 u off.  Of two repetitions at temperatures that
+    differ by 2 K the temperature is weighed, and G2 comes back.
+    """
+    table = rows()
+    level = np.array([row[3] for row in table])
+    for more, named in ((0.0, True), (2.0, False)):
+        T = level**2 + more * (np.arange(level.size) // 4 % 2)
+        heated = [[*row[:4], row[4] + 0.5 * t, row[5]] for row, t in zip(table, T, strict=True)]
+        result = reduced(heated, temperature=293.0 + T)
+        assert any(r.id == "temperature.aliased" and "aliased with b_g, G2" in r.text for r in result.reasons) == named
+        G2 = next(c for c in result.coefficients if c.name == "G2")
+        assert (abs(G2.estimate - 3.0) > 10.0 * G2.u) == named
+
+
 def test_a_lean_by_itself_up_and_down_is_in_u() -> None:
     """1 mrad about each axis.  A level gyro sees 15.041 °/h times a turn about north or up, whatever the latitude, and
     12 °/h/g times gravity along two axes across: 15.04 and 17.0 m°/h in each way, mean and half difference of two ways
