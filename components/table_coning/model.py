@@ -15,10 +15,11 @@ class TableConing(Component):
         w = theta' n + sin(theta) n' - (1 - cos theta) n x n'           body rate          [TEST-CONING; Bortz 1971]
         omega = face (mean of w over the step + C Earth rate + C (0, 0, twist)),   f = face C f_local
 
-    psi = 2 pi frequency (t - begin of the phase); theta opens from 0 to half_angle by (1 - cos)/2 within ramp, and
-    closes by the same law when the phase is over, before that of the next one opens.  The mean of w is exact while the
-    half-angle is constant: sin(theta) (n2 - n1) and -(1 - cos theta)(psi2 - psi1) over h.  attitude is the quaternion
-    of the plate without face, as the table reads it: a twist about the axis of the cone while it is open is not in it.
+    psi = 2 pi frequency (t - begin of the phase); theta opens from 0 to (1 + angle_gain) half_angle by (1 - cos)/2
+    within ramp, and closes by the same law when the phase is over, before that of the next one opens.  The mean of w is
+    exact while the half-angle is constant: sin(theta) (n2 - n1) and -(1 - cos theta)(psi2 - psi1) over h.  attitude is
+    the quaternion of the plate without face, as the table reads it: a twist about the axis of the cone while it is open
+    is not in it.
     Not modelled: servo and resonances of the table, distance of the instrument from the tip of the cone, what twist
     does to the direction of gravity and Earth rate.
     Source: Goodman 1958; Bortz 1971; own form.
@@ -26,11 +27,12 @@ class TableConing(Component):
 
     version = "1.0.0"
 
-    simulates = (each("twist", ("table.twist",)),)
+    simulates = (each("twist", ("table.twist",)), each("angle_gain", ("table.angle_gain",)))
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     face = Rotation("rows: axes x, y, z of the case in table axes")
     ramp = Parameter(0.5, "s", "time in which the cone opens, and closes", above=0.0)
+    angle_gain = Parameter(0.0, "1", "relative error of the half-angle", above=-1.0)
     twist = Parameter(0.0, "rad/s", "turn about the axis of an open cone that the table does not read")
 
     f_local = Input([0.0, 0.0, 9.80665], "m/s2", "specific force at the site, ENU")
@@ -67,7 +69,7 @@ class TableConing(Component):
         """Begin the cone of the running phase."""
         self.part = self.phase
         self.frequency = self.frequency_wanted
-        self.size = clip(self.half_angle_wanted, 0.0, WIDEST)
+        self.size = clip((1.0 + self.angle_gain) * self.half_angle_wanted, 0.0, WIDEST)
         self.t_begin = self.t
         self.t_end = -1.0
 

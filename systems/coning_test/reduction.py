@@ -48,7 +48,7 @@ from gyrobench.units import DEG, DPH
 
 from . import mistakes
 from .closed import AXES, Chain, cone_rate
-from .sources import TWIST
+from .sources import HALF_ANGLE, TWIST
 
 COLUMNS = ("t_start", "t_end", *(f"drift_{a}" for a in AXES))
 LEAST = 2  # readings at rest, and at each cone
@@ -131,7 +131,9 @@ class ConingAxis(DriftReduction[ConingSetup]):
         return out
 
     def effects(self, found: Findings) -> list[Effect]:
-        """Return the sources: a case turned by e on its plate shows d - e x d; a twist counts while the plate cones."""
+        """Return the sources: a case turned by e on its plate shows d - e x d; a twist counts while the plate cones;
+        all drifts go by 1 - cos theta.
+        """
         s, own, out = self.setup, AXES.index(self.axis), []
         for k, a in enumerate(AXES):
             change = -np.cross(np.eye(3)[k], self.by_cones)[:, own]
@@ -139,6 +141,9 @@ class ConingAxis(DriftReduction[ConingSetup]):
                 out.append(TURNED[a].effect(s, found.error(change)))
         if self.axis == s.axis:
             out.append(TWIST.effect(s, found.error(np.where(self.cones.number >= 0, 1.0, 0.0))))
+        theta = np.asarray(self.windows["half_angle"], dtype=float)
+        grown = theta / np.tan(np.where(theta, theta, 1.0) / 2.0)  # theta sin theta/(1 - cos theta)
+        out.append(HALF_ANGLE.effect(s, found.error(self.by_cones[:, own] * grown)))
         return [*out, TIME_BASE.effect(s, found.error(-self.means[:, own]))]
 
     def account(self, found: Findings) -> Account:

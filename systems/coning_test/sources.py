@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from gyrobench.reduction.setup.sources import Source
 
+HALF_ANGLE = Source(
+    "table.angle_gain", "half-angle of the cones", "1", "u_half_angle", "relative, positive where it is larger",
+    doc="relative standard uncertainty of the half-angle",
+)  # fmt: skip
 TWIST = Source(
     "table.twist", "steady turn of the table about the axis of the cone", "rad/s", "u_twist",
     doc="std. unc. of a steady turn of the table about the axis of the cone",

@@ -140,6 +140,21 @@ def test_set_up_errors_are_predicted(session: Session) -> None:
     assert found["d_y(31 Hz)"].estimate == pytest.approx(found["d_z(31 Hz)"].estimate * 1.0 / 60.0 * DEG, rel=1e-2)
 
 
+def test_a_half_angle_that_is_another_one(session: Session) -> None:
+    """0.1 % wider, stated as u: theta sin theta/(1 - cos theta) = 2 - theta^2/6 of it, 0.2 % of the drift of all axes;
+    by the same part the budget has it in u."""
+    quiet = dict.fromkeys(load_system(NAME).noises, 0.0)
+    values = {**SHORT, "frequencies": "31", "coning": False, "half_angle": DEG, "u_half_angle": 1e-3}
+    record = session.run({**values, **quiet, "imu.gyro_bias": [0.0] * 3, "table.angle_gain": 1e-3})
+    result = load_system(NAME).with_values(values).reduce(record)
+    found = {c.name: c for c in result.coefficients}
+    shift = {row[0]: row[-3] for t in result.tables if t.id.startswith("budget.predicted") for row in t.rows}
+    c = found["d_z(31 Hz)"]
+    assert c.u == pytest.approx(2e-3 * abs(c.estimate), rel=1e-2)
+    assert shift["d_z(31 Hz)"] == pytest.approx(2e-3 * c.estimate, rel=1e-2)
+    assert c.estimate - c.truth == pytest.approx(2e-3 * c.truth, rel=1e-2)
+
+
 # ------------------------------------------------------------------------------------------------ files
 def rows(axis: int = 2, noise: float = 0.05, sense: float = 1.0, factor: float = 1.0) -> list[list[float]]:
     """Drifts (deg/h) of increments taken for rotations, 10 ms: c (sin x/x - 1) about the axis of the cone, by hand."""
