@@ -11,6 +11,7 @@ Not modelled: drift slower than the record beyond a linear trend, change of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -37,6 +38,7 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Group,
     Quantity,
+    Reason,
     Record,
     Regression,
     RunDocument,
@@ -50,6 +52,8 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.units import DPH
 
 LEAST = 8  # readings
+MOST = 100.0  # Earth rates that a torquer may hold at rest in a sound record
+QUIETEST = 2e-6  # deg/sqrt(h), a twentieth of the best gyros' angle random walk
 RATE_SCALE = replace(TORQUER_SCALE, id="gyro.scale_factor", name="scale factor of the rate gyro", large=())
 
 
@@ -155,11 +159,28 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             closed_caption="Least squares under the noise model; closed: ω_IA − "
             + ("the mean rate" if s.rate else "k times the mean current"),
             tables=[_table(s, self.current, self.t0, self.t1, self.book)],
+            reasons=self._of_unit(found),
             repeatability={} if trend is None else {
                 "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
                 "record / s": float(np.ptp(self.middle)),
             },
         )  # fmt: skip
+
+    def _of_unit(self, found: Findings) -> list[Reason]:
+        """Return that a torque, or its noise, is that of no gyro: of a current in A given as mA, or the other way."""
+        s = self.setup
+        if s.rate or s.truth is not None or found.ideal:
+            return []
+        torque = abs(s.k * float(np.mean(self.current)))
+        walk = found.residual_std * math.sqrt(float(np.mean(self.t1 - self.t0)) / 3600.0)
+        if torque > MOST * s.earth_rate:
+            said = f"The torquer holds {torque / DPH:.3g} °/h at rest, {torque / s.earth_rate:.3g} times the Earth rate"
+        elif walk < QUIETEST:
+            said = f"The readings scatter as an angle random walk of {walk:.1g} °/√h does, less than that of any gyro"
+        else:
+            return []
+        text = f"{said}. Is the current in the unit that is given (mA, not A), and k the scale factor of this torquer?"
+        return [Reason("current.unit", text, ("pass", "fail"), severity="doubt")]
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [

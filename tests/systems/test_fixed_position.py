@@ -227,6 +227,20 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Command) -> 
             load().read_measured(tmp_path / "bad.csv", {})
 
 
+@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (1e3, "1.03e+03 times the Earth rate"), (1e-3, "less than that")])
+def test_a_current_in_another_unit(tmp_path: Path, factor: float, said: str) -> None:
+    """0.9 mA of 17.2 deg/h/mA are 15.5 deg/h, 1.03 of 15.04 deg/h; in mA of A 1029 times the Earth rate.  A scatter of
+    0.0002 mA, 0.0034 deg/h in a minute, is a random walk of 0.0034 sqrt(1/60) = 4.4e-4 deg/sqrt(h), of a thousandth
+    4.4e-7.
+    """
+    current = 0.9 + 2e-4 * np.random.default_rng(1).normal(size=40)
+    rows = "".join(f"{60 * k},{60 * k + 60},{factor * x:.12g}\n" for k, x in enumerate(current.tolist()))
+    head = "# latitude = 45.75deg\n# k = 17.2deg/h/mA\n# attitude = E U -N\n# type_b = none\n"
+    (tmp_path / "lab.csv").write_text(f"{head}t_start [s],t_end [s],mean [mA]\n{rows}", encoding="utf-8")
+    reasons = load().reduce(load().read_measured(tmp_path / "lab.csv", {})).reasons
+    assert [said in r.text and "mA, not A" in r.text for r in reasons if r.id == "current.unit"] == [True] * bool(said)
+
+
 @pytest.mark.long
 def test_days(session: Session, tmp_path: Path) -> None:
     """Eight turn-ons of rms 0.2 deg/h: mean, sigma (n - 1), t interval; the scatter is found significant."""
