@@ -79,7 +79,7 @@ WARM_UP = Sheet(
         Mistake("saturation", "readings held at 12 °/h", "a range was reached", clipped),
         Mistake("not settled", "each turn-on left after a time constant", "longer|within the record", cut_short),
         Mistake("axis exchanged", "another attitude from the fifth turn-on on", "another attitude", moved),
-        Mistake("position forgotten", "readings of two turn-ons mixed", "exchanged|turn-on", mixed),
+        Mistake("position forgotten", "readings of two turn-ons mixed", "exchanged|from turn-on to turn-on", mixed),
     ),
 )  # fmt: skip
 
