@@ -341,9 +341,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return the sources: a slow clock makes the time constants too small; as a share of them, not of the data."""
-        values = np.array(
-            [-v if q.unit == SECONDS else 0.0 for q, v in zip(found.quantities, found.value, strict=True)]
-        )
+        values = np.array([-v * (q.unit == SECONDS) for q, v in zip(found.quantities, found.value, strict=True)])
         return [TIME_BASE.effect(self.setup, None, values=values)]
 
     def test(self, found: Findings) -> None:
@@ -395,8 +393,10 @@ class Reduction(DriftReduction[TurnOnSetup]):
             "σ_on": "Repeatability of the bias from turn-on to turn-on {σ_on}.", "σ_day": "From day to day {σ_day}.",
             "t_w": f"Within {self.setup.limit / DPH:.4g} °/h after {{t_w}}.",
         }  # fmt: skip
-        sentences = told(coefficients, *(text for n, text in said.items() if n in names))
-        return [*sentences, found.noise_sentence("readings")]
+        return [
+            *told(coefficients, *(text for n, text in said.items() if n in names)),
+            found.noise_sentence("readings"),
+        ]
 
 
 reduce = Reduction.reduce
