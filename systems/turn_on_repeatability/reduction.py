@@ -55,10 +55,6 @@ FEW = 4  # readings of a turn-on from which on a warm-up is looked for
 MEANT = "time constant of the warm-up: after it 1/e is left"
 SECONDS = "s"
 ENDLESS = "longer than the record tells"
-HIDDEN = (
-    "Intervals of the warm-up allow for a second exponential that the record does not exclude; of two, those of the "
-    "bias when warm and of the time until it is warm for a third."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -370,7 +366,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             equation='y - omega = b_i + sum_k A_k e^(-t\\/tau_k)' if q else "y - omega = b_i",
             conventions=[
                 f"Exponentials of the warm-up of the bias: {q}, the same in all turn-ons.",
-                *([HIDDEN] if q and self.setup.exponentials < 0 else []),
+                *([shape.HIDDEN] if q and self.setup.exponentials < 0 else []),
                 "σ_on, σ_day: standard deviations of the population, less the noise of the biases; intervals by "
                 "generalized pivotal quantities, 0 where the record shows none.",
                 f"{self.count} turn-ons on {np.unique(self.day).size} days.",
@@ -393,10 +389,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
             "σ_on": "Repeatability of the bias from turn-on to turn-on {σ_on}.", "σ_day": "From day to day {σ_day}.",
             "t_w": f"Within {self.setup.limit / DPH:.4g} °/h after {{t_w}}.",
         }  # fmt: skip
-        return [
-            *told(coefficients, *(text for n, text in said.items() if n in names)),
-            found.noise_sentence("readings"),
-        ]
+        sentences = told(coefficients, *(text for n, text in said.items() if n in names))
+        return [*sentences, found.noise_sentence("readings")]
 
 
 reduce = Reduction.reduce

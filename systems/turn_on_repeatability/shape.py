@@ -16,6 +16,10 @@ OTHER = (
     "the warm-up is not one or two exponentials: the bias when warm, sizes and times are those of another curve",
     "the warm-up has the shape of the exponentials found",
 )
+HIDDEN = (
+    "Intervals of the warm-up allow for a second exponential that the record does not exclude; of two, those of the "
+    "bias when warm and of the time until it is warm for a third."
+)
 BANDS = 12  # of the time since the turn-on, even in its logarithm
 
 
