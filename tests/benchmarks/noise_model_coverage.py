@@ -47,7 +47,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
 
 
 FINE = 8  # steps of an oscillator to a sample
-KINDS = ("wild", "step", "line", "missing")
+KINDS = ("wild", "step", "line", "missing", "gaps")
 MIXED = "any"
 
 
@@ -89,6 +89,10 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = step * np.rint(x / step)
     if "missing" in kinds:
         x = np.where(rng.random(n) < 0.1, math.nan, x)
+    if "gaps" in kinds:
+        begin = np.flatnonzero(rng.random(n) < 1e-3)
+        for a, b in zip(begin, begin + rng.geometric(0.01, begin.size), strict=True):
+            x[a:b] = math.nan
     return np.asarray(x)
 
 

@@ -25,15 +25,18 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
+from gyrobench.reduction.noise_model.gap_completion import completed_by
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
-from gyrobench.reduction.noise_model.steps import largest_step
+from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
+
+Parts = list[tuple[NoiseTerm, Array]]
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
@@ -141,33 +144,52 @@ def _steps_of(treated: Treated, found: ModelSearch, means: bool) -> list[PlacedS
     """
     bound = 2.0 * math.log(treated.samples) + RATIO
     fits, steps = found.ranked[:3], list[PlacedStep]()
+
+    def ratios(i: int, parts: Parts, less: Sequence[PlacedStep]) -> tuple[Array, Array, Array]:
+        """Return what :func:`step_ratios` does of a stretch less steps, under a model."""
+        x, angle = treated.completed(i, less), sum(float(t.angle(p)) for t, p in parts)
+        S = _spectrum_of(x.size, parts, means)
+        return step_ratios(completed_by(x, treated.stretches[i].gone, S), S, angle)
+
+    def under(fits: list[Fitted]) -> Parts:
+        at = min(fits, key=lambda f: f.value)
+        return [*split(at.model, at.p), *found.resonances]
+
+    def stands(i: int, step: LevelStep, without: list[Fitted]) -> bool:
+        """Return whether the samples that are there show a step under the model without it: ordinates that completed
+        samples are in count for less, and so does the jump that a step is for drift without one.
+        """
+        near = slice(max(step.at - EDGE, 0), step.at + EDGE + 1)
+        return float(ratios(i, under(without), steps)[0][near].max()) > bound
+
     while len(treated.steps) + len(steps) < STEPS:
         at = max(fits, key=lambda f: f.evidence)
         fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
         tried: list[tuple[PlacedStep, list[Fitted]]] = []
         for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
-            parts = [*split(model, p), *found.resonances]
-            places, angle = [], sum(float(t.angle(q)) for t, q in parts)
-            for i in range(len(treated.stretches)):
-                x = treated.completed(i, steps)
-                step, ratio = largest_step(x, _spectrum_of(x.size, parts, means), angle)
-                places.append((ratio, i, step))
-            ratio, i, step = max(places, key=lambda c: c[0])
+            each = [largest_step(*ratios(i, [*split(model, p), *found.resonances], steps))
+                    for i in range(len(treated.stretches))]  # fmt: skip
+            i = max(range(len(each)), key=lambda i: each[i][1])
+            step, ratio = each[i]
             if ratio < bound:
                 continue
             data = treated.ordinates(means, less=[*steps, (i, step)])
             data.hold(found.resonances)
-            tried.append(((i, step), [maximize(data, found.prior, f.model, f.p) for f in fits]))
+            without = [maximize(data, found.prior, f.model, f.p) for f in fits]
+            if not treated.stretches[i].gone.size or stands(i, step, without):
+                tried.append(((i, step), without))
         if not tried:
             break
         one, without = min(tried, key=lambda t: min(f.value for f in t[1]))
         if min(f.value for f in fits) - min(f.value for f in without) < bound:
             break
         fits, steps = without, [*steps, one]
-    return steps
+    # what fast terms alone make of a step knows no drift: each again beside the others, under the model of all
+    others = [steps[:k] + steps[k + 1 :] for k in range(len(steps))]
+    return [(i, largest_step(*ratios(i, under(fits), less))[0]) for (i, _), less in zip(steps, others, strict=True)]
 
 
-def _spectrum_of(n: int, parts: list[tuple[NoiseTerm, Array]], means: bool) -> Array:
+def _spectrum_of(n: int, parts: Parts, means: bool) -> Array:
     """Return the spectrum (n,) of terms at the ordinates of a stretch, interpolated; 1 for that of the mean."""
     k = np.arange(1.0, n)
     few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))

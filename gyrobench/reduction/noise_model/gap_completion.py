@@ -11,9 +11,7 @@ others, so each change is carried on by half of itself and more.  [DRIFT-NOISE-M
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage, special
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.precision import FIRST, Precision, ordinates, smooth_spectrum
 
 FALSE = 0.002  # samples of a record that are called wild by chance; with estimates of noise and scatter 0.004
 LOWEST, CHANCE = 3.7, 0.03  # limit in a record of many wild samples: part of them that may be the noise's own
@@ -32,22 +31,18 @@ SWEEPS, LEAKS = 8, 0.1  # of wild samples; what is less than a part of the large
 AGAIN = 3.0  # of the limit of a sample alone: what is less far off is judged once more
 ENDS = 64  # samples from an end, within which the transform takes the noise for another one than it is
 ROUNDS, MOST_ROUNDS, AVERAGED = 4, 24, 8  # of spectrum and completion, at least, at most; the last that are averaged
-RESTS, STAYS = 0.03, 0.1  # change of the logarithm of a spectrum that needs no more rounds, and after the last
+RESTS, STAYS = 0.01, 0.03  # change of the logarithm of a spectrum that needs no more rounds, and after the last
 ONWARD = 1.8  # how far the change of a round is carried on
 MOST_LOST = 0.5  # of the power in an octave: where less is known, noise of several kinds is not told apart
 DRAWS = 40_000  # samples of all draws of a round; one at least, four at most
-ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 BLOCK = 256  # samples of a median, of the level that wild samples do not move
-SMOOTH = 0.03  # of the frequency
+PARTS_OF_OCTAVE = 8  # in which the rounds come to rest: the zero of a filter takes up some of them
 WHITE = 0.5  # of the least spectrum: the most that the excess of the core may be
-EVEN = (
-    0.2  # of the residuals independent, at least, for their core to be known: where they hang together by a gap of the
-)
-# spectrum, smaller wild samples are found
+# of the residuals independent, at least, for their core to be known: where they hang together by a gap of the spectrum,
+# smaller wild samples are found
+EVEN = 0.2
 BELOW = 0.5  # of the power of the wild samples: the most that is wild below the limit; where it is more, the tails are
 # continuous and the noise's own.  Of wild samples of normal sizes, 3.4 times the noise or more, it is less
-FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
-NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
 SEED = 90125
 
 
@@ -75,87 +70,6 @@ class Completed:
     def drawn(self) -> Array:
         """Return the stretch (n,) with what was missing or wild drawn from the noise around."""
         return self.x if self.noise is None else self.x + self.noise
-
-
-@functools.lru_cache(maxsize=1)
-def _means_about(n: int) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
-    """Return, of the means about each of the ordinates 1 .. n - 1, the ordinate before the first one, the last one, and
-    their number.
-    """
-    k = np.arange(1, n)
-    half = np.maximum(6, (SMOOTH * k).astype(int))
-    # one-sided at the ends would be biased by the slope: as far on the one side as on the other
-    near = np.minimum(half, np.minimum(k - 1, n - 1 - k))
-    near = np.maximum(near, np.minimum(2, np.minimum(k - 1, n - 1 - k)))
-    return (k - near - 1).astype(np.int32), (k + near).astype(np.int32), 2.0 * near + 1.0
-
-
-def smooth_spectrum(power: Array) -> Array:
-    """Return a smoothed spectrum (n,) of powers (n,) of ordinates; that of the mean, k = 0, is very large."""
-    n = power.size
-    total = np.concatenate([[0.0], np.cumsum(power[1:])])
-    before, last, count = _means_about(n)
-    broad = (total[last] - total[before]) / count
-    fine = ndimage.uniform_filter1d(power[1:], NARROW, mode="reflect")
-    out = np.empty(n)
-    out[1:] = np.where((fine > ABOVE * broad) & (np.arange(1, n) > 30), fine, broad)
-    out[1:] = np.maximum(out[1:], 1e-12 * float(np.mean(power[1:])))
-    # nothing holds a mean of few ordinates up when completion and spectrum follow one another
-    out[1:FIRST] = np.maximum(out[1:FIRST], LEAST * out[min(FIRST, n - 1)])
-    out[0] = 100.0 * n * float(np.max(out[1:]))
-    return out
-
-
-def ordinates(x: Array) -> Array:
-    """Return those of the cosine transform of a series (n,)."""
-    out: Array = fft.dct(x, norm="ortho")
-    return out
-
-
-class _Precision:
-    """Products with the precision P of a spectrum S (n,)."""
-
-    def __init__(self, S: Array) -> None:
-        self.S = S
-
-    def __call__(self, x: Array) -> Array:
-        return self.of(ordinates(x))
-
-    def of(self, X: Array) -> Array:
-        """Return the product with the series of ordinates X (n,)."""
-        out: Array = fft.idct(X / self.S, norm="ortho")
-        return out
-
-    @functools.cached_property
-    def diagonal(self) -> float:
-        return float(np.mean(1.0 / self.S))
-
-    def solve(self, at: NDArray[np.int64], right: Array) -> Array:
-        """Return P_mm^-1 right (m,) by conjugate gradients."""
-        full = np.zeros(self.S.size)
-
-        def product(v: Array) -> Array:
-            full[at] = v
-            out: Array = self(full)[at]
-            return out
-
-        return _conjugate_gradients(product, right)
-
-
-def _conjugate_gradients(product: Callable[[Array], Array], right: Array) -> Array:
-    x, r = np.zeros_like(right), right.copy()
-    d, rr = r.copy(), float(r @ r)
-    stop = EXACT**2 * rr
-    for _ in range(ITERATIONS):
-        if rr <= stop:
-            break
-        q = product(d)
-        step = rr / float(d @ q)
-        x += step * d
-        r -= step * q
-        rr, old = float(r @ r), rr
-        d = r + rr / old * d
-    return x
 
 
 def level(x: Array) -> Array:
@@ -237,7 +151,6 @@ def core_excess(z: Array) -> float:
 
 def complete(x: Array, find_wild: bool = True) -> Completed:
     """Return a stretch (n,), NaN where a sample is missing, completed; wild samples are found and count as missing."""
-    rng = np.random.default_rng(SEED)
     missing = ~np.isfinite(x)
     wild = np.zeros(x.size, dtype=bool)
     base = level(x)
@@ -258,8 +171,9 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         if k >= ROUNDS and change < RESTS:
             break
         last = k - (MOST_ROUNDS - AVERAGED)
+        rng = np.random.default_rng([SEED, max(last, 0)])  # the same draws: what changes is the spectrum
         S = now if S is None or k == 1 or last >= 0 else S * (now / S) ** ONWARD
-        P = _Precision(S)
+        P = Precision(S)
         y = _filled(x, missing | wild, P)
         if k == 1 and wild.any():
             # what was wild beside a wilder one may be none by what the others say of it: it is judged once more
@@ -307,22 +221,23 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
 
 
 def _lacking(
-    P: _Precision, at: NDArray[np.int64], kept: NDArray[np.int64], draws: int, rng: np.random.Generator
+    P: Precision, at: NDArray[np.int64], kept: NDArray[np.int64], draws: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Return the powers (n,) that the completion of the samples ``at`` lacks at those of them that are ``kept``, as a
     mean of draws, and the last draw (n,).
     """
     lost, noise = np.zeros(P.S.size), np.zeros(P.S.size)
+    solve = P.solver(at)
     for _ in range(draws):
         full = np.zeros(P.S.size)
-        full[at] = P.solve(at, fft.idct(rng.standard_normal(P.S.size) / np.sqrt(P.S), norm="ortho")[at])
+        full[at] = solve(fft.idct(rng.standard_normal(P.S.size) / np.sqrt(P.S), norm="ortho")[at])
         noise = np.zeros(P.S.size)
         noise[kept] = full[kept]
         lost += ordinates(noise) ** 2 / draws
     return lost, noise
 
 
-def _own_ends(x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: _Precision) -> NDArray[np.int64]:
+def _own_ends(x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: Precision) -> NDArray[np.int64]:
     """Return the wild samples near an end of x (n,) that differ from what the others say of them by no more than the
     noise does there.
 
@@ -339,9 +254,10 @@ def _own_ends(x: Array, wild: NDArray[np.bool_], missing: NDArray[np.bool_], P: 
     S[0] = S[1]
     highest = float(-special.ndtri(0.5 * FALSE / n))
     off, size = np.empty(near.size), np.empty(near.size)
+    solve = P.solver(at)
     for i, t in enumerate(near.tolist()):
         full = np.zeros(n)
-        full[at] = P.solve(at, (at == t).astype(float))
+        full[at] = solve((at == t).astype(float))
         w = P(full)
         W = np.abs(np.fft.rfft(w, 2 * n)) ** 2
         W[1:-1] *= 2.0
@@ -359,26 +275,43 @@ def mostly_known(x: Array, extra: Array | None) -> bool:
 
 
 def changed(now: Array, before: Array) -> float:
-    """Return the largest mean change of the logarithm of a spectrum (n,) over an octave."""
-    return float(np.max(np.abs(octaves(np.log(now / before)))))
+    """Return the largest mean change of the logarithm of a spectrum (n,) over parts of an octave."""
+    return float(np.max(np.abs(octaves(np.log(now / before), PARTS_OF_OCTAVE))))
 
 
-def octaves(x: Array) -> Array:
-    """Return the means of ordinates (n,) over octaves, from the eighth on."""
+def octaves(x: Array, parts: int = 1) -> Array:
+    """Return the means of ordinates (n,) over octaves, or over parts of them, from the eighth on."""
     edges = FIRST * 2 ** np.arange(max(int(math.log2(x.size / FIRST)), 1))
+    if parts > 1:
+        edges = np.unique(np.round(edges[:, None] * 2.0 ** (np.arange(parts) / parts)).astype(int))
+        edges = edges[edges < x.size]
     out: Array = np.add.reduceat(x[FIRST:], edges - FIRST) / np.diff(np.append(edges, x.size))
     return out
 
 
-def _filled(x: Array, gone: NDArray[np.bool_], P: _Precision) -> Array:
+def _filled(x: Array, gone: NDArray[np.bool_], P: Precision) -> Array:
     """Return x with the conditional mean of what is gone."""
     at = np.flatnonzero(gone)
     if not at.size:
         return x.copy()
     base = level(np.where(gone, np.nan, x))  # the gradients start from it
     y = np.where(gone, 0.0, x - base)
-    y[at] = P.solve(at, -P(y + base)[at])
+    y[at] = P.solver(at)(-P(y + base)[at])
     y += base
+    return y
+
+
+def completed_by(y: Array, at: NDArray[np.int64], S: Array) -> Array:
+    """Return a completed series y (n,), its samples ``at`` with the conditional mean that a spectrum S (n,) gives.
+
+    The sums of P y, by which steps are judged, are those of the samples that are there only if P completed the others.
+    """
+    if not at.size:
+        return y
+    S = S.copy()
+    S[0] = 100.0 * S.size * float(S[1:].max())
+    P, y = Precision(S), y.copy()
+    y[at] += P.solver(at)(-P(y)[at])
     return y
 
 

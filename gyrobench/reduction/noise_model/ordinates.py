@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.gap_completion import smooth_spectrum
+from gyrobench.reduction.noise_model.precision import smooth_spectrum
 from gyrobench.reduction.noise_model.terms import (
     SLOW,
     Grid,

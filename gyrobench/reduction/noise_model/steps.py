@@ -63,9 +63,8 @@ def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Arra
     return b * b / d, b / d, 1.0 / np.sqrt(d)
 
 
-def largest_step(x: Array, S: Array, q2: float = 0.0) -> tuple[LevelStep, float]:
-    """Return the step of the largest likelihood ratio, and that ratio; see :func:`step_ratios`."""
-    ratio, size, sd = step_ratios(x, S, q2)
+def largest_step(ratio: Array, size: Array, sd: Array) -> tuple[LevelStep, float]:
+    """Return the step of the largest likelihood ratio, and that ratio, of what :func:`step_ratios` returns."""
     k = int(np.argmax(ratio))
     return LevelStep(k, float(size[k]), float(sd[k])), float(ratio[k])
 

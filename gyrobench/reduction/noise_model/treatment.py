@@ -48,6 +48,11 @@ class TreatedStretch:
     done: Completed
     steps: tuple[LevelStep, ...] = ()
 
+    @property
+    def gone(self) -> NDArray[np.int64]:
+        """Return the indices of the samples that were completed."""
+        return np.union1d(np.flatnonzero(~np.isfinite(self.own)), self.done.wild)
+
 
 @dataclass(frozen=True)
 class Treated:
