@@ -8,6 +8,7 @@ proposed where names and units speak for them.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -101,6 +102,7 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
         ((w.needed, likeness(w.connector, [v], declared), -order), w, v)
         for (order, w), v in itertools.product(enumerate(lacking), free)
         if w.connector.unit != "1" or v.unit in ("", "1")  # an angle is no ratio
+        if not _of_another(w.connector.name, names) or w.connector.name.partition("_")[2].lower() in _words(v.name)
     ]
     taken: dict[str, Variable] = {}
     for (_, score, _), w, v in sorted(offers, key=lambda o: o[0], reverse=True):
@@ -110,6 +112,15 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
     lines = [_line(w, taken[w.connector.name]) for w in lacking if w.connector.name in taken]
     lines += [_left_open(w) for w in lacking if w.needed and w.connector.name not in taken]
     return ["[parameters]", *lines] if lines else []
+
+
+def _of_another(name: str, names: set[str]) -> bool:
+    """Return whether a parameter says something of another one, as k_T does of k: a k_torquer is the latter."""
+    return "_" in name and name.partition("_")[0] in names
+
+
+def _words(name: str) -> list[str]:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().split("_")
 
 
 def _left_open(w: WantedParameter) -> str:

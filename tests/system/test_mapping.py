@@ -214,6 +214,8 @@ def test_fit_command(foreign: Foreign, tmp_path: Path, command: Command) -> None
     }
     assert "# pickoff: no dependencies are declared" in written
     assert command(*arguments, "--out", file)[0] == 2  # not over what is there
+    servo = command("fit", foreign("python_gyro"), "--slot", "servo_polar.gyro")[1]
+    assert "k_torquer" not in servo, "the test needs no k, and what says something of k (k_T, k_E) is not k"
     code, text, err = command("fit", foreign("lag"), "--slot", "Rebalance")
     assert code == 0
     assert "# [i]  # torquer current, A: name the FMU's output, or state the value" in text
