@@ -202,10 +202,15 @@ class ImuChannel(DriftReduction[ImuSetup]):
             )
         else:
             equation = f'f_"read,{c.letter}" - f_{c.letter} = b_a + sum_k S_(a,k) f_k'
-        warm = []
+        more = []
+        if c.gyro:
+            more = [
+                "Scale factors are those at the rates of the turns: what of them changes with the rate is in them and "
+                "not in their uncertainties; rate_table_test shows it."
+            ]
         if self.thermal is not None:
             equation += " + sum_n b_n T^n + b_H z + b_R dot(T) + sum_n s_n T^n times upright(input)"
-            warm = [
+            more += [
                 "T: temperature above that of the coefficients, even within a window; z: a play within −1 … 1, 1 while "
                 "it rises; the last terms are those of bias and scale factor over the temperature [IMU-THERMAL]."
             ]
@@ -223,7 +228,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "Axes x, y, z of the case are those of the plate, which carries it; local frame east, north, up; outer "
                 "table axis level and east, table angles right-handed.",
                 f"Gravity {s.gravity:.6f} m/s² and Earth rate are taken as known; the accelerometers are read at rest.",
-                *warm,
+                *more,
             ],
             reasons=[Reason("rates.unseen", t) for t in geometry.unseen_rates(self.seen)] if c.gyro else [],
             random="noise of the instrument",
