@@ -283,7 +283,10 @@ def _known(session: Session, nominal: Mapping[str, Any], name: str, slot_tuned: 
     numbers = {k: v for n, v in nominal.items() if n.startswith(slot + ".") for k, v in flatten(n, v).items()}
     value = numbers.get(name)
     if bound is None or isinstance(value, bool) or not isinstance(value, int | float):
-        known = [n.partition(".")[2] for n, v in numbers.items() if isinstance(v, float)]
+        every = [n.partition(".")[2] for n, v in numbers.items() if isinstance(v, float)]
+        if inside := [n for n in every if n.partition("[")[0] == parameter]:
+            raise UsageError(f"--over {name}: {parameter} has {len(inside)} numbers, name one: {inside[0]}")
+        known = every if "[" in parameter else dict.fromkeys(n.partition("[")[0] for n in every)
         raise UsageError(f"--over {name}: {slot} has no such number; {suggest_names(parameter, known)}")
     unit = units.unit(bound.unit or "1")
     return float(value), unit.name if unit.factor == 1.0 and not unit.offset else unit.dimension

@@ -238,6 +238,8 @@ def test_one_of_several_loops_is_named() -> None:
         tune(system, ["bandwidth>1Hz"])
     with pytest.raises(UsageError, match="--loop roll: gimbal_stabilization has no such loop"):
         tune(system, ["bandwidth>1Hz"], loop="roll")
+    with pytest.raises(UsageError, match=r"I_inner has 9 numbers, name one: I_inner\[1,1\]"):
+        tune(system, ["bandwidth>1Hz"], ["platform.I_inner=±30%"], loop="pitch")
     with pytest.raises(UsageError, match="platform_single_axis does not state what moves a line of sight"):
         tune(load_system(NAMES[0]), ["jitter=1urad"])
 
