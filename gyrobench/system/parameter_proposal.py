@@ -102,7 +102,7 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
         ((w.needed, likeness(w.connector, [v], declared), -order), w, v)
         for (order, w), v in itertools.product(enumerate(lacking), free)
         if w.connector.unit != "1" or v.unit in ("", "1")  # an angle is no ratio
-        if not _of_another(w.connector.name, names) or w.connector.name.partition("_")[2].lower() in _words(v.name)
+        if w.needed or not _of_another(w.connector.name, names) or _suffix(w.connector.name) in _words(v.name)
     ]
     taken: dict[str, Variable] = {}
     for (_, score, _), w, v in sorted(offers, key=lambda o: o[0], reverse=True):
@@ -117,6 +117,10 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
 def _of_another(name: str, names: set[str]) -> bool:
     """Return whether a parameter says something of another one, as k_T does of k: a k_torquer is the latter."""
     return "_" in name and name.partition("_")[0] in names
+
+
+def _suffix(name: str) -> str:
+    return name.partition("_")[2].lower()
 
 
 def _words(name: str) -> list[str]:
