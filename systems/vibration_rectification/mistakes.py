@@ -42,7 +42,7 @@ def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Re
 def heated(found: Findings, channel: str) -> list[Reason]:
     """Return that a temperature goes by the level, or the way, so that no fit separates what it does."""
     for h in found.hidden:
-        if h.candidate.name.startswith("temperature") and "aliased with" in h.reason:
+        if h.candidate.name.startswith("temperature") and h.aliases:
             text = (
                 f"The temperature goes by the levels and ways alone ({h.reason}): what it does to the {channel} is in "
                 "these coefficients. Take levels again at another temperature, or wait until it is the same at all."

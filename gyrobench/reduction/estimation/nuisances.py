@@ -174,10 +174,11 @@ class InTheModel(str):
 
 @dataclass(frozen=True)
 class Hidden:
-    """A candidate that this plan does not show, and why."""
+    """A candidate that this plan does not show, and why; aliases: names of those that all of it is."""
 
     candidate: Candidate
     reason: str
+    aliases: tuple[str, ...] = ()
 
 
 def observable(
@@ -211,7 +212,8 @@ def observable(
         elif y is not None and (reason := _beyond_bound(c, model, y)):
             hidden.append(Hidden(c, reason))
         elif not c.scatter and contrasts < columns.shape[1]:
-            hidden.append(Hidden(c, f"not observable: aliased with {', '.join(_partners(columns, model, known))}"))
+            aliases = tuple(_partners(columns, model, known))
+            hidden.append(Hidden(c, f"not observable: aliased with {', '.join(aliases)}", aliases))
         else:
             seen.append(c)
             if c.scatter:
