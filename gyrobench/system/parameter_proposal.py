@@ -102,7 +102,7 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
         ((w.needed, likeness(w.connector, [v], declared), -order), w, v)
         for (order, w), v in itertools.product(enumerate(lacking), free)
         if w.connector.unit != "1" or v.unit in ("", "1")  # an angle is no ratio
-        if w.needed or not _of_another(w.connector.name, names) or _suffix(w.connector.name) in _words(v.name)
+        if w.needed or _speaks_of(v.name, w.connector.name, names)
     ]
     taken: dict[str, Variable] = {}
     for (_, score, _), w, v in sorted(offers, key=lambda o: o[0], reverse=True):
@@ -114,17 +114,13 @@ def parameter_lines(description: Any, wanted: Sequence[WantedParameter]) -> list
     return ["[parameters]", *lines] if lines else []
 
 
-def _of_another(name: str, names: set[str]) -> bool:
-    """Return whether a parameter says something of another one, as k_T does of k: a k_torquer is the latter."""
-    return "_" in name and name.partition("_")[0] in names
-
-
-def _suffix(name: str) -> str:
-    return name.partition("_")[2].lower()
-
-
-def _words(name: str) -> list[str]:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().split("_")
+def _speaks_of(variable: str, name: str, names: set[str]) -> bool:
+    """Return whether a variable may be a parameter that says something of another one, as k_T does of k: only with the
+    suffix in its name; a k_torquer is k.
+    """
+    other, _, suffix = name.partition("_")
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", variable).lower().split("_")
+    return not suffix or other not in names or suffix.lower() in words
 
 
 def _left_open(w: WantedParameter) -> str:
