@@ -67,6 +67,10 @@ class Completed:
     below: float = 0.0
 
     @property
+    def lacking(self) -> Array | float:
+        return 0.0 if self.extra is None else self.extra
+
+    @property
     def drawn(self) -> Array:
         """Return the stretch (n,) with what was missing or wild drawn from the noise around."""
         return self.x if self.noise is None else self.x + self.noise
@@ -281,10 +285,8 @@ def changed(now: Array, before: Array) -> float:
 
 def octaves(x: Array, parts: int = 1) -> Array:
     """Return the means of ordinates (n,) over octaves, or over parts of them, from the eighth on."""
-    edges = FIRST * 2 ** np.arange(max(int(math.log2(x.size / FIRST)), 1))
-    if parts > 1:
-        edges = np.unique(np.round(edges[:, None] * 2.0 ** (np.arange(parts) / parts)).astype(int))
-        edges = edges[edges < x.size]
+    count = max(int(parts * math.log2(x.size / FIRST)), 1)  # the last one may be up to twice as long
+    edges = np.unique(np.round(FIRST * 2.0 ** (np.arange(count) / parts)).astype(int))
     out: Array = np.add.reduceat(x[FIRST:], edges - FIRST) / np.diff(np.append(edges, x.size))
     return out
 

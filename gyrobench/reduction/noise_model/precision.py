@@ -51,6 +51,18 @@ def smooth_spectrum(power: Array) -> Array:
     return out
 
 
+def even_across(S: Array, places: Array) -> Array:
+    """Return a smoothed spectrum S (n,) without what a line at each of the places (k,) adds to it: its logarithm is
+    straight across the ordinates that it is smoothed over.
+    """
+    S, n = S.copy(), S.size
+    for at in np.rint(places).astype(int).tolist():
+        half = max(6, int(SMOOTH * at**POWER)) + NARROW
+        low, high = max(at - half, 1), min(at + half, n - 1)
+        S[low : high + 1] = np.exp(np.interp(np.arange(low, high + 1), [low, high], np.log(S[[low, high]])))
+    return S
+
+
 def ordinates(x: Array) -> Array:
     """Return those of the cosine transform of a series (n,)."""
     out: Array = fft.dct(x, norm="ortho")

@@ -2,7 +2,7 @@
 
 A gap of more than LONG samples ends a stretch; what is missing in shorter ones, and wild samples, is completed by what
 the noise around says of it (:mod:`completion`).  Lines are found in the longest stretch and taken off the samples that
-are there, in each stretch with an amplitude and phase of its own, by least squares.  [DRIFT-NOISE-MODEL,
+are there, in each stretch with an amplitude and phase of its own (:mod:`sines`).  [DRIFT-NOISE-MODEL,
 DRIFT-PERIODIC]
 """
 
@@ -21,6 +21,7 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
+from gyrobench.reduction.noise_model.sines import sines_of, standing
 from gyrobench.reduction.noise_model.steps import LevelStep, without
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.lines import SpectralLine, find_lines
@@ -30,7 +31,6 @@ MOST = 64  # stretches that are used, the longest
 LEAST = 64  # samples of a record
 LEVELS = 32  # parts of a record whose noise is compared
 ENDS = 256  # samples of an end of a stretch that do not tell of the level
-CHUNK = 1 << 17  # samples of a sine computed at a time
 DISTINCT, OFF_STEP = 0.2, 0.05  # values of the samples of an output in steps; how far from a multiple, in steps
 
 
@@ -190,39 +190,13 @@ def treat(
     if remove_lines:
         found = find_lines(done[longest].drawn, 1.0)
         lines, full = tuple(x for x in found.lines if x.steady or wandering), found.complete
+        lines = standing(own[longest], done[longest], lines)
     if lines:
-        frequencies = np.array([x.frequency for x in lines])
         for y, d in zip(own, done, strict=True):
-            used = np.isfinite(y)
-            used[d.wild] = False
-            y -= sines(y, used, frequencies[frequencies * y.size > 3.0])
+            y -= sines_of(y, d, lines)
         done = [complete(y, find_wild) for y in own]
     stretches = tuple(TreatedStretch(s.start, y, d) for s, y, d in zip(parts, own, done, strict=True))
     return Treated(rate.size, stretches, lines, full, *_levels(stretches), find_wild, rounding)
-
-
-def sines(y: Array, used: NDArray[np.bool_], frequencies: Array) -> Array:
-    """Return the sines (n,) of the frequencies (per sample), of least squares beside level and slope."""
-    n, count = y.size, frequencies.size
-    if not count:
-        return np.zeros(n)
-
-    def columns(a: int, b: int) -> Array:
-        t = np.arange(a, b) - 0.5 * n
-        phase = 2.0 * math.pi * frequencies[:, None] * t
-        return np.concatenate([np.cos(phase), np.sin(phase), np.ones((1, t.size)), t[None] / n])
-
-    size = 2 * count + 2
-    M, right = np.zeros((size, size)), np.zeros(size)
-    for a in range(0, n, CHUNK):
-        b = min(a + CHUNK, n)
-        X = columns(a, b) * used[a:b]
-        M += X @ X.T
-        right += X @ np.where(used[a:b], y[a:b], 0.0)
-    beta = np.linalg.lstsq(M, right, rcond=1e-12)[0]
-    beta[-2:] = 0.0
-    out: Array = np.concatenate([beta @ columns(a, min(a + CHUNK, n)) for a in range(0, n, CHUNK)])
-    return out
 
 
 def _inner(z: Array) -> Array:
