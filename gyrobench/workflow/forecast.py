@@ -20,10 +20,13 @@ LONG = 120.0  # s of wall time that are left, from which a run is a long one
 WORTH = 0.1  # of the plan: what an option has to save to be named
 
 
-def forecasting(progress: Progress | None, session: Session, step: float, kept: bool, feedback: Feedback) -> Progress:
+def forecasting(
+    progress: Progress | None, session: Session, step: float, kept: bool, checked: bool, feedback: Feedback
+) -> Progress:
     """Return a progress that gives the forecast of a long run as a note, once.
 
-    step: s.  kept: whether the run has a folder, where Ctrl-C leaves its record.
+    step: s.  kept: whether the run has a folder, where Ctrl-C leaves its record.  checked: whether whole runs for
+    the effect of the step follow.
     """
     told = False
 
@@ -35,12 +38,12 @@ def forecasting(progress: Progress | None, session: Session, step: float, kept: 
             return
         told = True
         if report.eta > LONG:
-            feedback.notes([f"{session.system.name}: {_sentences(report, session, step, kept)}"])
+            feedback.notes([f"{session.system.name}: {_sentences(report, session, step, kept, checked)}"])
 
     return reported
 
 
-def _sentences(report: ProgressReport, session: Session, step: float, kept: bool) -> str:
+def _sentences(report: ProgressReport, session: Session, step: float, kept: bool, checked: bool) -> str:
     descriptions = session.assembly.descriptions
     why = f"{report.total / step:,.0f} steps of {step:g} s, {report.steps / report.elapsed:,.0f} a second"
     if slow := [s for s, d in descriptions.items() if d.coSimulation.needsExecutionTool]:
@@ -51,6 +54,8 @@ def _sentences(report: ProgressReport, session: Session, step: float, kept: bool
         f"the run takes {format_duration(report.eta)} more ({why}); "
         f"shorter: {instead}a coarser step where the parts take it, --step {2.0 * step:g}s"
     )
+    if checked:  # a run with half the step, and for coefficients one with the step, both without noise
+        text += f"; --check-step then takes {'three times' if session.system.has_reduction else 'twice'} as long"
     if kept:
         obstacle = resume_obstacle(descriptions)
         text += f"; Ctrl-C keeps {'the record until then' if obstacle else 'a checkpoint, --resume goes on from it'}"

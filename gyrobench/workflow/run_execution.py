@@ -112,7 +112,7 @@ def _run(
     try:
         with feedback.progress(session.system.name) as progress:
             step = request.step or session.system.step
-            progress = forecasting(progress, session, step, folder is not None, feedback)
+            progress = forecasting(progress, session, step, folder is not None, request.check_step is True, feedback)
             if {"html", "pdf"} & set(request.formats) and folder is not None and session.system.has_reduction:
                 progress = importing(progress)
             record = session.run({}, request.seed, request.step, None, progress, checkpoints)

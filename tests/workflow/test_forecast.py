@@ -24,14 +24,14 @@ def test_all_options_that_hold_the_length_are_named_and_none_else() -> None:
     assert system.with_values(shorter(system)).plan().duration() == pytest.approx(0.5 * whole, rel=0.05)
 
 
-def told(elapsed: list[float], left: float, saves: bool = True, kept: bool = True) -> list[str]:
+def told(elapsed: list[float], left: float, saves: bool = True, kept: bool = True, checked: bool = False) -> list[str]:
     """Return the notes of a run of 100 s that has ``left`` s of wall time to go at each of some reports."""
     simulation = SimpleNamespace(needsExecutionTool=True, canGetAndSetFMUstate=saves, canSerializeFMUstate=saves)
     descriptions = {"gyro": SimpleNamespace(coSimulation=simulation)}
     assembly = SimpleNamespace(descriptions=descriptions)
     session: Any = SimpleNamespace(system=load_system("fixed_position"), assembly=assembly)
     notes: list[str] = []
-    progress = forecasting(None, session, 1e-3, kept, Feedback(notes.extend))
+    progress = forecasting(None, session, 1e-3, kept, checked, Feedback(notes.extend))
     for t in elapsed:  # the share that is done is t / (t + left)
         progress(ProgressReport(100.0 * t / (t + left), 100.0, round(1000 * t), 0, 1000.0, t))
     return notes
@@ -45,7 +45,9 @@ def test_a_long_run_says_once_how_long_and_what_instead() -> None:
     (note,) = told([MEASURED], 3.0 * LONG, saves=False)
     assert note.endswith("Ctrl-C keeps the record until then")
     (note,) = told([MEASURED], 3.0 * LONG, kept=False)
-    assert "Ctrl-C" not in note
+    assert "Ctrl-C" not in note and "--check-step" not in note
+    (note,) = told([MEASURED], 3.0 * LONG, checked=True)  # the step again, and half of it: 1 + 2 runs
+    assert "--check-step then takes three times as long; Ctrl-C" in note
 
 
 def test_a_run_of_a_minute_says_nothing() -> None:
