@@ -47,7 +47,7 @@ def format_result(result: Result) -> str:
             row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
         rows.append(row + ([c.verdict] if judged else []))
     notes = [s.replace("No", "no", 1) for s in no_values((c.name, c.no_value) for c in result.coefficients)]
-    notes += [f"warning: {w}" for w in [*_doubts(result), *result.warnings]]
+    notes += [f"warning: {w}" for w in dict.fromkeys([*_doubts(result), *result.warnings])]
     if result.step_check:
         notes.append(step_sentence(result.step_check))
     if judged:

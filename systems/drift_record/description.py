@@ -232,6 +232,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
         say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
+             "settling": noise_tables.settling_text(noise, p.units),
              "level": noise_tables.levels_text(noise), "changes": noise_tables.over_time_text(noise),
              "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():
@@ -264,10 +265,11 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
 
 
 def in_short(p: Prepared, run: RunDocument) -> str:
-    """Return lines, steps, wild and frozen samples of a channel in a few words."""
+    """Return lines, changes of the level, wild and frozen samples of a channel in a few words."""
     t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
     counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (t.wild.size, "wild"))
     said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
+    said += ["settles"] if t.settling else []
     said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "
              f"{noise_tables.number(g.tau.value)} s" for g in p.noise.processes if g.tau.determined]  # fmt: skip
     said += ["frozen"] if p.name in about.get("frozen", {}) else []
@@ -341,7 +343,7 @@ def conventions() -> list[str]:
         "Gauss-Markov process: dx/dt = −x/τ + w, variance σ², density of w two-sided, q = 2 σ²/τ.",
         "Spectrum figures are one-sided: 2 S.",
         "Not determined: the 95 % interval of the coefficient holds zero; its upper end is stated.",
-        "Lines, columns that the rate follows significantly, wild samples and steps of the level are taken out of it "
+        "Lines, columns that the rate follows significantly, wild samples and changes of the level are taken out of it "
         "before coefficients and deviations; the deviation of the record as it was judges the model.",
     ]
 

@@ -217,6 +217,19 @@ def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     )
 
 
+def settling_text(noise: NoiseModel, units: ChannelUnits) -> str:
+    """Return how the drift settles from the beginning of the record on; "" where it does not."""
+    s = noise.settling
+    if s is None or noise.slower:
+        return ""
+    change, u = -s.size / units.si, s.u / units.si
+    return (
+        f"The drift settles from the beginning of the record on, by {number(change, u)} ± {number(u, u)} {units.unit} "
+        f"with a time constant of {number(s.tau, s.u_tau)} ± {number(s.u_tau, s.u_tau)} s: taken out before the model; "
+        "left in, K, R and B take it for theirs. Let the instrument warm up, or leave the beginning out."
+    )
+
+
 def levels_text(noise: NoiseModel) -> str:
     """Return that the level of the noise changes along the record; "" where it does not."""
     t = noise.treatment

@@ -33,6 +33,7 @@ def test_what_speaks_against_a_record_is_said_without_a_verdict_too() -> None:
         Reason("noise.none", "The data lie on the model.", ("pass",), severity="doubt"),
         Reason("type_b.unstated", "No type B.", ("pass",), severity="doubt"),
         Reason("level.shift", "The level is another one.", ("pass",), severity="doubt"),
+        Reason("noise.none", "The data lie on the model."),  # in the report, too, with what is not judged
         Reason("verdict.withheld:level.shift", "Inconclusive: The level is another one.", severity="error"),
     ]
     result = LoopResult(

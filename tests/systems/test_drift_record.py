@@ -221,6 +221,21 @@ def test_a_deviation_that_only_falls_bounds_the_least_one_from_above(tmp_path: P
     assert found.no_value and found.interval[0] == 0.0 < found.interval[1] < 0.1 and " at " not in found.meaning
 
 
+def test_a_warm_up_is_taken_out_and_told(tmp_path: Path) -> None:
+    """6 exp(-t/400 s) deg/h in white noise of 1 deg/h a second: u of the size is near sqrt(2/400) = 0.07 and more."""
+    n, rng = 6000, np.random.default_rng(1)
+    t = np.arange(float(n))
+    x = rng.normal(size=n) + 6.0 * np.exp(-t / 400.0)
+    result = reduce(write(tmp_path / "r.csv", {"time [s]": t, "rate [deg/h]": x}))
+    (said,) = [r.text for r in result.reasons if r.id == "drift_record.settling"]
+    found = re.search(r"by −(\S+) ± (\S+) °/h with a time constant of (\S+) ± (\S+) s", said)
+    assert found is not None
+    size, u, tau, u_tau = map(float, found.groups())
+    assert 0.07 < u < 0.3 and abs(size - 6.0) < 3.0 * u
+    assert 10.0 < u_tau < 60.0 and abs(tau - 400.0) < 3.0 * u_tau
+    assert result["K"].no_value and all(row[-1] == "inside" for row in tabled(result, "deviations", "agreement").rows)
+
+
 @pytest.mark.long
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.

@@ -31,9 +31,17 @@ from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseMo
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
-from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
+from gyrobench.reduction.noise_model.steps import (
+    EDGE,
+    LevelChange,
+    LevelStep,
+    Settling,
+    largest_step,
+    settling,
+    step_ratios,
+)
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
-from gyrobench.reduction.noise_model.treatment import PlacedStep, Treated, output_step, treat
+from gyrobench.reduction.noise_model.treatment import Placed, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
 Parts = list[tuple[NoiseTerm, Array]]
@@ -113,7 +121,7 @@ def fit_noise(
 
 def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
     """Return the model of a treated record; raw (n,): as it was, in its unit."""
-    treated, found = _without_steps(treated, means)
+    treated, found = _without_changes(treated, means)
     clouds = posterior.draw(found)
     judge = Judge(found, deviations_of(raw, treated), treated)
     at = judge.near_the_record(judge.choose(clouds), clouds)
@@ -123,70 +131,83 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
     return _Fit(treated, found, clouds, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means) + slow))
 
 
-# ------------------------------------------------------------------ steps
-def _without_steps(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
-    """Return the record without the steps of its level that the likelihood asks for, and the models of what is left."""
+# ------------------------------------------------------------------ changes of the level
+def _without_changes(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
+    """Return the record without the changes of its level that the likelihood asks for, and the models of the rest."""
     found = search(treated.ordinates(means))
-    while steps := _steps_of(treated, found, means):
-        better = treated.without(steps)
+    while changes := _changes_of(treated, found, means):
+        better = treated.without(changes)
         data = better.ordinates(means)
-        # what was completed beside the steps, bands too, may not be there without them
+        # what was completed beside the changes, bands too, may not be there without them
         completed = any(s.done.extra is not None for s in treated.stretches)
         treated, found = better, search(data) if completed else search_again(data, found)
     return treated, found
 
 
-def _steps_of(treated: Treated, found: ModelSearch, means: bool) -> list[PlacedStep]:
-    """Return the steps that the likelihood asks for beside those taken out, one after the other.
+def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Placed]:
+    """Return the steps, and the drift that settles, that the likelihood asks for beside what was taken out, one after
+    the other.
 
-    Candidates are the largest steps under the model and under its fast terms alone, as a step passes for slow drift;
+    Candidates are the largest ones under the model and under its fast terms alone, as a step passes for slow drift;
     the models are fitted again without each of them.
     """
     bound = 2.0 * math.log(treated.samples) + RATIO
-    fits, steps = found.ranked[:3], list[PlacedStep]()
+    fits, changes = found.ranked[:3], list[Placed]()
 
-    def ratios(i: int, parts: Parts, less: Sequence[PlacedStep]) -> tuple[Array, Array, Array]:
-        """Return what :func:`step_ratios` does of a stretch less steps, under a model."""
+    def stretch(i: int, parts: Parts, less: Sequence[Placed]) -> tuple[Array, Array, float]:
+        """Return a stretch less changes, completed under a model, with its spectrum and the error of an angle."""
         x, angle = treated.completed(i, less), sum(float(t.angle(p)) for t, p in parts)
         S = _spectrum_of(x.size, parts, means)
-        return step_ratios(completed_by(x, treated.stretches[i].gone, S), S, angle)
+        return completed_by(x, treated.stretches[i].gone, S), S, angle
 
     def under(fits: list[Fitted]) -> Parts:
         at = min(fits, key=lambda f: f.value)
         return [*split(at.model, at.p), *found.resonances]
 
-    def stands(i: int, step: LevelStep, without: list[Fitted]) -> bool:
+    def largest(kind: type[LevelChange], of: tuple[Array, Array, float]) -> tuple[LevelChange, float]:
+        return settling(*of) if kind is Settling else largest_step(*step_ratios(*of))
+
+    def stands(i: int, change: LevelChange, without: list[Fitted]) -> bool:
         """Return whether the samples that are there show a step under the model without it: ordinates that completed
         samples are in count for less, and so does the jump that a step is for drift without one.
         """
-        near = slice(max(step.at - EDGE, 0), step.at + EDGE + 1)
-        return float(ratios(i, under(without), steps)[0][near].max()) > bound
+        if isinstance(change, Settling) or not treated.stretches[i].gone.size:
+            return True
+        near = slice(max(change.at - EDGE, 0), change.at + EDGE + 1)
+        return float(step_ratios(*stretch(i, under(without), changes))[0][near].max()) > bound
 
-    while len(treated.steps) + len(steps) < STEPS:
+    while True:
         at = max(fits, key=lambda f: f.evidence)
         fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
-        tried: list[tuple[PlacedStep, list[Fitted]]] = []
+        tried: list[tuple[Placed, list[Fitted]]] = []
+        steps = sum(isinstance(c, LevelStep) for _, c in changes) + len(treated.steps)
+        settles = treated.settling is not None or any(isinstance(c, Settling) for _, c in changes)
         for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
-            each = [largest_step(*ratios(i, [*split(model, p), *found.resonances], steps))
-                    for i in range(len(treated.stretches))]  # fmt: skip
-            i = max(range(len(each)), key=lambda i: each[i][1])
-            step, ratio = each[i]
-            if ratio < bound:
-                continue
-            data = treated.ordinates(means, less=[*steps, (i, step)])
-            data.hold(found.resonances)
-            without = [maximize(data, found.prior, f.model, f.p) for f in fits]
-            if not treated.stretches[i].gone.size or stands(i, step, without):
-                tried.append(((i, step), without))
+            parts = [*split(model, p), *found.resonances]
+            of = [stretch(i, parts, changes) for i in range(len(treated.stretches))]
+            each = [(largest(LevelStep, x), i) for i, x in enumerate(of) if steps < STEPS]
+            candidates = [max(each, key=lambda e: e[0][1])] if each else []
+            if not settles:
+                candidates.append((largest(Settling, of[0]), 0))
+            for (change, ratio), i in candidates:
+                if ratio < bound:
+                    continue
+                data = treated.ordinates(means, less=[*changes, (i, change)])
+                data.hold(found.resonances)
+                without = [maximize(data, found.prior, f.model, f.p) for f in fits]
+                if stands(i, change, without):
+                    tried.append(((i, change), without))
         if not tried:
             break
         one, without = min(tried, key=lambda t: min(f.value for f in t[1]))
         if min(f.value for f in fits) - min(f.value for f in without) < bound:
             break
-        fits, steps = without, [*steps, one]
-    # what fast terms alone make of a step knows no drift: each again beside the others, under the model of all
-    others = [steps[:k] + steps[k + 1 :] for k in range(len(steps))]
-    return [(i, largest_step(*ratios(i, under(fits), less))[0]) for (i, _), less in zip(steps, others, strict=True)]
+        fits, changes = without, [*changes, one]
+    # what fast terms alone make of a change knows no drift: each again beside the others, under the model of all
+    others = [changes[:k] + changes[k + 1 :] for k in range(len(changes))]
+    return [
+        (i, largest(type(c), stretch(i, under(fits), less))[0]) for (i, c), less in zip(changes, others, strict=True)
+    ]
 
 
 def _spectrum_of(n: int, parts: Parts, means: bool) -> Array:

@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
-from gyrobench.reduction.noise_model.steps import LevelStep
+from gyrobench.reduction.noise_model.steps import LevelStep, Settling
 from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
@@ -159,6 +159,13 @@ class NoiseModel:
     def steps(self) -> list[LevelStep]:
         """Return the steps of the level that were taken out, in the unit of the rate."""
         return [replace(s, size=s.size * self.scale.size, u=s.u * self.scale.size) for s in self.treatment.steps]
+
+    @property
+    def settling(self) -> Settling | None:
+        """Return the drift that settles, which was taken out, in the unit of the rate and s."""
+        s = self.treatment.settling
+        size, tau0 = self.scale.size, self.scale.tau0
+        return s and Settling(s.tau * tau0, s.u_tau * tau0, s.size * size, s.u * size)
 
     def allan(self, tau: Array) -> Array:
         """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""

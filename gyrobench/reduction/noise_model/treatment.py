@@ -22,7 +22,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
 from gyrobench.reduction.noise_model.sines import sines_of, standing
-from gyrobench.reduction.noise_model.steps import LevelStep, without
+from gyrobench.reduction.noise_model.steps import LevelChange, LevelStep, Settling, without
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.lines import SpectralLine, find_lines
 
@@ -34,19 +34,19 @@ ENDS = 256  # samples of an end of a stretch that do not tell of the level
 DISTINCT, OFF_STEP = 0.2, 0.05  # values of the samples of an output in steps; how far from a multiple, in steps
 
 
-PlacedStep = tuple[int, LevelStep]  # and the place of its stretch
+Placed = tuple[int, LevelChange]  # and the place of its stretch
 
 
 @dataclass(frozen=True)
 class TreatedStretch:
-    """Samples from ``start`` on without a long gap, lines and steps taken out: ``own`` (n,) with NaN, ``done``
-    completed.
+    """Samples from ``start`` on without a long gap, lines and changes of the level taken out: ``own`` (n,) with NaN,
+    ``done`` completed.
     """
 
     start: int
     own: Array
     done: Completed
-    steps: tuple[LevelStep, ...] = ()
+    changes: tuple[LevelChange, ...] = ()
 
     @property
     def gone(self) -> NDArray[np.int64]:
@@ -73,16 +73,16 @@ class Treated:
     find_wild: bool
     rounding: float = 0.0
 
-    def without(self, steps: Sequence[PlacedStep]) -> Treated:
-        """Return the record with steps taken out and their stretches completed anew.
+    def without(self, changes: Sequence[Placed]) -> Treated:
+        """Return the record with changes of the level taken out and their stretches completed anew.
 
         A step has power at low frequencies; what was completed beside it has too much of them.
         """
         stretches = list(self.stretches)
-        for place in sorted({place for place, _ in steps}):
-            s, mine = stretches[place], [step for i, step in steps if i == place]
+        for place in sorted({place for place, _ in changes}):
+            s, mine = stretches[place], [change for i, change in changes if i == place]
             own = without(s.own, mine)
-            stretches[place] = TreatedStretch(s.start, own, complete(own, self.find_wild), (*s.steps, *mine))
+            stretches[place] = TreatedStretch(s.start, own, complete(own, self.find_wild), (*s.changes, *mine))
         spread, levels, p_level = _levels(stretches)
         return replace(self, stretches=tuple(stretches), spread=spread, levels=levels, p_level=p_level)
 
@@ -113,14 +113,19 @@ class Treated:
     @property
     def steps(self) -> list[LevelStep]:
         """Return the steps, at their place on the grid."""
-        return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.steps]
+        return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.changes if isinstance(x, LevelStep)]
 
-    def completed(self, place: int, less: Sequence[PlacedStep] = ()) -> Array:
-        """Return a stretch completed, without steps, beside which it was completed."""
-        return without(self.stretches[place].done.x, [step for i, step in less if i == place])
+    @property
+    def settling(self) -> Settling | None:
+        """Return how the drift settles from the beginning of the record on."""
+        return next((x for x in self.stretches[0].changes if isinstance(x, Settling)), None)
 
-    def ordinates(self, means: bool, keep_wild: bool = False, less: Sequence[PlacedStep] = ()) -> Ordinates:
-        """Return the ordinates of the stretches; keep_wild: with the wild samples left in; less: without steps, what
+    def completed(self, place: int, less: Sequence[Placed] = ()) -> Array:
+        """Return a stretch completed, without changes of its level, beside which it was completed."""
+        return without(self.stretches[place].done.x, [change for i, change in less if i == place])
+
+    def ordinates(self, means: bool, keep_wild: bool = False, less: Sequence[Placed] = ()) -> Ordinates:
+        """Return the ordinates of the stretches; keep_wild: with the wild samples left in; less: without changes, what
         was completed as it is.
         """
         weight = self.there / sum(s.own.size for s in self.stretches) / self.spread
@@ -135,7 +140,9 @@ class Treated:
         return Ordinates(x, means, extra, weight, self.rounding)
 
     def cleaned(self) -> Array:
-        """Return the record (samples,) without lines, wild samples and steps, NaN where nothing is or was taken out."""
+        """Return the record (samples,) without lines, wild samples and changes of the level, NaN where nothing is or
+        was taken out.
+        """
         out = np.full(self.samples, np.nan)
         for s in self.stretches:
             y = s.done.x.copy()
