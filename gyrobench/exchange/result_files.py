@@ -73,7 +73,8 @@ def _time_of(file: Path | str, names: Sequence[str]) -> str:
     for name in TIME:
         if name in lower:
             return lower[name]
-    raise DataError(file, [f"no column 'time'; columns: {listed(names)}"])
+    measured = " (units in its head: a measured file goes with --data)" if any("[" in n for n in names) else ""
+    raise DataError(file, [f"no column 'time'; columns: {listed(names)}{measured}"])
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:

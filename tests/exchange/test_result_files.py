@@ -291,6 +291,7 @@ def test_files_that_are_none(command: Command, tmp_path: Path) -> None:
         ("e.fmu", b"PK\x03\x04" + b"\0" * 40, "an archive"),
         ("f.csv", b"", "no header line"),
         ("g.csv", b"a,b\n1,2\n", "no column 'time'; columns: a, b"),
+        ("m.csv", b"time [s],rate [deg/h]\n1,2\n", "a measured file goes with --data"),
         ("h.bin", b"\x01\x00\x02" * 9, "neither CSV nor .npy, .mat or Parquet"),
     ):
         (tmp_path / name).write_bytes(content)
