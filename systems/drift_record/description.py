@@ -233,6 +233,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
              "settling": noise_tables.settling_text(noise, p.units),
+             "swings": noise_tables.swings_text(noise, p.units),
              "level": noise_tables.levels_text(noise), "changes": noise_tables.over_time_text(noise),
              "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():
@@ -269,7 +270,7 @@ def in_short(p: Prepared, run: RunDocument) -> str:
     t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
     counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (t.wild.size, "wild"))
     said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
-    said += ["settles"] if t.settling else []
+    said += [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
     said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "
              f"{noise_tables.number(g.tau.value)} s" for g in p.noise.processes if g.tau.determined]  # fmt: skip
     said += ["frozen"] if p.name in about.get("frozen", {}) else []

@@ -230,6 +230,20 @@ def settling_text(noise: NoiseModel, units: ChannelUnits) -> str:
     )
 
 
+def swings_text(noise: NoiseModel, units: ChannelUnits) -> str:
+    """Return the swings of few cycles that were taken out."""
+    if not noise.swings or noise.slower:
+        return ""
+    said = [
+        f"± {number(s.size / units.si, s.u / units.si)} {units.unit} in {number(s.period, s.u_period)} s"
+        for s in noise.swings
+    ]
+    return (
+        f"The level swings by {', '.join(said)}: few cycles, which no noise of the rest makes, are taken out before "
+        "the model; left in, K and B take them for theirs. Record the temperature beside the rate."
+    )
+
+
 def levels_text(noise: NoiseModel) -> str:
     """Return that the level of the noise changes along the record; "" where it does not."""
     t = noise.treatment

@@ -75,7 +75,7 @@ class Prepared:
     def cleaned(self) -> bool:
         """Whether anything was taken out."""
         t = self.noise.treatment
-        return bool(any(r.kept for r in self.regressions) or t.lines or t.steps or t.settling or t.wild.size)
+        return bool(any(r.kept for r in self.regressions) or t.lines or t.changes or t.wild.size)
 
     @property
     def lines(self) -> Lines:

@@ -16,6 +16,7 @@ posterior of all models worth their weight.  [DRIFT-NOISE-MODEL]
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -31,15 +32,8 @@ from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseMo
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
-from gyrobench.reduction.noise_model.steps import (
-    EDGE,
-    LevelChange,
-    LevelStep,
-    Settling,
-    largest_step,
-    settling,
-    step_ratios,
-)
+from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
+from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
 from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Placed, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -52,7 +46,7 @@ LIKELY = 0.03  # part of the posterior of models of a kind, from which on an int
 PART = 0.25  # of the variance of several processes: one of them that counts as any
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
-STEPS = 5
+CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
@@ -145,8 +139,7 @@ def _without_changes(treated: Treated, means: bool) -> tuple[Treated, ModelSearc
 
 
 def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Placed]:
-    """Return the steps, and the drift that settles, that the likelihood asks for beside what was taken out, one after
-    the other.
+    """Return the steps and slow changes that the likelihood asks for beside what was taken out, one after the other.
 
     Candidates are the largest ones under the model and under its fast terms alone, as a step passes for slow drift;
     the models are fitted again without each of them.
@@ -165,13 +158,15 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
         return [*split(at.model, at.p), *found.resonances]
 
     def largest(kind: type[LevelChange], of: tuple[Array, Array, float]) -> tuple[LevelChange, float]:
-        return settling(*of) if kind is Settling else largest_step(*step_ratios(*of))
+        if kind is LevelStep:
+            return largest_step(*step_ratios(*of))
+        return settling(*of) if kind is Settling else swing(*of)
 
     def stands(i: int, change: LevelChange, without: list[Fitted]) -> bool:
         """Return whether the samples that are there show a step under the model without it: ordinates that completed
         samples are in count for less, and so does the jump that a step is for drift without one.
         """
-        if isinstance(change, Settling) or not treated.stretches[i].gone.size:
+        if not isinstance(change, LevelStep) or not treated.stretches[i].gone.size:
             return True
         near = slice(max(change.at - EDGE, 0), change.at + EDGE + 1)
         return float(step_ratios(*stretch(i, under(without), changes))[0][near].max()) > bound
@@ -180,15 +175,17 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
         at = max(fits, key=lambda f: f.evidence)
         fast = [(t, q) for t, q in split(at.model, at.p) if t.name in ("white", "readout", "quantization")]
         tried: list[tuple[Placed, list[Fitted]]] = []
-        steps = sum(isinstance(c, LevelStep) for _, c in changes) + len(treated.steps)
-        settles = treated.settling is not None or any(isinstance(c, Settling) for _, c in changes)
+        taken = Counter(type(c) for c in [*treated.changes, *(c for _, c in changes)])
         for model, p in [(at.model, at.p), *([joined(fast)] if fast and len(fast) < len(at.model) else [])]:
             parts = [*split(model, p), *found.resonances]
             of = [stretch(i, parts, changes) for i in range(len(treated.stretches))]
-            each = [(largest(LevelStep, x), i) for i, x in enumerate(of) if steps < STEPS]
-            candidates = [max(each, key=lambda e: e[0][1])] if each else []
-            if not settles:
-                candidates.append((largest(Settling, of[0]), 0))
+            longest = max(range(len(of)), key=lambda i: of[i][0].size)
+            places = {LevelStep: range(len(of)), Settling: [0], Swing: [longest]}
+            candidates = [
+                max(((largest(kind, of[i]), i) for i in places[kind]), key=lambda e: e[0][1])
+                for kind in CHANGES
+                if taken[kind] < CHANGES[kind]
+            ]
             for (change, ratio), i in candidates:
                 if ratio < bound:
                     continue

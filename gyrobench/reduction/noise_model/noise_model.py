@@ -12,7 +12,8 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
-from gyrobench.reduction.noise_model.steps import LevelStep, Settling
+from gyrobench.reduction.noise_model.slow_changes import Settling, Swing
+from gyrobench.reduction.noise_model.steps import LevelStep
 from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
@@ -166,6 +167,14 @@ class NoiseModel:
         s = self.treatment.settling
         size, tau0 = self.scale.size, self.scale.tau0
         return s and Settling(s.tau * tau0, s.u_tau * tau0, s.size * size, s.u * size)
+
+    @property
+    def swings(self) -> list[Swing]:
+        """Return the swings of few cycles that were taken out, in the unit of the rate and s."""
+        size, tau0 = self.scale.size, self.scale.tau0
+        return [
+            Swing(s.period * tau0, s.u_period * tau0, s.size * size, s.u * size, s.phase) for s in self.treatment.swings
+        ]
 
     def allan(self, tau: Array) -> Array:
         """Return the Allan deviation (k,) of the whole model over tau (s), multiples of tau0, without lines."""

@@ -22,7 +22,8 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
 from gyrobench.reduction.noise_model.sines import sines_of, standing
-from gyrobench.reduction.noise_model.steps import LevelChange, LevelStep, Settling, without
+from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, without
+from gyrobench.reduction.noise_model.steps import LevelStep
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.lines import SpectralLine, find_lines
 
@@ -116,9 +117,18 @@ class Treated:
         return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.changes if isinstance(x, LevelStep)]
 
     @property
+    def changes(self) -> list[LevelChange]:
+        """Return all changes of the level, each at its place in its stretch."""
+        return [x for s in self.stretches for x in s.changes]
+
+    @property
     def settling(self) -> Settling | None:
         """Return how the drift settles from the beginning of the record on."""
-        return next((x for x in self.stretches[0].changes if isinstance(x, Settling)), None)
+        return next((x for x in self.changes if isinstance(x, Settling)), None)
+
+    @property
+    def swings(self) -> list[Swing]:
+        return [x for x in self.changes if isinstance(x, Swing)]
 
     def completed(self, place: int, less: Sequence[Placed] = ()) -> Array:
         """Return a stretch completed, without changes of its level, beside which it was completed."""
