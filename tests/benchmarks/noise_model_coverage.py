@@ -1,17 +1,18 @@
 """Coverage of the noise model on simulated records: intervals of N, Gauss-Markov processes, K, Q; absent terms stated.
 
-    python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [wild] [step] [line] [missing] [part of a name]
+    python tests/benchmarks/noise_model_coverage.py RECORDS SAMPLES [FAULT ...] [part of a name]
     python tests/benchmarks/noise_model_coverage.py RECORDS 1e4..1e6 any [part of a name]
 
 RECORDS: how many, or a range such as 200..399 of their seeds.  SAMPLES: a number, or a range in which the logarithm is
-even.  any: nothing or one of the four faults by chance, each as likely.
+even.  any: nothing or one of the first five faults by chance, each as likely.
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
 rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place), before a readout of 0.003.
 rounded: to a multiple of.
-wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the sampling rate;
-missing: a tenth of the samples.
+Faults, wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the rate;
+missing: a tenth of the samples; gaps: a tenth, of 100 on average; slow: a warm-up of 3 standard deviations, a fifteenth
+of the record long, and three cycles of one.  "slow" stated: records with either taken out.
 
 Of a process that is found tau and sigma are those of the true one nearest in log tau, each counted once; "sigma
 together" is of all true ones within its interval of tau.
@@ -47,8 +48,8 @@ TRUTHS: dict[str, dict[str, Any]] = {
 
 
 FINE = 8  # steps of an oscillator to a sample
-KINDS = ("wild", "step", "line", "missing", "gaps")
-MIXED = "any"
+KINDS = ("wild", "step", "line", "missing", "gaps", "slow")
+MIXED, AMONG = "any", ["", *KINDS[:5]]
 
 
 def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Generator) -> Array:
@@ -85,6 +86,9 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = x + sd * (np.arange(n) > rng.integers(n // 10, 9 * n // 10))
     if "line" in kinds:
         x = x + 0.3 * sd * np.sin(2.0 * math.pi * 0.2317 * np.arange(n) + 1.0)
+    if "slow" in kinds:
+        t = np.arange(n) / n
+        x = x + sd * (3.0 * np.exp(-15.0 * t) + np.sin(2.0 * math.pi * 3.1 * t + 1.0))
     if step := truth.get("rounded", 0.0):
         x = step * np.rint(x / step)
     if "missing" in kinds:
@@ -107,7 +111,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
             if lengths[1] > lengths[0]:
                 n = round(lengths[0] * (lengths[1] / lengths[0]) ** np.random.default_rng([12, i]).random())
             if MIXED in kinds:
-                these = [k for k in [np.random.default_rng([13, i]).choice(["", *KINDS])] if k]
+                these = [k for k in [np.random.default_rng([13, i]).choice(AMONG)] if k]
             model = fit_noise(simulated(n, truth, these, np.random.default_rng([11, i, n])), 1.0, means=False)
             agreed.append(model.agrees)
             if not model.agrees:  # nothing is stated
@@ -119,6 +123,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                     missed.append(f"{term} {i} ({n} {' '.join(these)}: {e.low:.4g} to {e.high:.4g})")
                 stated[term].append(e.determined)
             stated["filter"].append(bool(model.filter_words()))
+            stated["slow"].append(bool(model.settling or model.swings))
             left = list(truth.get("markov", []))
             for g in (g for g in model.processes if g.tau.determined):
                 if not left:

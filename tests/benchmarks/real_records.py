@@ -56,6 +56,8 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
                for c in changing(model.over_time) if c.term.name not in PEAKS]  # fmt: skip
     bands = sum(c.term.name in PEAKS for c in changing(model.over_time))
     changes += [f"{bands} band{'s' if bands > 1 else ''}"] if bands else []
+    remarks = [f"{n} {word}" for n, word in counts if n]
+    remarks += [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
     tau = " to ".join(write_number(x, significant=2).text for x in (whole.tau[0], whole.tau[-1]))
     return {
         "τ / s": tau,
@@ -63,7 +65,10 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
         "stated": "yes" if model.agrees else "no",
         "N": "–" if not model.agrees else white if N.determined else f"below {high} {unit}",
         "N, published": published or "–",
-        "remarks": ", ".join([f"{n} {word}" for n, word in counts if n] + [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]) or "–",
+        "remarks": ", ".join(
+            [f"{n} {word}" for n, word in counts if n] + [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
+        )
+        or "–",
         "changes over the quarters": ", ".join(changes) or "–",
     }
 

@@ -47,7 +47,9 @@ PART = 0.25  # of the variance of several processes: one of them that counts as 
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
+TOGETHER = 2  # changes that may hide one another: what is left of one is a walk that the other one is lost in
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
+SLOW = 24.0  # of that of a slow change: some ten of them differ
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -139,13 +141,15 @@ def _without_changes(treated: Treated, means: bool) -> tuple[Treated, ModelSearc
 
 
 def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Placed]:
-    """Return the steps and slow changes that the likelihood asks for beside what was taken out, one after the other.
+    """Return the steps and slow changes that the likelihood asks for beside what was taken out, one after the other
+    or two at once.
 
     Candidates are the largest ones under the model and under its fast terms alone, as a step passes for slow drift;
     the models are fitted again without each of them.
     """
-    bound = 2.0 * math.log(treated.samples) + RATIO
+    needed = {LevelStep: 2.0 * math.log(treated.samples) + RATIO, Settling: SLOW, Swing: SLOW}
     fits, changes = found.ranked[:3], list[Placed]()
+    kept = fits, changes
 
     def stretch(i: int, parts: Parts, less: Sequence[Placed]) -> tuple[Array, Array, float]:
         """Return a stretch less changes, completed under a model, with its spectrum and the error of an angle."""
@@ -169,7 +173,7 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
         if not isinstance(change, LevelStep) or not treated.stretches[i].gone.size:
             return True
         near = slice(max(change.at - EDGE, 0), change.at + EDGE + 1)
-        return float(step_ratios(*stretch(i, under(without), changes))[0][near].max()) > bound
+        return float(step_ratios(*stretch(i, under(without), changes))[0][near].max()) > needed[LevelStep]
 
     while True:
         at = max(fits, key=lambda f: f.evidence)
@@ -187,7 +191,7 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
                 if taken[kind] < CHANGES[kind]
             ]
             for (change, ratio), i in candidates:
-                if ratio < bound:
+                if ratio < needed[type(change)]:
                     continue
                 data = treated.ordinates(means, less=[*changes, (i, change)])
                 data.hold(found.resonances)
@@ -196,10 +200,14 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
                     tried.append(((i, change), without))
         if not tried:
             break
-        one, without = min(tried, key=lambda t: min(f.value for f in t[1]))
-        if min(f.value for f in fits) - min(f.value for f in without) < bound:
+        one, fits = min(tried, key=lambda t: min(f.value for f in t[1]))
+        changes = [*changes, one]
+        further = [type(c) for _, c in changes[len(kept[1]) :]]
+        if min(f.value for f in kept[0]) - min(f.value for f in fits) > sum(needed[kind] for kind in further):
+            kept = fits, changes
+        elif len(further) == TOGETHER:
             break
-        fits, changes = without, [*changes, one]
+    fits, changes = kept
     # what fast terms alone make of a change knows no drift: each again beside the others, under the model of all
     others = [changes[:k] + changes[k + 1 :] for k in range(len(changes))]
     return [
