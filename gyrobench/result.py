@@ -28,12 +28,14 @@ from gyrobench.result_entries import (
     Reason,
     Response,
     Series,
+    SetBy,
     Specification,
     StepChange,
     StepCheck,
     Table,
     Test,
     TypeB,
+    VarianceShare,
 )
 from gyrobench.result_suite import SuiteComparison
 
@@ -60,6 +62,7 @@ __all__ = [
     "Response",
     "Result",
     "Series",
+    "SetBy",
     "Specification",
     "StepChange",
     "StepCheck",
@@ -68,6 +71,7 @@ __all__ = [
     "Table",
     "Test",
     "TypeB",
+    "VarianceShare",
 ]
 
 #: what :meth:`Result.array` reads of a coefficient
@@ -260,6 +264,7 @@ class LoopResult(Result):
 
     responses: list[Response]
     budget: list[BudgetLine] = field(default_factory=list)
+    shares: list[VarianceShare] = field(default_factory=list)
     allan: AllanDeviation | None = field(default=None, metadata=EMPTY)
     # of an estimator: its readings and their errors
     series: list[Series] = field(default_factory=list)
@@ -307,6 +312,7 @@ ABSENT: dict[str, Any] = {
     "psd": {},
     "harmonics": [],
     "budget": [],
+    "shares": [],
     "type_b": [],
     "repeatability": {},
     "ideal": False,

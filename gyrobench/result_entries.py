@@ -131,6 +131,27 @@ class Table:
 
 
 @dataclass(frozen=True)
+class SetBy:
+    """A quantity that sets the amplitude a of a source: it goes with a^power, within ``holds``."""
+
+    name: str  # "platform.stiction"
+    now: float
+    unit: str  # printed
+    power: float = 1.0
+    holds: Limit = (None, None)
+
+
+@dataclass(frozen=True)
+class VarianceShare:
+    """How a mean square, by rising powers of a factor on the amplitude of one source, goes with that; squared unit."""
+
+    of: str  # the coefficient whose square it is
+    source: str
+    square: list[float]
+    set_by: list[SetBy] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class Reason:
     """A limit to a result: a sentence for the reader, and the verdicts that it takes away.
 

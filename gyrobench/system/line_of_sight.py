@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from gyrobench.arrays import Array
+from gyrobench.result import SetBy
 
 #: one-sided power spectral density over frequencies in Hz
 Density = Callable[[Array], Array]
@@ -33,6 +32,7 @@ class SightSource:
 @dataclass(frozen=True)
 class LineOfSight:
     """Sources of the jitter of a line of sight, from ``lowest`` Hz on.  f: Hz, with which the densities are followed.
+    set_by: source and parameters of the parts -> quantities that set it.
 
     ride: label of the phase of the plan in which base and target move.  angles: loop -> channel of the angle whose
     jitter it is; {}: that which a load turns.  moved_by: slots of parts whose outputs are inputs of the linear model.
@@ -43,7 +43,8 @@ class LineOfSight:
 
     lowest: float
     sources: Sequence[SightSource]
-    f: Array = field(default_factory=lambda: np.zeros(0))
+    f: Array
+    set_by: Callable[[str, Mapping[str, Any]], list[SetBy]]
     ride: str = "ride"
     angles: Mapping[str, str] = field(default_factory=dict)
     moved_by: Sequence[str] = ()

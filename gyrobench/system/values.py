@@ -61,6 +61,13 @@ def nest(values: Mapping[str, Any]) -> dict[str, Any]:
     return nested | {name: build(cells) for name, cells in arrays.items()}
 
 
+def with_elements(parameters: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters with some of them, or elements of arrays ("a[1,2]"), changed."""
+    names = {_place(key)[0] for key in changed}
+    elements = {k: v for n in names for k, v in flatten(n, parameters[n]).items()}
+    return {**parameters, **nest(elements | dict(changed))}
+
+
 def parse_number(name: str, value: Any, unit: str = "1") -> float:
     """Return one number in SI, see :func:`parse`.  Raises InvalidValueError for a list too."""
     number = parse(name, value, unit)

@@ -297,15 +297,18 @@ def _read(
 
 
 def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
-    """Return the largest signal, V: of the controller, and of the platform that it drives, what is less.
+    """Return the largest signal, V: of the controller, of the platform that it drives and its current, what is least.
 
     Of a part with a controller of its own: its largest output.
     """
     own = own_controller(parameters, ports.slot)
     if own is not None:
         return own.limit(own_values(parameters, ports.slot))
-    slots = (ports.slot, "platform") if ports.kind == "test" else (ports.slot,)
-    return min(float(np.min(parameters.get(f"{s}.v_max", np.inf))) for s in slots)
+    found = [parameters.get(f"{ports.slot}.v_max", np.inf)]
+    if ports.kind == "test":
+        p = {n: np.asarray(parameters.get(f"platform.{n}", np.inf), float) for n in ("v_max", "i_max", "R")}
+        found += [p["v_max"], p["i_max"] * p["R"]]  # at rest the current is v/R
+    return min(float(np.min(x)) for x in found)
 
 
 def _limited(phases: Sequence[Gate], slot: str) -> float:

@@ -24,7 +24,9 @@ from gyrobench.linear.linear_model import Linear, operating_point
 from gyrobench.record.frequency_response import Complex
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.margins import excitation_responses
+from gyrobench.result import SetBy
 from gyrobench.system.line_of_sight import LineOfSight
+from gyrobench.system.values import with_elements
 from gyrobench.system.wiring import Assembly
 from gyrobench.tuning.loop_ports import LoopPorts
 from gyrobench.tuning.plant import without_controller
@@ -68,7 +70,7 @@ class SightModel:
             else:
                 w, u = both(source.kind, source.axis)
             moved.append(MovedSight(source.name, w, u, source.density(fine)))
-        return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis))
+        return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis), self.sources.set_by)
 
 
 def finer(f: Array) -> Array:
@@ -105,6 +107,7 @@ class SightWays:
     moved: tuple[MovedSight, ...]
     driven: Complex
     back: Complex
+    set_by: Callable[[str, Mapping[str, Any]], list[SetBy]]
 
     def sources(self, G: Complex) -> dict[str, float]:
         """Return source -> rms of the line of sight, rad; G: the controller at ``at``."""
@@ -120,15 +123,16 @@ class SightWays:
         """Return the jitter, rad rms."""
         return math.sqrt(sum(x * x for x in self.sources(G).values()))
 
-    def voltage(self, G: Complex) -> float:
-        """Return what the controller gives for all sources together, V rms."""
+    def voltage(self, G: Complex, source: str = "") -> float:
+        """Return what the controller gives for all sources together, or for one, V rms."""
         held = np.interp(self.f, self.at, G)
         answer = held / (1.0 - held * self.back)
-        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * self._seen(), self.f)))
+        return math.sqrt(float(np.trapezoid(np.abs(answer) ** 2 * self._seen(source), self.f)))
 
-    def _seen(self) -> Array:
-        """Return the density of the controller's input without the controller."""
-        return np.asarray(sum((np.abs(m.seen) ** 2 * m.density for m in self.moved), np.zeros(self.f.size)))
+    def _seen(self, source: str = "") -> Array:
+        """Return the density of the controller's input without the controller, of one source or all."""
+        moved = [m for m in self.moved if source in ("", m.name)]
+        return np.asarray(sum((np.abs(m.seen) ** 2 * m.density for m in moved), np.zeros(self.f.size)))
 
     def floor(self) -> float:
         """Return the jitter, rad rms, below which no linear controller of this loop comes, causal or not.
@@ -144,12 +148,17 @@ class SightWays:
 
 def sight_models(
     assembly: Assembly, parameters: Mapping[str, Any], part_of: Callable[[str], type[Component]], step: float,
-    points: Sequence[Mapping[str, float]], ports: LoopPorts, sources: LineOfSight,
+    points: Sequence[Mapping[str, float]], ports: LoopPorts, stated: Callable[[Mapping[str, Any]], LineOfSight],
 ) -> list[SightModel]:  # fmt: skip
-    """Return the model at each point of the spread.  Raises LinearizationError and ComponentError."""
+    """Return the model at each point of the spread.  Raises LinearizationError and ComponentError.
+
+    stated: parameters -> what moves the line of sight, which a spread may change too.
+    """
     found = []
     for values in points:
-        parts = operating_point(assembly, {**parameters, **values}, part_of)
+        there = with_elements(parameters, values)
+        sources = stated(there)
+        parts = operating_point(assembly, {**there, **sources.riding, **sources.slipping}, part_of)
         linear = Linear(assembly, parts, step, sources.moved_by)
         opened = without_controller(linear, ports.slot, {("v", "test"): -1.0, ("e", "u"): 1.0})
         found.append(SightModel(opened.discrete(), ports, sources))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from gyrobench.tuning.proof import ExpectedJitter, Proof, known_limit, proof_of
 from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
 from gyrobench.tuning.robustness import crossovers, measured
+from gyrobench.tuning.sight_allowance import PEAK, allowed
 from gyrobench.tuning.sight_jitter import SightModel, SightWays, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
@@ -41,9 +42,9 @@ from gyrobench.tuning.tuned_settings import TuningError, plan_settings, quiet, s
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
 from gyrobench.tuning.written_loop import TunedLoop
 
+Stated = Callable[[Mapping[str, Any]], LineOfSight]
 DENSE = 1500  # frequencies of the final figures
 HIGHEST = 0.4  # of the frequency of the communication steps: a wish may be there
-PEAK = 3.0  # of a random voltage over its rms
 ROUNDS = 3  # of the search for worse points between those of the spread
 
 
@@ -87,9 +88,10 @@ def tune(
             if max(w.f, w.value if w.name == "bandwidth" else 0.0) >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
                                  f"{HIGHEST / now.step:g} Hz")  # fmt: skip
-        sources = _line_of_sight(now, nominal, wishes, ports)
+        stated = _line_of_sight(now, wishes, ports)
+        sources = stated(nominal) if stated else None
         wishes = [replace(w, f=sources.lowest) if w.name == JITTER and sources else w for w in wishes]
-        models = _Loop(session, now, nominal, ranges, ports, sources)
+        models = _Loop(session, now, nominal, ranges, ports, stated)
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
@@ -116,6 +118,9 @@ def tune(
     ways = [s.at(f) for s in problem.sights]
     got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
     results = _results(wishes, got, problem.plants)
+    jitter = next((w for w in wishes if w.name == JITTER), None)
+    at_points = [p.values for p in problem.plants]
+    shares = allowed(jitter, ways, responses, at_points, nominal, known_limit(nominal, ports)) if jitter else ()
     part, settings = settings_of(shape, controller, nominal, system, ports.slot)
     settings |= plan_settings(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
@@ -127,23 +132,23 @@ def tune(
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
         for at in runs:
             k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
-            jitter = ways[k].rms(responses) if ways else 0.0
+            expected = ways[k].rms(responses) if ways else 0.0
             angle = problem.sights[0].angle if sources else ""
-            sight = ExpectedJitter(sources.ride, sources.lowest, jitter, angle, sources.lost) if sources else None
+            sight = ExpectedJitter(sources.ride, sources.lowest, expected, angle, sources.lost) if sources else None
             try:
                 proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
             except RunError as error:
                 proofs.append(Proof(at, (), (), 0, "", "", None, f"the run did not end: {error}"))
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
-        tuple(p.values for p in problem.plants), tuple(results), tuple(proofs), f, loops,
+        tuple(at_points), tuple(results), tuple(proofs), f, loops,
         swaps={slot: str(name) for slot, name in (parts or {}).items()},
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
         best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
         notes=(*implied, *about(quiet_one), *_idle(problem, ranges), *_slips(sources),
                *_driven(ways, responses, nominal, ports), *_notes(proofs)),
-        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged,
+        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged, allowed=shares,
     )  # fmt: skip
 
 
@@ -152,12 +157,12 @@ class _Loop:
 
     def __init__(
         self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range], ports: LoopPorts,
-        sources: LineOfSight | None = None,
+        stated: Stated | None = None,
     ) -> None:  # fmt: skip
         self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
         self.system, self.nominal, self.ranges = system, nominal, ranges
-        self.step, self.ports, self.sources = system.step, ports, sources
-        self.free = {**nominal, **(sources.free if sources else {})}
+        self.step, self.ports, self.stated = system.step, ports, stated
+        self.free = dict(stated(nominal).free) if stated else {}  # what slips in the ride is not in a spread, too
 
     def part_of(self, slot: str) -> type[Component]:
         if slot not in self.names:
@@ -166,17 +171,19 @@ class _Loop:
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
+        left = [{n: v for n, v in values.items() if n.partition("[")[0] not in self.free} for values in at]
+        free = {**self.nominal, **self.free}
         try:
-            return plants(self.assembly, self.free, self.part_of, step or self.step, at, self.ports)
+            found = plants(self.assembly, free, self.part_of, step or self.step, left, self.ports)
+            return [replace(p, values=values) for p, values in zip(found, at, strict=True)]
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
 
     def sights(self, at: Sequence[Mapping[str, float]]) -> list[SightModel]:
         """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
-        if self.sources is None:
+        if self.stated is None:
             return []
-        slipping = {**self.nominal, **self.sources.riding, **self.sources.slipping}
-        return sight_models(self.assembly, slipping, self.part_of, self.step, at, self.ports, self.sources)
+        return sight_models(self.assembly, self.nominal, self.part_of, self.step, at, self.ports, self.stated)
 
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
         at = points(self.ranges)
@@ -206,13 +213,11 @@ def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:
     return ports
 
 
-def _line_of_sight(
-    system: System, nominal: Mapping[str, Any], wishes: Sequence[Wish], ports: LoopPorts
-) -> LineOfSight | None:
-    """Return what makes the line of sight of a system jitter, where that is wanted.  Raises UsageError."""
+def _line_of_sight(system: System, wishes: Sequence[Wish], ports: LoopPorts) -> Stated | None:
+    """Return how a system states what makes its line of sight jitter, where that is wanted.  Raises UsageError."""
     if not any(w.name == JITTER for w in wishes):
         return None
-    stated = getattr(system, "line_of_sight", None)
+    stated: Stated | None = getattr(system, "line_of_sight", None)
     if stated is None:
         raise UsageError(f"--want jitter: {system.name} does not state what moves a line of sight")
     if ports.kind == "command" and not any(w.name == "bandwidth" or w.f for w in wishes if w.name != JITTER):
@@ -220,8 +225,7 @@ def _line_of_sight(
             f"--want jitter: it is least with a loop {ports.loop} that does nothing, and its target is lost then; want "
             'what the loop is for, too, --want "bandwidth>1Hz" or --want "S at 0.1Hz<-40dB"'
         )
-    found: LineOfSight = stated(nominal)
-    return found
+    return stated
 
 
 def _idle(problem: TuningProblem, ranges: Sequence[Range]) -> list[str]:

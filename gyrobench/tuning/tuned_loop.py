@@ -13,10 +13,14 @@ from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.reduction.loops.loop_measures import Point
 from gyrobench.tuning.proof import Proof, ProvenWish
+from gyrobench.tuning.sight_allowance import COLUMNS, AllowedSource
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.trade import Trade
 from gyrobench.tuning.wishes import Wish
+
+#: what is said of each source of a jitter
+ALLOWED = "what each may be at most with this controller and all others as they are"
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ class LoopTuning:
     loop: str = ""  # name of the loop, of a system with several
     trade: Trade | None = None
     best: float = 0.0
+    allowed: tuple[AllowedSource, ...] = ()  # sources of a wanted jitter
 
     @property
     def name(self) -> str:
@@ -125,6 +130,13 @@ class LoopTuning:
                     ],
                 }
                 for p in self.proofs
+            ],
+            "sources": [
+                {
+                    "name": a.source, "jitter": a.jitter * 1e-6, "factor": _finite(a.factor or math.nan),
+                    "quantity": a.set_by.name, "now": a.set_by.now, "most": a.most, "unit": a.set_by.unit,
+                }
+                for a in self.allowed
             ],
             "trade": _trade(self.trade),
             "reasons": list(self.reasons),
@@ -193,8 +205,7 @@ def _lines(t: LoopTuning) -> list[str]:
          where(w.at, t.spread)]
         for w in t.wishes
     ]  # fmt: skip
-    width = [max(len(r[k]) for r in rows) for k in range(3)]
-    lines += ["  " + "  ".join([*(c.ljust(n) for c, n in zip(r, width, strict=False)), r[3]]) for r in rows]
+    lines += _columns(rows)
     for p in t.proofs:
         lines += ["", f"co-simulation, {where(p.values, t.spread)}:"]
         if p.why_not:
@@ -208,6 +219,8 @@ def _lines(t: LoopTuning) -> list[str]:
             lines.append(f"  at its limit in the test sines: {p.limits}")
         if p.step is not None:
             lines.append(f"  {p.step}")
+    if t.allowed:
+        lines += ["", f"jitter by source, and {ALLOWED}:", *_columns([list(COLUMNS), *(a.row for a in t.allowed)])]
     if t.trade is not None:
         a, b = t.trade.wishes
         lines += ["", f"trade, worst case of the linear models: {a.name}, {b.name}"]
@@ -220,6 +233,12 @@ def _lines(t: LoopTuning) -> list[str]:
     values = ", ".join(f"{n} = {v:.5g}" for n, v in t.controller.values.items())
     title = "controller" if t.had else "the best that was found"
     return [*lines, "", f"{title}: {values}", "", t.command]
+
+
+def _columns(rows: list[list[str]]) -> list[str]:
+    """Return rows as lines with columns below one another."""
+    width = [max(len(r[k]) for r in rows) for k in range(len(rows[0]) - 1)]
+    return ["  " + "  ".join([*(c.ljust(n) for c, n in zip(r, width, strict=False)), r[-1]]) for r in rows]
 
 
 def measured_text(w: ProvenWish) -> str:

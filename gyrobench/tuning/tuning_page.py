@@ -26,8 +26,9 @@ from gyrobench.report.report_files import write_files
 from gyrobench.report.style import styled
 from gyrobench.tuning import tuning_figures as draw
 from gyrobench.tuning.proof import ProvenWish
+from gyrobench.tuning.sight_allowance import COLUMNS
 from gyrobench.tuning.trade import Trade
-from gyrobench.tuning.tuned_loop import LoopTuning, measured_text, range_text, where
+from gyrobench.tuning.tuned_loop import ALLOWED, LoopTuning, measured_text, range_text, where
 
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
 
@@ -51,6 +52,7 @@ def page(t: LoopTuning) -> Page:
     with styled():
         sections = [
             Section("Wishes", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
+            *([Section("Jitter by source", "sources", [_sources(t)])] if t.allowed else []),
             *([Section("Trade of two wishes", "trade", _trade(t.trade))] if t.trade else []),
             Section("Margins", "margins", _margins(t)),
             Section("Sensitivities and open loop", "responses", _responses(t)),
@@ -87,6 +89,16 @@ def _wishes(t: LoopTuning) -> PageTable:
         rows.append(Row([text_cell(c, m) for c, m in zip(cells, marks, strict=True)]))
     heads = columns("measure", "wanted", "worst case", "nominal", "worst at", "", wide=["worst at"])
     return PageTable(heads, rows, "Wishes, with the worst case of the linear models over the spread.")
+
+
+def _sources(t: LoopTuning) -> PageTable:
+    rows = [Row([text_cell(c, "" if k else "strong") for k, c in enumerate(a.row)]) for a in t.allowed]
+    where_ = "worst case of the linear models over the spread" if t.spread else "by the linear model"
+    caption = (
+        f"Jitter by source, and {ALLOWED}: {where_}. Factor: on the amplitude of the source. Cut: its peaks would meet "
+        "the limit of the voltage."
+    )
+    return PageTable(columns(*COLUMNS, wide=["at most"]), rows, caption)
 
 
 def _reasons(t: LoopTuning) -> list[Any]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,9 @@ from gyrobench.reduction.loops.margins import excitation_responses
 from gyrobench.reduction.loops.sight_budget import EXCITED, LOS, MoreSources, Ride, closed_model
 from gyrobench.reduction.loops.sight_reduction import AXES, SightReduction
 from gyrobench.reduction.loops.tracking_measures import MISS, RATE, TrackingMeasures
+from gyrobench.result import SetBy
 
-from .sources import TARGET, image_density, image_noises, prediction
+from .sources import TARGET, image_density, image_noises, prediction, set_by
 
 PAIR = (0, 1)
 
@@ -90,6 +92,9 @@ class Reduction(TrackingMeasures, SightReduction):
     def _ways(model: LinearModel, names: Sequence[str], f: Array) -> Complex:
         """Return (frequency, name, axis) of the responses to what is added to the error of the image."""
         return excitation_responses(model, "command", EXCITED, names, f)
+
+    def set_by(self, source: str, p: Mapping[str, Any]) -> list[SetBy]:
+        return set_by(source, p)
 
     def _images(self, sight: Complex, f: Array) -> dict[str, Array]:
         """Return the densities by noise and resolution of the images, held from frame to frame."""

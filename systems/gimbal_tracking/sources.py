@@ -9,16 +9,29 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.target_path import along
+from gyrobench.reduction.loops import sight_quantities as of_gimbal
+from gyrobench.result import SetBy
 from gyrobench.system.line_of_sight import Density
 
 TARGET = "motion of the target"
+NOISE, RESOLUTION = "noise of the images", "resolution of the images"
 FULL = 0.3  # of a pixel: noise from which the remainders of rounding are uniform, and independent of each other
 
 
 def image_noises(noise: float, pixel: float) -> dict[str, float]:
     """Return source -> rms of an image's error, rad; those of the resolution only where noise covers its steps."""
-    found = {"noise of the images": noise, "resolution of the images": pixel / 12.0**0.5 if noise > FULL * pixel else 0}
+    found = {NOISE: noise, RESOLUTION: pixel / 12.0**0.5 if noise > FULL * pixel else 0}
     return {name: sigma for name, sigma in found.items() if sigma}
+
+
+def set_by(source: str, p: Mapping[str, Any]) -> list[SetBy]:
+    """Return the quantities that set a source; those of the images within where noise covers the resolution."""
+    noise, pixel = (float(p.get(f"tracker.{n}", 0.0)) for n in ("image_noise", "pixel"))
+    if source == NOISE:
+        return [of_gimbal.of_parameter(p, "tracker.image_noise", "urad", (FULL * pixel, None))]
+    if source == RESOLUTION:
+        return [of_gimbal.of_parameter(p, "tracker.pixel", "urad", (None, noise / FULL))]
+    return of_gimbal.set_by(source, p)
 
 
 def image_density(period: float, sigma: float) -> Density:

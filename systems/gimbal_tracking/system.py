@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.target_path import TargetPath, read_path
+from gyrobench.result import SetBy
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.sight_test import AXES, MOVED_STEP, SightTest
 from gyrobench.system.line_of_sight import Density, LineOfSight, SightSource
@@ -18,7 +19,7 @@ from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
 
-from .sources import TARGET, image_density, image_noises, prediction, target_rates
+from .sources import TARGET, image_density, image_noises, prediction, set_by, target_rates
 
 TARGETS = ("rest", "constant", "sine", "circle", "flyby")
 TYPES = (1, 2)
@@ -199,13 +200,16 @@ class GimbalTracking(SightTest):
         # u = (-b, 1, a): a turn about x is its third element, one about z its first
         for element, rate in zip((3, 1), rates, strict=True):
             more.append(SightSource(TARGET, "direction", element, self.moved(rate[inside])))
-        turned = np.array([self["pitch"], self["yaw"]])[:, None] + np.cumsum(rates, axis=1) * MOVED_STEP
+        turned = np.array(parameters["platform.theta_0"])[:, None] + np.cumsum(rates, axis=1) * MOVED_STEP
         about = np.sqrt(np.mean(turned[:, inside] ** 2, axis=1)) * np.sign(turned[:, inside].mean(axis=1))
         angles = {loop: f"tracker.miss[{AXES[loop.split()[-1]][0]}]" for loop in self.loops}
         return replace(
             of_gimbal, sources=[*of_gimbal.sources, *more], angles=angles, moved_by=("target",), lost="tracker.lost",
             riding={"platform.theta_0": about.tolist()},
         )  # fmt: skip
+
+    def set_by(self, source: str, parameters: Mapping[str, Any]) -> list[SetBy]:
+        return set_by(source, parameters)
 
     def moves(self) -> dict[str, Any]:
         """Return the parameters of the moving target.  Raises DataError and OSError, of a recorded path."""

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from support.gimbal_rides import ridden, rows
 
+from gyrobench.reduction.estimation.allowance import BEYOND
 from gyrobench.reduction.loops.margins import excitation_response
 from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
@@ -84,6 +85,51 @@ def test_unbalance_and_acceleration_have_a_budget() -> None:
     result, _ = ridden({"platform.unbalance[2,3]": 2e-3}, psd="truck", gyro_noise=0.0, jitter_from=10.0, ride=30.0)
     assert result["jitter"].estimate == pytest.approx(result["jitter"].closed, rel=0.1)
     assert rows(result)["acceleration by unbalance"][2] == pytest.approx(100.0)
+
+
+def with_limit(record: Any, wanted: float) -> dict[str, Any]:
+    """Return what the allowance of each quantity is for a jitter, µrad."""
+    result = load_system("gimbal_stabilization").reduce(record, {"jitter": (None, wanted)})
+    return {row[2]: row[4] for t in result.tables if t.id == "budget.allowance:jitter" for row in t.rows}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "share", "options"),
+    [
+        ("gyro_noise", 1.5, {}),
+        ("psd_scale", 0.7, {"pitch": 0.35}),  # a roll times joint angle, too
+        ("platform.unbalance", 0.6, {"psd": "truck", "jitter_from": 10.0, "platform.unbalance[2,3]": 2e-3}),
+    ],
+)
+@pytest.mark.long
+def test_a_source_at_its_allowance_gives_the_jitter_that_was_wanted(quantity: str, share: float, options: Any) -> None:
+    """The budget of a new ride within 0.1 %, its co-simulation within 5 %."""
+    values = {n: options.pop(n) for n in list(options) if "." in n}
+    result, record = ridden(values, ride=36.0, **options)
+    wanted = share * result["jitter"].closed
+    most = with_limit(record, wanted)[quantity]
+    match quantity:
+        case "gyro_noise":
+            options["gyro_noise"] = math.radians(most)
+        case "platform.unbalance":
+            values["platform.unbalance[2,3]"] = most
+        case _:
+            options[quantity] = most
+    again, _ = ridden(values, ride=36.0, **options)
+    assert again["jitter"].closed == pytest.approx(wanted, rel=1e-3)
+    assert again["jitter"].estimate == pytest.approx(wanted, rel=0.05)
+
+
+@pytest.mark.long
+def test_an_allowance_beyond_reach_is_said_in_words() -> None:
+    """Dry friction alone makes more than a fifth of the jitter; where it slips, others are allowed twice as much."""
+    _, record = ridden(ride=20.0, jitter_from=2.0, stiction=0.05)
+    found = load_system("gimbal_stabilization").reduce(record)
+    wanted = found["jitter"].closed
+    assert str(with_limit(record, 0.2 * wanted)["gyro_noise"]).startswith("none suffices: ")
+    found = with_limit(record, 1.3 * wanted)
+    assert found["gyro_noise"] == BEYOND
+    assert 0.05 < found["platform.stiction"] < 0.1
 
 
 @pytest.mark.long

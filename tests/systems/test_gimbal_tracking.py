@@ -227,8 +227,7 @@ def test_a_recorded_ride_of_the_base_is_in_error_budget_and_wanted_jitter(tmp_pa
     with Session(system, child=True) as session:
         now, _, document = session.prepare()
         q, parts = document.parameters, lambda slot: load_part(session.names[slot])
-        sources = now.line_of_sight(q)
-        sight = sight_models(session.assembly, q, parts, now.step, [{}], ports, sources)[0]
+        sight = sight_models(session.assembly, q, parts, now.step, [{}], ports, now.line_of_sight)[0]
     f = np.geomspace(0.05, 1000.0, 3000)
     ways = sight.at(f)
     assert 1e6 * ways.rms(K * np.ones(f.size, complex)) == pytest.approx(rms, rel=0.05)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,8 +30,11 @@ def gimbal(of: str = "gimbal_stabilization", **values: object):
     return system
 
 
-def models(axis: str, of: str = "gimbal_stabilization", **values: object):
-    """Return the plant, the sight model, the system's own controller over F and its parameters."""
+def models(axis: str, of: str = "gimbal_stabilization", at: Any = None, **values: object):
+    """Return the plant, the sight model, the system's own controller over F and its parameters.
+
+    at: point of a spread, of the sight model.
+    """
     system = gimbal(of, **values)
     ports = loops_of(system)[axis]
     with Session(system, bench=Bench.find().folder, child=True) as session:
@@ -41,9 +45,8 @@ def models(axis: str, of: str = "gimbal_stabilization", **values: object):
         def part_of(slot: str):
             return load_part(session.names[slot])
 
-        free, slipping = {**q, **sources.free}, {**q, **sources.riding, **sources.slipping}
-        plant = plants(session.assembly, free, part_of, now.step, [{}], ports)[0]
-        sight = sight_models(session.assembly, slipping, part_of, now.step, [{}], ports, sources)[0]
+        plant = plants(session.assembly, {**q, **sources.free}, part_of, now.step, [{}], ports)[0]
+        sight = sight_models(session.assembly, q, part_of, now.step, [at or {}], ports, now.line_of_sight)[0]
     if f"{axis}.num" in q:
         num, den = np.array(q[f"{axis}.num"]), np.array(q[f"{axis}.den"])
     else:  # the design of a tracking loop has an integral alone
@@ -86,6 +89,44 @@ def test_the_model_without_controller_makes_the_loop(axis: str) -> None:
     use = F >= 1.0
     assert -G[use] * ways.back[np.isin(ways.f, F)] == pytest.approx(L[use], rel=1e-6)
     assert ways.f[0] == F[use][0]
+
+
+@pytest.mark.long
+def test_a_spread_moves_what_the_sources_are_set_by() -> None:
+    """Twice the noise of the gyro and three times the vibration, at a point of the spread, make as much of jitter."""
+    _, sight, G, _ = models("pitch")
+    _, there, _, _ = models("pitch", at={"gyro.white": 2 * math.radians(0.005) / math.sqrt(2), "vibration.scale": 3.0})
+    before, after = sight.at(F).sources(G), there.at(F).sources(G)
+    assert after["noise of the gyro"] == pytest.approx(2 * before["noise of the gyro"], rel=1e-9)
+    base = "motion of the base about x"
+    assert after[base] == pytest.approx(3 * before[base], rel=1e-9)
+
+
+@pytest.mark.long
+def test_allowances_of_a_tuned_loop_hold_in_the_worst_case() -> None:
+    """Each source at its allowance, by models of its own: the worst of the spread is the jitter that was wanted."""
+    tones = {"phase margin": "40deg", "jitter": "60urad"}
+    over = ["platform.bending[1]=±10%", "gyro.white=±30%"]
+    wishes = [f"{n}={x}" for n, x in tones.items()]
+    found = tune(gimbal(jitter_from=2.0, ride=20.0), wishes, over, structure="pi+notch", loop="pitch")
+    by_name = {a.set_by.name: a for a in found.allowed}
+    gyro, base = by_name["gyro_noise"], by_name["psd, rate_x"]
+    assert isinstance(gyro.most, float) and isinstance(base.most, float)
+    white = math.radians(gyro.most) / math.sqrt(2)
+    corners = [dict(p) for p in found.points if p]
+
+    def worst(each: list[dict[str, float]], scale: float = 1.0) -> float:
+        G = HeldController(rounded(found.controller.num, found.controller.den, {}), 2e-4)
+        f = np.union1d(F, [2.0])  # from where the jitter counts
+        response = G.response(np.exp(2j * np.pi * f * 2e-4))
+        given = {"jitter_from": 2.0, "ride": 20.0}
+        ways = [models("pitch", at=at, **given)[1].at(f) for at in each]
+        squares = [w.sources(response) for w in ways]
+        return max(math.hypot(s["noise of the gyro"], scale * s["motion of the base about x"]) for s in squares)
+
+    assert 1e6 * worst([{**at, "gyro.white": white} for at in corners]) == pytest.approx(60.0, rel=1e-3)
+    assert 1e6 * worst(corners, math.sqrt(base.most)) == pytest.approx(60.0, rel=1e-3)
+    assert "jitter by source" in str(found) and f"{gyro.most:.3g} °/s/√Hz" in str(found)
 
 
 @pytest.mark.long
@@ -230,7 +271,7 @@ def test_a_resonance_between_the_frequencies_of_the_grid() -> None:
     w = 2.0 * np.pi * f0
     plant = (w / s) ** 2 * (1.0 + 2.0 * z * s / w)
     moved = (MovedSight("noise", 0.0 * s, 1.0 + 0.0 * s, np.ones(fine.size)),)
-    ways = SightWays(f, fine, moved, plant, -plant)
+    ways = SightWays(f, fine, moved, plant, -plant, lambda *_: [])
     x = np.linspace(1.0, 1000.0, 4_000_001) / f0
     exact = np.trapezoid((1.0 + (2 * z * x) ** 2) / ((1.0 - x**2) ** 2 + (2 * z * x) ** 2), x * f0)
     assert ways.sources(np.ones(f.size, complex))["noise"] ** 2 == pytest.approx(exact, rel=0.02)

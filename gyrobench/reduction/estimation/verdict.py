@@ -22,11 +22,12 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.allowance import allowances
 from gyrobench.reduction.estimation.sentences import renewed
 from gyrobench.reduction.estimation.step_effect import with_step
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.setup import conditions
-from gyrobench.result import NO_VERDICT, Coefficient, Limit, Reason, Result, Specification, StepCheck
+from gyrobench.result import NO_VERDICT, Coefficient, Limit, LoopResult, Reason, Result, Specification, StepCheck
 from gyrobench.result_entries import StatedLimit
 
 R = TypeVar("R", bound=Result)
@@ -89,6 +90,8 @@ def conclude(
     verdict = worst_verdict(c.verdict for c in judged)
     rule = found.decision_rule or DECISION_RULE
     found = replace(found, coefficients=judged, reasons=reasons, verdict=verdict, decision_rule=rule)
+    if isinstance(found, LoopResult):
+        found = replace(found, tables=[*found.tables, *allowances(found.shares, judged)])
     return replace(found, summary=renewed(found))
 
 

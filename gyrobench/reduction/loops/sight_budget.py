@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,9 @@ THETA = ("platform.theta[1]", "platform.theta[2]")
 BASE = ("vibration.omega[1]", "vibration.omega[2]", "vibration.omega[3]")
 OF_BASE = tuple(f"motion of the base about {axis}" for axis in "xyz")  # sources of the budget
 BY_UNBALANCE = "acceleration by unbalance"
+NOISE_OF_GYRO = "noise of the gyro"
+FRICTION = "dry friction"
+ROLL = "roll times joint angle"
 INSIDE = ("pitch.e", "yaw.e")  # behind the summing points of the loops
 TORQUES = ("cogging", "cogging_order", "friction", "stiction")
 GEOMETRY = ("I_outer", "I_inner", "J_motor", *TORQUES)
@@ -88,7 +92,7 @@ def read_ride(gate: Gate, p: Mapping[str, Any], lowest: float, sight: tuple[str,
     for k in PAIR:
         of = {n: float(np.asarray(p[f"platform.{n}"], float)[k]) for n in TORQUES}
         if max(of["friction"], of["stiction"]) and slides:
-            made.setdefault("dry friction", [none, none])[k] = contact(theta[k], of, float(p["platform.presliding"]))
+            made.setdefault(FRICTION, [none, none])[k] = contact(theta[k], of, float(p["platform.presliding"]))
         if of["cogging"]:
             wave = -of["cogging"] * np.sin(of["cogging_order"] * theta[k])
             made.setdefault("cogging", [none, none])[k] = wave
@@ -218,6 +222,18 @@ class JitterSource:
 
 
 @dataclass(frozen=True)
+class JitterBudget:
+    """Sources of the line of sight; base: its density, (2, frequencies), by powers 0 to 4 of a factor on the vibration.
+
+    The acceleration and the rates of the base go with the factor, roll times joint angle with its square; the torques
+    that the joint angles of the ride make and noise stay.  (): a target turns the joints, too.
+    """
+
+    sources: dict[str, JitterSource]
+    base: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True)
 class MoreSources:
     """Sources beside those of the gimbal: what they move, with phases (line of sight, segments, frequencies), and
     densities of independent ones (line of sight, frequencies).
@@ -227,9 +243,7 @@ class MoreSources:
     noise: Mapping[str, Array]
 
 
-def by_source(
-    found: LoopFindings, ride: Ride, use: NDArray[np.bool_], more: MoreSources | None = None
-) -> dict[str, JitterSource]:
+def by_source(found: LoopFindings, ride: Ride, use: NDArray[np.bool_], more: MoreSources | None = None) -> JitterBudget:
     """Return the sources of the line of sight at the frequencies of its spectra that are used.
 
     Raises LookupError without a linear model of the parts that is needed.
@@ -253,10 +267,10 @@ def by_source(
             add(name, ways.torque[:, :, k], pair[k])
     outer = 1 - int(p["platform.form"])
     along = np.eye(2)[outer]
-    add("roll times joint angle", ways.rate[:, outer, None] * along, ride.second[0])
-    add("roll times joint angle", (ways.torque * at_the_body(p, f)[:, None, :])[:, :, outer], ride.second[1])
+    add(ROLL, ways.rate[:, outer, None] * along, ride.second[0])
+    add(ROLL, (ways.torque * at_the_body(p, f)[:, None, :])[:, :, outer], ride.second[1])
     moved |= more.moved if more else {}
-    whole = sum(moved.values(), np.zeros((), complex))
+    whole, named = sum(moved.values(), np.zeros((), complex)), set(moved)
     sources = {
         name: JitterSource(np.mean(np.abs(y) ** 2, axis=1), np.mean(np.real(np.conj(whole) * y), axis=1))
         for name, y in moved.items()
@@ -265,8 +279,16 @@ def by_source(
     white = float(p.get("gyro.white") or 0.0)
     if white and "gyro.bandwidth" in p:
         density = _gyro(p, ride, ways, 2.0 * white**2)
-        sources["noise of the gyro"] = JitterSource(density, density)
-    return sources | {name: JitterSource(y, y) for name, y in (more.noise if more else {}).items()}
+        sources[NOISE_OF_GYRO] = JitterSource(density, density)
+    sources |= {name: JitterSource(y, y) for name, y in (more.noise if more else {}).items()}
+    nothing = np.zeros((), complex)
+    shaken = sum((moved.pop(name) for name in (*OF_BASE, BY_UNBALANCE) if name in moved), nothing)
+    by_power = (whole - shaken - moved[ROLL], shaken, moved[ROLL])
+    base = [np.zeros((2, f.size)) for _ in range(5)]
+    for (i, a), (j, b) in product(enumerate(by_power), repeat=2):
+        base[i + j] += np.mean(np.real(np.conj(a) * b), axis=1)
+    base[0] += sum((x.part for name, x in sources.items() if name not in named), np.zeros(()))
+    return JitterBudget(sources, () if more and more.moved else tuple(base))
 
 
 def _gyro(p: Mapping[str, Any], ride: Ride, ways: Ways, density: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,19 @@ from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Gate, LoopReduction, Response, Table
 from gyrobench.reduction.loops.open_loop import limits_hit
 from gyrobench.reduction.loops.platform_measures import peak_noise
-from gyrobench.reduction.loops.sight_budget import LOS, OF_BASE, JitterSource, MoreSources, Ride, by_source, read_ride
-from gyrobench.result import Curve
+from gyrobench.reduction.loops.sight_budget import (
+    FRICTION,
+    LOS,
+    OF_BASE,
+    JitterBudget,
+    MoreSources,
+    Ride,
+    by_source,
+    read_ride,
+)
+from gyrobench.reduction.loops.sight_quantities import set_by, shares
+from gyrobench.result import Curve, SetBy
 
-Sources = Mapping[str, JitterSource]
 AXES = {"pitch": 1, "yaw": 3}
 MICRO = 1e-6
 EDGES = (3.0, 10.0, 30.0, 100.0)  # Hz, of the bands
@@ -97,7 +106,8 @@ class SightReduction(LoopReduction):
         spectra = (*ride.los, ride.los[0].together(ride.los[1]))
         f = ride.los[0].f
         use = f >= lowest * (1.0 - 1e-9)
-        sources = self._sources(ride, use)
+        budget = self._sources(ride, use)
+        sources = budget.sources
         df = widths(f, lowest)[use]
         linear = [sum((x.part[k] for x in sources.values()), np.zeros(int(use.sum()))) for k in (0, 1)]
         squares = [max(0.0, float(x @ df)) for x in (linear[0], linear[1], linear[0] + linear[1])]
@@ -108,17 +118,17 @@ class SightReduction(LoopReduction):
             found.add(name, meaning, "µrad", v, scale=MICRO, closed=math.sqrt(square) or None)
         self._bands(spectra[:2], linear, f[use], lowest)
         self._figures(spectra[:2], linear, f, use, df)
-        return self._budget(sources, squares, df, spectra[2].rms(lowest).value)
+        return self._budget(budget, squares, df, spectra[2].rms(lowest).value)
 
     def more_sources(self, ride: Ride, use: NDArray[np.bool_]) -> MoreSources | None:
         """Return sources beside those of the gimbal."""
         return None
 
-    def _sources(self, ride: Ride, use: NDArray[np.bool_]) -> Sources:
+    def _sources(self, ride: Ride, use: NDArray[np.bool_]) -> JitterBudget:
         try:
             return by_source(self.found, ride, use, self.more_sources(ride, use))
         except (LookupError, ValueError):  # parts of another kind
-            return {}
+            return JitterBudget({})
 
     def _bands(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, lowest: float) -> None:
         """Add the table of the jitter by band."""
@@ -137,9 +147,9 @@ class SightReduction(LoopReduction):
         )
         self.found.tables.append(Table("jitter.bands", "Jitter by frequency", caption, ["band / Hz", *heads], rows))
 
-    def _budget(self, sources: Sources, squares: Sequence[float], df: Array, measured: float) -> str:
+    def _budget(self, budget: JitterBudget, squares: Sequence[float], df: Array, measured: float) -> str:
         """Add the table of sources, warn where it does not explain the ride; return the largest as words."""
-        square = squares[2]
+        sources, square = budget.sources, squares[2]
         if not square > 0.0:
             return ""
         alone = {n: [math.sqrt(float(y @ df)) / MICRO for y in x.alone] for n, x in sources.items()}
@@ -157,7 +167,7 @@ class SightReduction(LoopReduction):
             "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part "
             "of the others."
         )
-        if "dry friction" in sources:
+        if FRICTION in sources:
             caption += " The joints slip: their dry friction is the torque that their angles make, not a spring."
         title = "Jitter budget, by source"
         self.found.tables.append(
@@ -171,9 +181,11 @@ class SightReduction(LoopReduction):
                 why = "dry friction sticks for a part of the ride and slips in another"
             text = (
                 f"The jitter budget gives {whole / MICRO:.3g} µrad, the co-simulation {measured / MICRO:.3g} µrad"
-                f"{': ' + why if why else ''}. Believe the co-simulation."
+                f"{': ' + why if why else ''}. Believe the co-simulation; no allowance by source is stated."
             )
             self.found.warn("budget.not_linear", text)
+        else:
+            self.found.facts["shares"] = shares(budget, df, self.run.parameters, self.set_by)
         largest = max(share, key=lambda n: share[n])
         if largest in OF_BASE:
             self._rolls(share[largest], largest)
@@ -193,6 +205,10 @@ class SightReduction(LoopReduction):
                 "inner joint stands farthest from 0: a wider loop or a third axis, of roll, makes it less."
             )
             self.found.warn("roll.askew", text)
+
+    def set_by(self, source: str, p: Mapping[str, Any]) -> list[SetBy]:
+        """Return the quantities that set a source."""
+        return set_by(source, p)
 
     def _stuck(self) -> bool:
         return any(np.any(np.asarray(self.run.parameters.get(f"platform.{n}", 0.0))) for n in ("friction", "stiction"))

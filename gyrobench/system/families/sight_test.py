@@ -19,7 +19,9 @@ from gyrobench.arrays import Array
 from gyrobench.record.motion_profile import RECORDED, profile_rates
 from gyrobench.record.vibration_spectrum import VibrationSpectrum, read_spectrum
 from gyrobench.reduction.loops.jitter import shortest, spectra
-from gyrobench.reduction.loops.sight_budget import BY_UNBALANCE, at_the_body, by_unbalance
+from gyrobench.reduction.loops.sight_budget import BY_UNBALANCE, NOISE_OF_GYRO, OF_BASE, at_the_body, by_unbalance
+from gyrobench.reduction.loops.sight_quantities import TIMES, set_by
+from gyrobench.result import SetBy
 from gyrobench.system.families import loop_test as loop
 from gyrobench.system.families.base_spectra import SPECTRA
 from gyrobench.system.families.loop_test import LoopTest
@@ -173,11 +175,12 @@ class SightTest(LoopTest):
 
             return of
 
+        angles = [float(x) for x in parameters["platform.theta_0"]]  # pitch, yaw
         white = 2.0 * float(parameters.get("gyro.white", 0.0)) ** 2
         band, K = float(parameters.get("gyro.bandwidth", np.inf)), float(parameters.get("decoupler.K", 1.0))
 
         def noise(axis: str) -> Density:
-            gain = K if axis == self.inner else K / math.cos(self[self.inner])
+            gain = K if axis == self.inner else K / math.cos(angles[FORMS.index(self["form"])])
             return lambda f: white * gain**2 / (1.0 + (f / band) ** 4)
 
         squares = [np.zeros(3), np.zeros(3)]  # of rates and angles of the base
@@ -189,8 +192,8 @@ class SightTest(LoopTest):
             turned = np.cumsum(recorded, axis=1) * MOVED_STEP
             squares = [old + np.var(new, axis=1) for old, new in zip(squares, (recorded, turned), strict=True)]
         free, slipping = self.slips(parameters, squares) if np.any(squares[0]) else ({}, {})
-        base = [SightSource(f"motion of the base about {x}", "motion", k + 1, angle(k)) for k, x in enumerate("xyz")]
-        lever = by_unbalance(parameters, (self["pitch"], self["yaw"]))
+        base = [SightSource(name, "motion", k + 1, angle(k)) for k, name in enumerate(OF_BASE)]
+        lever = by_unbalance(parameters, (angles[0], angles[1]))
 
         def torque(joint: int, base: VibrationSpectrum) -> Density:
             def of(f: Array) -> Array:
@@ -201,9 +204,19 @@ class SightTest(LoopTest):
 
         if spectrum and np.any(lever):
             base += [SightSource(BY_UNBALANCE, "torque", k, torque(two - 1, spectrum)) for two, k in AXES.values()]
-        gyro = [SightSource("noise of the gyro", "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
+
+        def quantities(source: str, parameters: Mapping[str, Any]) -> list[SetBy]:
+            if slipping and source in OF_BASE:  # friction that slips does not go with the base
+                return [SetBy("amplitude", 1.0, TIMES, holds=(1.0, 1.0))]
+            return self.set_by(source, parameters)
+
+        gyro = [SightSource(NOISE_OF_GYRO, "test", k, noise(axis), axis) for axis, (_, k) in AXES.items()]
         narrow = spectrum.frequencies() if spectrum else np.zeros(0)
-        return LineOfSight(self["jitter_from"], [*base, *gyro], narrow, free=free, slipping=slipping)
+        return LineOfSight(self["jitter_from"], [*base, *gyro], narrow, quantities, free=free, slipping=slipping)
+
+    def set_by(self, source: str, parameters: Mapping[str, Any]) -> list[SetBy]:
+        """Return the quantities that set a source of the line of sight's jitter."""
+        return set_by(source, parameters)
 
     def recorded_rates(self, parameters: Mapping[str, Any]) -> Array | None:
         """Return the rates of the base by its recorded motion in the ride, rad/s, (3, times); None: there is none."""
@@ -229,9 +242,10 @@ class SightTest(LoopTest):
         """
         most = np.maximum(parameters["platform.friction"], parameters["platform.stiction"])
         k_in, k_out = (0, 2) if self.inner == "pitch" else (2, 0)
-        c, s = (fun(self["yaw" if self.inner == "pitch" else "pitch"]) ** 2 for fun in (math.cos, math.sin))
+        inside, outside = (float(parameters["platform.theta_0"][k // 2]) for k in (k_in, k_out))
+        c, s = (fun(outside) ** 2 for fun in (math.cos, math.sin))
         rate, angle = (np.sqrt([
-            c * x[k_in] + s * x[1], x[k_out] + math.tan(self[self.inner]) ** 2 * (c * x[1] + s * x[k_in])
+            c * x[k_in] + s * x[1], x[k_out] + math.tan(inside) ** 2 * (c * x[1] + s * x[k_in])
         ]) for x in squares)  # fmt: skip
         rate, angle = (x if self.inner == "pitch" else x[::-1] for x in (rate, angle))  # pitch, yaw
         if not np.any(most) or not np.all(angle > float(parameters["platform.presliding"])):
