@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,19 +14,31 @@ from gyrobench.bench import UsageError
 
 MOST = 6  # parameters: 2^6 corners
 INNER = 8  # points inside
+WHOLE = 1e-9  # of a number of steps
 
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter "slot.parameter" of a part, SI, from ``low`` to ``high``."""
+    """A parameter "slot.parameter" of a part, SI, from ``low`` to ``high``.
+
+    step: of a time whose ends and nominal value are whole communication steps, s: so are the points between.
+    """
 
     name: str
     low: float
     high: float
     unit: str
+    step: float = 0.0
 
     def at(self, share: float) -> float:
-        return self.low + share * (self.high - self.low)
+        value = self.low + share * (self.high - self.low)
+        return round(value / self.step) * self.step if self.step else value
+
+    def in_steps(self, nominal: float, step: float) -> Range:
+        """Return the range of a delay or a period as one of whole communication steps; any other one as it is."""
+        steps = [x / step for x in (nominal, self.low, self.high)]
+        whole = self.unit == "s" and all(abs(n - round(n)) < WHOLE * max(n, 1.0) for n in steps)
+        return replace(self, step=step) if whole else self
 
 
 Point = dict[str, float]  # "slot.parameter" -> SI

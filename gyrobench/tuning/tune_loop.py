@@ -84,6 +84,8 @@ def tune(
         if own is not None:
             shape = checked_structure(own, structure_of(structure or own.structure), ports.slot)
         ranges = parse_spread(over, lambda name: _known(session, nominal, name, ports.slot))
+        elements = {k: v for n, value in nominal.items() for k, v in flatten(n, value).items()}
+        ranges = [r.in_steps(elements[r.name], now.step) for r in ranges]
         for w in wishes:
             if max(w.f, w.value if w.name == "bandwidth" else 0.0) >= HIGHEST / now.step:
                 raise UsageError(f"--want {w.name}: the communication step of {now.step:g} s reaches up to "
@@ -308,9 +310,8 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
         start = np.array([problem.plants[k].values.get(r.name, elements[r.name]) for r in loop.ranges])
         low, high = np.array([[r.low, r.high] for r in loop.ranges]).T
 
-        def at(share: Any, low: Any = low, high: Any = high) -> dict[str, float]:
-            inside = low + np.clip(share, 0.0, 1.0) * (high - low)
-            return {r.name: float(v) for r, v in zip(loop.ranges, inside, strict=True)}
+        def at(share: Any) -> dict[str, float]:
+            return {r.name: r.at(float(x)) for r, x in zip(loop.ranges, np.clip(share, 0.0, 1.0), strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
             there = loop.plants([at(share)])
