@@ -17,11 +17,11 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
-from gyrobench.tuning.plant import Plant
+from gyrobench.tuning.plant import STICKS, Plant
 from gyrobench.tuning.robustness import grid, measured
 from gyrobench.tuning.sight_jitter import SightModel, SightWays
 from gyrobench.tuning.structures import BLOCKS, Controller, ControllerStructure
-from gyrobench.tuning.wishes import JITTER, Wish
+from gyrobench.tuning.wishes import JITTER, MARGINS, Wish
 
 LOOK = 512  # controllers of the coarse look
 CROWD = 48  # controllers of the differential evolution
@@ -117,13 +117,27 @@ class TuningProblem:
             self._ways.append(self.sights[len(self._ways)].at(self.f))
         response = held.response(np.exp(2j * np.pi * self.f * step))
         loops = self.loops(response)
-        got = with_jitter(self.wishes, measured(self.wishes, self.f, loops), self._ways, response)
+        got = self.measures(self.f, loops, self._ways, response)
         for i, wish in enumerate(self.wishes):
             if wish.name == "phase margin":
                 got[:, i] = np.minimum(got[:, i], grazing(loops))
         with np.errstate(divide="ignore"):
             ratio = np.array([[np.log(w.ratio(g)) for w, g in zip(self.wishes, row, strict=True)] for row in got])
         return np.asarray(np.clip(ratio, -9.0, CAP))
+
+    def measures(self, f: Array, loops: Complex, ways: Sequence[SightWays], response: Complex) -> Array:
+        """Return the measures (plants, wishes) of loops over f.  response: of the controller.
+
+        Where joints stick, margins alone count: what else is wanted is that of the joints that slip.
+        """
+        got = measured(self.wishes, f, loops)
+        sticks = [STICKS in p.values for p in self.plants]
+        for i, wish in enumerate(self.wishes):
+            if wish.name == JITTER:
+                got[:, i] = [way.rms(response) for way in ways]
+            elif wish.name not in MARGINS:
+                got[sticks, i] = got[0, i]
+        return got
 
     def worst(self, x: Array) -> float:
         return float(self.ratios(x).min())
@@ -139,14 +153,6 @@ def grazing(loops: Complex) -> Array:
     inner = size[:, 1:-1]
     peak = (inner > GRAZES) & (inner < 1.0) & (inner >= size[:, :-2]) & (inner >= size[:, 2:])
     return np.asarray(np.min(np.where(peak, np.abs(np.angle(-loops[:, 1:-1])), np.inf), axis=1, initial=np.inf))
-
-
-def with_jitter(wishes: Sequence[Wish], got: Array, ways: Sequence[SightWays], response: Complex) -> Array:
-    """Return the measures (plants, wishes) with the jitter in its place.  response: of the controller."""
-    for i, wish in enumerate(wishes):
-        if wish.name == JITTER:
-            got[:, i] = [way.rms(response) for way in ways]
-    return got
 
 
 def search(problem: TuningProblem, quick: bool = False) -> Array:

@@ -24,6 +24,10 @@ from gyrobench.tuning.loop_ports import STABILIZER, LoopPorts
 from gyrobench.tuning.own_controllers import InnerOwnController, own_controller, own_values
 from gyrobench.tuning.structures import Controller
 
+DRY = ("friction", "stiction")
+#: of the values of a plant: joints stick that slip in the others
+STICKS = "sticking"
+
 
 @dataclass(frozen=True)
 class Plant:
@@ -72,6 +76,12 @@ def modes(z: Any, step: float) -> list[complex]:
     """Return the poles in the s plane with a damping below 0.3, upper half, by frequency.  z: those of steps."""
     p = np.log(z[np.abs(z) > 1e-9] + 0j) / step
     return sorted((complex(x) for x in p if x.imag > 0.0 and -x.real < 0.3 * abs(x)), key=abs)
+
+
+def without_friction(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the dry friction of the parts as parameters of 0; {} where there is none."""
+    names = [n for n, v in parameters.items() if n.rpartition(".")[2] in DRY and np.any(np.asarray(v, float))]
+    return {n: (0.0 * np.asarray(parameters[n], float)).tolist() for n in names}
 
 
 def plants(

@@ -19,26 +19,26 @@ from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError
 from gyrobench.packaging import load_part
-from gyrobench.record.frequency_response import Complex
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
-from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search, with_jitter
+from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.own_controllers import checked_structure, own_controller
-from gyrobench.tuning.plant import Plant, modes, plants
+from gyrobench.tuning.plant import STICKS, Plant, modes, plants, without_friction
 from gyrobench.tuning.proof import ExpectedJitter, Proof, known_limit, proof_of
 from gyrobench.tuning.quietness import about, quieted
 from gyrobench.tuning.reasons import reasons_of
-from gyrobench.tuning.robustness import crossovers, measured
-from gyrobench.tuning.sight_allowance import PEAK, allowed
-from gyrobench.tuning.sight_jitter import SightModel, SightWays, sight_models
+from gyrobench.tuning.robustness import crossovers
+from gyrobench.tuning.sight_allowance import allowed
+from gyrobench.tuning.sight_jitter import SightModel, sight_models
 from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.tuned_settings import TuningError, plan_settings, quiet, settings_of
+from gyrobench.tuning.tuning_notes import driven, idle, of_proofs, slips, states
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
 from gyrobench.tuning.written_loop import TunedLoop
 
@@ -118,17 +118,18 @@ def tune(
             f"{', or a smaller spread' if ranges else ''}"
         )
     ways = [s.at(f) for s in problem.sights]
-    got = with_jitter(wishes, measured(wishes, f, loops), ways, responses)
+    got = problem.measures(f, loops, ways, responses)
     results = _results(wishes, got, problem.plants)
     jitter = next((w for w in wishes if w.name == JITTER), None)
     at_points = [p.values for p in problem.plants]
-    shares = allowed(jitter, ways, responses, at_points, nominal, known_limit(nominal, ports)) if jitter else ()
+    limit = known_limit(nominal, ports)
+    shares = allowed(jitter, ways, responses, at_points, nominal, limit) if jitter else ()
     part, settings = settings_of(shape, controller, nominal, system, ports.slot)
     settings |= plan_settings(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
     reasons = () if had else tuple(reasons_of(models, problem, x, results, f, loops))
     swaps = {**(parts or {}), **({ports.slot: part} if part else {})}
-    worst = sorted(results, key=lambda r: r.ratio)[0].at
+    worst = {n: v for n, v in min(results, key=lambda r: r.ratio).at.items() if n != STICKS}  # a run has both
     runs = [{}, worst] if worst else [{}]
     proofs = []
     with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
@@ -148,8 +149,8 @@ def tune(
         maps={slot: str(file) for slot, file in (maps or {}).items()},
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
         best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
-        notes=(*implied, *about(quiet_one), *_idle(problem, ranges), *_slips(sources),
-               *_driven(ways, responses, nominal, ports), *_notes(proofs)),
+        notes=(*implied, *about(quiet_one), *idle(problem, ranges), *slips(sources), *states(models.sticks, nominal),
+               *slow(wishes, f, loops[0]),               *driven(ways, responses, nominal, ports), *of_proofs(proofs)),
         slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged, allowed=shares,
     )  # fmt: skip
 
@@ -164,7 +165,9 @@ class _Loop:
         self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
         self.system, self.nominal, self.ranges = system, nominal, ranges
         self.step, self.ports, self.stated = system.step, ports, stated
-        self.free = dict(stated(nominal).free) if stated else {}  # what slips in the ride is not in a spread, too
+        #: what is free of friction in the loop that is tuned, and whether that which sticks is judged beside it
+        self.free = dict(stated(nominal).free) if stated else without_friction(nominal)
+        self.sticks = bool(self.free) and not stated
 
     def part_of(self, slot: str) -> type[Component]:
         if slot not in self.names:
@@ -173,13 +176,18 @@ class _Loop:
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
-        left = [{n: v for n, v in values.items() if n.partition("[")[0] not in self.free} for values in at]
-        free = {**self.nominal, **self.free}
         try:
-            found = plants(self.assembly, free, self.part_of, step or self.step, left, self.ports)
+            there = [self._there(values) for values in at]
+            found = plants(self.assembly, self.nominal, self.part_of, step or self.step, there, self.ports)
             return [replace(p, values=values) for p, values in zip(found, at, strict=True)]
         except (LinearizationError, ComponentError) as error:
             raise TuningError(f"{self.system.name}: no linear model to tune: {error}") from None
+
+    def _there(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return the parameters that differ from nominal at a point: what slips is without friction."""
+        if STICKS in values:
+            return {n: v for n, v in values.items() if n != STICKS}
+        return {n: v for n, v in values.items() if n.partition("[")[0] not in self.free} | self.free
 
     def sights(self, at: Sequence[Mapping[str, float]]) -> list[SightModel]:
         """Return what moves the line of sight at points of the spread; nothing where no jitter is wanted."""
@@ -188,13 +196,17 @@ class _Loop:
         return sight_models(self.assembly, self.nominal, self.part_of, self.step, at, self.ports, self.stated)
 
     def problem(self, shape: ControllerStructure, wishes: Sequence[Wish]) -> TuningProblem:
-        at = points(self.ranges)
+        at: list[dict[str, float]] = points(self.ranges)
+        corners = 1 + 2 ** len(self.ranges)
+        if self.sticks:
+            at = [*at[:corners], *({**values, STICKS: 1.0} for values in at[:corners]), *at[corners:]]
+            corners *= 2
         models = self.plants(at)
         shape = shape.of(models[0])
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
-            shape, wishes, models, decades, frequencies(models, decades, wishes), 1 + 2 ** len(self.ranges),
+            shape, wishes, models, decades, frequencies(models, decades, wishes), corners,
             sights=self.sights(at),
         )  # fmt: skip
 
@@ -228,40 +240,6 @@ def _line_of_sight(system: System, wishes: Sequence[Wish], ports: LoopPorts) -> 
             'what the loop is for, too, --want "bandwidth>1Hz" or --want "S at 0.1Hz<-40dB"'
         )
     return stated
-
-
-def _idle(problem: TuningProblem, ranges: Sequence[Range]) -> list[str]:
-    """Return which parameters of the spread do nothing to the loop by the linear model; none where a jitter counts."""
-    found = []
-    if not problem.sights:
-        corners = problem.responses()[1 : problem.corners]
-        for j, r in enumerate(ranges):
-            bit = 1 << (len(ranges) - 1 - j)  # of a corner's number
-            if all(np.array_equal(corners[k], corners[k | bit]) for k in range(len(corners)) if not k & bit):
-                found.append(f"{r.name} does nothing to the linear loop: its spread changes none of the margins")
-    return found
-
-
-def _slips(sources: LineOfSight | None) -> list[str]:
-    """Return how dry friction is in the search, where it slips in the ride."""
-    if sources is None or not sources.slipping:
-        return []
-    return [
-        "dry friction slips in the ride: margins are searched without it, the jitter with viscous friction that makes "
-        "torques as large there; its reversals are in the co-simulation alone"
-    ]
-
-
-def _driven(ways: Sequence[SightWays], G: Complex, nominal: Mapping[str, Any], ports: LoopPorts) -> list[str]:
-    """Return that what moves the line of sight alone takes the controller's output to its limit, where it does."""
-    limit = known_limit(nominal, ports)
-    volts = max((w.voltage(G) for w in ways), default=0.0)
-    if PEAK * volts < limit:
-        return []
-    return [
-        f"base, target and noise take {volts:.2g} V rms by the linear model, and the limit of {ports.slot} is "
-        f"{limit:.3g} V: their peaks are cut, and the jitter is more than the linear model says"
-    ]
 
 
 def tunable() -> list[str]:
@@ -339,28 +317,3 @@ def _results(wishes: Sequence[Wish], got: Any, models: Sequence[Plant]) -> list[
         worst = int(np.argmin([wish.ratio(g) for g in got[:, k]]))
         found.append(WishResult(wish, float(got[0, k]), float(got[worst, k]), models[worst].values))
     return found
-
-
-def _notes(proofs: Sequence[Proof]) -> list[str]:
-    notes = []
-    for p in proofs:
-        if p.friction and not all(w.agrees for w in p.wishes):
-            notes.append(
-                f"the linear model takes the friction ({p.friction}) for an elastic contact that does not slip: at the "
-                "amplitude of the test sines the loop is another one (describing function)"
-            )
-            break
-    if untold := list(dict.fromkeys(w.wish.name for p in proofs for w in p.wishes if not w.told)):
-        notes.append(
-            f"the co-simulation does not tell {' and '.join(untold)}: the test sines stand too little above what else "
-            "moves the loop. Less noise in the parts (gyro, images, base) would tell, or a larger limit, which lets "
-            "larger sines through"
-        )
-    if any(p.limits for p in proofs):
-        notes.append("a part was at its limit in the test sines: what was measured there is not linear")
-    if lost := max((p.lost for p in proofs), default=0.0):
-        notes.append(
-            f"the target was lost in {100.0 * lost:.2g} % of the ride: the loop was open then, and the jitter is none "
-            "of a tracker that sees; want more bandwidth, or widen the field"
-        )
-    return notes

@@ -179,7 +179,7 @@ def _text(value: Any) -> str:
 def where(at: Mapping[str, float], spread: tuple[Range, ...]) -> str:
     """Return a point of the spread as text."""
     unit = {r.name: r.unit for r in spread}
-    return ", ".join(f"{n} = {_shown(v, unit[n])}" for n, v in at.items()) or "nominal"
+    return ", ".join(f"{n} = {_shown(v, unit[n])}" if n in unit else n for n, v in at.items()) or "nominal"
 
 
 def range_text(r: Range) -> str:

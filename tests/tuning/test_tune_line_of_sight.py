@@ -18,6 +18,8 @@ from gyrobench.tuning.proof import loop_plan
 from gyrobench.tuning.sight_jitter import MovedSight, SightWays, finer, sight_models
 from gyrobench.tuning.structures import rounded
 from gyrobench.tuning.tune_loop import tune
+from gyrobench.tuning.tuning_notes import slow
+from gyrobench.tuning.wishes import Wish
 
 F = np.geomspace(0.05, 1000.0, 3000)
 
@@ -194,6 +196,38 @@ def test_slipping_friction_is_viscous_friction_of_the_same_torque() -> None:
     assert sources.free["platform.stiction"] == [0.0, 0.0]
     still = system.line_of_sight({**q, "platform.presliding": 0.5})
     assert still.slipping == {} and still.free == {}
+
+
+@pytest.mark.long
+def test_margins_hold_for_joints_that_stick_and_that_slip() -> None:
+    """A rigid gimbal by hand: 0.4/(J s + c) while it slips, a contact of k = 0.05/2e-4 N.m/rad with damping sqrt(k J)
+    beside it while it sticks; 1.5 steps of delay.  Tuned for the contact alone it was unstable as soon as it slipped.
+    """
+    wishes = ["phase margin=40deg", "peak S<6dB", "bandwidth>1.5Hz"]
+    found = tune(gimbal(stiction=0.05, bending=0.0), wishes, structure="pi+lead", loop="pitch")
+    assert found.had, str(found)
+    s = 2j * np.pi * F
+    x = s / (200 * np.pi)
+    G = np.polyval(found.controller.num[::-1], s) / np.polyval(found.controller.den[::-1], s)
+    way = 0.4 * G * np.exp(-1.5 * 2e-4 * s) / (1.0 + math.sqrt(2.0) * x + x**2)
+    k = 0.05 / 2e-4
+    slips, sticks = way / (0.05 * s + 0.01), way / (0.05 * s + 0.01 + math.sqrt(k * 0.05) + k / s)
+    peaks = [float(np.abs(1.0 / (1.0 + L)).max()) for L in (slips, sticks)]
+    worst = next(w.worst for w in found.wishes if w.wish.name == "peak S")
+    assert max(peaks) == pytest.approx(worst, rel=0.02)
+    for L in (slips, sticks):
+        crossed = np.flatnonzero(np.diff(np.sign(np.abs(L) - 1.0)))
+        assert np.all(np.abs(np.angle(-L[crossed])) > math.radians(39.0))
+    assert "for joints that stick" in str(found)
+
+
+def test_a_loop_slower_than_its_jitter_says_so() -> None:
+    """L = f0/(j f) crosses at f0; the jitter counts from 1 Hz on."""
+    f = np.geomspace(0.01, 100.0, 500)
+    jitter = Wish("jitter", 25e-6, "rad", False, f=1.0)
+    bandwidth = Wish("bandwidth", 2.0, "Hz", True)
+    assert "crosses at 0.37 Hz" in slow([jitter], f, 0.37 / (1j * f))[0]
+    assert slow([jitter], f, 5.0 / (1j * f)) == [] == slow([jitter, bandwidth], f, 0.37 / (1j * f))
 
 
 @pytest.mark.long
