@@ -7,19 +7,17 @@ passes: the margins are those of one amplitude.
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gyrobench import units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.identification.loop_margins import Margin
+from gyrobench.reduction.loops.wanted_measure import FACTOR, wanted_measure
 
 #: name -> unit, whether more is better
 MEASURES = {
-    "phase margin": ("rad", True), "gain margin": ("factor", True), "gain-reduction margin": ("factor", False),
-    "delay margin": ("s", True), "disk margin": ("1", True), "peak S": ("factor", False), "peak T": ("factor", False),
+    "phase margin": ("rad", True), "gain margin": (FACTOR, True), "gain-reduction margin": (FACTOR, False),
+    "delay margin": ("s", True), "disk margin": ("1", True), "peak S": (FACTOR, False), "peak T": (FACTOR, False),
     "crossover": ("Hz", True),
 }  # fmt: skip
 PASS, FAIL, OPEN = "pass", "fail", "inconclusive"
@@ -47,7 +45,7 @@ class WantedMargin:
         return MarginVerdict(self, OPEN, dependent) if dependent else MarginVerdict(self, PASS, "")
 
     def __str__(self) -> str:
-        shown = Margin(self.name, 0.0, 0.0, 0.0, 0.0, MEASURES[self.name][0]).shown(self.limit)
+        shown = Margin(self.name, 0.0, 0.0, 0.0, 0.0, MEASURES[self.name][0] or "factor").shown(self.limit)
         return f"{self.name} {'at least' if self.least else 'at most'} {shown}"
 
 
@@ -65,33 +63,11 @@ class MarginVerdict:
 
 def parse_wanted(texts: Sequence[str]) -> list[WantedMargin]:
     """Return what is wanted.  Raises UsageError."""
-    return [_wanted(text) for text in texts]
+    found = [wanted_measure(text, _kind, ", ".join(MEASURES)) for text in texts]
+    return [WantedMargin(name, limit, least) for name, limit, _, least in found]
 
 
-def _wanted(text: str) -> WantedMargin:
-    found = re.fullmatch(r"\s*([^<>=]+?)\s*(<=|>=|<|>|=)\s*(.+?)\s*", text)
-    if not found:
-        raise UsageError(f'--want {text}: write MEASURE=VALUE, for example "phase margin=40deg"; there are: {_names()}')
-    name, sign, value = " ".join(found[1].split()), found[2], found[3]
+def _kind(text: str, name: str) -> tuple[str, bool]:
     if name not in MEASURES:
         raise UsageError(f"--want {text}: no measure '{name}'; {suggest_names(name, list(MEASURES))}")
-    unit, least = MEASURES[name]
-    if sign[0] in "<>" and (sign[0] == ">") is not least:
-        raise UsageError(
-            f"--want {text}: of {name} {'more' if least else 'less'} is better; write {'>' if least else '<'} or ="
-        )
-    try:
-        if unit == "factor":
-            bare = units.parse_quantity(value.removesuffix("dB").strip(), "1")
-            number = 10.0 ** (bare / 20.0) if value.endswith("dB") else bare
-        else:
-            number = units.parse_quantity(value, unit)
-    except units.UnitError as error:
-        raise UsageError(f"--want {text}: {error}" + ("; a factor, or dB" if unit == "factor" else "")) from None
-    if not (math.isfinite(number) and number > 0.0):
-        raise UsageError(f"--want {text}: must be above 0")
-    return WantedMargin(name, number, least)
-
-
-def _names() -> str:
-    return ", ".join(MEASURES)
+    return MEASURES[name]

@@ -274,7 +274,8 @@ def _read(
     points = sorted((p for p, counts in judged if counts), key=lambda p: p.f)
     limit = known_limit(record.run.parameters, ports)
     own = own_controller(record.run.parameters, ports.slot)
-    cut = _limited(phases, ports.slot) if own else _cut(phases, ports.slot, limit)
+    name, most = ("saturated", 1.0) if own else ("v", limit)
+    cut = _at_rest(phases, f"{ports.slot}.{name}", most)
     what, unit = ("output", own.unit) if own else ("voltage", "V")
     at_limit = f"at the limit of {limit:.3g} {unit} {100.0 * cut:.2g} % of the time"
     noise = f"{ports.slot} (noise alone has its {what} {at_limit})"
@@ -311,17 +312,10 @@ def known_limit(parameters: Mapping[str, Any], ports: LoopPorts) -> float:
     return min(float(np.min(x)) for x in found)
 
 
-def _limited(phases: Sequence[Gate], slot: str) -> float:
-    """Return the part of the time at rest in which a part says that it is at its limit."""
-    flag = f"{slot}.saturated"
-    at_rest = [g[flag] for g in phases if g.label == REST and flag in g.channels]
-    return float(np.mean(at_rest[0] > 0.5)) if at_rest else 0.0
-
-
-def _cut(phases: Sequence[Gate], slot: str, limit: float) -> float:
-    """Return the part of the time in which noise alone has the voltage at its limit."""
-    at_rest = [g[f"{slot}.v"] for g in phases if g.label == REST and f"{slot}.v" in g.channels]
-    return float(np.mean(np.abs(at_rest[0]) >= (1.0 - 1e-9) * limit)) if at_rest else 0.0
+def _at_rest(phases: Sequence[Gate], name: str, most: float) -> float:
+    """Return the part of the time without a test signal in which the size of a channel is at its most."""
+    gate = next((g for g in phases if g.label == REST and name in g.channels), None)
+    return float(np.mean(np.abs(gate[name]) >= (1.0 - 1e-9) * most)) if gate else 0.0
 
 
 def _jitter(wish: Wish, phases: Sequence[Gate], sight: ExpectedJitter) -> ProvenWish:

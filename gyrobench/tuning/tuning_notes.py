@@ -101,6 +101,6 @@ def slow(wishes: Sequence[Wish], f: Array, L: Complex) -> list[str]:
         return []
     where = f"crosses at {at:.2g} Hz" if at else "does not cross |L| = 1"
     return [
-        f"the loop {where}, below the {lowest:g} Hz from which the jitter counts: the inertia alone keeps it small, and "
-        'nothing wanted holds slower motion or a load; want what else the loop is for, "bandwidth>2Hz"'
+        f"the loop {where}, below the {lowest:g} Hz from which the jitter counts: the inertia alone keeps it small, "
+        'and nothing wanted holds slower motion or a load; want what else the loop is for, "bandwidth>2Hz"'
     ]

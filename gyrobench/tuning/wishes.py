@@ -6,14 +6,12 @@ Inside all are SI: rad, s, Hz; ratios of amplitudes as factors (6dB = 1.995).
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gyrobench import units
 from gyrobench.bench import UsageError, suggest_names
+from gyrobench.reduction.loops.wanted_measure import FACTOR, positive, wanted_measure
 
-FACTOR = ""  # unit of a ratio of amplitudes: a number, or dB
 #: measure -> unit, least (True) or most (False) wanted, meaning
 MEASURES: dict[str, tuple[str, bool, str]] = {
     "phase margin": ("rad", True, "phase that a gain crossover lies away from −180°, the smallest"),
@@ -112,24 +110,18 @@ def _known() -> str:
     return f"{', '.join(MEASURES)}, S at FREQUENCY"
 
 
-def _wish(text: str) -> Wish:
-    found = re.fullmatch(r"\s*([^<>=]+?)\s*(<=|>=|<|>|=)\s*(.+?)\s*", text)
-    if not found:
-        raise UsageError(f'--want {text}: write MEASURE=VALUE, for example "phase margin=40deg"; there are: {_known()}')
-    name, sign, value = found.groups()
-    name = " ".join(name.split())
-    f = 0.0
+def _kind(text: str, name: str) -> tuple[str, bool]:
+    """Return the unit of a measure and whether more is better.  Raises UsageError."""
     if name.startswith(AT):
-        f = _positive(text, name.removeprefix(AT), "Hz")
-        unit, least = FACTOR, False
-    elif name in MEASURES:
-        unit, least, _ = MEASURES[name]
-    else:
+        return FACTOR, False
+    if name not in MEASURES:
         raise UsageError(f"--want {text}: no measure '{name}'; {suggest_names(name, [*MEASURES, 'S at 1Hz'])}")
-    if sign[0] in "<>" and (sign[0] == ">") is not least:
-        better, right = ("more", ">") if least else ("less", "<")
-        raise UsageError(f"--want {text}: of {name} {better} is better; write {right} or =")
-    number = _factor(text, value) if unit == FACTOR else _positive(text, value, unit)
+    return MEASURES[name][:2]
+
+
+def _wish(text: str) -> Wish:
+    name, number, unit, least = wanted_measure(text, _kind, _known())
+    f = positive(text, name.removeprefix(AT), "Hz") if name.startswith(AT) else 0.0
     if name in ("gain margin", "peak S") and number <= 1.0:
         raise UsageError(f"--want {text}: must be above 0 dB, a factor above 1")
     if name == "phase margin" and number >= math.pi:
@@ -137,26 +129,3 @@ def _wish(text: str) -> Wish:
     if name == "disk margin" and number >= 2.0:
         raise UsageError(f"--want {text}: is below 2 in every loop")
     return Wish(name, number, unit, least, f)
-
-
-def _positive(text: str, value: str, unit: str) -> float:
-    try:
-        number = units.parse_quantity(value, unit)
-    except units.UnitError as error:
-        raise UsageError(f"--want {text}: {error}") from None
-    if not number > 0.0:
-        raise UsageError(f"--want {text}: must be > 0")
-    return number
-
-
-def _factor(text: str, value: str) -> float:
-    """Return a ratio of amplitudes, given as a factor or in dB."""
-    bare = value.removesuffix("dB").strip()
-    try:
-        number = units.parse_quantity(bare, "1")
-    except units.UnitError:
-        raise UsageError(f"--want {text}: a factor or decibels are expected, such as 2 or 6dB") from None
-    factor = 10.0 ** (number / 20.0) if value.endswith("dB") else number
-    if not factor > 0.0:
-        raise UsageError(f"--want {text}: must be > 0 as a factor; did you mean dB?")
-    return factor
