@@ -121,6 +121,14 @@ def test_a_source_at_its_allowance_gives_the_jitter_that_was_wanted(quantity: st
 
 
 @pytest.mark.long
+def test_a_coarse_gyro_is_named_as_what_the_budget_lacks() -> None:
+    """Steps of 0.5 deg/s over noise of 0.053 deg/s rms: the line of sight wanders within one."""
+    result, _ = ridden({"gyro.resolution": math.radians(0.5)}, ride=20.0, jitter_from=2.0)
+    text = next(r.text for r in result.reasons if r.id == "budget.not_linear")
+    assert "the steps of the gyro's output are larger than its noise" in text
+
+
+@pytest.mark.long
 def test_an_allowance_beyond_reach_is_said_in_words() -> None:
     """Dry friction alone makes more than a fifth of the jitter; where it slips, others are allowed twice as much."""
     _, record = ridden(ride=20.0, jitter_from=2.0, stiction=0.05)

@@ -87,3 +87,12 @@ def psd_scale(p: Mapping[str, Any]) -> list[SetBy]:
     if int(p.get("motion.preset", 0)) == RECORDED or not p.get("vibration.points"):
         return []
     return [SetBy("psd_scale", float(p.get("vibration.scale", 1.0)), "1")]
+
+
+def coarse(p: Mapping[str, Any]) -> bool:
+    """Return whether the noise of the gyro does not cover its resolution, which is no noise then.
+
+    2 white^2 through a filter of second order has 1.11 times its bandwidth; below 0.3 of a step its rounding is uneven.
+    """
+    white, band, step = (float(p.get(f"gyro.{n}", 0.0)) for n in ("white", "bandwidth", "resolution"))
+    return white * math.sqrt(2.22 * band) < 0.3 * step

@@ -25,7 +25,7 @@ from gyrobench.reduction.loops.sight_budget import (
     by_source,
     read_ride,
 )
-from gyrobench.reduction.loops.sight_quantities import set_by, shares
+from gyrobench.reduction.loops.sight_quantities import coarse, set_by, shares
 from gyrobench.result import Curve, SetBy
 
 AXES = {"pitch": 1, "yaw": 3}
@@ -177,6 +177,8 @@ class SightReduction(LoopReduction):
         if abs(measured / whole - 1.0) > WRONG:
             limited = limits_hit([g for g in self.found.gates if g.label == "ride"])
             why = f"a limit was active in {', '.join(limited)}" if limited else ""
+            if not why and coarse(self.run.parameters):
+                why = "the steps of the gyro's output are larger than its noise"
             if not why and self._stuck():
                 why = "dry friction sticks for a part of the ride and slips in another"
             text = (
