@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -48,12 +48,12 @@ class AllowedSource:
 
 def allowed(
     wish: Wish, ways: Sequence[SightWays], G: Complex, points: Sequence[Mapping[str, float]],
-    nominal: Mapping[str, Any], limit: float,
+    nominal: Mapping[str, Any], limit: float, set_by: Callable[[str, Mapping[str, Any]], list[SetBy]],
 ) -> tuple[AllowedSource, ...]:  # fmt: skip
     """Return the sources with what they may be, each with all others as they are.
 
-    ways: at the points of the spread, nominal first; limit: of the voltage.  A quantity that the spread itself has is
-    judged by its value at each point.
+    ways: at the points of the spread, nominal first; limit: of the voltage; set_by: source and parameters -> quantities that set it.
+    One that the spread itself has is judged by its value at each point.
     """
     parameters = [with_elements(nominal, values) for values in points]
     each = [{n: (j / MICRO) ** 2 for n, j in w.sources(G).items()} for w in ways]
@@ -68,7 +68,7 @@ def allowed(
             PEAK * math.hypot(w.voltage(G), math.sqrt(max(k * k - 1.0, 0.0)) * w.voltage(G, source)) > limit
             for w, k in zip(ways, known, strict=False) if math.isfinite(k)
         )  # fmt: skip
-        quantities = [ways[0].set_by(source, p) for p in parameters]
+        quantities = [set_by(source, p) for p in parameters]
         for own in zip(*quantities, strict=True):
             most = [at_most(s, k, f"{without:.3g} µrad") for s, k in zip(own, factors, strict=True)]
             least = next((x for x in most if isinstance(x, str)), None) or min(

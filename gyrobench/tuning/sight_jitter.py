@@ -24,7 +24,6 @@ from gyrobench.linear.linear_model import Linear, operating_point
 from gyrobench.record.frequency_response import Complex
 from gyrobench.record.run_document import LinearModel
 from gyrobench.reduction.loops.margins import excitation_responses
-from gyrobench.result import SetBy
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.values import with_elements
 from gyrobench.system.wiring import Assembly
@@ -70,7 +69,7 @@ class SightModel:
             else:
                 w, u = both(source.kind, source.axis)
             moved.append(MovedSight(source.name, w, u, source.density(fine)))
-        return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis), self.sources.set_by)
+        return SightWays(f, fine, tuple(moved), *both(self.ports.kind, self.ports.axis))
 
 
 def finer(f: Array) -> Array:
@@ -107,7 +106,6 @@ class SightWays:
     moved: tuple[MovedSight, ...]
     driven: Complex
     back: Complex
-    set_by: Callable[[str, Mapping[str, Any]], list[SetBy]]
 
     def sources(self, G: Complex) -> dict[str, float]:
         """Return source -> rms of the line of sight, rad; G: the controller at ``at``."""

@@ -119,10 +119,12 @@ def tune(
     ways = [s.at(f) for s in problem.sights]
     got = problem.measures(f, loops, ways, responses)
     results = _results(wishes, got, problem.plants)
-    jitter = next((w for w in wishes if w.name == JITTER), None)
     at_points = [p.values for p in problem.plants]
-    limit = known_limit(nominal, ports)
-    shares = allowed(jitter, ways, responses, at_points, nominal, limit) if jitter else ()
+    wanted = [w for w in wishes if w.name == JITTER]
+    shares = [
+        x for w in wanted if sources
+        for x in allowed(w, ways, responses, at_points, nominal, known_limit(nominal, ports), sources.set_by)
+    ]  # fmt: skip
     part, settings = settings_of(shape, controller, nominal, system, ports.slot)
     settings |= plan_settings(system, nominal, session, settings, crossovers(f, loops[0]), ports.slot)
     had = all(r.ratio >= 1.0 for r in results)
@@ -149,8 +151,8 @@ def tune(
         seconds=seconds, evaluations=problem.evaluations, reasons=reasons,
         best=quiet_one.ratio if quiet_one else min(r.ratio for r in results),
         notes=(*implied, *about(quiet_one), *idle(problem, ranges), *slips(sources), *states(models.sticks, nominal),
-               *slow(wishes, f, loops[0]),               *driven(ways, responses, nominal, ports), *of_proofs(proofs)),
-        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged, allowed=shares,
+               *slower(wishes, f, loops[0]), *driven(ways, responses, nominal, ports), *of_proofs(proofs)),
+        slot=ports.slot, loop=ports.loop if len(system.loops) > 1 else "", trade=exchanged, allowed=tuple(shares),
     )  # fmt: skip
 
 

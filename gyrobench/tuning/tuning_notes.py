@@ -91,7 +91,7 @@ def states(sticks: bool, nominal: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def slow(wishes: Sequence[Wish], f: Array, L: Complex) -> list[str]:
+def slower(wishes: Sequence[Wish], f: Array, L: Complex) -> list[str]:
     """Return that a loop is slower than the jitter that is all it was wanted for.  L: at nominal values over f."""
     lowest = next((w.f for w in wishes if w.name == JITTER), 0.0)
     if not lowest or any(w.name == "bandwidth" or w.f for w in wishes if w.name != JITTER):

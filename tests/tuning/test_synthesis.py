@@ -31,8 +31,8 @@ from gyrobench.tuning.synthesis import (
     w_plane,
 )
 from gyrobench.tuning.trade import trade, traded
-from gyrobench.tuning.tune_loop import _idle
 from gyrobench.tuning.tuned_loop import WishResult
+from gyrobench.tuning.tuning_notes import idle
 from gyrobench.tuning.wishes import parse_wishes
 
 needs_slycot = pytest.mark.skipif(find_spec("slycot") is None, reason="slycot is not installed")
@@ -272,7 +272,7 @@ def test_a_spread_that_does_nothing_is_named() -> None:
     other = replace(nominal, c=2.0 * nominal.c)
     four = replace(one, plants=[nominal, nominal, nominal, other, other], corners=5)
     names = [Range(n, 0.0, 1.0, "1") for n in ("part.a", "part.b")]
-    assert [n.split()[0] for n in _idle(four, names)] == ["part.b"]
+    assert [n.split()[0] for n in idle(four, names)] == ["part.b"]
 
 
 def test_no_controller_is_below_the_floor() -> None:

@@ -18,7 +18,7 @@ from gyrobench.tuning.proof import loop_plan
 from gyrobench.tuning.sight_jitter import MovedSight, SightWays, finer, sight_models
 from gyrobench.tuning.structures import rounded
 from gyrobench.tuning.tune_loop import tune
-from gyrobench.tuning.tuning_notes import slow
+from gyrobench.tuning.tuning_notes import slower
 from gyrobench.tuning.wishes import Wish
 
 F = np.geomspace(0.05, 1000.0, 3000)
@@ -226,8 +226,8 @@ def test_a_loop_slower_than_its_jitter_says_so() -> None:
     f = np.geomspace(0.01, 100.0, 500)
     jitter = Wish("jitter", 25e-6, "rad", False, f=1.0)
     bandwidth = Wish("bandwidth", 2.0, "Hz", True)
-    assert "crosses at 0.37 Hz" in slow([jitter], f, 0.37 / (1j * f))[0]
-    assert slow([jitter], f, 5.0 / (1j * f)) == [] == slow([jitter, bandwidth], f, 0.37 / (1j * f))
+    assert "crosses at 0.37 Hz" in slower([jitter], f, 0.37 / (1j * f))[0]
+    assert slower([jitter], f, 5.0 / (1j * f)) == [] == slower([jitter, bandwidth], f, 0.37 / (1j * f))
 
 
 @pytest.mark.long
@@ -305,7 +305,7 @@ def test_a_resonance_between_the_frequencies_of_the_grid() -> None:
     w = 2.0 * np.pi * f0
     plant = (w / s) ** 2 * (1.0 + 2.0 * z * s / w)
     moved = (MovedSight("noise", 0.0 * s, 1.0 + 0.0 * s, np.ones(fine.size)),)
-    ways = SightWays(f, fine, moved, plant, -plant, lambda *_: [])
+    ways = SightWays(f, fine, moved, plant, -plant)
     x = np.linspace(1.0, 1000.0, 4_000_001) / f0
     exact = np.trapezoid((1.0 + (2 * z * x) ** 2) / ((1.0 - x**2) ** 2 + (2 * z * x) ** 2), x * f0)
     assert ways.sources(np.ones(f.size, complex))["noise"] ** 2 == pytest.approx(exact, rel=0.02)
