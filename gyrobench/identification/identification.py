@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from gyrobench.identification.wanted_margins import MarginVerdict
 
 
 @dataclass(frozen=True)
-class Identification:
+class LoopIdentification:
     """Responses L, S, T and P (plant, output over input, SI) of a loop, each with u; its margins; remarks.
 
     periods: how many were used, each of ``period``, s; 0, 0 for an excitation without.
@@ -109,13 +108,8 @@ class Identification:
             "seconds": self.seconds,
         }
 
-    def write(self, folder: str | Path) -> dict[str, Path]:
-        """Write identification.json, identification.html and identification.pdf; return the path of each format."""
-        from gyrobench.identification.identification_page import write_identification
-
-        return write_identification(self, Path(folder))
-
-    def __str__(self) -> str:
+    def text(self) -> str:
+        """Return all of it as a text."""
         lines = [f"{self.record.name}: {self.method}; excitation at the {self.record.at}", ""]
         rows = [
             [m.name, m.shown(m.value), f"{m.shown(m.low)} to {m.shown(m.high)}", f"at {m.f:.4g} Hz"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
-from gyrobench.identification.identification import Identification
+from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.report import loop_plane
 from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, chart, figure, svg, zero_line
@@ -25,7 +25,7 @@ def decibel(x: Array) -> Array:
     return np.asarray(20.0 * np.log10(np.maximum(x, LOWEST)))
 
 
-def open_loop(t: Identification) -> str:
+def open_loop(t: LoopIdentification) -> str:
     """Return gain and phase of L over frequency, points with intervals and the curve through them."""
     fig, axes = figure(WIDE * 0.8, 96, nrows=2, sharex=True)
     g = t.responses["L"]
@@ -41,7 +41,7 @@ def open_loop(t: Identification) -> str:
     return svg(fig, "open-loop")
 
 
-def plant(t: Identification) -> str:
+def plant(t: LoopIdentification) -> str:
     """Return gain and phase of the plant over frequency."""
     fig, axes = figure(WIDE * 0.8, 96, nrows=2, sharex=True)
     unit, factor = t.plant_unit
@@ -60,7 +60,7 @@ def plant(t: Identification) -> str:
     return svg(fig, "plant")
 
 
-def _known(t: Identification) -> NDArray[np.bool_]:
+def _known(t: LoopIdentification) -> NDArray[np.bool_]:
     return t.responses["L"].determined
 
 
@@ -90,7 +90,7 @@ def _about_limits(axes: Any) -> None:
     axes[1, 0].axhline(-180.0, color=MUTED, linewidth=0.8, zorder=1)
 
 
-def sensitivities(t: Identification) -> str:
+def sensitivities(t: LoopIdentification) -> str:
     """Return |S| and |T| over frequency, with intervals."""
     fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
     for ax, name, dense in ((axes[0, 0], "S", t.curve.S), (axes[1, 0], "T", 1.0 - t.curve.S)):
@@ -113,11 +113,11 @@ def sensitivities(t: Identification) -> str:
     return svg(fig, "sensitivities")
 
 
-def _disks(t: Identification) -> list[loop_plane.Disk]:
+def _disks(t: LoopIdentification) -> list[loop_plane.Disk]:
     return [("disk margin", m.value, GREEN) for m in t.margins if m.name == "disk margin" and 0.0 < m.value < 1.99]
 
 
-def nyquist(t: Identification) -> str:
+def nyquist(t: LoopIdentification) -> str:
     """Return L near the critical point, with the circles that hold 95 % of each point's gain and phase."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle
@@ -133,7 +133,7 @@ def nyquist(t: Identification) -> str:
     return loop_plane.nyquist(fig, ax, _disks(t))
 
 
-def nichols(t: Identification) -> str:
+def nichols(t: LoopIdentification) -> str:
     """Return gain over phase of L."""
     fig, ax = chart(HALF, 78)
     g = t.responses["L"]
@@ -146,7 +146,7 @@ def nichols(t: Identification) -> str:
     return loop_plane.nichols(fig, ax, _disks(t))
 
 
-def distortion(t: Identification) -> str:
+def distortion(t: LoopIdentification) -> str:
     """Return the output's amplitude at excited lines and at those that are left out; "" where there are none."""
     if not t.distortions:
         return ""

@@ -12,7 +12,7 @@ import numpy as np
 
 from gyrobench.bench import Bench
 from gyrobench.identification import identification_figures as draw
-from gyrobench.identification.identification import Identification
+from gyrobench.identification.identification import LoopIdentification
 from gyrobench.identification.loop_record import PLANT_INPUT, PLANT_OUTPUT
 from gyrobench.identification.plant_fit import shown_values
 from gyrobench.identification.plant_model import PARAMETERS
@@ -36,12 +36,12 @@ NAMES = {kind: f"identification.{kind}" for kind in FORMATS}
 SHOWN = 30  # frequencies of the table
 
 
-def write_identification(found: Identification, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+def write_identification(found: LoopIdentification, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
     """Write identification.json, .html and .pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
     return write_files(found.as_dict(), lambda: page(found), folder, formats, NAMES, Bench.find().folder)
 
 
-def page(t: Identification) -> Page:
+def page(t: LoopIdentification) -> Page:
     """Return the page."""
     told = {k: v for k, v in t.as_dict().items() if k != "seconds"}
     report_id = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
@@ -63,7 +63,7 @@ def page(t: Identification) -> Page:
             Section("Responses", "responses", [_responses(t)]),
             Section("Method", "method", _method(t)),
         ]
-    return Page(f"Identified loop: {t.record.name}", report_id, head, sections, what="Identification").finish()
+    return Page(f"Identified loop: {t.record.name}", report_id, head, sections, what="LoopIdentification").finish()
 
 
 def minus(text: str) -> str:
@@ -71,7 +71,7 @@ def minus(text: str) -> str:
     return text.replace("-", "−")
 
 
-def _margins(t: Identification) -> Any:
+def _margins(t: LoopIdentification) -> Any:
     if not t.margins:
         return Text("No margins could be measured.")
     rows = []
@@ -83,7 +83,7 @@ def _margins(t: Identification) -> Any:
     return PageTable(columns("measure", "value", "95 %", "at", wide=["measure"]), rows, caption)
 
 
-def _verdicts(t: Identification) -> list[Any]:
+def _verdicts(t: LoopIdentification) -> list[Any]:
     if not t.verdicts:
         return []
     rows = [Row([text_cell(minus(str(v.wanted)), "strong"), text_cell(v.verdict, v.verdict), text_cell(v.why)])
@@ -92,11 +92,11 @@ def _verdicts(t: Identification) -> list[Any]:
     return [PageTable(columns("wanted", "verdict", "", wide=[""]), rows, caption)]
 
 
-def _notes(t: Identification) -> list[Any]:
+def _notes(t: LoopIdentification) -> list[Any]:
     return [BulletList([f"{n[:1].upper()}{n[1:]}." for n in t.notes], warn=True)] if t.notes else []
 
 
-def _near(t: Identification) -> list[Any]:
+def _near(t: LoopIdentification) -> list[Any]:
     return pictures(
         Picture("nichols", draw.nichols(t), "Gain over phase of L; inside the dashed curve the disk margin is smaller.",
                 "Nichols plot of the open loop", half=True),
@@ -105,29 +105,29 @@ def _near(t: Identification) -> list[Any]:
     )  # fmt: skip
 
 
-def _loop(t: Identification) -> list[Section]:
+def _loop(t: LoopIdentification) -> list[Section]:
     return [
         Section("Open loop", "open-loop-section", _open_loop(t)),
         Section("Sensitivities", "sensitivities-section", _sensitivities(t)),
     ]
 
 
-def _open_loop(t: Identification) -> list[Any]:
+def _open_loop(t: LoopIdentification) -> list[Any]:
     caption = "Open loop L = 1/S − 1, with 95 % coverage intervals at each frequency."
     return pictures(Picture("open-loop", draw.open_loop(t), caption, "Bode plot of the open loop"))
 
 
-def _sensitivities(t: Identification) -> list[Any]:
+def _sensitivities(t: LoopIdentification) -> list[Any]:
     caption = "S = x/r, x the signal behind the summing point, and T = 1 − S, with 95 % coverage intervals."
     return pictures(Picture("sensitivities", draw.sensitivities(t), caption, "gain of S and T over frequency"))
 
 
-def _plant(t: Identification) -> list[Any]:
+def _plant(t: LoopIdentification) -> list[Any]:
     caption = "Plant P: output over input, both as they answer to the excitation, with 95 % coverage intervals."
     return [*_parameters(t), *pictures(Picture("plant", draw.plant(t), caption, "Bode plot of the plant"))]
 
 
-def _parameters(t: Identification) -> list[Any]:
+def _parameters(t: LoopIdentification) -> list[Any]:
     if t.fit is None:
         return []
     rows = [
@@ -140,7 +140,7 @@ def _parameters(t: Identification) -> list[Any]:
     return [PageTable(heads, rows, caption), BulletList([sentence], warn=True) if t.fit.lacks else Text(sentence)]
 
 
-def _distortion(t: Identification) -> list[Any]:
+def _distortion(t: LoopIdentification) -> list[Any]:
     rows = [
         Row([
             text_cell(d.kind), text_cell(str(d.count)),
@@ -163,7 +163,7 @@ def _db(x: float) -> float:
     return 20.0 * float(np.log10(max(x, 1e-9)))
 
 
-def _responses(t: Identification) -> PageTable:
+def _responses(t: LoopIdentification) -> PageTable:
     unit, factor = t.plant_unit
     shown = ("L", "S", "P") if t.record.closed else ("P",)
     which = np.flatnonzero(t.responses[shown[0]].determined)
@@ -185,7 +185,7 @@ def _responses(t: Identification) -> PageTable:
     return PageTable(heads, rows, "Responses at some of the frequencies; all are in identification.json.", small=True)
 
 
-def _method(t: Identification) -> list[Any]:
+def _method(t: LoopIdentification) -> list[Any]:
     enters = {
         PLANT_INPUT: "u = v + r, with v of the controller: x = u",
         PLANT_OUTPUT: "the controller gets y + r: x = y + r",

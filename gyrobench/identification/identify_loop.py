@@ -15,7 +15,6 @@ from gyrobench.arrays import Array
 from gyrobench.bench import Bench, UsageError
 from gyrobench.identification.amplitude import difference
 from gyrobench.identification.distortion import Distortion, distortions, is_odd, with_distortion
-from gyrobench.identification.identification import Identification
 from gyrobench.identification.line_spectrum import (
     PERIODS,
     LineAmplitudes,
@@ -34,6 +33,7 @@ from gyrobench.identification.plant_fit import fit_plant, parse_fit
 from gyrobench.identification.ratios import loop_responses
 from gyrobench.identification.strange_stretch import STRANGE, is_random, strange_stretch
 from gyrobench.identification.wanted_margins import parse_wanted
+from gyrobench.identification.written_identification import Identification
 from gyrobench.record.csv_reader import DataError
 
 WHOLE = 0.05  # of a sample: what the last period may be off

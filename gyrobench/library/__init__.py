@@ -43,9 +43,9 @@ from gyrobench.workflow.run_comparison import Comparison, compare_results, read_
 
 if TYPE_CHECKING:
     from gyrobench.design.designed_test import DesignedTest
-    from gyrobench.identification.identification import Identification
     from gyrobench.identification.multisine import Multisine
-    from gyrobench.tuning.tuned_loop import TunedLoop
+    from gyrobench.identification.written_identification import Identification
+    from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
     "Comparison",

@@ -9,8 +9,9 @@ from itertools import chain
 from typing import Any
 
 from gyrobench.record.frequency_response import Complex
-from gyrobench.reduction.estimation.allowance import at_most, largest_factor
+from gyrobench.reduction.estimation.allowance import MOST, TINY, at_most, largest_factor
 from gyrobench.reduction.loops.sight_quantities import TIMES
+from gyrobench.report.numbers import write_number
 from gyrobench.result import SetBy
 from gyrobench.system.values import with_elements
 from gyrobench.tuning.sight_jitter import SightWays
@@ -40,8 +41,12 @@ class AllowedSource:
     def row(self) -> list[str]:
         """Return the cells of :data:`COLUMNS` as text."""
         s, unit = self.set_by, f" {self.set_by.unit}" if self.set_by.unit != "1" else ""
-        most = self.most if isinstance(self.most, str) else f"{self.most:.3g}{unit}{', cut' if self.clips else ''}"
-        factor = "" if self.factor is None or math.isinf(self.factor) else f"{self.factor:.3g}"
+        most = (
+            self.most
+            if isinstance(self.most, str)
+            else f"{write_number(self.most, significant=3).text}{unit}{', cut' if self.clips else ''}"
+        )
+        factor = "" if self.factor is None or self.factor > MOST else f"{self.factor:.3g}"
         now = "as it is" if s.unit == TIMES else f"{s.now:.3g}{unit}"
         return [self.source, f"{self.jitter:.3g} µrad", factor, s.name, now, most]
 
@@ -58,7 +63,9 @@ def allowed(
     parameters = [with_elements(nominal, values) for values in points]
     each = [{n: (j / MICRO) ** 2 for n, j in w.sources(G).items()} for w in ways]
     found = []
-    for source in (n for n in dict.fromkeys(chain(*each)) if any(of.get(n) for of in each)):
+    for source in (
+        n for n in dict.fromkeys(chain(*each)) if any(of.get(n, 0.0) > TINY * sum(of.values()) for of in each)
+    ):
         squares = [[sum(of.values()) - of.get(source, 0.0), 0.0, of.get(source, 0.0)] for of in each]
         factors = [largest_factor(square, wish.value / MICRO) for square in squares]
         without = math.sqrt(max(0.0, *(square[0] for square in squares)))

@@ -36,10 +36,11 @@ from gyrobench.tuning.spread import Range, parse_spread, points
 from gyrobench.tuning.structures import Controller, ControllerStructure
 from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.trade import trade, traded
-from gyrobench.tuning.tuned_loop import TunedLoop, WishResult
+from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.tuned_settings import TuningError, plan_settings, quiet, settings_of
 from gyrobench.tuning.tuning_notes import driven, idle, of_proofs, slips, states
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
+from gyrobench.tuning.written_loop import TunedLoop
 
 Stated = Callable[[Mapping[str, Any]], LineOfSight]
 DENSE = 1500  # frequencies of the final figures

@@ -6,7 +6,6 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from gyrobench import units
@@ -39,10 +38,8 @@ class WishResult:
 
 
 @dataclass(frozen=True)
-class TunedLoop:
-    """Controller, wishes and what came of them, proof, reasons; ``print`` shows them as a text.
-
-    settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
+class LoopTuning:
+    """settings: for --set, beside those that were ``given``; part: in the slot of the stabilizer, "" for its own.
 
     swaps, maps: parts and mapping files of other slots that were given.
 
@@ -148,13 +145,8 @@ class TunedLoop:
             "evaluations": self.evaluations,
         }  # fmt: skip
 
-    def write(self, folder: str | Path) -> dict[str, Path]:
-        """Write tuning.json, tuning.html and tuning.pdf into a folder; return the path of each format."""
-        from gyrobench.tuning.tuning_page import write_tuning
-
-        return write_tuning(self, Path(folder))
-
-    def __str__(self) -> str:
+    def text(self) -> str:
+        """Return all of it as a text."""
         return "\n".join(_lines(self))
 
 
@@ -199,7 +191,7 @@ def _shown(value: float, unit: str) -> str:
     return units.format_quantity(float(f"{value:.4g}"), unit).replace(f" {unit}", f" {units.display(unit)}")
 
 
-def _lines(t: TunedLoop) -> list[str]:
+def _lines(t: LoopTuning) -> list[str]:
     state = "tuned" if t.proven else "tuned, but not proven in co-simulation" if t.had else "cannot be had"
     over = ", ".join(range_text(r) for r in t.spread)
     lines = [

@@ -13,7 +13,7 @@ from gyrobench.report import loop_plane
 from gyrobench.report.style import BLUE, GREEN, HALF, MUTED, VERMILION, WIDE, axis_label, chart, figure, svg, zero_line
 from gyrobench.tuning.robustness import FLOOR
 from gyrobench.tuning.trade import Trade
-from gyrobench.tuning.tuned_loop import TunedLoop
+from gyrobench.tuning.tuned_loop import LoopTuning
 from gyrobench.tuning.wishes import JITTER
 
 SPAN = 40.0  # figures over frequency show so much about the crossover
@@ -22,7 +22,7 @@ OTHER: dict[str, Any] = {"color": MUTED, "linewidth": 0.5, "alpha": 0.6, "zorder
 DOTS: dict[str, Any] = {"color": VERMILION, "marker": "o", "linestyle": "", "markersize": 3.2, "zorder": 4}
 
 
-def margin_disks(t: TunedLoop) -> list[tuple[str, float, str]]:
+def margin_disks(t: LoopTuning) -> list[tuple[str, float, str]]:
     """Return the disks to show: name, margin, colour."""
     from gyrobench.tuning.robustness import peak
 
@@ -32,7 +32,7 @@ def margin_disks(t: TunedLoop) -> list[tuple[str, float, str]]:
     return [*((f"wanted {x:.3g}", x, VERMILION) for x in wanted), *((f"{n} {x:.3g}", x, c) for n, x, c in shown)]
 
 
-def near(t: TunedLoop) -> tuple[float, float]:
+def near(t: LoopTuning) -> tuple[float, float]:
     """Return the range of frequencies that the figures show, Hz."""
     size = np.abs(t.loops[0])
     crossed = t.f[np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))]
@@ -40,16 +40,16 @@ def near(t: TunedLoop) -> tuple[float, float]:
     return max(float(t.f[0]), middle / SPAN), min(float(t.f[-1]), middle * SPAN)
 
 
-def _inside(t: TunedLoop) -> Array:
+def _inside(t: LoopTuning) -> Array:
     low, high = near(t)
     return np.asarray((t.f >= low) & (t.f <= high))
 
 
-def _named(t: TunedLoop) -> list[loop_plane.Disk]:
+def _named(t: LoopTuning) -> list[loop_plane.Disk]:
     return [(f"disk, {name}", margin, colour) for name, margin, colour in margin_disks(t)]
 
 
-def nyquist(t: TunedLoop) -> str:
+def nyquist(t: LoopTuning) -> str:
     """Return L near the critical point, with the disks that it must not enter."""
     fig, ax = chart(HALF, 78)
     for k, L in reversed(list(enumerate(t.loops))):
@@ -60,7 +60,7 @@ def nyquist(t: TunedLoop) -> str:
     return loop_plane.nyquist(fig, ax, _named(t))
 
 
-def nichols(t: TunedLoop) -> str:
+def nichols(t: LoopTuning) -> str:
     """Return gain over phase of L, the disks in these coordinates."""
     fig, ax = chart(HALF, 78)
     pick = _inside(t)
@@ -73,7 +73,7 @@ def nichols(t: TunedLoop) -> str:
     return loop_plane.nichols(fig, ax, _named(t))
 
 
-def _measured(t: TunedLoop) -> tuple[Array, Array, Array]:
+def _measured(t: LoopTuning) -> tuple[Array, Array, Array]:
     """Return frequencies (Hz), |L| (dB) and phase (degrees, near that of the model) of the co-simulation."""
     f, L = np.array([p.f for p in t.measured]), np.array([p.value for p in t.measured])
     turn, there = np.degrees(np.angle(L)), np.interp(f, t.f, _polar(t.loops[0], t.f)[1])
@@ -87,7 +87,7 @@ def _polar(L: Complex, f: Array) -> tuple[Array, Array]:
     return size, turn - 360.0 * math.ceil(at / 360.0)
 
 
-def open_loop(t: TunedLoop) -> str:
+def open_loop(t: LoopTuning) -> str:
     """Return gain and phase of L over frequency, with the points that the co-simulation measured."""
     fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
     pick = _inside(t)
@@ -111,7 +111,7 @@ def _of(k: int) -> str | None:
     return "nominal" if k == 0 else "spread" if k == 1 else None
 
 
-def sensitivities(t: TunedLoop) -> str:
+def sensitivities(t: LoopTuning) -> str:
     """Return |S| and |T| over frequency with the bounds that the wishes set."""
     fig, axes = figure(WIDE * 0.8, 92, nrows=2, sharex=True)
     pick = _inside(t)
@@ -163,7 +163,7 @@ def trade(t: Trade) -> str:
     return svg(fig, "trade")
 
 
-def load_step(t: TunedLoop) -> str:
+def load_step(t: LoopTuning) -> str:
     """Return the platform's angle after a step of torque in the co-simulation; "" where none is seen."""
     shown = [(p.values, p.step) for p in t.proofs if p.step is not None and p.step.seen]
     if not shown:

@@ -1,4 +1,4 @@
-"""What is said of a tuned loop beside its figures: what a spread does not move, friction, limits, what was lost."""
+"""Notes on a tuned loop beside its figures: what a spread does not move, friction, limits, what was lost."""
 
 from __future__ import annotations
 

@@ -28,17 +28,17 @@ from gyrobench.tuning import tuning_figures as draw
 from gyrobench.tuning.proof import ProvenWish
 from gyrobench.tuning.sight_allowance import COLUMNS
 from gyrobench.tuning.trade import Trade
-from gyrobench.tuning.tuned_loop import ALLOWED, TunedLoop, measured_text, range_text, where
+from gyrobench.tuning.tuned_loop import ALLOWED, LoopTuning, measured_text, range_text, where
 
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
 
 
-def write_tuning(tuned: TunedLoop, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+def write_tuning(tuned: LoopTuning, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
     """Write tuning.json, tuning.html, tuning.pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
     return write_files(tuned.as_dict(), lambda: page(tuned), folder, formats, NAMES, Bench.find().folder)
 
 
-def page(t: TunedLoop) -> Page:
+def page(t: LoopTuning) -> Page:
     """Return the page."""
     report_id = hashlib.sha256(json.dumps(t.as_dict(), sort_keys=True).encode()).hexdigest()[:12]
     over = "; ".join(range_text(r) for r in t.spread) or "none"
@@ -63,7 +63,7 @@ def page(t: TunedLoop) -> Page:
     return Page(f"Tuned loop: {t.name}", report_id, head, sections, what="Tuning").finish()
 
 
-def summary(t: TunedLoop) -> str:
+def summary(t: LoopTuning) -> str:
     """Return the answer in a sentence."""
     where_ = f"over the whole spread ({len(t.points)} points of it)" if t.spread else "at nominal values"
     if t.proven:
@@ -78,7 +78,7 @@ def minus(text: str) -> str:
     return text.replace("-", "−")
 
 
-def _wishes(t: TunedLoop) -> PageTable:
+def _wishes(t: LoopTuning) -> PageTable:
     rows = []
     for w in t.wishes:
         good = w.ratio >= 1.0
@@ -91,7 +91,7 @@ def _wishes(t: TunedLoop) -> PageTable:
     return PageTable(heads, rows, "Wishes, with the worst case of the linear models over the spread.")
 
 
-def _sources(t: TunedLoop) -> PageTable:
+def _sources(t: LoopTuning) -> PageTable:
     rows = [Row([text_cell(c, "" if k else "strong") for k, c in enumerate(a.row)]) for a in t.allowed]
     where_ = "worst case of the linear models over the spread" if t.spread else "by the linear model"
     caption = (
@@ -101,7 +101,7 @@ def _sources(t: TunedLoop) -> PageTable:
     return PageTable(columns(*COLUMNS, wide=["at most"]), rows, caption)
 
 
-def _reasons(t: TunedLoop) -> list[Any]:
+def _reasons(t: LoopTuning) -> list[Any]:
     return [BulletList(list(t.reasons), warn=True)] if t.reasons else []
 
 
@@ -119,7 +119,7 @@ def _trade(trade: Trade) -> list[Any]:
     ]
 
 
-def _margins(t: TunedLoop) -> list[Any]:
+def _margins(t: LoopTuning) -> list[Any]:
     return pictures(
         Picture("nichols", draw.nichols(t), "Gain over phase of L; inside a dashed curve the disk margin is smaller.",
                 "Nichols plot of the open loop", half=True),
@@ -128,7 +128,7 @@ def _margins(t: TunedLoop) -> list[Any]:
     )  # fmt: skip
 
 
-def _responses(t: TunedLoop) -> list[Any]:
+def _responses(t: LoopTuning) -> list[Any]:
     both = (
         Picture("sensitivities", draw.sensitivities(t), "S = 1/(1 + L) and T = L/(1 + L), and what was wanted.",
                 "gain of S and T over frequency"),
@@ -138,7 +138,7 @@ def _responses(t: TunedLoop) -> list[Any]:
     return [*pictures(both[0]), *pictures(both[1])]
 
 
-def _proofs(t: TunedLoop) -> list[Any]:
+def _proofs(t: LoopTuning) -> list[Any]:
     rows: list[Row] = []
     for p in t.proofs:
         if p.why_not:
@@ -164,21 +164,21 @@ def _proven(point: str, w: ProvenWish) -> list[Any]:
     return [*(text_cell(c) for c in cells), text_cell(state[0], state[1])]
 
 
-def _step(t: TunedLoop) -> list[Any]:
+def _step(t: LoopTuning) -> list[Any]:
     steps = [p.step for p in t.proofs if p.step is not None]
     load = steps[0].torque if steps else 0.0
     caption = f"Angle of the platform after a load of {load:g} N·m, in the co-simulation, with its noise."
     return pictures(Picture("load-step", draw.load_step(t), caption, "platform angle after a load step"))
 
 
-def _notes(t: TunedLoop) -> list[Any]:
+def _notes(t: LoopTuning) -> list[Any]:
     hidden = [f"{where(p.values, t.spread)}: {p.step}" for p in t.proofs if p.step and not p.step.seen]
     limited = [f"{where(p.values, t.spread)}: at its limit in the test sines: {p.limits}" for p in t.proofs if p.limits]
     notes = [f"{n[:1].upper()}{n[1:]}." for n in (*hidden, *limited, *t.notes)]
     return [BulletList(notes, warn=True)] if notes else []
 
 
-def _controller(t: TunedLoop) -> list[Any]:
+def _controller(t: LoopTuning) -> list[Any]:
     rows = [Row([text_cell(n), text_cell(f"{v:.6g}")]) for n, v in t.controller.values.items()]
     parts = [("numerator", t.controller.num), ("denominator", t.controller.den)]
     rows += [
@@ -192,7 +192,7 @@ def _controller(t: TunedLoop) -> list[Any]:
     ]
 
 
-def _method(t: TunedLoop) -> list[Any]:
+def _method(t: LoopTuning) -> list[Any]:
     names = {w.wish.name: w.wish for w in t.wishes}
     from gyrobench.tuning.wishes import MEASURES
 

@@ -25,10 +25,10 @@ from friction_loops import MeasuredLoop, random_friction
 from own_loops import PLACES, H, margins_of, odd_multisine, random_platform
 
 from gyrobench.errors import GyrobenchError
-from gyrobench.identification.identification import Identification
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_fit import fit_plant
+from gyrobench.identification.written_identification import Identification
 
 BAND = (1.0, 150.0)  # Hz
 PERIOD = 4000  # samples
