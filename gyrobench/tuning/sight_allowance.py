@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any
 
 from gyrobench.record.frequency_response import Complex
-from gyrobench.reduction.estimation.allowance import MOST, TINY, at_most, largest_factor
+from gyrobench.reduction.estimation.allowance import MOST, MUCH, TINY, at_most, largest_factor
 from gyrobench.reduction.loops.sight_quantities import TIMES
 from gyrobench.report.numbers import write_number
 from gyrobench.result import SetBy
@@ -78,8 +78,8 @@ def allowed(
         quantities = [set_by(source, p) for p in parameters]
         for own in zip(*quantities, strict=True):
             most = [at_most(s, k, f"{without:.3g} µrad") for s, k in zip(own, factors, strict=True)]
-            least = next((x for x in most if isinstance(x, str)), None) or min(
-                x for x in most if not isinstance(x, str)
-            )
+            reached = [x for x in most if not isinstance(x, str)]
+            said = [x for x in most if isinstance(x, str) and x != MUCH]  # much at one point is no limit at another
+            least = said[0] if said else min(reached, default=MUCH)
             found.append(AllowedSource(source, math.sqrt(max(s[2] for s in squares)), factor, own[0], least, clips))
     return tuple(found)
