@@ -36,7 +36,7 @@ def positive(text: str, value: str, unit: str) -> float:
     except units.UnitError as error:
         raise UsageError(f"--want {text}: {error}") from None
     if not number > 0.0:
-        raise UsageError(f"--want {text}: must be > 0")
+        raise UsageError(f"--want {text}: must be above 0")
     return number
 
 
@@ -46,7 +46,7 @@ def _factor(text: str, value: str) -> float:
     try:
         number = units.parse_quantity(bare, "1")
     except units.UnitError:
-        raise UsageError(f"--want {text}: a factor or decibels are expected, such as 2 or 6dB") from None
+        raise UsageError(f"--want {text}: a factor, or dB, is expected, such as 2 or 6dB") from None
     factor = 10.0 ** (number / 20.0) if value.endswith("dB") else number
     if not factor > 0.0:
         raise UsageError(f"--want {text}: must be > 0 as a factor; did you mean dB?")
