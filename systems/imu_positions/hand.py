@@ -16,224 +16,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
-from gyrobench.reduction.setup import sources
-from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import (
-    Account,
     Array,
     Coefficient,
     DriftReduction,
     DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
     Reason,
     Record,
-    Regression,
     RunDocument,
     Table,
 )
-from gyrobench.units import ARCSEC, DPH
 
-from . import mistakes, norms, tables, turn_errors, turns
-from .channels import AXES, CHANNELS, UG, ImuInstrument, overview
+from . import mistakes, norms, tables, turns
+from .channels import AXES, CHANNELS, overview
+from .hand_channels import HandAccelerometers, HandGyro, HandTurns
 from .hand_positions import COLUMNS, HandSetup, Positions
 
 UNKNOWN = "unknown"  # option attitudes
 STEADY = math.radians(2.0)  # rad/s, beyond what bias and g-sensitivity change from position to position
-ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimated
-LEVEL_RATE = Source(
-    "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
-)
-WHITE = "noise of the instrument and what the model does not hold, from the residuals"
-CONVENTIONS = [
-    "Axes of the case: x along the input axis of the accelerometer x, y in the plane of those of x and y, z "
-    "right-handed to them; so Sa_xy, Sa_xz and Sa_yz are zero. Gyros in these axes.",
-    "reading = input + bias + matrix · input; specific force f = a − g: an axis that points up reads +1 g.",
-]
-
-
-class HandChannel(DriftReduction[HandSetup]):
-    """One of the regressions, all of which share the positions."""
-
-    words = ""
-
-    def __init__(self, positions: Positions) -> None:
-        super().__init__({}, positions.setup)
-        self.at = positions
-
-    def account(self, found: Findings) -> Account:
-        return Account(
-            method="Positions at rest in unknown attitudes and the turns between them; least squares about the "
-            "solution, noise from what is left [IMU-HAND]",
-            sources=["IMU-HAND; Tedaldi 2014, eq. 1..13", "RED-OLS; Hu 1981, eq. 4-64..4-78"],
-            equation=self.equation,
-            conventions=CONVENTIONS,
-            random=WHITE,
-        )
-
-    equation = ""
-
-    def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
-        return [found.noise_sentence("data")]
-
-
-class HandAccelerometers(HandChannel):
-    """Nine unknowns of three accelerometers from the size of gravity."""
-
-    equation = '|(1 + S_a)^(-1) (f_"read" - b_a)| = g'
-
-    def regression(self) -> Regression:
-        D, at = self.at.scale_a, self.at
-        readings = at.acc / D[0]
-        X = -norms.slopes(at.triad, readings)
-        solution = np.concatenate([[at.triad.matrix[p] for p in norms.PLACES], at.triad.bias])
-        y = np.linalg.norm(at.force, axis=1) - self.setup.gravity + X @ (solution - self.start)
-        group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
-        unit = ("specific force less gravity", "µg", UG)
-        return Regression(list(norms.NAMES), X, y, at.start, at.end, [group], *unit, noise="white", limit=norms.LIMIT)
-
-    @property
-    def start(self) -> Array:
-        """The unknowns from which the data are counted: the middle of counts."""
-        D, middle = self.at.scale_a
-        return np.concatenate([np.zeros(6), middle / D])
-
-    def derived(self, found: Findings) -> Findings:
-        """Return the fit as the instruments have it: counts and their scale factors where the scale was unknown."""
-        counts, D = "a" in self.setup.counts, self.at.scale_a[0]
-        truth = {} if counts else dict(self.setup.truth or {})
-        quantities = [_quantity("a", n, counts, truth, float(D[0])) for n in norms.NAMES]
-        diagonal = {i: k for k, (i, j) in enumerate(norms.PLACES) if i == j}
-
-        def of(change: Array) -> Array:
-            b = self.start + change
-            if not counts:
-                return b
-            out = np.array(b)
-            for k, (i, j) in enumerate(norms.PLACES):
-                own = 1.0 + b[diagonal[i]]
-                out[k] = D[i] * own if i == j else b[k] / own
-            return out
-
-        return found.derive(quantities, of)
-
-    def effects(self, found: Findings) -> list[Effect]:
-        y = found.data.y
-        return [sources.GRAVITY.effect(self.setup, -np.ones(y.size))]
-
-
-class HandTurns(HandChannel):
-    """Nine elements of the matrix of three gyros from gravity before and after each turn."""
-
-    equation = "u_(k+1) = Q_k^T u_k, quad Q_k = product exp((1 + S_g)^(-1) (omega_read - b) dif t)"
-
-    def regression(self) -> Regression:
-        found = self.at.found
-        X = -turns.slopes(found.turned, found.matrix)
-        y = turns.left(found.turned, found.matrix) + X @ found.matrix.ravel()
-        number = np.repeat(np.arange(1.0, len(found.turned) + 1), 2)
-        W = turn_errors.whitener(self.at, X, y)
-        ends = np.array([[t.time[0], t.time[-1]] for t in found.turned])
-        halves = np.column_stack([ends[:, 0], ends.mean(axis=1), ends.mean(axis=1), ends[:, 1]]).reshape(-1, 2)
-        group = Group("turns", np.arange(y.size), number, "number of the turn", "")
-        names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        unit = ("whitened direction of gravity", "″", ARCSEC)
-        return Regression(names, W @ X, W @ y, halves[:, 0], halves[:, 1], [group], *unit, "white", limit=norms.LIMIT)
-
-    def derived(self, found: Findings) -> Findings:
-        counts, D = "g" in self.setup.counts, self.at.scale_g
-        truth = {} if counts else dict(self.setup.truth or {})
-        names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        quantities = [_quantity("g", n, counts, truth, D) for n in names]
-
-        def of(b: Array) -> Array:
-            if not counts:
-                return b
-            S = b.reshape(3, 3)
-            own = 1.0 + np.diag(S)
-            out = S / own[:, None]
-            np.fill_diagonal(out, D * own)
-            return np.asarray(out.ravel())
-
-        return found.derive(quantities, of)
-
-    def effects(self, found: Findings) -> list[Effect]:
-        """Return the level Earth rate; what readings at rest share between turns is in the weights."""
-        at, own = self.at, self.at.found
-        X = -turns.slopes(own.turned, own.matrix)
-        W = turn_errors.whitener(at, X, turns.left(own.turned, own.matrix) + X @ own.matrix.ravel())
-        return [LEVEL_RATE.effect(own.u, turn_errors.of_level_rate(at) @ W, parts=("first", "second"))]
-
-
-class HandGyro(HandChannel):
-    """Bias and g-sensitivity of a gyro at rest."""
-
-    def __init__(self, positions: Positions, channel: ImuInstrument) -> None:
-        super().__init__(positions)
-        self.channel = channel
-        self.level = positions.level_by_others(channel.axis)  # Earth rate and its u
-
-    @property
-    def equation(self) -> str:  # type: ignore[override]
-        i = self.channel.letter
-        return f'omega_"read,{i}" - omega_{i} = b_g + sum_k G_k f_k \\/ g_0'
-
-    def regression(self) -> Regression:
-        at, c, s = self.at, self.channel, self.setup
-        matrix = np.eye(3) + at.found.matrix
-        y = (at.gyro[:, c.axis] - self.middle) / at.scale_g - ((at.vertical + self.level[0]) @ matrix.T)[:, c.axis]
-        quantities = self._quantities()
-        X = np.column_stack([np.ones(len(y)), at.force / frames.G0])
-        group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
-        many = y.size >= ESTIMATED
-        weighed = [replace(nuisances.trend(at.start, at.end), name=f"trend {c.name}")] if many and s.nuisances else []
-        unit, noise = ("rate at rest", "°/h", DPH), "estimated" if many else "white"
-        return Regression(quantities, X, y, at.start, at.end, [group], *unit, noise, candidates=weighed)
-
-    @property
-    def middle(self) -> float:
-        """What the data are counted from: the mean of counts, which begin anywhere."""
-        return float(np.mean(self.at.gyro[:, self.channel.axis])) if "g" in self.setup.counts else 0.0
-
-    def _quantities(self) -> list[Quantity]:
-        counts = "g" in self.setup.counts
-        truth = {} if counts else dict(self.setup.truth or {})
-        return [_quantity("g", n, counts, truth, self.at.scale_g) for n in self.channel.names(())]
-
-    def derived(self, found: Findings) -> Findings:
-        start = np.array([self.middle / self.at.scale_g, 0.0, 0.0, 0.0])
-        return found.derive(self._quantities(), lambda b: start + b) if self.middle else found
-
-    def effects(self, found: Findings) -> list[Effect]:
-        at, c = self.at, self.channel
-        level = np.array([d[:, c.axis] for d in at.found.level])  # (n, 2)
-        if at.enough:
-            return [LEVEL_RATE.effect(self.level[1], level.T.copy(), parts=("first", "second"))]
-        own = np.concatenate([np.diag(level[:, 0]), np.diag(level[:, 1])])  # a heading of its own each
-        return [LEVEL_RATE.effect(at.level_size, own)]
-
-
-def _quantity(kind: str, name: str, counts: bool, truth: Mapping[str, float], scale: float) -> Quantity:
-    """Return a coefficient; in counts, scale counts for a unit of SI, a diagonal element is a scale factor."""
-    what, _, along = name.partition("_")
-    channel = ImuInstrument(kind, AXES.index(along[0]))
-    if not counts or what == "G" or (what[0] == "S" and along[0] != along[1]):
-        return channel.quantity(name, truth)
-    if what[0] == "b":
-        return Quantity(name, f"bias of the {channel.words}", "counts", 1.0 / scale)
-    unit = "counts/(rad/s)" if kind == "g" else "counts/(m/s²)"
-    return Quantity(name, f"scale factor of the {channel.words}", unit, 1.0, shown=f"k{kind}_{channel.letter}")
 
 
 class HandReduction(ChannelTests[HandSetup]):

@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench.arrays import AnyArray, Array
 from gyrobench.record.circumstances import Keys, faults
@@ -136,7 +137,21 @@ def _windows(
     for k, c in enumerate(CHANNELS):
         out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for _, a, b in rows])
         out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for _, a, b in rows])
-    return out, _moved(out)
+    rest = np.zeros(time.size, dtype=bool)
+    for a, b in found:
+        rest[a:b] = True
+    return out, _moved(out) + _clipped(time, every, rest)
+
+
+def _clipped(time: Array, every: Array, rest: NDArray[np.bool_]) -> list[str]:
+    """Return the channels that stand at one end of their values: their readings there are no means of an input."""
+    stretches = {c: still.held(every[:, k], rest) for k, c in enumerate(CHANNELS)}
+    return [
+        f"column {c.name}: {b - a} samples from t = {time[a]:.6g} s on are all {every[a, CHANNELS.index(c)]:.6g}, the "
+        f"largest or smallest that there is: the {c.words} is beyond its range. Take a larger range"
+        + (", turn more slowly, or leave out the samples of the turns" if c.gyro else "")
+        for c, (a, b) in ((c, s) for c, s in stretches.items() if s)
+    ]
 
 
 def _moved(windows: Mapping[str, AnyArray]) -> list[str]:

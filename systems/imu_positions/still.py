@@ -16,6 +16,7 @@ LOUD = 2.0  # times that: moved
 LEAST = 1.0  # s of a position
 EDGE = 0.25  # of the width that is left out at both ends
 BLOCK = 4096  # windows at a time
+CHANCE = 1e-4  # that a clean channel stands so long at one end
 SHORT = 16  # samples of the width at least
 
 
@@ -54,6 +55,24 @@ def labelled(number: Array) -> list[tuple[int, int]]:
     change = np.flatnonzero(np.diff(n)) + 1
     ends = [0, *change.tolist(), len(n)]
     return [(a, b) for a, b in pairwise(ends) if n[a] != 0.0]
+
+
+def held(samples: Array, still: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """Return the longest stretch in which a channel (n,) stands at one end of its values, where no chance makes it so
+    long; still (n,): rows at rest.
+
+    Neighbours are alike by the quantum of the channel, at rest more often than in motion: a stretch is compared with
+    the share of such pairs among the others of its kind.
+    """
+    alike = np.diff(samples) == 0.0
+    found = None
+    for end in (np.min(samples), np.max(samples)):
+        for a, b in _stretches(samples == end):
+            kind = (still[:-1] == still[a]) & (samples[:-1] != end)
+            share = (np.count_nonzero(alike[kind]) + 1.0) / (np.count_nonzero(kind) + 2.0)
+            if share ** (b - a - 1) * samples.size < CHANCE and (found is None or b - a > found[1] - found[0]):
+                found = (a, b)
+    return found
 
 
 def _stretches(still: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 
-from . import norms, turns
+from . import hand_noise, norms, turns
 from .hand_positions import Positions
 from .turns import Turn
 
@@ -28,23 +28,12 @@ def whitener(at: Positions, X: Array, y: Array) -> Array:
     own = np.diag(np.repeat(0.5 * (1.0 + span / np.median(span)), 2))
     usual = float(np.mean(np.diag(rest)))
     sizes = usual * np.concatenate([[1e-6], np.geomspace(*SIZES, GUESSES)])
-    best = max(sizes, key=lambda size: _likelihood(rest + size * own, X, y))
-    values, vectors = np.linalg.eigh(rest + best * own)
-    scale = np.sqrt(float(np.median(np.diag(rest + best * own))))
-    return np.asarray((vectors * (scale / np.sqrt(values))) @ vectors.T)
+    best = min(sizes, key=lambda size: sum(hand_noise.restricted(rest + size * own, X, y)))
+    return hand_noise.whitener(rest + best * own)
 
 
 def _square(errors: Array) -> Array:
     return np.asarray(errors.T @ errors)
-
-
-def _likelihood(covariance: Array, X: Array, y: Array) -> float:
-    """Return the logarithm of the restricted likelihood, but for a constant."""
-    root = np.linalg.cholesky(covariance)
-    Z, d = np.linalg.solve(root, X), np.linalg.solve(root, y)
-    left = d - Z @ np.linalg.lstsq(Z, d, rcond=None)[0]
-    volume = 2.0 * float(np.sum(np.log(np.diag(root)))) + float(np.linalg.slogdet(Z.T @ Z)[1])
-    return -0.5 * (volume + float(left @ left))
 
 
 def of_level_rate(at: Positions) -> Array:

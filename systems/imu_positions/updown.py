@@ -7,9 +7,10 @@ hg, half of up less down, is the vertical Earth rate where the gyro has no g-sen
 pieces, from which the noise is estimated, of gyros with the errors of the readings of an angle.  [IMU-UPDOWN]
 
 An axis that leans by t reads g cos t: what the two level accelerometers read is tilt or bias, and 1 - cos t, even from
-0 to what it would be without bias, is in u of Sa.
+0 to what it would be without bias, is in u of Sa; the level Earth rate along it, whose heading is anything, in u of bg
+and hg, unless u_mount states the lean.
 
-Not modelled: the axis off the vertical but for this and the line u_mount of the budget, misalignments.
+Not modelled: misalignments; squares of the specific force, which two directions do not tell from a bias.
 """
 
 from __future__ import annotations
@@ -53,6 +54,9 @@ TILT = Source(
     "axis.vertical", "axis off the vertical", "rad", "u_mount", "of each position, towards the level Earth rate"
 )
 LEAN = Source("axis.cosine", "axis off the vertical, by the level accelerometers", "1", "", "1 less the cosine")
+LEAN_RATE = Source(
+    "axis.lean", "axis off the vertical, by the level accelerometers", "rad", "", "of each position, level Earth rate"
+)
 
 
 class UpDownChannel(DriftReduction[ImuSetup]):
@@ -94,17 +98,21 @@ class UpDownChannel(DriftReduction[ImuSetup]):
         s, y = self.setup, found.data.y
         if not self.channel.gyro:
             sign = self.sign[self.sign != 0.0]
-            return [sources.GRAVITY.effect(s, -sign), LEAN.effect(self._lean() / math.sqrt(3.0), -s.gravity * sign)]
+            cosine = float(np.mean(self._lean**2)) / 2.0
+            return [sources.GRAVITY.effect(s, -sign), LEAN.effect(cosine / math.sqrt(3.0), -s.gravity * sign)]
         level = s.earth_rate * math.cos(s.latitude)
         phase = np.asarray(self.windows["phase"])[self.sign != 0.0]
-        each = np.array([np.where(phase == p, level, 0.0) for p in np.unique(phase)])
-        return [TILT.effect(s, each.reshape(-1, y.size))]
+        each = np.array([np.where(phase == p, level, 0.0) for p in np.unique(phase)]).reshape(-1, y.size)
+        if TILT.size(s):
+            return [TILT.effect(s, each)]
+        largest = float(np.max(self._lean))
+        return [LEAN_RATE.effect(largest / math.sqrt(2.0), each * self._lean / largest)]  # towards any heading
 
-    def _lean(self) -> float:
-        """Return 1 less the cosine of the axis to the vertical, if what the other accelerometers read were no bias."""
+    @property
+    def _lean(self) -> Array:
+        """Angle of the axis to the vertical (n,), rad, if what the other accelerometers read were no bias."""
         level = [np.asarray(self.windows[f"mean_a{a}"], dtype=float) for a in AXES if a != self.channel.letter]
-        squares = np.sum(np.square(level), axis=0)[self.sign != 0.0]
-        return float(np.mean(squares)) / (2.0 * self.setup.gravity**2)
+        return np.asarray(np.hypot(*level)[self.sign != 0.0] / self.setup.gravity)
 
     def account(self, found: Findings) -> Account:
         i = self.channel.letter
@@ -120,6 +128,7 @@ class UpDownChannel(DriftReduction[ImuSetup]):
             conventions=[
                 "Specific force f = a − g: an axis that points up reads +1 g; s = +1 up, −1 down.",
                 "hg holds the vertical Earth rate, its scale factor error and the g-sensitivity along the axis.",
+                "Biases hold what goes with the square of the specific force.",
             ],
             random="noise of the instrument",
         )

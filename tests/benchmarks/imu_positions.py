@@ -9,8 +9,8 @@ table    12 positions and turns about three axes; noise of window means white, G
 set_up   the same on a table and in a mount that are off by what is stated, or is not (set_up_unstated)
 thermal  six positions and turns, six times, while the temperature goes 40 K up and down; the same noise, or white
          noise alone (thermal_white)
-unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; white noise of a small unit, of its
-         gyros white, Gauss-Markov (0.3 positions to half the record) or both
+unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; noise of a small unit, white,
+         Gauss-Markov (0.3 positions to half the record) or both
 up_down  an axis up and down, 120 s each at 20 Hz; the same noise of gyros and accelerometers; in half of the runs
          each position leans by 2 mrad, which is stated
 """
@@ -158,8 +158,8 @@ def of_thermal_white(rng: Rng) -> tuple[Any, dict[str, float]]:
 
 def of_hand(rng: Rng) -> tuple[Any, dict[str, float]]:
     unit, latitude = Unit.drawn(rng, 0.01), rng.uniform(-1.2, 1.2)
-    t, gyro, acc = handled(unit, poses(rng, 24), rng, rest=3.0, turn=1.5, acc=1e-3, latitude=latitude, gravity=9.805)
-    gyro = gyro + series_of(rng, len(t), 0.01, 2.5, 3.0 * DPH)
+    t, gyro, acc = handled(unit, poses(rng, 24), rng, rest=3.0, turn=1.5, latitude=latitude, gravity=9.805)
+    gyro, acc = gyro + series_of(rng, len(t), 0.01, 2.5, 3.0 * DPH), acc + series_of(rng, len(t), 0.01, 2.5, 6.3e-4)
     head = f"# attitudes = unknown\n# latitude = {math.degrees(latitude):.12g}deg\n# gravity = 9.805m/s2\n"
     return of_file(head, t, gyro, acc), own_axes(unit)
 

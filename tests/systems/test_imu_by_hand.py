@@ -184,6 +184,83 @@ def test_mistakes_are_named(said: str, tmp_path: Path) -> None:
     assert said in str(error.value)
 
 
+@pytest.mark.parametrize("channel", ["ax", "gy"])
+def test_a_channel_beyond_its_range_is_refused(channel: str, tmp_path: Path) -> None:
+    """Readings clipped at 0.9 of the largest force and at half of the fastest turn; rounded ones that stand still
+    at rest are none."""
+    rng = np.random.default_rng(17)
+    time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 12), rng, gyro=GYRO, acc=ACC, rest=2.5)
+    limit = 0.5 * float(np.abs(gyro[:, 1]).max())
+    clipped = (gyro, np.minimum(acc, [0.9 * acc[:, 0].max(), 99.0, 99.0])) if channel == "ax" else (
+        np.clip(gyro, [-99.0, -limit, -99.0], [99.0, limit, 99.0]), acc)  # fmt: skip
+    with pytest.raises(DataError, match=f"column {channel}: .* samples from t = .* beyond its range"):
+        record(write(tmp_path / "log.csv", time, *clipped))
+    record(write(tmp_path / "coarse.csv", time, np.round(gyro / 1e-3) * 1e-3, np.round(acc / 0.02) * 0.02))
+
+
+def test_slow_noise_of_accelerometers_is_found_in_the_directions() -> None:
+    """Data of 24 positions with the noise of three biases, correlated over 15 s: plain least squares hold the truth in
+    0.66 of the intervals of the biases (the residuals change their sign with the directions), weighed ones in 0.9; t
+    with 15 degrees of freedom 2.131."""
+    noise: Any = importlib.import_module(".hand_noise", room)
+    rng = np.random.default_rng(18)
+    time = 4.5 * np.arange(24.0)
+    slow = np.linalg.cholesky(np.exp(-np.abs(time[:, None] - time) / 15.0))
+    hits = {"plain": 0, "weighed": 0}
+    for _ in range(40):
+        up = np.array([p.inv().apply([0.0, 0.0, 1.0]) for p in poses(rng, 24)])
+        X = norms.slopes(norms.Triad(np.zeros((3, 3)), np.zeros(3)), up)
+        y = -np.sum(up * (slow @ rng.normal(size=(24, 3)) * 3.0 + rng.normal(size=(24, 3))), axis=1)
+        for name, W in (("plain", np.eye(24)), ("weighed", noise.whitener(noise.of_sizes(up, time, X, y)))):
+            found, left = np.linalg.lstsq(W @ X, W @ y, rcond=None)[:2]
+            u = np.sqrt(np.diag(np.linalg.inv((W @ X).T @ (W @ X))) * left[0] / 15.0)
+            hits[name] += int(np.sum(np.abs(found[6:]) < 2.131 * u[6:]))
+    assert hits["plain"] < 0.75 * 120 and hits["weighed"] >= 0.9 * 120, hits
+
+
+def test_an_order_that_hides_a_drift_is_said(tmp_path: Path) -> None:
+    """Directions one after the other from +x to -x: a bias that grows in time has the sizes of a scale factor.  The
+    same directions with opposite ones in turn do not."""
+    rng = np.random.default_rng(19)
+    # t about -u_x: t u_x about -u_x^2, the size that 1 + Sa_xx makes
+    rings = [(h, a) for h in (1.0, 0.6, 0.2, -0.2, -0.6, -1.0) for a in np.arange(3) * 2.1 + h][1:-1]
+    up = [np.array([h, math.sqrt(1 - h * h) * math.cos(a), math.sqrt(1 - h * h) * math.sin(a)]) for h, a in rings]
+    mixed = [v for pair in zip(up[: len(up) // 2], up[: len(up) // 2 - 1 : -1], strict=True) for v in pair]
+    said = []
+    for k, directions in enumerate((up, mixed)):
+        attitudes = [Rotation.align_vectors([[0.0, 0.0, 1.0]], [d])[0] for d in directions]
+        series = handled(Unit.drawn(rng), attitudes, rng, gyro=GYRO, acc=ACC, rest=2.5)
+        result = hand.HandReduction.of_record(record(write(tmp_path / f"{k}.csv", *series)))
+        said.append([r.text for r in result.reasons if r.id == "order.trend"])
+    assert "hides a bias of the accelerometer x" in said[0][0] and not said[1]
+
+
+@pytest.mark.long
+def test_squares_of_the_instruments_are_named(tmp_path: Path) -> None:
+    """10^-3 f²/g of the accelerometers and 2·10⁻⁴ rad/s/g² of the gyros move the biases by 3 to 5 u."""
+    rng = np.random.default_rng(20)
+    time, gyro, acc = handled(Unit.drawn(rng, 0.01), poses(rng, 24), rng, gyro=GYRO, acc=ACC, rest=3.0)
+    for name, g, a in (("a", gyro, acc + 1e-3 * acc**2 / G0), ("g", gyro + 2e-4 * (acc / G0) ** 2, acc)):
+        result = hand.HandReduction.of_record(record(write(tmp_path / f"{name}.csv", time, g, a)))
+        channels = {t.id.partition(":")[2] for t in result.tests if t.id.startswith("square") and t.p < 1e-3}
+        assert channels == ({"accelerometers"} if name == "a" else {"gx", "gy", "gz"})
+        assert any(r.id == "residuals.contradict" for r in result.reasons)
+
+
+@pytest.mark.long
+def test_latitude_and_time_base_are_lines_of_the_budget(tmp_path: Path) -> None:
+    """1 degree of latitude changes the vertical Earth rate by 15.041 cos 0.7 pi/180 = 0.2008 deg/h, along each axis
+    that points up: G_kk by it (g0/9.805 = 1.0002); 100 ppm of time change Sg_kk by 100 ppm."""
+    rng = np.random.default_rng(21)
+    series = handled(Unit.drawn(rng, 1e-3), poses(rng, 18), rng, gyro=GYRO, acc=ACC, rest=2.5)
+    path = write(tmp_path / "log.csv", *series)
+    result = hand.HandReduction.of_record(record(path, u_latitude="1deg", u_time="100e-6"))
+    lines = {(b.coefficient, b.source): b for b in result.budget}
+    for a in "xyz":
+        assert abs(lines[f"G_{a}{a}", "latitude"].contribution) == pytest.approx(0.2008, rel=2e-3)
+        assert lines[f"Sg_{a}{a}", "time base"].contribution == pytest.approx(100.0, rel=2e-3)
+
+
 def test_few_positions_say_what_is_missing(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 6), rng, gyro=GYRO, acc=ACC)
@@ -293,6 +370,20 @@ def test_up_and_down(tmp_path: Path) -> None:
             < 5.0 * found[n].u * tables.SCALES[found[n].unit]
         )
     assert not any(r.id == "plausibility.earth_rate" for r in result.reasons)
+
+
+def test_up_and_down_that_leans(tmp_path: Path) -> None:
+    """0.02 rad off the vertical, no noise to speak of: hg may be off by half of what both positions may be, and each
+    by 15.041 cos 0.7 x 0.02/sqrt 2 = 0.1627 deg/h: 0.1627/sqrt 2 = 0.115 deg/h.  A lean that is stated is taken."""
+    unit = Unit.drawn(np.random.default_rng(13))
+    unit.ba, unit.Sa = unit.ba * 0.0, unit.Sa * 0.0
+    path = write(tmp_path / "log.csv", *up_down(np.random.default_rng(13), unit, angle=0.02))
+    updown: Any = importlib.import_module(".updown", room)
+    for stated, u in (({}, 0.115), ({"u_mount": "1e-3rad"}, 15.041 * math.cos(0.7) * 1e-3 / math.sqrt(2.0))):
+        result = updown.UpDownReduction.of_record(record(path, attitudes="up_down", **stated))
+        half = next(c for c in result.coefficients if c.name == "hg_z")
+        lines = [b.contribution for b in result.budget if b.coefficient == "hg_z" and "vertical" in b.source]
+        assert math.hypot(*lines) == pytest.approx(u, rel=0.02) and half.u > 0.99 * u
 
 
 def test_up_and_down_without_an_upright_axis(tmp_path: Path) -> None:
