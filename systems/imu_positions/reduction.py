@@ -42,7 +42,7 @@ from gyrobench.reduction.toolkit import (
 )
 from gyrobench.units import DPH
 
-from . import geometry, mistakes, tables
+from . import geometry, mistakes, table_errors, tables
 from .budget import ImuSetup, Kinematics
 from .channels import BY_NAME, CHANNELS, UG, overview
 from .compensation import truth_of
@@ -315,7 +315,12 @@ class Reduction(ChannelTests[ImuSetup]):
 
     def result(self) -> DriftTestResult:
         found = super().result()
-        return replace(found, tables=[*found.tables, tables.by_position(self.windows, self.kinematics.motion, found)])
+        off = table_errors.reasons(
+            self.each, self.windows, self.kinematics,
+            lambda setup, name: ImuChannel(self.windows, setup, name, self.kinematics),
+        )  # fmt: skip
+        by_position = tables.by_position(self.windows, self.kinematics.motion, found)
+        return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off])
 
 
 def _places(force: Array) -> Array:
