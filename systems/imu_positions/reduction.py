@@ -23,6 +23,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -193,6 +194,20 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "misalignments or g-sensitivity change with the temperature, which the model has as constant",
                 "misalignments and g-sensitivity do not follow the temperature",
             )  # fmt: skip
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Say where too few temperatures tell a hysteresis of the scale factor from what it does with T."""
+        c = self.channel
+        own = self.kinematics.felt[0 if c.gyro else 1][self.rows, c.axis]
+        if self.thermal is None or not self.scaled or self.thermal.told(own, self.found.X):
+            return result
+        text = (
+            f"A scale factor of the {c.words} that has a hysteresis, or follows the rate of change of the temperature, "
+            "is not told from its powers by so few temperatures: these may be off by more than u. Take more cycles, "
+            "half of them while it is heated and half while it is cooled."
+        )
+        names = tuple(k.name for k in result.coefficients if k.name.startswith("S") and k.name[-1] == c.letter)
+        return replace(result, reasons=[*result.reasons, Reason("thermal.few", text, BOTH, names)])
 
     def account(self, found: Findings) -> Account:
         c, s = self.channel, self.setup

@@ -23,6 +23,9 @@ from .channels import UG, ImuInstrument
 
 PLACES = (np.arange(8) + 0.5) / 8.0  # of a window, at which the play is taken
 OTHER_WIDTHS = (1.0 / 3.0, 3.0)  # of the hysteresis, that a test looks for
+APART = (
+    0.1  # least share of one more power, hysteresis and rate of a scale factor that the model leaves, of two of them
+)
 #: ending of a coefficient -> parameter of the parts, size of its unit over that of the bias, unit, meaning
 BIAS = {
     "T": ("bias_T", 1.0, "/K", "change of the bias of the {} per kelvin"),
@@ -96,6 +99,12 @@ class Thermal:
         """Return two powers more, hysteresis and rate of change of the scale factor (n, 4); own: the input (n,)."""
         T, n = self.powers[0], self.orders[1]
         return np.column_stack([own * x for x in (T ** (n + 1), T ** (n + 2), self.way, self.slope)])
+
+    def told(self, own: Array, X: Array) -> bool:
+        """Return whether a hysteresis of the scale factor is told from one more power of it; X (n, p): the model."""
+        more, unit = (v / np.linalg.norm(v, axis=0) for v in (self.grown(own)[:, [0, 2, 3]], X))
+        left = more - unit @ np.linalg.lstsq(unit, more, rcond=None)[0]
+        return bool(np.linalg.svd(left, compute_uv=False)[1] > APART)
 
     def turned(self, inputs: Array) -> Array:
         """Return columns (n, k) of misalignments, or g-sensitivities, that change with T: inputs (n, k)."""

@@ -164,6 +164,21 @@ def test_a_model_that_leaves_out_what_follows_the_temperature_is_named() -> None
         assert any(r.id == "residuals.contradict" for r in result.reasons) == bool(named)
 
 
+@pytest.mark.parametrize(("cycles", "said"), [(4, True), (6, False)])
+def test_few_temperatures_of_the_scale_factor_are_said(cycles: int, said: bool) -> None:
+    """A gyro is turned once a cycle: four scale factors are S, ST, ST2 and either one power more or a hysteresis.  One
+    of 50 ppm was named SgT3, with SgT 13 u off and ordinary residuals; six tell them apart."""
+    w, _ = heated(20, cycles, white(20))
+    at = reduction.Reduction(w, setup(nuisances=True))
+    way = at.of_channel("gx").thermal.way
+    w["mean_gx"] = w["mean_gx"] + 5e-5 * way * at.kinematics.felt[0][:, 0]
+    result = at.of_channel("gx").result()
+    named = {r.id for r in result.reasons} & {"thermal.few", "residuals.contradict"}
+    assert named == ({"thermal.few"} if said else {"residuals.contradict"})
+    names = next((r.names for r in result.reasons if r.id == "thermal.few"), ())
+    assert set(names) >= ({"SgT_x", "SgT2_x"} if said else set())
+
+
 VALUES: dict[str, Any] = {
     "chamber.tau": 60.0, "chamber.lag": 20.0, "dwell": 10.0, "windows": 1, "turns": 1, "rate": 1.0, "cycles": 5,
     "nuisances": "none",
