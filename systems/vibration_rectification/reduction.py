@@ -27,6 +27,7 @@ from gyrobench import frames
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.sources import GRAVITY, LATITUDE
@@ -59,6 +60,12 @@ LEAST = 3  # levels, rest included
 FADING = 1.0 / 3.0  # of a level that is not reached: from a reading to the next one
 FADES = (2.5, 10.0)  # time constants in a position, of what fades after it was taken
 UG = 1e-6 * G0
+SHOWN = 0.01  # probability of a fourth power by chance, below which the report says what it changes
+ONCE = Reason(
+    "turned.once",
+    "The axis was turned over once: a bias that changes then (it is touched, heated, switched) is in the biases, in G "
+    "and in S, and in no residual. Take the first position once more at the end.",
+)
 EAST = "The axis x of the gyro points east, up and down alike, where it sees nothing of the Earth rate."
 
 
@@ -172,25 +179,35 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Add what the coefficients may be where something fades after the axis was turned over, as heat that another
-        attitude moves does: noise that drifts explains it as well.
+        """Add what the coefficients may be with effects that noise explains as well: a fourth power of the level, and
+        what fades after the axis was turned over, as heat that another attitude moves does.
         """
-        if not self.both:
-            return result
+        told = next((t.p for t in self.found.tests if t.id == "level.fourth"), None)
+        text = (
+            f"{'G2' if self.channel == GYRO else 'K2'} may hold a fourth power of the level, and its interval is wider "
+            "with it. Take more levels, or leave out the highest."
+        )
+        fourth = self._with(result, "level.fourth.with", text, self.s2[:, None] ** 2)
+        if told is not None and told < SHOWN:
+            fourth = [replace(r, severity="warning") for r in fourth]
+        return replace(result, reasons=[*result.reasons, *fourth, *(self._faded(result) if self.both else [])])
+
+    def _with(self, result: DriftTestResult, id: str, text: str, more: Array) -> list[Reason]:
+        intervals = intervals_with(*self.model, more, result.coefficients)
+        return [Reason(id, text, BOTH, severity="condition", intervals=intervals)] if intervals else []
+
+    def _faded(self, result: DriftTestResult) -> list[Reason]:
         turns = np.concatenate([[0], np.flatnonzero(np.diff(self.up)) + 1])
         place = np.searchsorted(turns, np.arange(self.up.size), side="right") - 1
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
         whole = np.append(t1[turns[1:] - 1], t1[-1]) - t0[turns]
         since = ((t0 + t1) / 2.0 - t0[turns][place]) / whole[place]
         fades = np.where(place > 0, self.up, 0.0)[:, None] * np.exp(-since[:, None] * np.array(FADES))
-        more = np.column_stack([fades, t0 - t0.mean()])
-        intervals = intervals_with(*self.model, more, result.coefficients)
         text = (
             "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift "
             f"of the {self.channel}. Wait longer before the first reading of a position."
         )
-        reason = Reason("turned.fades", text, ("pass", "fail"), severity="condition", intervals=intervals)
-        return replace(result, reasons=[*result.reasons, *([reason] if intervals else [])])
+        return self._with(result, "turned.fades", text, np.column_stack([fades, t0 - t0.mean()]))
 
     def late(self) -> Array:
         """Return the step of the mean square that a reading would still hold some of, a third of the one before it."""
@@ -240,7 +257,10 @@ class Reduction(ChannelTests[VibrationSetup]):
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
-        return cls.reduce(labelled(record), cls.setup_of(record.run))
+        windows = labelled(record)
+        result = cls.reduce(windows, cls.setup_of(record.run))
+        once = record.run.measured and np.count_nonzero(np.diff(windows["up"])) == 1
+        return replace(result, reasons=[*result.reasons, ONCE]) if once else result
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> VibrationSetup:
