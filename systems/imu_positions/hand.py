@@ -138,14 +138,12 @@ class HandReduction(ChannelTests[HandSetup]):
 
 def _labels(p: Array) -> str:
     """Return what a signed permutation of the gyros against the accelerometers says."""
-    order, signs = np.argmax(np.abs(p), axis=1), p.sum(axis=1)
-    reads = ", ".join(f"{a} reads {'−' if s < 0 else ''}{AXES[k]}" for a, k, s in zip(AXES, order, signs, strict=True))
     handed = "; so labelled one of the triads is left-handed" if np.linalg.det(p) < 0.0 else ""
-    mirrored = ", ".join(a for a in AXES if (p @ np.eye(3))[AXES.index(a), AXES.index(a)] > 0.0)
-    other = ""
-    if np.array_equal(np.abs(p), np.eye(3)) and np.linalg.det(p) > 0.0:
-        other = f", or the sign of the accelerometer {mirrored} is"
-    if np.array_equal(np.abs(p), np.eye(3)):
-        axes = " and ".join(a for a, s in zip(AXES, signs, strict=True) if s < 0)
-        return f"gyros: against the accelerometers the signs of {axes} are reversed{other}{handed}"
-    return f"gyros: in axes of the accelerometers {reads}{handed}; columns are exchanged, or signs reversed"
+    signs = dict(zip(AXES, np.diag(p), strict=True))
+    if not all(signs.values()):
+        reads = mistakes.reads(p)
+        return f"gyros: in axes of the accelerometers {reads}{handed}; columns are exchanged, or signs reversed"
+    axes = " and ".join(a for a, s in signs.items() if s < 0.0)
+    mirrored = ", ".join(a for a, s in signs.items() if s > 0.0)
+    other = "" if handed else f", or the sign of the accelerometer {mirrored} is"
+    return f"gyros: against the accelerometers the signs of {axes} are reversed{other}{handed}"

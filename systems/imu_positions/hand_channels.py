@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
@@ -50,7 +49,7 @@ CONVENTIONS = [
 class HandChannel(DriftReduction[HandSetup]):
     """One of the regressions, all of which share the positions."""
 
-    words = ""
+    equation = ""
 
     def __init__(self, positions: Positions) -> None:
         super().__init__({}, positions.setup)
@@ -66,10 +65,16 @@ class HandChannel(DriftReduction[HandSetup]):
             random=WHITE,
         )
 
-    equation = ""
-
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [found.noise_sentence("data")]
+
+    def quantities(self, kind: str, names: Sequence[str], scale: float) -> list[Quantity]:
+        """Return coefficients of gyros (g) or accelerometers (a); of counts, ``scale`` of them for a unit of SI, a
+        diagonal element is a scale factor.
+        """
+        counts = kind in self.setup.counts
+        truth = {} if counts else dict(self.setup.truth or {})
+        return [_quantity(kind, n, counts, truth, scale) for n in names]
 
 
 class HandAccelerometers(HandChannel):
@@ -130,22 +135,16 @@ class HandAccelerometers(HandChannel):
 
     def derived(self, found: Findings) -> Findings:
         """Return the fit as the instruments have it: counts and their scale factors where the scale was unknown."""
-        counts, D = "a" in self.setup.counts, self.at.scale_a[0]
-        truth = {} if counts else dict(self.setup.truth or {})
-        quantities = [_quantity("a", n, counts, truth, float(D[0])) for n in norms.NAMES]
-        diagonal = {i: k for k, (i, j) in enumerate(norms.PLACES) if i == j}
+        counts, D = "a" in self.setup.counts, float(self.at.scale_a[0][0])
 
         def of(change: Array) -> Array:
             b = self.start + change
             if not counts:
                 return b
-            out = np.array(b)
-            for k, (i, j) in enumerate(norms.PLACES):
-                own = 1.0 + b[diagonal[i]]
-                out[k] = D[i] * own if i == j else b[k] / own
-            return out
+            S = _in_counts(norms.Triad.of(b).matrix, D)
+            return np.array([*(S[place] for place in norms.PLACES), *b[6:]])
 
-        return found.derive(quantities, of)
+        return found.derive(self.quantities("a", norms.NAMES, D), of)
 
     def effects(self, found: Findings) -> list[Effect]:
         return [sources.GRAVITY.effect(self.setup, -self.data[2].sum(axis=1))]
@@ -176,20 +175,8 @@ class HandTurns(HandChannel):
 
     def derived(self, found: Findings) -> Findings:
         counts, D = "g" in self.setup.counts, self.at.scale_g
-        truth = {} if counts else dict(self.setup.truth or {})
-        names = [f"Sg_{a}{b}" for a in AXES for b in AXES]
-        quantities = [_quantity("g", n, counts, truth, D) for n in names]
-
-        def of(b: Array) -> Array:
-            if not counts:
-                return b
-            S = b.reshape(3, 3)
-            own = 1.0 + np.diag(S)
-            out = S / own[:, None]
-            np.fill_diagonal(out, D * own)
-            return np.asarray(out.ravel())
-
-        return found.derive(quantities, of)
+        quantities = self.quantities("g", [f"Sg_{a}{b}" for a in AXES for b in AXES], D)
+        return found.derive(quantities, lambda b: _in_counts(b.reshape(3, 3), D).ravel() if counts else b)
 
     def effects(self, found: Findings) -> list[Effect]:
         """Return time base and level Earth rate; what readings at rest share between turns is in the weights."""
@@ -217,13 +204,12 @@ class HandGyro(HandChannel):
         at, c, s = self.at, self.channel, self.setup
         matrix = np.eye(3) + at.found.matrix
         y = (at.gyro[:, c.axis] - self.middle) / at.scale_g - ((at.vertical + self.level[0]) @ matrix.T)[:, c.axis]
-        quantities = self._quantities()
-        X = np.column_stack([np.ones(len(y)), at.force / frames.G0])
+        quantities = self.quantities("g", c.names(()), at.scale_g)
         group = Group("positions", np.arange(y.size), np.arange(1.0, y.size + 1), "number of the position", "")
         many = y.size >= ESTIMATED
         weighed = [replace(nuisances.trend(at.start, at.end), name=f"trend {c.name}")] if many and s.nuisances else []
         unit, noise = ("rate at rest", "°/h", DPH), "estimated" if many else "white"
-        return Regression(quantities, X, y, at.start, at.end, [group], *unit, noise, candidates=weighed)
+        return Regression(quantities, at.own, y, at.start, at.end, [group], *unit, noise, candidates=weighed)
 
     def test(self, found: Findings) -> None:
         """Add an F test of g² terms, which the bias would take in part for its own."""
@@ -240,14 +226,9 @@ class HandGyro(HandChannel):
         """What the data are counted from: the mean of counts, which begin anywhere."""
         return float(np.mean(self.at.gyro[:, self.channel.axis])) if "g" in self.setup.counts else 0.0
 
-    def _quantities(self) -> list[Quantity]:
-        counts = "g" in self.setup.counts
-        truth = {} if counts else dict(self.setup.truth or {})
-        return [_quantity("g", n, counts, truth, self.at.scale_g) for n in self.channel.names(())]
-
     def derived(self, found: Findings) -> Findings:
         start = np.array([self.middle / self.at.scale_g, 0.0, 0.0, 0.0])
-        return found.derive(self._quantities(), lambda b: start + b) if self.middle else found
+        return found.derive(found.quantities[:4], lambda b: start + b) if self.middle else found
 
     def effects(self, found: Findings) -> list[Effect]:
         at, c, s = self.at, self.channel, self.setup
@@ -259,8 +240,15 @@ class HandGyro(HandChannel):
         return [vertical, LEVEL_RATE.effect(at.level_size, own)]
 
 
+def _in_counts(S: Array, D: float) -> Array:
+    """Return a matrix (3, 3) of readings in counts, D for a unit of SI: scale factors, others over their own."""
+    own = 1.0 + np.diag(S)
+    out = np.asarray(S / own[:, None])
+    np.fill_diagonal(out, D * own)
+    return out
+
+
 def _quantity(kind: str, name: str, counts: bool, truth: Mapping[str, float], scale: float) -> Quantity:
-    """Return a coefficient; in counts, scale counts for a unit of SI, a diagonal element is a scale factor."""
     what, _, along = name.partition("_")
     channel = ImuInstrument(kind, AXES.index(along[0]))
     if not counts or what == "G" or (what[0] == "S" and along[0] != along[1]):

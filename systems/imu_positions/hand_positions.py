@@ -124,6 +124,11 @@ class Positions:
         return self.triad.force(self.acc / self.scale_a[0])
 
     @cached_property
+    def own(self) -> Array:
+        """Regressors (n, 4) of a gyro at rest: bias, and what the forces do by its g-sensitivity."""
+        return np.column_stack([np.ones(len(self.force)), self.force / frames.G0])
+
+    @cached_property
     def up(self) -> Array:
         return np.asarray(self.force / np.linalg.norm(self.force, axis=1)[:, None])
 
@@ -182,8 +187,11 @@ class Positions:
     def _sensitivity(self, earth: Array, matrix: Array) -> Array:
         """Return the g-sensitivity (3, 3), rad/s per g0, from the readings at rest; earth: Earth rate there (n, 3)."""
         y = self.gyro / self.scale_g - earth @ (np.eye(3) + matrix).T
-        X = np.column_stack([np.ones(len(y)), self.force / frames.G0])
-        return np.asarray(np.linalg.lstsq(X, y, rcond=None)[0][1:].T)
+        return np.asarray(np.linalg.lstsq(self.own, y, rcond=None)[0][1:].T)
+
+    def _left(self, rates: Array) -> Array:
+        """Return what bias and g-sensitivity leave of rates (n, k) at rest."""
+        return np.asarray(rates - self.own @ np.linalg.lstsq(self.own, rates, rcond=None)[0])
 
     def _turn(self, k: int, t: Turn, earth: Array, level: Array, G: Array, inverse: Array) -> Turn:
         """Return a turn with readings over D, the Earth rate (n, 3) of the positions in them; level (3,): at the start.
@@ -213,12 +221,9 @@ class Positions:
         these gyros read at rest, and from its size, which is known.
         """
         n, K = len(self.up), np.eye(3) + matrix
-        own = np.column_stack([np.ones(n), self.force / frames.G0])
 
         def left(v: Array) -> Array:
-            """Return what bias and g-sensitivity leave of rates (n, 3), one gyro behind the other."""
-            v = v[:, list(gyros)]
-            return np.asarray((v - own @ np.linalg.lstsq(own, v, rcond=None)[0]).T.ravel())
+            return self._left(v[:, list(gyros)]).T.ravel()
 
         data = left(self.gyro / self.scale_g - self.vertical @ K.T)
         X = np.column_stack([left(d @ K.T) for d in np.swapaxes(np.array(level), 0, 1)])
@@ -237,10 +242,8 @@ class Positions:
     @cached_property
     def noise_g(self) -> float:
         """Standard deviation of a reading of a gyro at rest, rad/s, from what is left of bias and g-sensitivity."""
-        y = self.gyro / self.scale_g - self.vertical - self.found.rate
-        own = np.column_stack([np.ones(len(y)), self.force])
-        left = y - own @ np.linalg.lstsq(own, y, rcond=None)[0]
-        return math.sqrt(float(np.sum(left**2)) / max(3 * (len(y) - 4), 1))
+        left = self._left(self.gyro / self.scale_g - self.vertical - self.found.rate)
+        return math.sqrt(float(np.sum(left**2)) / max(3 * (len(left) - 4), 1))
 
     @property
     def level_size(self) -> float:

@@ -59,7 +59,7 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
     size = float(np.linalg.norm(matrix)) / math.sqrt(3.0)
     if not size > 0.0:
         return [f"{NAME[kind]}: all readings are the same: none was read"]
-    best = min(_signed_permutations(), key=lambda p: float(np.linalg.norm(matrix / size - p)))
+    best = min(signed_permutations(), key=lambda p: float(np.linalg.norm(matrix / size - p)))
     off = float(np.max(np.abs(matrix / size - best)))
     if off > SOUND:
         rows = "; ".join(" ".join(f"{x:.3g}" for x in row) for row in matrix)
@@ -70,7 +70,8 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
     return [f"{NAME[kind]}: {text}" for text in (*_permuted(best, kind), *scaled(size, kind))]
 
 
-def _signed_permutations() -> Iterator[Array]:
+def signed_permutations() -> Iterator[Array]:
+    """Yield the matrices (3, 3) by which three axes are labelled otherwise or reversed."""
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
             p = np.zeros((3, 3))
@@ -78,11 +79,16 @@ def _signed_permutations() -> Iterator[Array]:
             yield p
 
 
+def reads(p: Array) -> str:
+    """Return which axis each instrument of a signed permutation reads."""
+    order, signs = np.argmax(np.abs(p), axis=1), p.sum(axis=1)
+    return ", ".join(f"{a} reads {'−' if s < 0 else ''}{AXES[k]}" for a, k, s in zip(AXES, order, signs, strict=True))
+
+
 def _permuted(p: Array, kind: str) -> list[str]:
     order, signs = np.argmax(np.abs(p), axis=1), p.sum(axis=1)
     if np.array_equal(p, np.eye(3)):
         return []
-    reads = ", ".join(f"{a} reads {'−' if s < 0 else ''}{AXES[k]}" for a, k, s in zip(AXES, order, signs, strict=True))
     moved = [a for k, a in enumerate(AXES) if order[k] != k]
     if not moved:
         reversed_axes = " and ".join(a for a, s in zip(AXES, signs, strict=True) if s < 0)
@@ -91,7 +97,7 @@ def _permuted(p: Array, kind: str) -> list[str]:
     elif len(moved) == 2 and np.all(signs > 0):
         text = f"{moved[0]} and {moved[1]} are exchanged"
     else:
-        text = f"the axes are labelled otherwise: {reads}"
+        text = f"the axes are labelled otherwise: {reads(p)}"
     if np.linalg.det(p) < 0.0:
         return [f"{text}; so labelled the triad is left-handed"]
     return [f"{text}: the columns are mistaken, or the case is mounted so on the plate"]

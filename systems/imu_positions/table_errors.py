@@ -24,6 +24,7 @@ from .geometry import accelerometer_columns
 
 SEEN = 0.05  # of the change of the forces by an error, least share that bias and matrix leave
 MOST = 3  # errors at a time
+CLEAR = 5.0  # u of each: smaller ones may make any residual ordinary
 Channel = Callable[[ImuSetup, str], DriftReduction[ImuSetup]]
 
 
@@ -42,6 +43,8 @@ def reasons(
     for _ in range(min(MOST, len(shapes))):
         chosen.append(min(set(shapes) - set(chosen), key=lambda n: _fit([*chosen, n], shapes, data)[2]))
         sizes, u, _ = _fit(chosen, shapes, data)
+        if np.any(np.abs(sizes) < CLEAR * u):
+            break
         parts = [f"{n} = {s:.9g}({v:.3g}) rad" for n, s, v in zip(chosen, sizes, u, strict=True)]
         corrected = replace(setup, corrections="; ".join(parts))
         with asked.residuals_alone():

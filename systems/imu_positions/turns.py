@@ -9,8 +9,6 @@ A sample's rotation vector is the trapezoid of the rate with the first coning te
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +16,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from gyrobench.arrays import Array
+
+from .mistakes import signed_permutations
 
 STEP = 1e-6  # of S, for slopes
 GUESSES = 90  # of a scale factor that is not known
@@ -127,7 +127,7 @@ def nominal(turns: list[Turn], known: bool) -> tuple[float, Array]:
     if good < GOOD:
         return identity, np.eye(3)
     best = (0.5 * good, identity, np.eye(3))
-    for p in _signed():
+    for p in signed_permutations():
         each = _offs(some, np.array([s * p for s in scales]))
         k = int(np.argmin(each))
         if each[k] < best[0]:
@@ -154,14 +154,6 @@ def _largest(turns: list[Turn]) -> list[Turn]:
 def _offs(turns: list[Turn], matrices: Array) -> Array:
     """Return the root mean square (b,) of what gravity is found off by, readings = matrix · rate."""
     return np.asarray(np.sqrt(np.mean(_left(turns, matrices - np.eye(3)) ** 2, axis=1)))
-
-
-def _signed() -> Iterator[Array]:
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            p = np.zeros((3, 3))
-            p[range(3), order] = signs
-            yield p
 
 
 def headings(turns: list[Turn], inverse: Array, first: Array) -> list[Array]:
