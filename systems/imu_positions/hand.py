@@ -30,7 +30,6 @@ from gyrobench.reduction.toolkit import (
     DriftTestResult,
     Reason,
     Record,
-    RunDocument,
     Table,
 )
 
@@ -71,10 +70,6 @@ class HandReduction(ChannelTests[HandSetup]):
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
         return cls.reduce(record.windows, HandSetup.of_record(record))
-
-    @classmethod
-    def setup_of(cls, run: RunDocument) -> HandSetup:
-        return HandSetup.of(run)
 
     def problems(self) -> list[str]:
         s = self.setup

@@ -38,7 +38,6 @@ from gyrobench.reduction.toolkit import (
     Findings,
     Group,
     Quantity,
-    Record,
     Regression,
     RunDocument,
     Table,
@@ -161,10 +160,6 @@ class UpDownReduction(ChannelTests[ImuSetup]):
     def of_channel(self, name: str) -> DriftReduction[ImuSetup]:
         channel = next(c for c in CHANNELS if c.name == name)
         return UpDownChannel(self.windows, self.setup, channel, self.signs[:, channel.axis])
-
-    @classmethod
-    def of_record(cls, record: Record) -> DriftTestResult:
-        return cls.reduce(record.windows, cls.setup_of(record.run))
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> ImuSetup:

@@ -23,6 +23,7 @@ import math
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,7 @@ tables: Any = importlib.import_module(".tables", room)
 Rng = np.random.Generator
 DPH = math.pi / 648000.0
 LEAN = 2e-3  # rad
+EVERYWHERE = {"type_b.unstated", "arrangement.unstated", "noise.unbounded"}
 
 
 def correlated(t0: Any, t1: Any, tau: float) -> Any:
@@ -200,9 +202,11 @@ def main() -> int:
     for way in given.way or list(WAYS):
         hits: dict[str, list[bool]] = {}
         z: dict[str, list[float]] = {}
+        said: Counter[str] = Counter()
         began = time.monotonic()
         for run in range(given.runs):
             result, truth = WAYS[way](np.random.default_rng([given.seed, run]))
+            said.update({r.id for r in result.reasons if r.severity != "condition"} - EVERYWHERE)
             for c in result.coefficients:
                 if c.name not in truth:
                     continue
@@ -213,6 +217,7 @@ def main() -> int:
                     (c.estimate * tables.SCALES[c.unit] - truth[c.name]) / c.u / tables.SCALES[c.unit]
                 )
         print(f"\n{way}: {given.runs} runs in {time.monotonic() - began:.0f} s")
+        print(f"records with: {dict(said)}")
         for kind, found in hits.items():
             n, h = len(found), sum(found)
             low, high = stats.beta.ppf(0.025, h, n - h + 1), stats.beta.ppf(0.975, h + 1, n - h) if h < n else 1.0
