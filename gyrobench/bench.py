@@ -179,4 +179,8 @@ class Bench:
                 return root / room / name
         if Path(name).is_dir():
             raise BenchError(f"no {kind} '{name}', which is {missing(Path(name))}")
-        raise BenchError(f"no {kind} '{name}'; {suggest_names(name, self._listing(room, file))}")
+        known = self._listing(room, file)
+        readmes = {k: folder / "README.md" for k, folder in known.items()}
+        part_of = [k for k, f in readmes.items() if f.is_file() and f"`{name}`:" in f.read_text("utf-8")]
+        hint = f"that is part of {' and '.join(part_of)}" if part_of else suggest_names(name, known)
+        raise BenchError(f"no {kind} '{name}'; {hint}")

@@ -131,6 +131,8 @@ def test_values_of_a_file(gyrobench: Command, tmp_path: Path) -> None:
 REFUSED = [
     (["run", "tumbl_single_axis"], "no system 'tumbl_single_axis'; did you mean tumble_single_axis?"),
     (["show", "tumble_single"], "did you mean tumble_single_axis"),
+    (["show", "imu_thermal"], "no system 'imu_thermal'; that is part of imu_positions"),
+    (["show", "warm_up"], "no system 'warm_up'; that is part of turn_on_repeatability"),
     (["run", NAME, "--set", "type_b=none"], "type_b: what measured data say"),
     (["run", NAME, "--set", "latitud=45deg"], "latitud: no such option of tumble_single_axis; options: latitude"),
     (["run", NAME, "--set", "gyr.D_I=3"], "--set gyr.D_I: no slot 'gyr'; did you mean gyro?"),
