@@ -57,8 +57,8 @@ def allowed(
 ) -> tuple[AllowedSource, ...]:  # fmt: skip
     """Return the sources with what they may be, each with all others as they are.
 
-    ways: at the points of the spread, nominal first; limit: of the voltage; set_by: source and parameters -> quantities that set it.
-    One that the spread itself has is judged by its value at each point.
+    ways: at the points of the spread, nominal first; limit: of the voltage; set_by: source and parameters -> quantities
+    that set it.  One that the spread itself has is judged by its value at each point.
     """
     parameters = [with_elements(nominal, values) for values in points]
     each = [{n: (j / MICRO) ** 2 for n, j in w.sources(G).items()} for w in ways]

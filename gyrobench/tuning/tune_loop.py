@@ -38,7 +38,7 @@ from gyrobench.tuning.synthesis import structure_of
 from gyrobench.tuning.trade import trade, traded
 from gyrobench.tuning.tuned_loop import WishResult
 from gyrobench.tuning.tuned_settings import TuningError, plan_settings, quiet, settings_of
-from gyrobench.tuning.tuning_notes import driven, idle, of_proofs, slips, states
+from gyrobench.tuning.tuning_notes import driven, idle, of_proofs, slips, slower, states
 from gyrobench.tuning.wishes import JITTER, Wish, parse_wishes, with_margin
 from gyrobench.tuning.written_loop import TunedLoop
 
