@@ -161,6 +161,7 @@ def test_a_cell_shows_what_it_prints_and_its_last_value() -> None:
     assert notebook.html(figure).startswith('<img alt="figure" src="data:image/png;base64,iVBOR')
 
 
+@pytest.mark.long
 @pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("myst_parser", "furo"))), reason='needs the extra: pip install -e ".[docs]"'
 )

@@ -171,4 +171,4 @@ def test_a_g_sensitivity_rests_on_the_earth_rate_and_on_turning_over(tmp_path: P
     asked = said(reduced(tmp_path, "vibration_rectification", text))["arrangement.unstated"]
     for words in ("the Earth rate taken off before (G by", "up and down exchanged (G by", "the rates wrong by 2 % (G"):
         assert words in asked
-    assert not said(reduced(tmp_path, "vibration_rectification", CHECKED + text))
+    assert set(said(reduced(tmp_path, "vibration_rectification", CHECKED + text))) == {"turned.once"}
