@@ -47,9 +47,8 @@ PART = 0.25  # of the variance of several processes: one of them that counts as 
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
-TOGETHER = 2  # changes that may hide one another: what is left of one is a walk that the other one is lost in
 RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
-SLOW = 24.0  # of that of a slow change: some ten of them differ
+SLOW, SEEN = 24.0, 9.0  # of that of a slow change: some ten of them differ; before the models are fitted again
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -141,15 +140,13 @@ def _without_changes(treated: Treated, means: bool) -> tuple[Treated, ModelSearc
 
 
 def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Placed]:
-    """Return the steps and slow changes that the likelihood asks for beside what was taken out, one after the other
-    or two at once.
+    """Return the steps and slow changes that the likelihood asks for beside what was taken out, one after the other.
 
-    Candidates are the largest ones under the model and under its fast terms alone, as a step passes for slow drift;
-    the models are fitted again without each of them.
+    Candidates are the largest ones under the model, steps also under its fast terms alone, as a step passes for slow
+    drift; the models are fitted again without each of them.
     """
     needed = {LevelStep: 2.0 * math.log(treated.samples) + RATIO, Settling: SLOW, Swing: SLOW}
     fits, changes = found.ranked[:3], list[Placed]()
-    kept = fits, changes
 
     def stretch(i: int, parts: Parts, less: Sequence[Placed]) -> tuple[Array, Array, float]:
         """Return a stretch less changes, completed under a model, with its spectrum and the error of an angle."""
@@ -184,14 +181,11 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
             parts = [*split(model, p), *found.resonances]
             of = [stretch(i, parts, changes) for i in range(len(treated.stretches))]
             longest = max(range(len(of)), key=lambda i: of[i][0].size)
-            places = {LevelStep: range(len(of)), Settling: [0], Swing: [longest]}
-            candidates = [
-                max(((largest(kind, of[i]), i) for i in places[kind]), key=lambda e: e[0][1])
-                for kind in CHANGES
-                if taken[kind] < CHANGES[kind]
-            ]
-            for (change, ratio), i in candidates:
-                if ratio < needed[type(change)]:
+            kinds = {LevelStep: range(len(of))} | ({Settling: [0], Swing: [longest]} if model is at.model else {})
+            each = [(largest(kind, of[i]), i) for kind in kinds if taken[kind] < CHANGES[kind] for i in kinds[kind]]
+            steps, slow = ([e for e in each if isinstance(e[0][0], LevelStep) is step] for step in (True, False))
+            for (change, ratio), i in [max(e, key=lambda e: e[0][1]) for e in (steps, slow) if e]:
+                if ratio < (needed[LevelStep] if isinstance(change, LevelStep) else SEEN):
                     continue
                 data = treated.ordinates(means, less=[*changes, (i, change)])
                 data.hold(found.resonances)
@@ -200,14 +194,10 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
                     tried.append(((i, change), without))
         if not tried:
             break
-        one, fits = min(tried, key=lambda t: min(f.value for f in t[1]))
-        changes = [*changes, one]
-        further = [type(c) for _, c in changes[len(kept[1]) :]]
-        if min(f.value for f in kept[0]) - min(f.value for f in fits) > sum(needed[kind] for kind in further):
-            kept = fits, changes
-        elif len(further) == TOGETHER:
+        one, without = min(tried, key=lambda t: min(f.value for f in t[1]))
+        if min(f.value for f in fits) - min(f.value for f in without) < needed[type(one[1])]:
             break
-    fits, changes = kept
+        fits, changes = without, [*changes, one]
     # what fast terms alone make of a change knows no drift: each again beside the others, under the model of all
     others = [changes[:k] + changes[k + 1 :] for k in range(len(changes))]
     return [
