@@ -163,6 +163,8 @@ class _WorkerState:
         self.test: System | Suite = load_test(self.settings.system, self.bench)
         if self.settings.ends:
             logging.getLogger("gyrobench").setLevel(logging.ERROR)  # warnings are in the rows
+            # where Ctrl-C ends the scheduler first, a message under way would be a traceback on the terminal
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)
             given = self.settings.memory_limit
             limit = given or (int(0.9 * self.memory) if self.memory else None)
             self.guard = Guard(self.folder, self.settings.time_limit, limit, bool(given))
