@@ -18,6 +18,14 @@ from gyrobench.files import missing, temporary_folder
 
 ROOMS = ("components", "systems", "reports")
 
+#: tests that are asked for by the name of what a system does, too -> that system
+PART_OF = {
+    "imu_calibration": "imu_positions",
+    "imu_thermal": "imu_positions",
+    "warm_up": "turn_on_repeatability",
+    "gyro_g_sensitivity": "vibration_rectification",
+}
+
 
 class BenchError(GyrobenchError):
     """There is no such bench, part or system; the text lists what there is."""
@@ -180,7 +188,6 @@ class Bench:
         if Path(name).is_dir():
             raise BenchError(f"no {kind} '{name}', which is {missing(Path(name))}")
         known = self._listing(room, file)
-        readmes = {k: folder / "README.md" for k, folder in known.items()}
-        part_of = [k for k, f in readmes.items() if f.is_file() and f"`{name}`:" in f.read_text("utf-8")]
-        hint = f"that is part of {' and '.join(part_of)}" if part_of else suggest_names(name, known)
+        whole = PART_OF.get(name, "")
+        hint = f"that is part of {whole}" if whole in known else suggest_names(name, known)
         raise BenchError(f"no {kind} '{name}'; {hint}")

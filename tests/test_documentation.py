@@ -143,7 +143,8 @@ def test_the_notebook_has_the_outputs_of_its_code() -> None:
     """Stored by docs/site/notebook.py --write; each cell shows something, the tumble curve is a picture."""
     stored = json.loads(notebook.FILE.read_text(encoding="utf-8"))
     assert stored["metadata"]["gyrobench"]["sources"] == notebook.sources(stored), "its code has changed since"
-    assert (stored["nbformat"], stored["nbformat_minor"]) >= (4, 5)  # before, cells had no "id"
+    assert (stored["nbformat"], stored["nbformat_minor"]) == (4, 5)  # since then each cell has an "id"
+    assert len({c["id"] for c in stored["cells"]}) == len(stored["cells"])
     cells = [c for c in stored["cells"] if c["cell_type"] == "code"]
     assert all(c["outputs"] for c in cells) and [c["execution_count"] for c in cells] == [*range(1, len(cells) + 1)]
     assert sum("image/png" in o.get("data", ()) for c in cells for o in c["outputs"]) == 1

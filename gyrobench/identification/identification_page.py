@@ -63,7 +63,7 @@ def page(t: LoopIdentification) -> Page:
             Section("Responses", "responses", [_responses(t)]),
             Section("Method", "method", _method(t)),
         ]
-    return Page(f"Identified loop: {t.record.name}", report_id, head, sections, what="LoopIdentification").finish()
+    return Page(f"Identified loop: {t.record.name}", report_id, head, sections, what="Identification").finish()
 
 
 def minus(text: str) -> str:

@@ -77,9 +77,10 @@ def allowed(
         )  # fmt: skip
         quantities = [set_by(source, p) for p in parameters]
         for own in zip(*quantities, strict=True):
-            most = [at_most(s, k, f"{without:.3g} µrad") for s, k in zip(own, factors, strict=True)]
-            reached = [x for x in most if not isinstance(x, str)]
-            said = [x for x in most if isinstance(x, str) and x != MUCH]  # much at one point is no limit at another
-            least = said[0] if said else min(reached, default=MUCH)
+            # much at one point is no limit at another
+            limited = [(s, k) for s, k in zip(own, factors, strict=True) if k is None or k <= MOST]
+            most = [at_most(s, k, f"{without:.3g} µrad") for s, k in limited]
+            said = [x for x in most if isinstance(x, str)]
+            least = said[0] if said else min((x for x in most if not isinstance(x, str)), default=MUCH)
             found.append(AllowedSource(source, math.sqrt(max(s[2] for s in squares)), factor, own[0], least, clips))
     return tuple(found)

@@ -23,9 +23,7 @@ from .channels import UG, ImuInstrument
 
 PLACES = (np.arange(8) + 0.5) / 8.0  # of a window, at which the play is taken
 OTHER_WIDTHS = (1.0 / 3.0, 3.0)  # of the hysteresis, that a test looks for
-APART = (
-    0.1  # least share of one more power, hysteresis and rate of a scale factor that the model leaves, of two of them
-)
+APART = 0.1  # least share of one more power, hysteresis and rate of a scale factor, of two of them, that is left
 #: ending of a coefficient -> parameter of the parts, size of its unit over that of the bias, unit, meaning
 BIAS = {
     "T": ("bias_T", 1.0, "/K", "change of the bias of the {} per kelvin"),

@@ -71,9 +71,10 @@ EAST = "The axis x of the gyro points east, up and down alike, where it sees not
 
 @dataclass(frozen=True, kw_only=True)
 class VibrationSetup(SiteSetup):
-    """axis: of the case, along the vibration."""
+    """axis: of the case, along the vibration; measured: no run, whose bias is the same after the axis was turned."""
 
     axis: str
+    measured: bool = False
 
 
 class VibrationChannel(DriftReduction[VibrationSetup]):
@@ -257,15 +258,13 @@ class Reduction(ChannelTests[VibrationSetup]):
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
-        windows = labelled(record)
-        result = cls.reduce(windows, cls.setup_of(record.run))
-        once = record.run.measured and np.count_nonzero(np.diff(windows["up"])) == 1
-        return replace(result, reasons=[*result.reasons, ONCE]) if once else result
+        return cls.reduce(labelled(record), cls.setup_of(record.run))
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> VibrationSetup:
         axis = str(run.options["axis"])
-        return VibrationSetup.of(run, axis=axis, truth=None if run.measured else true_values(run, axis))
+        truth = None if run.measured else true_values(run, axis)
+        return VibrationSetup.of(run, axis=axis, measured=run.measured, truth=truth)
 
     def problems(self) -> list[str]:
         s, w = self.setup, self.windows
@@ -288,6 +287,8 @@ class Reduction(ChannelTests[VibrationSetup]):
     def result(self) -> DriftTestResult:
         found = super().result()
         s, said = self.setup, [*mistakes.implausible(found.coefficients)]
+        if s.measured and np.count_nonzero(np.diff(self.windows["up"])) == 1:
+            said.append(ONCE)
         if s.axis == "x":
             vertical = s.earth_rate * math.sin(s.latitude) / DPH
             said += mistakes.same_both_ways(found.coefficients, vertical / s.gravity * G0)

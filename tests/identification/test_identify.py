@@ -406,7 +406,8 @@ def test_without_a_loop_the_plant_alone_is_identified() -> None:
     k = int(np.argmin(np.abs(found.f - 4.0)))
     exact = 1.0 / abs(4.0 + 2.0j * 2.0 * np.pi * found.f[k])  # 1/(c + jωJ)
     assert abs(found.responses["P"].value[k]) == pytest.approx(exact, rel=0.01)
-    assert [s.title for s in page(found).sections][:2] == ["Margins", "Plant"]
+    shown = page(found)
+    assert [s.title for s in shown.sections][:2] == ["Margins", "Plant"] and "of identification" in shown.words["end"]
 
 
 def test_nothing_passes_at_a_limit(steady: LoopRecord) -> None:
