@@ -13,18 +13,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from gyrobench import reading
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import missing, temporary_folder
 
 ROOMS = ("components", "systems", "reports")
-
-#: tests that are asked for by the name of what a system does, too -> that system
-PART_OF = {
-    "imu_calibration": "imu_positions",
-    "imu_thermal": "imu_positions",
-    "warm_up": "turn_on_repeatability",
-    "gyro_g_sensitivity": "vibration_rectification",
-}
 
 
 class BenchError(GyrobenchError):
@@ -188,6 +181,7 @@ class Bench:
         if Path(name).is_dir():
             raise BenchError(f"no {kind} '{name}', which is {missing(Path(name))}")
         known = self._listing(room, file)
-        whole = PART_OF.get(name, "")
+        part_of = standard_folder() / "systems" / "part_of.toml"
+        whole = reading.toml(reading.read_text(part_of, BenchError), part_of, BenchError).get(name)
         hint = f"that is part of {whole}" if whole in known else suggest_names(name, known)
         raise BenchError(f"no {kind} '{name}'; {hint}")
