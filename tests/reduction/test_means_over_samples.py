@@ -12,9 +12,20 @@ from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.maximum import WIDEST, by_chance
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.noise_model.terms import NoiseTerm
 
 COVERAGE = Path(__file__).parents[1] / "benchmarks" / "noise_model_coverage.py"
+
+
+def model_of(name: str, seed: int) -> NoiseModel:
+    """Return the model of a record of 10,000 samples of the coverage benchmark."""
+    spec = importlib.util.spec_from_file_location("noise_model_coverage", COVERAGE)
+    assert spec is not None and spec.loader is not None
+    coverage = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(coverage)
+    record = coverage.simulated(10_000, coverage.TRUTHS[name], [], np.random.default_rng([11, seed, 10_000]))
+    return fit_noise(record, 1.0, means=False)
 
 
 def test_the_width_of_an_average_beside_a_whole_number() -> None:
@@ -31,15 +42,18 @@ def test_drift_under_a_mean_over_whole_samples() -> None:
     """Processes of 12, 150 and 1500 samples behind a mean of three: an average of 2.99 fills the zero that the fastest
     one is seen in, and its tau was 13.0 to 34.7, by a walk in the place of the others.
     """
-    spec = importlib.util.spec_from_file_location("noise_model_coverage", COVERAGE)
-    assert spec is not None and spec.loader is not None
-    coverage = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(coverage)
-    truth = coverage.TRUTHS["mean of 3, three processes"]
-    model = fit_noise(coverage.simulated(10_000, truth, [], np.random.default_rng([11, 12, 10_000])), 1.0, means=False)
+    model = model_of("mean of 3, three processes", 12)
     assert model.filter_words() == "mean over 3 samples"
     tau = model.processes[0].tau  # may stand for the first two: its upper end is no sign of the average
     assert tau.low < 11.0 and tau.value < 20.0
+
+
+@pytest.mark.long
+def test_flicker_under_a_mean_over_whole_samples() -> None:
+    """B = 0.12 behind a mean of three, which a process beside one behind it as well hid: B was at most 0.009."""
+    model = model_of("all noise through a mean of 3, flicker", 2)
+    assert model.filter_words() == "mean over 3 samples, which slow noise passes too"
+    assert model["B"].low <= 0.12 <= model["B"].high
 
 
 @pytest.mark.long

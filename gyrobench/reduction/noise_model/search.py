@@ -201,18 +201,20 @@ class ModelSearch:
 
     def grow_means(self) -> None:
         """Try slow terms beside a mean over whole samples, where it is nearly as likely as the best model: other
-        filters, of more parameters, hide its zeros, and each slow term that passes none fills them.
+        filters, of more parameters, hide its zeros, and each slow term that passes none fills them.  One that slow
+        noise passes too is likely only beside the slow terms that are right.
         """
-        at: Fitted | None = None
-        while likely := [f for f in self.seen.values() if any(t.filter.startswith(MEANS) for t in f.model)
-                         and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
-            top = max(likely, key=lambda f: f.evidence)
-            if at is not None and top.model == at.model:
-                break
-            at = top
-            for model, start in [(m, s) for m, starts in self.neighbours(at) for s in starts]:
-                if canonical(model, start)[0] not in self.seen:
-                    self.fit(model, start)
+        for kind in MEANS:
+            at: Fitted | None = None
+            while likely := [f for f in self.seen.values() if any(t.filter.startswith(kind) for t in f.model)
+                             and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
+                top = max(likely, key=lambda f: f.evidence)
+                if at is not None and top.model == at.model:
+                    break
+                at = top
+                for model, start in [(m, s) for m, starts in self.neighbours(at) for s in starts]:
+                    if canonical(model, start)[0] not in self.seen:
+                        self.fit(model, start)
 
     # ------------------------------------------------------------------ resonances
     def peak(self, at: Fitted, vain: Sequence[Array] = (), clear: float = CLEAR) -> Array | None:
