@@ -47,7 +47,7 @@ def format_result(result: Result) -> str:
             row += [write_number(c.truth, c.u).text, "–" if c.z is None else f"{c.z:+.2f}".replace("-", "−")]
         rows.append(row + ([c.verdict] if judged else []))
     notes = [s.replace("No", "no", 1) for s in no_values((c.name, c.no_value) for c in result.coefficients)]
-    notes += [f"warning: {w}" for w in dict.fromkeys([*_doubts(result), *result.warnings])]
+    notes += [f"warning: {w}" for w in [*_doubts(result), *result.warnings]]
     if result.step_check:
         notes.append(step_sentence(result.step_check))
     if judged:
@@ -60,12 +60,15 @@ def format_result(result: Result) -> str:
 
 
 def _doubts(result: Result) -> list[str]:
-    """Return what speaks against a record, where no verdict was taken away that says so; missing statements apart."""
+    """Return what speaks against a record, where neither a verdict that was taken away nor a warning says so; missing
+    statements apart.
+    """
     from gyrobench.reduction.estimation.fit_result import UNSTATED
 
     said = {r.id for r in result.reasons}
     doubts = [r for r in result.reasons if r.severity == "doubt" and not r.id.endswith(UNSTATED)]
-    return [r.text for r in doubts if f"verdict.withheld:{r.id}" not in said]
+    doubts = [r for r in doubts if not any(w.startswith(r.text) for w in result.warnings)]
+    return list(dict.fromkeys(r.text for r in doubts if f"verdict.withheld:{r.id}" not in said))
 
 
 def step_sentence(check: StepCheck) -> str:

@@ -215,6 +215,20 @@ def test_runs_of_equal_samples_over_blocks() -> None:
     assert found.rows_repeated() == 0
 
 
+@pytest.mark.parametrize(("step", "again", "named"), [(1e-5, 0.1, True), (0.03, 0.1, True), (0.03, 0.0, False),
+                                                      (0.3, 0.1, False), (1.0, 0.0, False)])  # fmt: skip
+def test_rows_repeated_by_chance_in_a_single_channel(step: float, again: float, named: bool) -> None:
+    """White noise of 1 in steps q has 0.28 q of its rows like the one before: 1 in 120 at 0.03, 1 in 12 at 0.3."""
+    rng = np.random.default_rng(3)
+    x = np.round(rng.normal(size=20_000) / step) * step
+    for i in 1 + np.flatnonzero(rng.random(x.size - 1) < again):
+        x[i] = x[i - 1]
+    found = EqualSamples(["x"])
+    for part in np.array_split(np.arange(x.size), 7):
+        found.add(np.float64(0.01) * part, {"x": x[part]})
+    assert (found.rows_repeated() > 0) == named
+
+
 @pytest.mark.usefixtures("no_arma")
 @pytest.mark.long
 def test_channels_side_by_side_are_those_one_after_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
