@@ -181,7 +181,8 @@ def terms_text(noise: NoiseModel) -> str:
     if noise["R"].determined:
         words.append("a ramp")
     shape = noise.filter_words()
-    passed = f" The white noise has passed a filter: {shape}." if shape else " No filter of the white noise is seen."
+    which = "All noise" if noise.slow_filtered else "The white noise"
+    passed = f" {which} has passed a filter: {shape}." if shape else " No filter of the white noise is seen."
     return f"Terms of the model: {', '.join(words)}; {noise.models} models were compared.{passed}"
 
 

@@ -14,7 +14,7 @@ from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.slow_changes import Settling, Swing
 from gyrobench.reduction.noise_model.steps import LevelStep
-from gyrobench.reduction.noise_model.terms import MEANS, PEAKS, Grid, filter_of, passes_slow, samples_of
+from gyrobench.reduction.noise_model.terms import ALL, MEAN, PEAKS, SLOW, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -198,11 +198,16 @@ class NoiseModel:
             return ""
         t, q = found
         words, at = list[str](), 1
-        for part in t.filter.split("+"):
+        for part in t.filter.removesuffix(ALL).split("+"):
             size = filter_of(part)[1]
             words.append(_filter_words(part, q[at : at + size], self.scale.tau0))
             at += size
         return ", after a ".join(words)
+
+    @property
+    def slow_filtered(self) -> bool:
+        """Return whether there is slow noise and has passed the sensor's filter too."""
+        return any(t.name in SLOW for t in self.shape[0]) and any(passes_slow(t.filter) for t in self.shape[0])
 
     def peaks(self) -> list[tuple[float, float, float]]:
         """Return frequency (Hz), bandwidth (Hz, full at half power) and rms (unit) of every resonance."""
@@ -220,18 +225,17 @@ def _filter_words(name: str, p: Array, tau0: float) -> str:
     """Return what a filter of parameters p (k,) is, in words."""
     if name == "first":
         return f"low-pass of first order, time constant {_seconds(tau0 * math.exp(p[0]))}"
-    if name == "second":
-        return (
-            f"low-pass of second order, {math.exp(p[0]) / (2.0 * math.pi * tau0):.3g} Hz, damping {math.exp(p[1]):.2g}"
-        )
+    if name in ("second", "recursive"):
+        kind = "low-pass" if name == "second" else "recursive digital low-pass"
+        return f"{kind} of second order, {math.exp(p[0]) / (2.0 * math.pi * tau0):.3g} Hz, damping {math.exp(p[1]):.2g}"
     if name == "butterworth":
         return f"digital low-pass, {_cutoff(p[0], tau0):.3g} Hz, order {math.exp(p[1]):.2g}"
     if name == "cascade":
         return f"{math.exp(p[1]):.2g} digital low-passes in a row of {_cutoff(p[0], tau0):.3g} Hz each"
     if name == "average":
         return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
-    if name.startswith(MEANS):
-        return f"mean over {samples_of(name)} samples{', which slow noise passes too' if passes_slow(name) else ''}"
+    if name.startswith(MEAN):
+        return f"mean over {samples_of(name)} samples"
     level = float(np.exp(-2.0 * np.sum(p[::2])))
     return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
 

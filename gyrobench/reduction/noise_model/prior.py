@@ -10,7 +10,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
-from gyrobench.reduction.noise_model.terms import PEAKS, SLOW, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import ALL, PEAKS, SLOW, Grid, NoiseTerm
 
 GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum is smoothed
 HELD_BACK = 0.1  # of a spectrum that falls by f^-2
@@ -22,6 +22,7 @@ APART = math.log(3.0)  # least distance of the logarithms of two tau: nearer one
 FILTERS = {
     "first": [(0.05, 30.0)],
     "second": [(0.03, 6.0), (0.1, 5.0)],
+    "recursive": [(0.03, 6.0), (0.1, 5.0)],
     "average": [(1.05, LONGEST_MEAN)],
     "butterworth": [(0.02, 30.0), (0.5, 12.0)],
     "cascade": [(0.02, 30.0), (0.5, 12.0)],
@@ -100,7 +101,7 @@ class Prior:
                 limits.append((math.log(SHORTEST_TAU), self.longest))
             elif term.name in PEAKS:
                 limits += [(math.log(3.0), self.longest), (-7.0, math.log(math.pi))]
-            for part in term.filter.split("+"):
+            for part in term.filter.removesuffix(ALL).split("+"):
                 if part.startswith("shape"):
                     limits += [(-6.0, 6.0)] * int(part[5:])
                 limits += [(math.log(a), math.log(b)) for a, b in FILTERS.get(part, [])]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize, nearly_whole
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, samples_of
+from gyrobench.reduction.noise_model.terms import ALL, DIGITAL, MEAN, PEAKS, SLOW, NoiseTerm, samples_of
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence
@@ -28,10 +29,11 @@ STARTS: dict[str, list[list[float]]] = {
     "second": [[0.0, -0.3], [-2.0, -0.3]],
     "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
     "butterworth": [[math.log(t), math.log(2.0)] for t in (0.15, 0.6, 2.5)],
+    "recursive": [[0.0, -0.3], [-2.0, -0.3]],
     "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
     "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
-HELD_BACK = 0.3  # of the spectrum, just below half the sampling rate: what a digital low-pass passes there at most
+HELD_BACK = 0.3  # of the spectrum, just below half the sampling rate: what a low-pass passes there at most
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
 CLEAR = 1e-4  # probability of so large an excess of power anywhere in a record without resonance
@@ -81,6 +83,18 @@ class ModelSearch:
     @property
     def ranked(self) -> list[Fitted]:
         return sorted(self.seen.values(), key=lambda f: -f.evidence)
+
+    @functools.cached_property
+    def holds_back(self) -> bool:
+        """Return whether the spectrum is low just below half the sampling rate, as behind a low-pass."""
+        level = self.prior.level
+        return bool(level[-1] <= HELD_BACK * np.median(level))
+
+    def may_pass_all(self, name: str) -> bool:
+        """Return whether it is told from the record whether slow noise has passed a filter too; behind a free shape a
+        fast process may be the white noise.
+        """
+        return self.holds_back and name not in ("none", *DIGITAL) and "shape" not in name
 
     # ------------------------------------------------------------------ moves
     def excess(self, at: Fitted) -> tuple[Array, Array]:
@@ -143,32 +157,36 @@ class ModelSearch:
         if parts[0][0].name != "white":
             return
         (term, q), rest = parts[0], parts[1:]
-        first, _, behind = term.filter.partition("+")
-        count = samples_of(first) if first.startswith("mean") else round(math.exp(q[1])) if first == "average" else 1
+        base = term.filter.removesuffix(ALL)
+        every, (first, _, behind) = term.filter[len(base) :], base.partition("+")
+        count = samples_of(first) if first.startswith(MEAN) else round(math.exp(q[1])) if first == "average" else 1
+
+        def with_filter(name: str, p: Array) -> tuple[Model, list[Array]]:
+            model, start = joined([(NoiseTerm("white", name), p), *rest])
+            return model, [start]
+
+        if self.may_pass_all(base):
+            yield with_filter(base if every else base + ALL, q)
         if count > 1:  # of slow noise too, which fills its zeros otherwise
-            made = joined([(NoiseTerm("white", f"boxcar{count}"), q[:1]), *rest])
-            yield made[0], [made[1]]
+            yield with_filter(f"{MEAN}{count}{ALL}", q[:1])
         if first == "average" and (whole := nearly_whole(q[1])):
-            new = NoiseTerm("white", f"mean{whole}+{behind}" if behind else f"mean{whole}")
-            made = joined([(new, np.delete(q, 1)), *rest])
-            yield made[0], [made[1]]
+            yield with_filter("+".join([f"{MEAN}{whole}", *([behind] if behind else [])]) + every, np.delete(q, 1))
         if behind:
-            made = joined([(NoiseTerm("white", first), q[: 1 + (first == "average")]), *rest])
-            yield made[0], [made[1]]
-        for after in BEHIND if (first == "average" or first.startswith("mean")) and not behind else ():
-            new = NoiseTerm("white", f"{first}+{after}")  # a mean of what has passed a filter already
-            for guess in STARTS.get(after, [[0.0] * (new.size - q.size)]):
-                made = joined([(new, np.concatenate([q, guess])), *rest])
-                yield made[0], [made[1]]
+            yield with_filter(first + every, q[: 1 + (first == "average")])
+        for after in BEHIND if (first == "average" or first.startswith(MEAN)) and not behind else ():
+            name = f"{first}+{after}{every}"  # a mean of what has passed a filter already
+            for guess in STARTS.get(after, [[0.0] * (NoiseTerm("white", name).size - q.size)]):
+                yield with_filter(name, np.concatenate([q, guess]))
         for name in names:
-            if name == term.filter or (name == "none" and W in at.model):
+            if name == base or (name == "none" and W in at.model):
                 continue
-            new = NoiseTerm("white", name)
             least = [(W, np.array([self.prior.readout]))]  # shows in a stop band
             others = rest + least if name in DIGITAL and W not in at.model else rest
-            for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
-                made = joined([(new, np.append(q[0], guess)), *others])
-                yield made[0], [made[1]]
+            for end in ("", ALL) if self.may_pass_all(name) else ("",):
+                new = NoiseTerm("white", name + end)
+                for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
+                    made = joined([(new, np.append(q[0], guess)), *others])
+                    yield made[0], [made[1]]
 
     def climb(self, at: Fitted, names: tuple[str, ...]) -> Fitted:
         """Go to the best neighbour, until there is none."""
@@ -188,25 +206,30 @@ class ModelSearch:
         return at
 
     def try_digital(self) -> None:
-        """Try digital low-passes in place of the best filter where the spectrum falls; they stay if one is better."""
-        level, before = self.prior.level, dict(self.seen)
-        if level[-1] > HELD_BACK * np.median(level):
+        """Try digital low-passes in place of the best filter where the spectrum falls; they stay if nearly as good."""
+        before = dict(self.seen)
+        if not self.holds_back:
             return
         for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL) for s in starts]:
             self.fit(model, start)
         if any(t.filter in DIGITAL for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
-            self.seen = before
+            near = self.best.evidence - NEARLY
+            self.seen = {m: f for m, f in self.seen.items() if m in before or f.evidence > near}
 
-    def grow_means(self) -> None:
-        """Try slow terms beside a mean over whole samples, where it is nearly as likely as the best model: other
-        filters, of more parameters, hide its zeros, and each slow term that passes none fills them.  One that slow
-        noise passes too is likely only beside the slow terms that are right.
+    def grow_filters(self) -> None:
+        """Try slow terms beside a mean over whole samples, and beside a filter that slow noise passes too, where such a
+        model is nearly as likely as the best: other filters, of more parameters, hide the zeros of a mean, and each
+        slow term that passes none fills them, as it fills what a low-pass holds back; one that slow noise passes is
+        likely beside the right slow terms alone.
         """
-        for kind in MEANS:
+        families: tuple[Callable[[str], bool], ...] = (
+            lambda name: name.startswith(MEAN), lambda name: name.endswith(ALL), lambda name: name in DIGITAL,
+        )  # fmt: skip
+        for belongs in families:
             at: Fitted | None = None
-            while likely := [f for f in self.seen.values() if any(t.filter.startswith(kind) for t in f.model)
+            while likely := [f for f in self.seen.values() if any(belongs(t.filter) for t in f.model)
                              and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
                 top = max(likely, key=lambda f: f.evidence)
                 if at is not None and top.model == at.model:
@@ -344,7 +367,7 @@ def search_again(data: Ordinates, before: ModelSearch) -> ModelSearch:
     for f in before.ranked[:3]:
         found.fit(f.model, f.p)
     found.climb(found.best, SIMPLE + SHAPES)
-    found.grow_means()
+    found.grow_filters()
     return found
 
 
@@ -359,5 +382,5 @@ def search(data: Ordinates) -> ModelSearch:
     if found.resonances:
         found.add_resonances()
         found.climb(found.best, SIMPLE + SHAPES)
-    found.grow_means()
+    found.grow_filters()
     return found

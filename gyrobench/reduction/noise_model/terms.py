@@ -16,8 +16,9 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
 
 Filters, "mean4+first" of two in a row:
 "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them, "boxcar4" of slow noise too; digital low-passes with zeros at half the sampling rate (bilinear
-transform), "butterworth" of any order and a "cascade" of equal ones of first order (of means over two samples, too);
+"mean4" over 4 of them; "first*", "mean4*": of slow noise too, which passes what white noise from the same place passes;
+digital low-passes, of slow noise too: "butterworth" of any order and a "cascade" of equal ones of first order (of means
+over two samples, too), with zeros at half the sampling rate (bilinear transform), "recursive" of two poles alone;
 "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
@@ -41,9 +42,10 @@ from gyrobench.reduction.series.noise_spectra import folded
 
 PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")
-DIGITAL = ("butterworth", "cascade")  # filters that slow noise passes too, as they hold back what it has above them
+DIGITAL = ("butterworth", "cascade", "recursive")  # slow noise passes them too: they hold back what it has above them
 SIZES = {"gauss_markov": 2, "resonance": 3, "band": 3}  # parameters, one of other terms
-MEANS = ("mean", "boxcar")  # over a whole number of samples, with zeros; slow noise passes a boxcar too
+MEAN = "mean"  # over a whole number of samples, with zeros
+ALL = "*"  # at the end of the name of a filter that slow noise passes too
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
@@ -179,6 +181,13 @@ def _cascade(p: Array, grid: Grid) -> Array:
     return np.asarray(np.exp(-np.minimum(x, math.log(LEAST_PASSED))))
 
 
+def _recursive(p: Array, grid: Grid) -> Array:
+    """Product of (1 - z)^2/(1 - 2 z cos omega + z^2) over both poles z of a low-pass of second order."""
+    z1, z2, _ = _second_poles(p)
+    out: Array = np.real(np.prod([(1.0 - z) ** 2 / (1.0 - 2.0 * z * grid.cos + z * z) for z in (z1, z2)], axis=0))
+    return out
+
+
 def _shape(p: Array, grid: Grid) -> Array:
     waves = np.array([np.cos((j + 1) * grid.omega) - 1.0 for j in range(p.shape[-1])])
     out: Array = np.exp(np.clip(p @ waves, -40.0, 40.0))
@@ -192,17 +201,18 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
     "average": (_average, 1),
     "butterworth": (_butterworth, 2),
     "cascade": (_cascade, 2),
+    "recursive": (_recursive, 2),
 }
 
 
 def samples_of(name: str) -> int:
-    """Return the samples that a filter of MEANS is over."""
-    return int(name.lstrip(string.ascii_lowercase))
+    """Return the samples that a filter MEAN is over."""
+    return int(name.strip(string.ascii_lowercase + ALL))
 
 
 def passes_slow(name: str) -> bool:
     """Return whether slow noise passes a filter too."""
-    return name in DIGITAL or name.startswith("boxcar")
+    return name in DIGITAL or name.endswith(ALL)
 
 
 @functools.cache
@@ -211,10 +221,11 @@ def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
 
     Of two in a row, "mean4+first", the parameters of the first one come first.
     """
+    name = name.removesuffix(ALL)
     if "+" in name:
         (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
         return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
-    if name.startswith(MEANS):
+    if name.startswith(MEAN):
         return _mean(samples_of(name)), 0
     return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
 
@@ -240,7 +251,7 @@ class NoiseTerm:
         return (
             self.name == "quantization"
             or self.name in PEAKS
-            or (self.name == "white" and (self.filter == "second" or "shape" in self.filter))
+            or (self.name == "white" and any(rising in self.filter for rising in ("second", "recursive", "shape")))
         )
 
     def unit(self, p: Array, grid: Grid) -> Array:
@@ -282,7 +293,7 @@ class NoiseTerm:
         """Return the Allan variance (..., k) of means over m (k,) samples, m whole numbers."""
         v = np.exp(p[..., 0:1])
         if self.name == "white":
-            return v * _allan_white(self.filter, p[..., 1:], m)
+            return v * _allan_white(self.filter.removesuffix(ALL), p[..., 1:], m)
         if self.name == "readout":
             return v / m
         if self.name == "quantization":
@@ -360,7 +371,7 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         z1, z2, share = _second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
         return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
-    if name.startswith(MEANS) and "+" not in name:
+    if name.startswith(MEAN) and "+" not in name:
         count = samples_of(name)
         lag = np.arange(count + 1.0)
         return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
