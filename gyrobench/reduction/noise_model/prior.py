@@ -22,7 +22,7 @@ APART = math.log(3.0)  # least distance of the logarithms of two tau: nearer one
 FILTERS = {
     "first": [(0.05, 30.0)],
     "second": [(0.03, 6.0), (0.1, 5.0)],
-    "recursive": [(0.03, 6.0), (0.1, 5.0)],
+    "recursive": [(0.03, 6.0), (0.1, 1.0)],  # a slow pole beside a fast one would be drift
     "average": [(1.05, LONGEST_MEAN)],
     "butterworth": [(0.02, 30.0), (0.5, 12.0)],
     "cascade": [(0.02, 30.0), (0.5, 12.0)],
