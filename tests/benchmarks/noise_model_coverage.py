@@ -8,7 +8,8 @@ even.  any: nothing or one of the first five faults by chance, each as likely.
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
-rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place), before a readout of 0.003.
+rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place; poles: a recursive filter,
+natural frequency and damping, without the readout), before a readout of 0.003.
 rounded: to a multiple of.
 Faults, wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the rate;
 missing: a tenth of the samples; gaps: a tenth, of 100 on average; slow: a warm-up of 3 standard deviations, a fifteenth
@@ -43,6 +44,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
     "all noise through a mean of 3, flicker": {"N": 1.0, "B": 0.12, "all": 3},
     "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
+    "recursive low-pass, flicker": {"N": 1.0, "B": 0.15, "poles": (0.5, 0.5)},
     "mean of 2, rounded": {"N": 1.0, "mean": 2, "markov": [(0.125, 100.0), (0.042, 3000.0)], "rounded": 0.042},
 }
 
@@ -66,6 +68,10 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
     if count := truth.get("all", 0):
         x = lfilter(np.full(count, 1.0 / count), [1.0], x)
+    if "poles" in truth:
+        w, zeta = truth["poles"]
+        a = np.real(np.poly(np.exp(np.roots([1.0, 2.0 * zeta * w, w * w]))))
+        x = lfilter([a.sum()], a, x)
     if "digital" in truth:
         x = lfilter(*butter(*truth["digital"]), x) + 0.003 * rng.normal(size=n + 500)
     x = x[500:]
