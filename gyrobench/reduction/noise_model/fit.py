@@ -34,7 +34,7 @@ from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
 from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEAN, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Placed, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
@@ -212,7 +212,7 @@ def _spectrum_of(n: int, parts: Parts, means: bool) -> Array:
     grid = Grid(math.pi * few / n, means)
     S = spectrum(*joined(parts), grid)
     for term, p in parts:  # a stretch leaks into the zeros of a mean, and into what a digital low-pass holds back
-        if term.filter.startswith((MEAN, "average", *DIGITAL)):
+        if term.filter.startswith((*MEANS, "average", *DIGITAL)):
             own = term.spectrum(p, grid)
             S = np.maximum(S, LEAK * float(np.trapezoid(own, few)) / n**2)
     return np.concatenate([[1.0], np.exp(np.interp(np.log(k), np.log(few), np.log(S)))])

@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.terms import MEAN, PEAKS
+from gyrobench.reduction.noise_model.terms import MEANS, PEAKS
 
 NEARLY_WHOLE = 0.02  # of the width of an average: a mean over a whole number of samples is tried in its place
 STEPS = 40  # of the search for a maximum
@@ -83,7 +83,9 @@ def volume(model: Model, information: Array) -> float:
     count = int(filters.sum())
     if count:
         logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
-    whole = sum(t.filter.startswith(MEAN) for t in model)  # its number of samples was sought as that of any mean
+    whole = sum(
+        t.filter.startswith(tuple(MEANS)) for t in model
+    )  # its number of samples was sought as that of any mean
     return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * (count + whole)
 
 

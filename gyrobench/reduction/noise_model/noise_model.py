@@ -14,7 +14,7 @@ from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
 from gyrobench.reduction.noise_model.slow_changes import Settling, Swing
 from gyrobench.reduction.noise_model.steps import LevelStep
-from gyrobench.reduction.noise_model.terms import ALL, MEAN, PEAKS, SLOW, Grid, filter_of, passes_slow, samples_of
+from gyrobench.reduction.noise_model.terms import ALL, MEANS, PEAKS, SLOW, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -234,8 +234,8 @@ def _filter_words(name: str, p: Array, tau0: float) -> str:
         return f"{math.exp(p[1]):.2g} digital low-passes in a row of {_cutoff(p[0], tau0):.3g} Hz each"
     if name == "average":
         return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
-    if name.startswith(MEAN):
-        return f"mean over {samples_of(name)} samples"
+    if name.startswith(tuple(MEANS)):
+        return f"mean over {samples_of(name)} samples{', taken twice' if name.startswith('bartlett') else ''}"
     level = float(np.exp(-2.0 * np.sum(p[::2])))
     return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
 

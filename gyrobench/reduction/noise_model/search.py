@@ -14,7 +14,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize, nearly_whole
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import ALL, DIGITAL, MEAN, PEAKS, SLOW, NoiseTerm, samples_of
+from gyrobench.reduction.noise_model.terms import ALL, DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, samples_of
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence
@@ -22,6 +22,7 @@ MOST_VAIN = 6  # places where none is found
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
 BEHIND = ("first", "shape3")
 SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
+TWICE = tuple(f"bartlett{k}" for k in range(3, 17))  # of two samples: a cascade
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
@@ -159,7 +160,7 @@ class ModelSearch:
         (term, q), rest = parts[0], parts[1:]
         base = term.filter.removesuffix(ALL)
         every, (first, _, behind) = term.filter[len(base) :], base.partition("+")
-        count = samples_of(first) if first.startswith(MEAN) else round(math.exp(q[1])) if first == "average" else 1
+        count = samples_of(first) if first.startswith("mean") else round(math.exp(q[1])) if first == "average" else 1
 
         def with_filter(name: str, p: Array) -> tuple[Model, list[Array]]:
             model, start = joined([(NoiseTerm("white", name), p), *rest])
@@ -168,12 +169,12 @@ class ModelSearch:
         if self.may_pass_all(base):
             yield with_filter(base if every else base + ALL, q)
         if count > 1:  # of slow noise too, which fills its zeros otherwise
-            yield with_filter(f"{MEAN}{count}{ALL}", q[:1])
+            yield with_filter(f"mean{count}{ALL}", q[:1])
         if first == "average" and (whole := nearly_whole(q[1])):
-            yield with_filter("+".join([f"{MEAN}{whole}", *([behind] if behind else [])]) + every, np.delete(q, 1))
+            yield with_filter("+".join([f"mean{whole}", *([behind] if behind else [])]) + every, np.delete(q, 1))
         if behind:
             yield with_filter(first + every, q[: 1 + (first == "average")])
-        for after in BEHIND if (first == "average" or first.startswith(MEAN)) and not behind else ():
+        for after in BEHIND if (first == "average" or first.startswith(tuple(MEANS))) and not behind else ():
             name = f"{first}+{after}{every}"  # a mean of what has passed a filter already
             for guess in STARTS.get(after, [[0.0] * (NoiseTerm("white", name).size - q.size)]):
                 yield with_filter(name, np.concatenate([q, guess]))
@@ -210,27 +211,28 @@ class ModelSearch:
         before = dict(self.seen)
         if not self.holds_back:
             return
-        for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL) for s in starts]:
+        for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL + TWICE) for s in starts]:
             self.fit(model, start)
-        if any(t.filter in DIGITAL for t in self.best.model):
+        if any(t.filter in DIGITAL + TWICE for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
             near = self.best.evidence - NEARLY
             self.seen = {m: f for m, f in self.seen.items() if m in before or f.evidence > near}
 
     def grow_filters(self) -> None:
-        """Try slow terms beside a mean over whole samples, and beside a filter that slow noise passes too, where such a
-        model is nearly as likely as the best: other filters, of more parameters, hide the zeros of a mean, and each
-        slow term that passes none fills them, as it fills what a low-pass holds back; one that slow noise passes is
-        likely beside the right slow terms alone.
+        """Try slow terms beside a mean over whole samples or a digital low-pass that is nearly as likely as the best
+        model, and beside a filter that slow noise passes too: other filters, of more parameters, hide the zeros of a
+        mean, and each slow term that passes none fills them, as it fills what a low-pass holds back; one that slow
+        noise passes is likely beside the right slow terms alone.
         """
-        families: tuple[Callable[[str], bool], ...] = (
-            lambda name: name.startswith(MEAN), lambda name: name.endswith(ALL), lambda name: name in DIGITAL,
+        families: tuple[tuple[Callable[[str], bool], float], ...] = (
+            (lambda name: name.startswith(tuple(MEANS)), NEARLY), (lambda name: name in DIGITAL, NEARLY),
+            (lambda name: name.endswith(ALL), math.inf),
         )  # fmt: skip
-        for belongs in families:
+        for belongs, near in families:
             at: Fitted | None = None
             while likely := [f for f in self.seen.values() if any(belongs(t.filter) for t in f.model)
-                             and f.evidence > self.best.evidence - NEARLY]:  # fmt: skip
+                             and f.evidence > self.best.evidence - near]:  # fmt: skip
                 top = max(likely, key=lambda f: f.evidence)
                 if at is not None and top.model == at.model:
                     break

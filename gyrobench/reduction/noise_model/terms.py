@@ -16,7 +16,8 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
 
 Filters, "mean4+first" of two in a row:
 "none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them; "first*", "mean4*": of slow noise too, which passes what white noise from the same place passes;
+"mean4" over 4 of them, "bartlett4" twice; "first*", "mean4*": of slow noise too, which passes what white noise from the
+same place passes;
 digital low-passes, of slow noise too: "butterworth" of any order and a "cascade" of equal ones of first order (of means
 over two samples, too), with zeros at half the sampling rate (bilinear transform), "recursive" of two poles alone;
 "shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
@@ -44,13 +45,13 @@ PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")
 DIGITAL = ("butterworth", "cascade", "recursive")  # slow noise passes them too: they hold back what it has above them
 SIZES = {"gauss_markov": 2, "resonance": 3, "band": 3}  # parameters, one of other terms
-MEAN = "mean"  # over a whole number of samples, with zeros
+MEANS = {"mean": 1, "bartlett": 2}  # over a whole number of samples, with zeros: how often
 ALL = "*"  # at the end of the name of a filter that slow noise passes too
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
 NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
 FASTEST = 1e-300  # pole
-SIMPSON = ((1.0 / 6.0, -1.0), (2.0 / 3.0, 0.0), (1.0 / 6.0, 1.0))
+BIN = ((5.0 / 18.0, -math.sqrt(0.6)), (4.0 / 9.0, 0.0), (5.0 / 18.0, math.sqrt(0.6)))  # Gauss-Legendre: exact to x^5
 LEAST_PASSED = 1e12  # of the power, what a digital low-pass holds back at most
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
 
@@ -135,11 +136,11 @@ def _second(p: Array, grid: Grid) -> Array:
     return out
 
 
-def _fejer(k: Any, grid: Grid) -> Array:
-    """Return sin^2(k omega/2)/(k sin^2(omega/2)), of bins by Simpson's rule: about zeros a parabola."""
-    rows = SIMPSON if grid.half_width.any() else ((1.0, 0.0),)
+def _fejer(k: Any, grid: Grid, times: int = 1) -> Array:
+    """Return sin^2(k omega/2)/(k sin^2(omega/2)), or its square, of bins by Gauss's rule: about zeros a parabola."""
+    rows = BIN if grid.half_width.any() else ((1.0, 0.0),)
     halves = [(share, 0.5 * (grid.omega + at * grid.half_width)) for share, at in rows]
-    return np.asarray(sum(share * (np.sin(k * half) / np.sin(half)) ** 2 for share, half in halves) / k)
+    return np.asarray(sum(share * ((np.sin(k * half) / np.sin(half)) ** 2 / k) ** times for share, half in halves))
 
 
 def _average_parts(p: Array) -> tuple[Array, Array, Array]:
@@ -157,16 +158,24 @@ def _average(p: Array, grid: Grid) -> Array:
     return out
 
 
-def _mean(count: int) -> Callable[[Array, Grid], Array]:
+def _mean(count: int, times: int) -> Callable[[Array, Grid], Array]:
+    gamma = _covariance_of_mean(count, times)[1:, None]
+    h = np.arange(1.0, gamma.size + 1.0)[:, None]
+
     def mean(p: Array, grid: Grid) -> Array:
         """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
-        h = np.arange(1.0, count)[:, None]
         wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
-        leak = -2.0 * np.sum((1.0 - h / count) * wave, axis=0) / grid.samples
-        out = (_fejer(count, grid) + np.maximum(leak, 0.0)) / count
+        leak = -2.0 * np.sum(gamma * wave, axis=0) / grid.samples
+        out = _fejer(count, grid, times) / count**times + np.maximum(leak, 0.0)
         return np.broadcast_to(out, (*p.shape[:-1], grid.omega.size))
 
     return mean
+
+
+def _covariance_of_mean(count: int, times: int) -> Array:
+    """Return the covariance at lags from 0 on of white noise, N = 1, of which means over samples are taken."""
+    kernel = functools.reduce(np.convolve, [np.full(count, 1.0 / count)] * times)
+    return np.correlate(kernel, kernel, "full")[kernel.size - 1 :]
 
 
 def _butterworth(p: Array, grid: Grid) -> Array:
@@ -206,7 +215,7 @@ FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
 
 
 def samples_of(name: str) -> int:
-    """Return the samples that a filter MEAN is over."""
+    """Return the samples that a filter of MEANS is over."""
     return int(name.strip(string.ascii_lowercase + ALL))
 
 
@@ -225,8 +234,8 @@ def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
     if "+" in name:
         (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
         return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
-    if name.startswith(MEAN):
-        return _mean(samples_of(name)), 0
+    if name.startswith(tuple(MEANS)):
+        return _mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0
     return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
 
 
@@ -371,10 +380,9 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         z1, z2, share = _second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
         return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
-    if name.startswith(MEAN) and "+" not in name:
-        count = samples_of(name)
-        lag = np.arange(count + 1.0)
-        return _allan_covariance(np.broadcast_to((1.0 - lag / count) / count, (*p.shape[:-1], lag.size)), m)
+    if name.startswith(tuple(MEANS)) and "+" not in name:
+        gamma = np.append(_covariance_of_mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0.0)
+        return _allan_covariance(np.broadcast_to(gamma, (*p.shape[:-1], gamma.size)), m)
     if name == "average":
         k, lower, upper = _average_parts(p)
         lag = np.arange(min(float(np.max(k)) + 2.0, 2.0 * float(np.max(m)) + 1.0))  # a longer mean is not asked for
