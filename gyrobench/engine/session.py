@@ -7,13 +7,15 @@ A :class:`Session` is prepared once (unzip, load, bind, order) and runs many tim
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from gyrobench.engine import preflight
+from gyrobench.engine.beside import beside
 from gyrobench.engine.checkpoint import CheckpointManager, ResumeError
 from gyrobench.engine.execution import Ending, Job, execute
 from gyrobench.engine.fmi3_instance import new_instance
@@ -37,6 +39,7 @@ from gyrobench.system.wiring import Assembly, assemble
 
 TIMEOUT = 60.0  # s
 ENGINES = ("native", "linked", "reference")
+LinearFound: TypeAlias = tuple[LinearModels, list[str]]  # and their warnings
 
 
 class Session:
@@ -190,6 +193,15 @@ class Session:
 
         Raises InvalidConfigurationError and InvalidValueError; warnings are logged.
         """
+        system, starts, document, take = self._prepare(values, seed, step)
+        if system.loops:
+            take(self._linear(system, document.parameters))
+        return system, starts, document
+
+    def _prepare(
+        self, values: Mapping[str, Any] | None, seed: int, step: float | None
+    ) -> tuple[System, Starts, RunDocument, Callable[[LinearFound], None]]:
+        """Return the same without the linear models, and what takes them when they are found."""
         system = self.system.with_values(values or {})
         if step is not None:
             system.step = float(step)
@@ -208,13 +220,17 @@ class Session:
         gains = [(c.gain, c.offset) for c in self.assembly.connections]
         if gains != self.gains:  # factors of wires follow the parts
             self.program, self.gains = build_program(self.assembly), gains
-        linear = self._linear(system, parameters, notes) if system.loops else None
         document = self._document(system, seed, parameters, notes)
         if errors:
             document.setup_errors = errors
-        if linear is not None:
-            document.linear = linear
-        return system, starts, document
+
+        def take(found: LinearFound) -> None:
+            document.linear, warnings = found
+            at = len(self.notes) + len(notes)
+            document.notes[at:at] = warnings
+            self._warn(system, warnings)
+
+        return system, starts, document, take
 
     def run(
         self,
@@ -226,7 +242,7 @@ class Session:
         checkpoints: CheckpointManager | None = None,
     ) -> Record:
         """Run from t = 0, or from where ``checkpoints`` resumes, to the end; return the record.  See :func:`run`."""
-        system, starts, document = self.prepare(values, seed, step)
+        system, starts, document, take = self._prepare(values, seed, step)
         schedule = Schedule.of(system)
         if checkpoints is not None:
             job = {k: getattr(document, k) for k in ("system", "seed", "step", "coupling", "options", "parameters")}
@@ -238,7 +254,9 @@ class Session:
                 document.notes.append(f"{own} (one of PythonFMU: its registered variables alone)")
                 self._warn(system, document.notes[-1:])
         library, document.linked = self._library(system)
-        ending = self._execute(Job(self.program, starts, schedule, library, checkpoints, document.units), progress)
+        linear = beside(lambda: self._linear(system, document.parameters), take, progress)
+        with linear if system.loops else contextlib.nullcontext(progress) as reported:
+            ending = self._execute(Job(self.program, starts, schedule, library, checkpoints, document.units), reported)
         self._warn(system, ending.remarks)
         document.notes += ending.remarks
         problem = ending.problem
@@ -251,31 +269,13 @@ class Session:
                 raise RunError(str(problem))
         return self._finish(ending.state or RunState(), system, document, out, problem, checkpoints)
 
-    def _linear(self, system: System, parameters: dict[str, Any], notes: list[str]) -> LinearModels:
-        """Return the linear models for run.json; their warnings are logged immediately, and noted."""
-        from gyrobench.linear.crossovers import missed_crossovers
-        from gyrobench.linear.linear_model import LinearizationError, loops
-        from gyrobench.packaging import load_part
+    def _linear(self, system: System, parameters: Mapping[str, Any]) -> LinearFound:
+        """Return the linear models for run.json, and their warnings."""
+        from gyrobench.linear.crossovers import judged_loops
+        from gyrobench.linear.linear_model import known_parts
 
-        def part_of(slot: str) -> Any:
-            if slot not in self.names:
-                raise LinearizationError(
-                    f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known"
-                )
-            return load_part(self.names[slot], self.bench)
-
-        models, warnings = loops(self.assembly, parameters, part_of, system.step)
-        models.wanted = system.crossovers()
-        if models.missing:
-            asked = ", ".join(f"{loop} {f:.4g} Hz" for loop, f in models.wanted.items())
-            unknown = f"; whether the loop crosses where it was asked to ({asked}) is not known before the run"
-            warnings = [w + (unknown if asked else "") for w in warnings]
-        else:
-            causes = [*(f"part {self.swaps[s]} in {s}" for s in self.swapped), *system.given]
-            models.warnings = warnings = [*warnings, *missed_crossovers(models, models.wanted, causes)]
-        self._warn(system, warnings)
-        notes += warnings
-        return models
+        causes = [*(f"part {self.swaps[s]} in {s}" for s in self.swapped), *system.given]
+        return judged_loops(self.assembly, system, parameters, known_parts(self.names, self.bench), causes)
 
     def _warn(self, system: System, texts: Iterable[str]) -> None:
         """Log each warning immediately, and once; the report repeats it."""

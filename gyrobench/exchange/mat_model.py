@@ -26,8 +26,7 @@ from gyrobench.arrays import Array
 from gyrobench.component import Component, ComponentError
 from gyrobench.exchange.ssp_export import ExportError, prepare
 from gyrobench.files import write_whole
-from gyrobench.linear.linear_model import loops, operating_point
-from gyrobench.packaging import load_part
+from gyrobench.linear.linear_model import known_parts, loops, operating_point
 from gyrobench.record.run_document import LinearModel, LinearPair
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.system import System
@@ -47,13 +46,8 @@ def export_mat(
     """Write the linear models of a system; return notes.  Raises ExportError where there are none."""
     assembly, starts, notes = prepare(system, parts, maps, None, seed, bench)
     names = {slot: str((parts or {}).get(slot, declared.part)) for slot, declared in system.slots.items()}
-    if foreign := [slot for slot, name in names.items() if name.endswith(".fmu")]:
-        raise ExportError(f"mat: the FMU in slot {foreign[0]} is not one of this bench: its Jacobians are not known")
     parameters = {f"{slot}.{bound.variable}": x for slot, given in starts.items() for bound, x in given}
-
-    def part_of(slot: str) -> type[Component]:
-        return load_part(names[slot], bench)
-
+    part_of = known_parts({slot: name for slot, name in names.items() if not name.endswith(".fmu")}, bench)
     models, warnings = loops(assembly, parameters, part_of, system.step)
     if models.missing:
         raise ExportError(f"mat: {system.name} has no linear model: {models.missing}")

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from gyrobench.component import Component
+from gyrobench.linear.linear_model import loops
 from gyrobench.record.frequency_response import TOLERANCE, model_response
 from gyrobench.record.run_document import LinearModel, LinearModels
+from gyrobench.system.system import System
+from gyrobench.system.wiring import Assembly
 
 POINTS = 2000  # of a response in which crossovers are searched
 SPAN = 100.0  # they are searched up to this factor from the requested crossover
@@ -29,10 +34,28 @@ def crossovers(model: LinearModel, wanted: float) -> list[tuple[float, float]]:
     return crossed
 
 
-def missed_crossovers(models: LinearModels, wanted: Mapping[str, float], causes: Sequence[str]) -> list[str]:
+def judged_loops(
+    assembly: Assembly, system: System, parameters: Mapping[str, Any],
+    part_of: Callable[[str], type[Component]], causes: Sequence[str],
+) -> tuple[LinearModels, list[str]]:  # fmt: skip
+    """Return the linear models that run.json keeps, and the warnings to give: of growing loops, of missed crossovers.
+
+    causes: what was set or swapped, for the user to check.
+    """
+    models, warnings = loops(assembly, parameters, part_of, system.step)
+    models.wanted = system.crossovers()
+    if models.missing:
+        asked = ", ".join(f"{loop} {f:.4g} Hz" for loop, f in models.wanted.items())
+        unknown = f"; whether the loop crosses where it was asked to ({asked}) is not known before the run"
+        return models, [w + (unknown if asked else "") for w in warnings]
+    models.warnings = [*warnings, *_missed_crossovers(models, models.wanted, causes)]
+    return models, models.warnings
+
+
+def _missed_crossovers(models: LinearModels, wanted: Mapping[str, float], causes: Sequence[str]) -> list[str]:
     """Return a sentence for each loop whose crossover will not be the requested one.
 
-    wanted: loop -> Hz.  causes: what was set or swapped, for the user to check.
+    wanted: loop -> Hz.
     """
     because = f"; set or swapped: {', '.join(causes)}" if causes else ""
     sentences = []

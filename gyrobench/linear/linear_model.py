@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from gyrobench.errors import GyrobenchError
 from gyrobench.linear.block import LinearBlock, block_of, multirate_of, step_of, undelayed_of
 from gyrobench.linear.multirate import MultirateStep
 from gyrobench.linear.sampled_model import SampledStep
+from gyrobench.packaging import load_part
 from gyrobench.record.frequency_response import unstable
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, OpenLoop
 from gyrobench.system.sockets import socket
@@ -46,6 +48,17 @@ PASSES = 3  # along the wires, to find the operating point
 
 class LinearizationError(GyrobenchError):
     """The system has no linear model; the text says why."""
+
+
+def known_parts(names: Mapping[str, str], bench: Path | None) -> Callable[[str], type[Component]]:
+    """Return what finds the class of the part in a slot; it raises LinearizationError where no name is known for it."""
+
+    def part_of(slot: str) -> type[Component]:
+        if slot not in names:
+            raise LinearizationError(f"the FMU in slot {slot} is not one of this bench: its Jacobians are not known")
+        return load_part(names[slot], bench)
+
+    return part_of
 
 
 def operating_point(

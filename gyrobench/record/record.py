@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 WHOLE = ("phase", "n", "flagged")  # integer columns
 SUFFIXES = (".parquet", ".csv")
 LONG = 1 << 18  # rows: a longer column that is read on request stays on the disk
+TURNED = 512  # rows that are made columns at a time
 
 
 def _have_parquet() -> bool:
@@ -278,15 +279,15 @@ def _check_tables(folder: Path, run: RunDocument) -> None:
 def rows_to_columns(rows: list[AnyArray], names: list[str], time: bool) -> dict[str, AnyArray]:
     """Return blocks of rows [t, columns...] as named columns; with ``time`` the first one is kept as "time".
 
-    A block is turned while it is in the processor's cache: a column of the whole would fetch the whole.
+    A few rows are turned while they are in the processor's cache: a column of a block would fetch the block.
     """
     blocks = [r if r.ndim == 2 else r[None, :] for r in rows]
     if len(blocks) > 1 and max(len(b) for b in blocks) == 1:  # of the reference engine
         blocks = [np.concatenate(blocks)]
     table, at = np.empty((1 + len(names), sum(len(b) for b in blocks))), 0
-    for block in blocks:
-        table[:, at : at + len(block)] = block.T
-        at += len(block)
+    for few in (b[k : k + TURNED] for b in blocks for k in range(0, len(b), TURNED)):
+        table[:, at : at + len(few)] = few.T
+        at += len(few)
     columns: dict[str, AnyArray] = {"time": table[0]} if time else {}
     for name, column in zip(names, table[1:], strict=True):
         columns[name] = column.astype(np.int64) if name in WHOLE and not time else column

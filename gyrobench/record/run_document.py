@@ -170,7 +170,7 @@ class LinearModels(Entry):
     loops: dict[str, OpenLoop] = Field(default_factory=dict)
     wanted: dict[str, float] = Field(default_factory=dict, description="loop -> requested gain crossover, Hz")
     warnings: list[str] = Field(
-        default_factory=list, description="warnings from the linear models, given before the run"
+        default_factory=list, description="warnings of the linear models, given as the run begins"
     )
 
 

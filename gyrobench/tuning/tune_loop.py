@@ -13,12 +13,11 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.bench import Bench, UsageError, suggest_names
-from gyrobench.component import Component, ComponentError
+from gyrobench.component import ComponentError
 from gyrobench.engine.run_errors import RunError
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.linear_model import LinearizationError
-from gyrobench.packaging import load_part
+from gyrobench.linear.linear_model import LinearizationError, known_parts
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
 from gyrobench.system.values import flatten
@@ -164,17 +163,12 @@ class _Loop:
         self, session: Session, system: System, nominal: Mapping[str, Any], ranges: Sequence[Range], ports: LoopPorts,
         stated: Stated | None = None,
     ) -> None:  # fmt: skip
-        self.assembly, self.names, self.bench = session.assembly, dict(session.names), session.bench
+        self.assembly, self.part_of = session.assembly, known_parts(dict(session.names), session.bench)
         self.system, self.nominal, self.ranges = system, nominal, ranges
         self.step, self.ports, self.stated = system.step, ports, stated
         #: what is free of friction in the loop that is tuned, and whether that which sticks is judged beside it
         self.free = dict(stated(nominal).free) if stated else without_friction(nominal)
         self.sticks = bool(self.free) and not stated
-
-    def part_of(self, slot: str) -> type[Component]:
-        if slot not in self.names:
-            raise LinearizationError(f"the FMU in slot {slot} is not one of this bench")
-        return load_part(self.names[slot], self.bench)
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""

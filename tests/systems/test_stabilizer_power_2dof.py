@@ -279,5 +279,5 @@ def test_foreign_part_leaves_the_system_without_a_linear_model(tmp_path: Path) -
     with Session(NAME, {"gyro": build("gyro_2dof", out=tmp_path)}) as s:
         s.names.pop("gyro", None)
         system = s.system.with_values(STILL)
-        linear = s._linear(system, {}, [])
+        linear, _ = s._linear(system, {})
     assert "the FMU in slot gyro is not one of this bench" in linear.missing

@@ -113,26 +113,10 @@ def test_with_the_resolver_every_azimuth_is_stable() -> None:
 
 def linear_model(s: Session, system: Any) -> LinearModels:
     """As Session.run takes it for run.json."""
-    seen: list[LinearModels] = []
-
-    class Stop(Exception):
-        pass
-
-    original = s._linear
-
-    def keep(*given: Any) -> LinearModels:
-        seen.append(original(*given))
-        raise Stop
-
-    s._linear = keep  # type: ignore[method-assign]
-    try:
-        values = {**system.values, **system.overrides}
-        s.run({k: v for k, v in values.items() if k in system.given})
-    except Stop:
-        pass
-    finally:
-        s._linear = original  # type: ignore[method-assign]
-    return seen[0]
+    values = {**system.values, **system.overrides}
+    linear = s.prepare({k: v for k, v in values.items() if k in system.given})[2].linear
+    assert linear is not None
+    return linear
 
 
 @pytest.mark.parametrize("azimuth", [70.0, 180.0, 300.0])
