@@ -17,6 +17,7 @@ from gyrobench.arrays import Array
 # ordinates to either side of a smoothed one: of the frequency and a power of it, which make its bias at the zero of a
 # filter fall with the length of the record as its scatter does
 SMOOTH, POWER = 0.0945, 0.75
+FEW = 400  # samples whose products are those of a matrix
 ITERATIONS, EXACT = 60, 1e-3  # of the conjugate gradients
 FIRST, LEAST = 8, 0.1  # ordinates whose spectrum is not less than a part of that after them
 NARROW, ABOVE = 5, 4.0  # ordinates of a narrow mean, and how much it exceeds the smooth spectrum where it is taken
@@ -87,6 +88,31 @@ class Precision:
     def diagonal(self) -> float:
         return float(np.mean(1.0 / self.S))
 
+    @functools.cached_property
+    def _correlation(self) -> Array:
+        """Return the series (2n,) of the inverse of the spectrum."""
+        out: Array = np.fft.irfft(np.append(1.0 / self.S, 1.0 / self.S[-1]))
+        return out
+
+    def _among(self, at: NDArray[np.int64]) -> Callable[[Array], Array]:
+        """Return what gives P_mm d (m,) of d (m,), for samples m at ``at``.
+
+        The cosines of two samples i, j multiply to those of i - j and i + j + 1: of FEW samples the elements are read
+        off the series of 1/S, which has no ordinate n.
+        """
+        if at.size > FEW:
+            full = np.zeros(self.S.size)
+
+            def through(d: Array) -> Array:
+                full[at] = d
+                return self(full)[at]
+
+            return through
+        places = np.abs(np.subtract.outer(at, at)), np.add.outer(at, at) + 1
+        last = 0.5 / self.S[-1] / self.S.size
+        elements = sum(self._correlation[k] - last * (1.0 - 2.0 * (k % 2)) for k in places)
+        return lambda d: elements @ d
+
     def solver(self, at: NDArray[np.int64]) -> Callable[[Array], Array]:
         """Return what gives P_mm^-1 r (m,) of r (m,), for samples m at ``at``: conjugate gradients that start from the
         blocks of P of each gap alone.
@@ -97,9 +123,9 @@ class Precision:
         lengths = np.diff(begin, append=at.size)
         gaps = [(n, begin[lengths == n, None] + np.arange(n)) for n in np.unique(lengths).tolist()]
         # far from the ends P is a Toeplitz matrix, and the factor of a gap is the first part of that of a longer one
-        p = np.fft.irfft(np.append(1.0 / self.S, 1.0 / self.S[-1]))
+        p = self._correlation
         factor = linalg.cholesky(linalg.toeplitz(p[: gaps[-1][0]]), lower=True)
-        full = np.zeros(self.S.size)
+        apply = self._among(at)
 
         def alone(r: Array) -> Array:
             z = np.empty_like(r)
@@ -115,8 +141,7 @@ class Precision:
             for _ in range(ITERATIONS):
                 if rz <= stop:
                     break
-                full[at] = d
-                q = self(full)[at]
+                q = apply(d)
                 step = rz / float(d @ q)
                 x += step * d
                 r -= step * q
