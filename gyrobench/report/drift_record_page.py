@@ -6,6 +6,7 @@ from typing import Any
 
 from gyrobench.report import channels_section, result_page
 from gyrobench.report import drift_record_figures as figures
+from gyrobench.report.language import in_use
 from gyrobench.report.page_model import (
     BulletList,
     CollapsedBlocks,
@@ -23,6 +24,7 @@ from gyrobench.report.result_json import Report
 from gyrobench.report.style import styled
 from gyrobench.report.tables import method_table
 from gyrobench.result import DriftRecordResult
+from gyrobench.side_by_side import each
 
 SMOOTHED = (
     " Red: Gauss–Markov drift of the longest stretch, lines and columns taken out, smoothed from all samples, with its "
@@ -36,8 +38,9 @@ def page(report: Report[DriftRecordResult]) -> Page:
     with styled():
         first, *rest = result_page.opening(report, "Noise coefficients")
         sections = [first, *channels_section.sections(report), *rest]
-        for k in range(len(report.result.columns)):
-            sections += _sections(report, k)
+        # side by side, but in a language, which notes here what it lacks
+        of_columns = each(lambda k: _sections(report, k), len(report.result.columns), in_use() is None)
+        sections += [section for of_one in of_columns for section in of_one]
         sections += result_page.closing(report)
     return Page(report.result.title, report.report_id, result_page.head(report), sections).finish()
 

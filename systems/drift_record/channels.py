@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import current_process, get_all_start_methods, get_context
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,11 +16,11 @@ from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Coefficient, DriftColumn, Reason
+from gyrobench.side_by_side import each
 
 T = TypeVar("T")
 LONG = 100_000  # samples from which on a process of its own is worth its start
 AXIS = re.compile(r"(?:(.*?)[ _.]?([xyz])|([xyz])[ _.]?(.*))", re.I)
-_task: Callable[[int], Any]
 
 
 @dataclass(frozen=True)
@@ -59,33 +56,19 @@ class RecordChannel:
         return (stem, last.lower()) if last else (rest, first.lower())
 
 
-def each(task: Callable[[int], T], count: int, samples: int) -> list[T]:
-    """Return task(0) ... task(count - 1), of long records side by side in forked processes, one a core.
+def analysed(task: Callable[[int], T], count: int, samples: int) -> list[T]:
+    """Return task(0) ... task(count - 1), of long records side by side.  Raises ReductionError with all problems."""
 
-    One after the other where the system cannot fork, and in a process that must not have children.
-    """
-    forks = "fork" in get_all_start_methods() and hasattr(os, "sched_getaffinity")
-    cores = len(os.sched_getaffinity(0)) if forks else 1
-    if count < 2 or cores < 2 or samples < LONG or current_process().daemon:
-        return [task(k) for k in range(count)]
-    # the task and the record come along with the fork; what comes back is small
-    with ProcessPoolExecutor(min(cores, count), get_context("fork"), _take, (task,)) as pool:
-        found = list(pool.map(_done, range(count)))
+    def done(k: int) -> tuple[list[T], list[str]]:
+        try:
+            return [task(k)], []
+        except ReductionError as error:
+            return [], error.problems
+
+    found = each(done, count, samples >= LONG)
     if problems := [p for _, wrong in found for p in wrong]:
         raise ReductionError(problems)
-    return [result for result, _ in found]
-
-
-def _take(task: Callable[[int], Any]) -> None:
-    global _task
-    _task = task
-
-
-def _done(k: int) -> tuple[Any, list[str]]:
-    try:
-        return _task(k), []
-    except ReductionError as error:
-        return None, error.problems
+    return [result for results, _ in found for result in results]
 
 
 def triads(channels: Sequence[RecordChannel], words: str) -> list[list[RecordChannel]]:

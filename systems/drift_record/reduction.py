@@ -44,7 +44,7 @@ from gyrobench.result_entries import (
 )
 
 from . import description, model_tables, noise_tables, together
-from .channels import RecordChannel, each
+from .channels import RecordChannel, analysed
 from .preparation import Columns, Prepared, columns_of, prepare, truth_of
 
 __all__ = ["ReductionError", "from_record"]
@@ -77,7 +77,7 @@ def from_record(record: Record) -> DriftRecordResult:
     columns = columns_of(record)
     names, truth = list(columns.rates), truth_of(record)
     several = len(names) > 1
-    channels = each(lambda k: channel(names[k], columns, run, truth, several), len(names), columns.time.size)
+    channels = analysed(lambda k: channel(names[k], columns, run, truth, several), len(names), columns.time.size)
     reasons, summary = channels[0].reasons, channels[0].summary
     shared = list[Table]()
     if several:
