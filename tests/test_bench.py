@@ -166,7 +166,16 @@ def test_init_refuses(tmp_path: Path) -> None:
 #: record -> reduction -> report.
 #: A room may know what comes before it, never what comes after; bench, units and the like belong to no room.
 COMMON = {"errors", "files", "bench", "units", "arrays", "frames", "attitudes", "drift", "notebook", "reading"}
-COMMON |= {"result", "result_content", "result_entries", "result_suite", "callable_room", "boundary", "user_code"}
+COMMON |= {
+    "result",
+    "result_content",
+    "result_entries",
+    "result_suite",
+    "callable_room",
+    "boundary",
+    "user_code",
+    "side_by_side",
+}
 ROOMS: dict[str, set[str]] = {
     **{name: COMMON for name in COMMON},
     "component": {"errors"},  # a Python FMU carries a copy of both

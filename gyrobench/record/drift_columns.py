@@ -22,6 +22,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.circumstances import Statement
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head, for_arrow, header_places, read_head, regular
+from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.record import Record
 from gyrobench.record.time_series import read_blocks
 
@@ -107,6 +108,8 @@ def _of_parquet(source: Path) -> DriftTable:
     except (pa.ArrowInvalid, OSError) as error:
         raise DataError(source, [f"not a readable Parquet file: {error}"]) from None
     schema = file.schema_arrow
+    if is_log(source) and any(pa.types.is_temporal(field.type) for field in schema):  # dates become seconds
+        return open_table(as_text(source))
     names, problems = [], []
     for field in schema:
         unit = (field.metadata or {}).get(b"unit", b"").decode()
@@ -119,7 +122,7 @@ def _of_parquet(source: Path) -> DriftTable:
         places, wrong = header_places(names, {c.name: c for c in columns})
         for name, (k, _) in places.items():
             kind = schema.field(k).type
-            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
                 wrong.append(f"column '{name}': holds {kind}, numbers are expected")
         if wrong:
             raise DataError(source, wrong)

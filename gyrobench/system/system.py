@@ -113,7 +113,7 @@ class MeasuredData:
 
     template: an empty record with its explanations, printed by ``gyrobench reduce SYSTEM --template``.
     read: (system, file, values) -> record; see gyrobench.system.lab_record for one that fits most tests.
-    progress: the reader takes a fourth argument, which gets its progress: a file may have any length.
+    progress: the reader takes files of any length, Parquet as it is, and a fourth argument, which gets its progress.
     samples: header of a file of samples that the reader takes too, where attitudes are unknown.
     """
 

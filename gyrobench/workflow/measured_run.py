@@ -53,7 +53,8 @@ def reduce_measured(
         record = _read_mapped(measured, system, data, values, columns, feedback)
     else:
         try:
-            record = _read(measured, system, as_text(data) if is_log(data) else data, values, feedback)
+            as_it_is = not is_log(data) or (measured.progress and data.suffix.lower() == ".parquet")
+            record = _read(measured, system, data if as_it_is else as_text(data), values, feedback)
         except DataError as error:
             raise DataError(data, error.problems).advised(*_fitting(system, data)) from None
     with (data / RUN if data.is_dir() else data).open("rb") as content:

@@ -274,6 +274,20 @@ def test_columns_of_the_bench_need_no_map(gyrobench: Command, tmp_path: Path) ->
     parquet.write_table(pa.table(made), tmp_path / "log.parquet")
     code, out, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--json")
     assert code == 0 and json.loads(out)["provenance"]["data"]["file"] == "log.parquet", err
+    fields = [pa.field("time", pa.float64(), metadata={"unit": "ms"}), pa.field("rate [deg/s]", pa.float64())]
+    stated = pa.schema(fields, metadata={"instrument": "gyro 17"})
+    content = [1e3 * made["time [s]"], made["rate [deg/s]"]]
+    parquet.write_table(pa.table(content, schema=stated), tmp_path / "stated.parquet")
+    code, again, err = gyrobench("reduce", "drift_record", "--data", "stated.parquet", "--json")
+    assert code == 0, err  # units and statements in the metadata, which a table of text has not
+    first, second = (json.loads(t) for t in (out, again))
+    assert second["provenance"]["instrument"] == "gyro 17"
+    n = first["coefficients"][0]["estimate"]
+    assert second["coefficients"][0]["estimate"] == pytest.approx(n, rel=1e-6)
+    days = np.datetime64("2026-03-01T08:00:00") + np.arange(2000) * np.timedelta64(10, "ms")
+    parquet.write_table(pa.table({"time": days, "rate [deg/s]": made["rate [deg/s]"]}), tmp_path / "days.parquet")
+    code, again, err = gyrobench("reduce", "drift_record", "--data", "days.parquet", "--json")
+    assert code == 0 and json.loads(again)["coefficients"][0]["estimate"] == pytest.approx(n, rel=1e-6), err
     code, _, err = gyrobench("reduce", "drift_record", "--data", "log.parquet", "--columns", "none.toml")
     assert code == 2 and "none.toml" in err
     parquet.write_table(
