@@ -10,7 +10,7 @@ from scipy.signal import butter, fftconvolve, lfilter
 
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
-from gyrobench.reduction.noise_model.precision import ordinates
+from gyrobench.reduction.noise_model.precision import Precision, ordinates
 from gyrobench.reduction.noise_model.sines import sines_of, standing
 from gyrobench.reduction.series.lines import SpectralLine
 
@@ -149,3 +149,16 @@ def test_missing_samples_under_a_steep_spectrum(share: float, stated: bool) -> N
     assert model.agrees == model.treatment.settled == stated
     if stated:
         assert model["N"].low <= 0.1 <= model["N"].high and model["N"].determined
+
+
+@pytest.mark.parametrize("n", [64, 65, 1001])
+def test_products_among_few_samples_are_those_of_the_transform(n: int) -> None:
+    """P_mm d by the elements, and as (P x)_m of the series x that is d at the samples m and 0 elsewhere."""
+    rng = np.random.default_rng(n)
+    S = np.exp(2.0 * rng.normal(size=n))
+    P = Precision(S)
+    at = np.unique([0, 1, n - 1, *rng.integers(0, n, 12).tolist()])
+    d, x = rng.normal(size=at.size), np.zeros(n)
+    x[at] = d
+    whole = P(x)[at]
+    np.testing.assert_allclose(P._among(at)(d), whole, rtol=0.0, atol=1e-13 * np.abs(whole).max())

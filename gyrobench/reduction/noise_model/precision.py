@@ -98,7 +98,7 @@ class Precision:
         """Return what gives P_mm d (m,) of d (m,), for samples m at ``at``.
 
         The cosines of two samples i, j multiply to those of i - j and i + j + 1: of FEW samples the elements are read
-        off the series of 1/S, which has no ordinate n.
+        off the series of 1/S.  Its ordinate n is in both with opposite signs.
         """
         if at.size > FEW:
             full = np.zeros(self.S.size)
@@ -108,9 +108,8 @@ class Precision:
                 return self(full)[at]
 
             return through
-        places = np.abs(np.subtract.outer(at, at)), np.add.outer(at, at) + 1
-        last = 0.5 / self.S[-1] / self.S.size
-        elements = sum(self._correlation[k] - last * (1.0 - 2.0 * (k % 2)) for k in places)
+        p = self._correlation
+        elements = p[np.abs(np.subtract.outer(at, at))] + p[np.add.outer(at, at) + 1]
         return lambda d: elements @ d
 
     def solver(self, at: NDArray[np.int64]) -> Callable[[Array], Array]:
