@@ -127,8 +127,11 @@ def _of_parquet(source: Path) -> DriftTable:
         if wrong:
             raise DataError(source, wrong)
         asked = [schema.field(k).name for k, _ in places.values()]
-        for batch in file.iter_batches(ROWS, columns=asked):
-            yield {n: f.to_si(_numbers(batch.column(schema.field(k).name))) for n, (k, f) in places.items()}
+        try:
+            for batch in file.iter_batches(ROWS, columns=asked):
+                yield {n: f.to_si(_numbers(batch.column(schema.field(k).name))) for n, (k, f) in places.items()}
+        except (pa.ArrowInvalid, OSError) as error:
+            raise DataError(source, [f"not a readable Parquet file: {error}"]) from None
 
     if not file.metadata.num_rows:
         problems.append("no rows below the header")

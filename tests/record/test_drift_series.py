@@ -196,10 +196,14 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "latin.csv").write_bytes("time [s],rate [deg/h]\n0,1\n0.1,2 °\n".encode("latin-1"))
     (tmp_path / "torn.csv").write_bytes(b"time [s],rate [deg/h]\n0,1\n0.1,2\xc3")
     pq.write_table(pa.table({"time [s]": ["a", "b"], "rate [deg/h]": [1.0, 2.0]}), tmp_path / "words.parquet")
+    pq.write_table(pa.table({"time [s]": TIME, "rate [deg/h]": RATE}), tmp_path / "page.parquet")
+    whole = (tmp_path / "page.parquet").read_bytes()
+    (tmp_path / "page.parquet").write_bytes(whole[:40] + b"\xff" * 40 + whole[80:])
     for name, words in {
         "empty.csv": "the file is empty", "latin.csv": "not UTF-8 text", "torn.csv": "not UTF-8 text",
         "bare.csv": "row 2: numbers, where names and units of the columns are expected",
         "nothing.csv": "no such file", "text.parquet": "not a readable Parquet file",
+        "page.parquet": "not a readable Parquet file",
         "head.csv": "no rows below the header",
         "words.parquet": "column 'time': holds string, numbers are expected",
     }.items():  # fmt: skip
