@@ -24,6 +24,7 @@ from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.nuisances import BOTH
+from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -138,14 +139,16 @@ class ImuChannel(DriftReduction[ImuSetup]):
         own = (omega if c.gyro else force)[self.rows, c.axis]
         return found.error(own, -self.design(omega[self.rows], force[self.rows], 0.0))
 
+    def errors(self, found: Findings) -> list[tuple[Source, Array]]:
+        """Return each source with what one unit of it does to the data (n,) or (parts, n)."""
+        return [
+            (source, np.array([self.error(found, *part) for part in zip(omega, force, strict=True)])
+             if omega.ndim == 3 else self.error(found, omega, force))
+            for source, (omega, force) in self.kinematics.changes
+        ]  # fmt: skip
+
     def effects(self, found: Findings) -> list[Effect]:
-        out = []
-        for source, (omega, force) in self.kinematics.changes:
-            if omega.ndim == 2:
-                error = self.error(found, omega, force)
-            else:
-                error = np.array([self.error(found, *part) for part in zip(omega, force, strict=True)])
-            out.append(source.effect(self.setup, error))
+        out = [source.effect(self.setup, error) for source, error in self.errors(found)]
         lost = [k for k in range(3) if k not in self.seen]
         if lost:
             names = [f"Sg_{self.channel.letter}{'xyz'[k]}" for k in lost]
@@ -331,9 +334,8 @@ class Reduction(ChannelTests[ImuSetup]):
     def result(self) -> DriftTestResult:
         found = super().result()
         off = table_errors.reasons(
-            self.each, self.windows, self.kinematics,
-            lambda setup, name: ImuChannel(self.windows, setup, name, self.kinematics),
-        )  # fmt: skip
+            self.each, self.setup, lambda setup, name: ImuChannel(self.windows, setup, name, self.kinematics)
+        )
         by_position = tables.by_position(self.windows, self.kinematics.motion, found)
         return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off])
 

@@ -20,6 +20,7 @@ from gyrobench.arrays import Array
 from .mistakes import signed_permutations
 
 STEP = 1e-6  # of S, for slopes
+LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(2, 0, 1)  # (i, j, k): i of e_j x e_k
 GUESSES = 90  # of a scale factor that is not known
 TURNED = (0.15, 15.0)  # rad, between which the mean turn lies where it is not known
 GOOD = 0.15  # rad: a turn by hand is found to some degrees with nominal scale factors
@@ -74,14 +75,15 @@ def across(direction: Array) -> Array:
 
 def _product(vectors: Array) -> Array:
     """Return products (b, 3, 3) of turns by rotation vectors (b, m, 3), in the order of m: of pairs, then of those."""
-    count = len(vectors)
-    q = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_quat().reshape(count, -1, 4)
-    while q.shape[1] > 1:
-        if q.shape[1] % 2:
-            q = np.concatenate([q, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1, 1))], axis=1)
-        pairs = [Rotation.from_quat(q[:, k::2].reshape(-1, 4)) for k in (0, 1)]
-        q = (pairs[0] * pairs[1]).as_quat().reshape(count, -1, 4)
-    return np.asarray(Rotation.from_quat(q[:, 0]).as_matrix())
+    angle = np.linalg.norm(vectors, axis=2)[..., None, None]
+    cross = np.einsum("ijk,bmj->bmik", LEVI_CIVITA, vectors)
+    square = vectors[..., None] * vectors[..., None, :]
+    half = np.sinc(angle / (2.0 * np.pi))
+    Q = np.cos(angle) * np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half * half * square
+    while Q.shape[1] > 1:
+        odd = Q[:, -1:] if Q.shape[1] % 2 else Q[:, :0]
+        Q = np.concatenate([Q[:, 0 : Q.shape[1] - odd.shape[1] : 2] @ Q[:, 1::2], odd], axis=1)
+    return np.asarray(Q[:, 0])
 
 
 def _left(turns: list[Turn], matrices: Array) -> Array:

@@ -15,13 +15,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 import test_coning
 import test_gyro_bandwidth
-import test_imu_by_hand
 import test_imu_positions
+import test_imu_up_down
 import test_rate_table
 import test_sculling
 import test_turn_on_repeatability
 import test_vibration_rectification
 from imu_world import EDGES, FACES, Unit, World, handled, plan, poses
+from scipy.spatial.transform import Rotation
 
 from gyrobench.frames import G0
 
@@ -275,9 +276,9 @@ A = tuple(f"mean_a{a} [m/s2]" for a in "xyz")
 WORLD = World()
 
 
-def positions() -> Columns:
+def positions(world: World = WORLD) -> Columns:
     rng = np.random.default_rng(10)
-    w = WORLD.windows(plan((*EDGES[4:], *EDGES[:4], *FACES)), Unit.drawn(rng), test_imu_positions.white(rng))
+    w = world.windows(plan((*EDGES[4:], *EDGES[:4], *FACES)), Unit.drawn(rng), test_imu_positions.white(rng))
     return {n + u: np.asarray(w[n], dtype=float) for n, u in UNITS.items()}
 
 
@@ -308,6 +309,13 @@ POSITIONS = Sheet(
                 windows_of(test_imu_positions.stayed)),
         Mistake("row late", "positions 1 and 2 exchanged", "positions 1 and 2 exchanged",
                 windows_of(test_imu_positions.exchanged)),
+        Mistake("set-up", "the table 60″ out of the right angle", "out of the right angle, [56]",
+                lambda c: c.update(positions(World(square=60.0 * math.pi / 648000.0)))),
+        Mistake("set-up", "gravity stated 0.1 % too large", "gravity, or the acc", times(0.999, *A)),
+        Mistake("set-up", "times 0.1 % too long", "the times wrong|their times, wrong",
+                times(1.001, "t_start [s]", "t_end [s]")),
+        Mistake("set-up", "the case turned by 1° on its plate", "the case turned",
+                lambda c: c.update(positions(World(case=Rotation.from_rotvec([0.0, 0.0, math.pi / 180.0]))))),
     ),
 )  # fmt: skip
 
@@ -337,6 +345,9 @@ BY_HAND = Sheet(
         Mistake("axis exchanged", "gyros x and y exchanged", "x reads y", exchange((LOG[1], LOG[2]))),
         Mistake("left-handed", "gyro z reversed", "left-handed", times(-1.0, LOG[3])),
         Mistake("sign", "accelerometer z reversed", "sign of the accelerometer z|signs of", times(-1.0, LOG[6])),
+        Mistake("sign", "all accelerometers reversed", "accelerometers reversed", times(-1.0, *LOG[4:])),
+        Mistake("set-up", "gravity stated 0.1 % too large", "gravity, or the acc", times(0.999, *LOG[4:])),
+        Mistake("set-up", "times 1 % too long", "their times, wrong", times(1.01, LOG[0])),
         Mistake("unit", "g under m/s²", "at rest they read", times(1.0 / G0, *LOG[4:])),
         Mistake("unit", "°/s under rad/s", "°/s were taken for rad/s", times(180.0 / math.pi, *LOG[1:4])),
         Mistake("unit", "rad/s under °/s", "rad/s were taken for °/s", times(math.pi / 180.0, *LOG[1:4])),
@@ -347,7 +358,7 @@ BY_HAND = Sheet(
 
 def upright() -> Columns:
     rng = np.random.default_rng(11)
-    return logged(*test_imu_by_hand.up_down(rng, Unit.drawn(rng)))
+    return logged(*test_imu_up_down.up_down(rng, Unit.drawn(rng)))
 
 
 def never_turned(c: Columns) -> None:
@@ -360,13 +371,14 @@ UP_DOWN = Sheet(
     "imu_positions, up_down", "imu_positions",
     "# attitudes = up_down\n# latitude = 40.10704566deg\n# gravity = 9.805m/s2\n", upright,
     (
-        Mistake("axis exchanged", "gyros x and z exchanged, z upright", "gx and mean_gz exchanged",
+        Mistake("axis exchanged", "gyros x and z exchanged, z upright", "gx and gz exchanged",
                 exchange((LOG[1], LOG[3]))),
-        Mistake("axis exchanged", "accelerometers x and z exchanged", "reading reversed", exchange((LOG[4], LOG[6]))),
-        Mistake("left-handed", "gyro z reversed", "reading reversed", times(-1.0, LOG[3])),
-        Mistake("sign", "accelerometer z reversed", "reading reversed", times(-1.0, LOG[6])),
+        Mistake("axis exchanged", "accelerometers x and z exchanged", "accelerometers reversed",
+                exchange((LOG[4], LOG[6]))),
+        Mistake("left-handed", "gyro z reversed", "gyros reversed", times(-1.0, LOG[3])),
+        Mistake("sign", "accelerometer z reversed", "accelerometers reversed", times(-1.0, LOG[6])),
         Mistake("unit", "g under m/s²", "at rest they read", times(1.0 / G0, *LOG[4:])),
-        Mistake("unit", "°/s under rad/s", "readings wrong", times(180.0 / math.pi, *LOG[1:4])),
+        Mistake("unit", "°/s under rad/s", "the gyros, or their times, wrong", times(180.0 / math.pi, *LOG[1:4])),
         Mistake("position forgotten", "not turned over", "up and down", never_turned),
     ),
 )  # fmt: skip

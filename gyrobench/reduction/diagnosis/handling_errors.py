@@ -107,7 +107,7 @@ def _hides(result: DriftTestResult, record: Record) -> bool:
 def with_options(record: Record, options: Mapping[str, Any]) -> Record:
     """Return the record with other options in its run.json."""
     run = record.run.model_copy(update={"options": {**record.run.options, **options}})
-    return Record(record.windows, {}, run)
+    return Record(record.windows, record.channels, run)
 
 
 def _contradicted(result: DriftTestResult) -> bool:

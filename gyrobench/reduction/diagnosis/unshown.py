@@ -62,7 +62,6 @@ EARLY, DAY = 0.01, 86400.0  # of the time of a reading; s
 FORCES = ("f_x", "f_y")  # of the accelerometers of a north finder
 #: columns that stand beside each other in a table, and are of one kind
 NEIGHBOURS = (("mean_x", "mean"), FORCES, ("drift_x", "drift_y"), ("drift_y", "drift_z"), ("drift_x", "drift_z"))
-GYROS = (("mean_gx", "mean_gy"), ("mean_gy", "mean_gz"), ("mean_gx", "mean_gz"))  # where no angles show the axes
 METERS = (
     ("the readings", READINGS, ("u_voltage",)),
     ("the currents", ("current",), ("u_current",)),
@@ -80,29 +79,30 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
     readings reversed, latitude, scale factors, scales of meters and the zero of the angles in an attitude off, readings
     begun too early, a drift by the time of day - but for what a standard uncertainty is stated of.
     """
+    if "mean_gx" in record.windows and "imu.rate[1]" in record.channels and "outer_start" not in record.windows:
+        yield from _site(record)
+        yield from unshown_instruments.by_hand(record)
+        return
     yield from exchanged_labels(record)
     yield from _two_pairs(record)
     yield from reversed_columns(record, [n for n in ANGLES if n in record.windows], "the rotation", False)
     yield from reversed_columns(record, [n for n in record.windows if n.startswith(READINGS)], "the reading", False)
     for name in (n for n in readings(record.windows) if not n.startswith(READINGS)):
         yield from reversed_columns(record, [name], f"the {name}", False)
-    for a, b in (*NEIGHBOURS, *(GYROS if "outer_start" not in record.windows else ())):
+    for a, b in NEIGHBOURS:
         yield from exchanged_columns(record, [(a, b)], f"the columns {a} and {b} exchanged")
     forces = [n for n in FORCES if n in record.windows]
     if forces:
         yield from reversed_columns(record, forces, "the specific force", False)
         yield from scaled(record, forces, {"the specific force in m/s² and given as g": 1.0 / G0})
     options = record.run.options
-    latitude = float(options.get("latitude", 0.0))
-    if "latitude" in options and not options.get("u_latitude"):
-        moved = latitude + math.copysign(OFF, -latitude)
-        yield HandlingCandidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
-        yield from wrong_hemisphere(record)
+    yield from _site(record)
     for name, stated in SCALES.items():
         if options.get(name) and not options.get(stated):
             other = with_options(record, {name: float(options[name]) * TOO_LARGE})
             yield HandlingCandidate(f"the scale factor {name} wrong by 2 %", other)
     yield from unshown_instruments.shaken(record)
+    yield from unshown_instruments.inertial(record)
     yield from _heads(record)
     yield from _meters(record)
     yield from _daily(record)
@@ -126,6 +126,15 @@ def mistakes(record: Record) -> Iterator[HandlingCandidate]:
         here = np.isin(phase, [row.phase for row in record.run.plan if attitude_name(row) == name])
         columns = {n: np.where(here, record.windows[n] + OFF, record.windows[n]) for n in ANGLES}
         yield HandlingCandidate(f"the zero of the angles wrong by 1° in {name}", changed(record, **columns))
+
+
+def _site(record: Record) -> Iterator[HandlingCandidate]:
+    options = record.run.options
+    if "latitude" in options and not options.get("u_latitude"):
+        latitude = float(options["latitude"])
+        moved = latitude + math.copysign(OFF, -latitude)
+        yield HandlingCandidate("the latitude wrong by 1°", with_options(record, {"latitude": moved}))
+        yield from wrong_hemisphere(record)
 
 
 def _daily(record: Record) -> Iterator[HandlingCandidate]:

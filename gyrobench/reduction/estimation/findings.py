@@ -344,8 +344,7 @@ class Findings:
         standard uncertainties (SI).  Of columns that the fit holds in part only the rest is tested.  None, without a
         test, for ideal data, fewer than ``minimum`` degrees of freedom, or columns that the fit holds all.
         """
-        basis, s, _ = np.linalg.svd(self.est.X, full_matrices=False)  # of what joined some columns may be alike
-        basis = basis[:, s > 1e-9 * s[0]]
+        basis = self._basis()
         size = np.linalg.norm(extra, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
@@ -366,6 +365,27 @@ class Findings:
         back = turned[there].T / s[there] / size[:, None]
         covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
         return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    def beside(self, extra: Array) -> tuple[Array, Array, Array, Array]:
+        """Return what the fit leaves of ``extra`` columns (n, k), by noise model: their moments (g, k, k), those
+        with the data (g, k), the squares of the data (g,), probabilities (g,): fits of one amplitude add theirs.
+        """
+        basis = self._basis()
+        p = basis.shape[1]
+        M, xy, yy = self._whitened_moments(
+            np.column_stack([basis, *(v - basis @ (basis.T @ v) for v in (extra, self.y))])
+        )
+        taken = M[:, p:, :p] @ np.linalg.inv(M[:, :p, :p])
+        own = np.linalg.solve(M[:, :p, :p], xy[:, :p, None])[..., 0]
+        return (
+            M[:, p:, p:] - taken @ M[:, :p, p:], xy[:, p:] - np.einsum("gkp,gp->gk", taken, xy[:, :p]),
+            yy - np.einsum("gp,gp->g", own, xy[:, :p]), self.est.noise.models[:, 3],
+        )  # fmt: skip
+
+    def _basis(self) -> Array:
+        """Return what the fit holds as orthonormal columns: of what joined some may be alike."""
+        basis, s, _ = np.linalg.svd(self.est.X, full_matrices=False)
+        return np.asarray(basis[:, s > 1e-9 * s[0]])
 
     def _whitened_moments(self, columns: Array) -> tuple[Array, Array, Array]:
         """X'X (g, c, c), X'y and y'y of the whitened columns (y the last) for each of the noise models that count."""
