@@ -8,9 +8,11 @@ pieces, from which the noise is estimated, of gyros with the errors of the readi
 
 An axis that leans by t reads g cos t: what the two level accelerometers read is tilt or bias, and 1 - cos t, even from
 0 to what it would be without bias, is in u of Sa; the level Earth rate along it, whose heading is anything, in u of bg
-and hg, unless u_mount states the lean.
+and hg, unless u_mount states the lean.  An input axis that leans towards a level one by m reads m t of a case that leans by t
+to the same side up and down, as bias: half of the difference and half of the sum of what a level accelerometer reads,
+as angles, are these two or bias, and their product, even from 0, is in u of ba.
 
-Not modelled: misalignments; squares of the specific force, which two directions do not tell from a bias.
+Not modelled: misalignments of the gyros; squares of the specific force, which two directions do not tell from a bias.
 """
 
 from __future__ import annotations
@@ -53,6 +55,13 @@ TILT = Source(
     "axis.vertical", "axis off the vertical", "rad", "u_mount", "of each position, towards the level Earth rate"
 )
 LEAN = Source("axis.cosine", "axis off the vertical, by the level accelerometers", "1", "", "1 less the cosine")
+LEAN_BIAS = Source(
+    "axis.product",
+    "axis off the vertical, by the level accelerometers, times a misalignment",
+    "1",
+    "",
+    "both as angles",
+)
 LEAN_RATE = Source(
     "axis.lean", "axis off the vertical, by the level accelerometers", "rad", "", "of each position, level Earth rate"
 )
@@ -97,8 +106,14 @@ class UpDownChannel(DriftReduction[ImuSetup]):
         s, y = self.setup, found.data.y
         if not self.channel.gyro:
             sign = self.sign[self.sign != 0.0]
-            cosine = float(np.mean(self._lean**2)) / 2.0
-            return [sources.GRAVITY.effect(s, -sign), LEAN.effect(cosine / math.sqrt(3.0), -s.gravity * sign)]
+            cosine, up = float(np.mean(self._lean**2)) / 2.0, sign > 0.0
+            first, last = (self._level[:, rows].mean(axis=1) for rows in (up, ~up))
+            product = float(np.sum(np.abs(first**2 - last**2))) / 4.0  # of half the difference and half the sum
+            return [
+                sources.GRAVITY.effect(s, -sign),
+                LEAN.effect(cosine / math.sqrt(3.0), -s.gravity * sign),
+                LEAN_BIAS.effect(product / math.sqrt(3.0), np.full(y.size, s.gravity)),
+            ]
         level = s.earth_rate * math.cos(s.latitude)
         phase = np.asarray(self.windows["phase"])[self.sign != 0.0]
         each = np.array([np.where(phase == p, level, 0.0) for p in np.unique(phase)]).reshape(-1, y.size)
@@ -108,10 +123,14 @@ class UpDownChannel(DriftReduction[ImuSetup]):
         return [LEAN_RATE.effect(largest / math.sqrt(2.0), each * self._lean / largest)]  # towards any heading
 
     @property
+    def _level(self) -> Array:
+        """Angles of the axis to the vertical (2, n), rad, if what the other accelerometers read were no bias."""
+        read = np.array([self.windows[f"mean_a{a}"] for a in AXES if a != self.channel.letter], dtype=float)
+        return np.asarray(read[:, self.sign != 0.0] / self.setup.gravity)
+
+    @property
     def _lean(self) -> Array:
-        """Angle of the axis to the vertical (n,), rad, if what the other accelerometers read were no bias."""
-        level = [np.asarray(self.windows[f"mean_a{a}"], dtype=float) for a in AXES if a != self.channel.letter]
-        return np.asarray(np.hypot(*level)[self.sign != 0.0] / self.setup.gravity)
+        return np.asarray(np.hypot(*self._level))
 
     def account(self, found: Findings) -> Account:
         i = self.channel.letter
