@@ -8,9 +8,11 @@ pieces, from which the noise is estimated, of gyros with the errors of the readi
 
 An axis that leans by t reads g cos t: what the two level accelerometers read is tilt or bias, and 1 - cos t, even from
 0 to what it would be without bias, is in u of Sa; the level Earth rate along it, whose heading is anything, in u of bg
-and hg, unless u_mount states the lean.  An input axis that leans towards a level one by m reads m t of a case that leans by t
-to the same side up and down, as bias: half of the difference and half of the sum of what a level accelerometer reads,
-as angles, are these two or bias, and their product, even from 0, is in u of ba.
+and hg, unless u_mount states the lean.
+
+An input axis that leans towards a level one by m reads m t of a case that leans by t to the same side up and down, as
+bias.  Half of the difference and half of the sum of what a level accelerometer reads, as angles, are these two or bias;
+their product, even from 0, is in u of ba.
 
 Not modelled: misalignments of the gyros; squares of the specific force, which two directions do not tell from a bias.
 """
