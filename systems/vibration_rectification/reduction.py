@@ -27,6 +27,7 @@ from gyrobench import frames
 from gyrobench.frames import G0
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
@@ -237,7 +238,7 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
                 *([EAST] if self.channel == GYRO and self.setup.axis != "x" else []),
                 *([] if self.both else [one_way]),
             ],
-            reasons=mistakes.heated(found, self.channel),
+            reasons=[*mistakes.heated(found, self.channel), *(mistakes.jumped(found, self.up) or jumped(found))],
             random="noise of the instrument",
         )
 

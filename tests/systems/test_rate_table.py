@@ -399,3 +399,15 @@ def test_a_vibrating_gyro_by_hand() -> None:
     with Session(NAME, {"gyro": "gyro_hemispherical"}) as prepared:
         result = reduced(prepared, {**SHORT, "gyro.white": 0.0})
     assert abs(found(result)["e"].estimate) < 20.0 and found(result)["e"].truth is None  # ppm, its drift by angle
+
+
+def test_a_bias_that_jumps_in_one_sweep_is_named(tmp_path: Path) -> None:
+    """5 standard deviations of a reading: the likeliest noise is then a random walk, in which no step stands out; but
+    that the rest walks nowhere is less likely than a jump.  b was 4 u off without a word; a clean sweep is not named.
+    """
+    rate, mean = lab(np.random.default_rng(6))
+    half = rate.size // 2
+    for by, said in ((0.0, False), (0.05, True)):
+        jumped = mean[:half] + np.where(np.arange(half) >= 20, by, 0.0)
+        text = " ".join(r.text for r in measured(write(tmp_path / "a.csv", rate[:half], jumped)).reasons)
+        assert ("From row 21 on the level of the record is another one" in text) == said

@@ -324,3 +324,22 @@ def test_an_axis_that_was_turned_over_once_is_said(tmp_path: Path) -> None:
         assert (abs(G.estimate - 12.0) > 10.0 * G.u) == said
         if said:
             assert G.estimate == pytest.approx(12.0 - 10.0, abs=0.3)
+
+
+def test_a_bias_that_jumps_is_named_at_a_level_and_at_a_turn(tmp_path: Path) -> None:
+    """2 deg/h, 20 standard deviations.  Up, down and up hold it as slow drift: at the first reading down G is off by
+    half of it (4 u, b_g 7 u), and no drift is within a position; among the readings down it is the level of the record.
+    """
+    head = "# latitude = 0deg\n# gravity = 9.80665\n# axis = y\n"
+    names = "t_start [s],t_end [s],up,level [g],rate [deg/h]\n"
+    system = load_system(NAME)
+    assert system.measured_data is not None
+    for at, said in ((99, ""), (8, "turned.jump"), (16, "turned.jump"), (12, "level.shift")):
+        moved = [[*r[:4], r[4] + 2.0 * (k >= at)] for k, r in enumerate(rows(up=(1.0, -1.0, 1.0)))]
+        file = tmp_path / f"{at}.csv"
+        file.write_text(head + names + "\n".join(",".join(f"{v:.10g}" for v in row) for row in moved) + "\n")
+        reasons = {r.id: r for r in Reduction.from_record(system.measured_data.read(system, file, {})).reasons}
+        assert [i for i in ("turned.jump", "level.shift") if i in reasons] == ([said] if said else [])
+        if said:
+            words = "Equal positions differ by 2" if "turn" in said else "From row 13 on the level of the record"
+            assert words in reasons[said].text and reasons[said].blocks == ("pass", "fail")

@@ -5,11 +5,16 @@ record and not one that fell together with a motion.  So a step from each row on
 
     t_k = s'v / (|s| sd),   s: the step, v: the residuals, both whitened and free of the terms of the fit
 
-externally studentized, LEVEL over the number of rows.  A single row that explains more than any step is an outlier
-(outliers), not a jump.  [Chen 1993]
+externally studentized.  The largest is a jump where chance makes it with less than LEVEL over the number of rows, in
+the mean over all noise models: slower ones than the likeliest jump more easily.  A smaller one hides in the random walk
+that it makes the likeliest noise itself: a step in white noise is a jump, too, where it is likelier by as much than all
+of the record in that noise.  A single row that explains more than any step is an outlier (outliers).  [Chen 1993]
 """
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
@@ -32,7 +37,45 @@ def jumped(found: Findings) -> list[Reason]:
         return []
     steps, rows = np.tri(n)[:, LEAST : n - LEAST + 1], np.eye(n)
     v = (found.est.residual - found.est.likeliest.set_up)[:, None]
-    Z = _whitened(found, np.hstack([found.est.X, v, steps, rows]))
+    columns = np.hstack([found.est.X, v, steps, rows])
+    white, determinant = _whitened(found, columns)
+    told = _largest(white, p)
+    if told.at >= steps.shape[1] or _chance(found, steps[:, told.at]) >= LEVEL / n:
+        squares = told.squares
+        told = _largest(columns, p)
+        gain = 0.5 * (n - p - 1) * math.log(squares / told.left) + 0.5 * determinant
+        if told.at >= steps.shape[1] or gain < math.log(n / LEVEL):
+            return []
+    by = told.size / found.y_scale
+    text = (
+        f"From row {told.at + LEAST + 1} on the level of the record is another one, by {by:+.3g} {found.y_unit} "
+        f"({told.t:.0f} standard deviations). The estimates take it for slow noise, or for what was done then. Look "
+        "for the cause, and measure again or leave the rows before or after it out."
+    )
+    return [Reason("level.shift", text.replace("-", "−"), ("pass", "fail"), severity="doubt")]
+
+
+def _chance(found: Findings, step: Array) -> float:
+    """Return the probability of so large a step by chance, in the mean over the noise models."""
+    square, own, squares, probability = found.beside(step[:, None])
+    gain = own[:, 0] ** 2 / square[:, 0, 0]
+    free = found.y.size - found.est.X.shape[1] - 1
+    return float(probability @ special.fdtrc(1.0, free, gain / np.maximum(squares - gain, 1e-300) * free))
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Index of the column that explains most, its size, its t; squares without it, and what it leaves of them."""
+
+    at: int
+    size: float
+    t: float
+    squares: float
+    left: float
+
+
+def _largest(Z: Array, p: int) -> _Step:
+    """Return the column of Z beyond p terms and the residuals that explains most of these."""
     Q = np.linalg.qr(Z[:, :p])[0]
     Z = Z[:, p:] - Q @ (Q.T @ Z[:, p:])
     z, Z = Z[:, 0], Z[:, 1:]
@@ -40,23 +83,19 @@ def jumped(found: Findings) -> list[Reason]:
     free = size > 1e-6 * np.median(size)  # of the terms of the fit
     along = np.where(free, z @ Z / np.where(free, size, 1.0), 0.0)
     best = int(np.argmax(np.abs(along)))
-    left = max(float(z @ z) - float(along[best]) ** 2, 1e-300)
-    t = float(along[best]) * np.sqrt((n - p - 1) / left)
-    if best >= steps.shape[1] or 2.0 * float(special.stdtr(n - p - 1, -abs(t))) >= LEVEL / n:
-        return []
-    by = float(along[best] / size[best]) / found.y_scale
-    text = (
-        f"From row {best + LEAST + 1} on the level of the record is another one, by {by:+.3g} {found.y_unit} "
-        f"({abs(t):.0f} standard deviations). The estimates take it for slow noise, or for what was done then. Look "
-        "for the cause, and measure again or leave the rows before or after it out."
-    )
-    return [Reason("level.shift", text.replace("-", "−"), ("pass", "fail"), severity="doubt")]
+    squares, explained = float(z @ z), float(along[best])
+    left = max(squares - explained**2, 1e-300)
+    t = abs(explained) * math.sqrt((len(z) - p - 1) / left)
+    return _Step(best, explained / float(size[best]), t, squares, left)
 
 
-def _whitened(found: Findings, columns: Array) -> Array:
-    """Return columns (n, m) whose noise is white, by the likeliest model, up to a factor."""
+def _whitened(found: Findings, columns: Array) -> tuple[Array, float]:
+    """Return columns (n, m) whose noise is white, by the likeliest model, up to a factor, and the log determinant of
+    its covariance.
+    """
     if found.white:
-        return columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
+        weighed = columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
+        return weighed, -math.inf  # nothing but white noise is thought of
     one = tuple(np.array([m]) for m in found.est.noise.best)
-    out: Array = noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :]
-    return out
+    out, determinant = noise_model.whiten(found.t_start, found.t_end, columns, *one)
+    return np.asarray(out[:, 0, :]), float(determinant[0])
