@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
+from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.result import Reason
 from gyrobench.units import DEG
@@ -35,6 +35,7 @@ FIGURES = (
 )
 PLAIN = 1e-9  # Hz; finer than any figure
 STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
+CLEAR, EARLY = 5.0, 0.01  # u, and of the delay, from which on a negative delay beside the poles is said
 NEAR = 2.0  # steps of the frequencies from a resonance, within which a crossing rests on the model
 NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
 
@@ -68,6 +69,7 @@ class Reduction(MeasureReduction):
                 f"Curve: {self._curve_named()}, of the least Bayesian information criterion.",
                 f"Table rate: amplitude {least:.4g} to {most:.4g} °/s.",
                 *_sampled(points),
+                self._delayed(),
             ],
             reasons=list(mistakes(response, found)),
         )
@@ -119,6 +121,20 @@ class Reduction(MeasureReduction):
         more = f", a delay and a resonance at {c.resonance:.4g} Hz" if c.resonant else " and a delay"
         return f"{c.poles} poles{more}"
 
+    def _pure_delay(self) -> tuple[float, float]:
+        """Return the delay that the gain does not explain, and its u, s: the gyro's own, or that of a late reading."""
+        c = self.figures.curve
+        return float(c.p[1]), float(np.sqrt(c.cov[1, 1] * max(1.0, c.chi2 / max(c.dof, 1))))
+
+    def _delayed(self) -> str:
+        T, u = (x * 1e3 for x in self._pure_delay())
+        held = self.response.held * 1e3
+        samples = f", {T / held:.3g} samples of the gyro" if held else ""
+        return (
+            f"{T:.3g} ms of the delay (u = {u:.2g} ms{samples}) are no pole's, whose gain would show: the gyro's own, "
+            "or those of a late reading."
+        ).replace("-", "−")
+
     def _table(self) -> Table:
         r, fitted = self.response, self.figures.curve.at(self.response.f)
         db = 20.0 / math.log(10.0)
@@ -140,6 +156,7 @@ class Reduction(MeasureReduction):
             (READING_LAG, lag, r.moved(1j * lag * w)),
             (TIME_BASE, time, r.at(1.0 - time)),
             (COSINE, cosine, r.moved(cosine * one + 0j)),
+            (GAIN_SLOPE, gain, r.moved(-gain * (r.f / r.f[-1]) ** 2 + 0j)),
         ]
 
     def _sensitivities(self) -> list[Sensitivity]:
@@ -181,6 +198,13 @@ class Reduction(MeasureReduction):
                 "no measure of their uncertainty. The gyro has a response of another shape, or points are wrong."
             )
             found.doubt("response.misfit", text)
+        T, u = self._pure_delay()
+        if self.run.measured and -T > max(CLEAR * u, EARLY * float(self.figures.value[3])):
+            text = (
+                f"The phase lags by {-T * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros of "
+                "the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of the table."
+            )
+            found.warn("response.early", text)
         peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
         if peak > 0.5 * math.log(2.0):
             top = float(self.response.f[int(np.argmax(self.response.gain))])

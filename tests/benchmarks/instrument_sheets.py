@@ -176,6 +176,14 @@ def phase_turned(c: Columns) -> None:
     c[_response(3)] = c[_response(3)] + 180.0
 
 
+def sample_late(c: Columns) -> None:
+    c[_response(3)] = c[_response(3)] - 360.0 * 1e-3 * c[_response(0)]
+
+
+def table_falls(c: Columns) -> None:
+    c[_response(2)] = c[_response(2)] * (1.0 + 0.04 * (c[_response(0)] / 200.0) ** 2)
+
+
 BANDWIDTH = Sheet(
     "gyro_bandwidth", "gyro_bandwidth", "", response,
     (
@@ -185,6 +193,8 @@ BANDWIDTH = Sheet(
         Mistake("unit", "°/h under °/s", "°/h", times(3600.0, _response(2))),
         Mistake("unit", "phases in rad under °", "in rad", times(math.pi / 180.0, _response(3))),
         Mistake("unit", "frequencies in rad/s under Hz", "rad/s given as Hz", times(2.0 * math.pi, _response(0))),
+        Mistake("row late", "a sample of 1 ms late", "a reading late by", sample_late),
+        Mistake("set-up", "amplitude of the table 4 % off at 200 Hz", "an amplitude wrong", table_falls),
         Mistake("position forgotten", "a frequency left out: the generator stayed", "Hz is",
                 copied(14, 13, 1, _response(2), _response(3))),
     ),

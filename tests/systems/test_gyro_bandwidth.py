@@ -350,3 +350,20 @@ def test_a_resonance_in_the_band_is_in_the_curve(tmp_path: Path, at: float, with
         assert {r.id for r in result.reasons if r.blocks} == withheld
         crossing = optimize.brentq(lambda f: abs(true(f)) - math.sqrt(0.5), at, 60.0)
         assert abs(c.estimate - crossing) < 3.0 * c.u < 3.0
+
+
+def test_a_late_sample_and_a_table_that_falls_off_are_said(tmp_path: Path) -> None:
+    """1 ms of lag is in the phase alone: two poles at 50 Hz have a delay of sqrt 2/(2 pi 50) = 4.50 ms, the rest is no
+    pole's.  No residual has it, nor 2 % of amplitude at the highest frequency: both are asked for.  A table that
+    falls off by 4 % makes the gain that of more poles, whose phase is not there."""
+    rows = rows_of()
+    late = rows - np.outer(rows[:, 0], [0.0, 0.0, 0.0, 0.36])
+    result = measured(tmp_path, late, "# type_b = none")
+    assert found(result)["delay"].estimate == pytest.approx(5.50, abs=0.02)
+    assert any(text.startswith("1 ms of the delay (u = 0.0005") for text in result.conventions)
+    (asked,) = (r.text for r in result.reasons if r.id == "arrangement.unstated")
+    assert "a reading late by 1 ms (a sample too much) (f_90 by" in asked
+    assert "an amplitude wrong by 2 % at the highest frequency (" in asked
+    low = rows * np.column_stack([*np.ones((2, 20)), 1.0 - 0.04 * (rows[:, 0] / 200.0) ** 2, np.ones(20)])
+    for table, said in ((rows, False), (low, True)):
+        assert any(r.id == "response.early" for r in measured(tmp_path, table).reasons) == said

@@ -17,19 +17,26 @@ from scipy import special
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT, TOO_LARGE
+from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
 from gyrobench.reduction.estimation.effects import PREDICTED
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor
 from gyrobench.reduction.setup.conditions import TYPE_B_UNSTATED
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
-from gyrobench.reduction.setup.sources import READING_GAIN, TIME_BASE, Source
+from gyrobench.reduction.setup.sources import READING_GAIN, READING_LAG, RELATIVE, TIME_BASE, Source
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Reason, Table
 
 ROUNDING = 1e-6  # least relative uncertainty of a point
 LINES = 12  # numbers from which neighbour_noise estimates
-WRONG = {READING_GAIN.id: "a gain of table or reading wrong by 2 %", TIME_BASE.id: "a time base wrong by 2 %"}
+GAIN_SLOPE = Source("reading.gain.slope", "gain of table or reading at the highest frequency", RELATIVE, "")
+#: what no residual shows: words, and how far it is off
+WRONG = {
+    READING_GAIN.id: ("a gain of table or reading wrong by 2 %", 0.02),
+    TIME_BASE.id: ("a time base wrong by 2 %", 0.02),
+    READING_LAG.id: ("a reading late by 1 ms (a sample too much)", 1e-3),
+    GAIN_SLOPE.id: ("an amplitude wrong by 2 % at the highest frequency", 0.02),
+}
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
 ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
 
@@ -146,16 +153,13 @@ def not_stated(
         yield Reason(TYPE_B_UNSTATED, text, ("pass", "fail"), severity="doubt")
     if run.arrangement == "checked":
         return
-    said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id]]
-    for s in by:
-        moved = {
-            name: (TOO_LARGE - 1.0) * abs(float(np.nan_to_num(s.change[k]))) / u
-            for k, name, _, _, u in figures
-            if u > 0.0
-        }
+    said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id][0]]
+    for s in (s for s in by if s.source.id in WRONG and s.u == 0.0):
+        words, size = WRONG[s.source.id]
+        moved = {name: size * abs(float(np.nan_to_num(s.change[k]))) / u for k, name, _, _, u in figures if u > 0.0}
         far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
-        if s.source.id in WRONG and s.u == 0.0 and far:
-            said.append(f"{WRONG[s.source.id]} ({', '.join(f'{n} by {moved[n]:.2g} u' for n in far)})")
+        if far:
+            said.append(f"{words} ({', '.join(f'{n} by {moved[n]:.2g} u' for n in far)})")
     text = (
         f"No residual of this record would show: {'; '.join(said)}. State that units and scales were checked "
         "(arrangement = checked)."
