@@ -199,9 +199,10 @@ class Reduction(MeasureReduction):
             )
             found.doubt("response.misfit", text)
         T, u = self._pure_delay()
-        if self.run.measured and -T > max(CLEAR * u, EARLY * float(self.figures.value[3])):
+        early = -T
+        if self.run.measured and early > max(CLEAR * u, EARLY * float(self.figures.value[3])):
             text = (
-                f"The phase lags by {-T * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros of "
+                f"The phase lags by {early * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros of "
                 "the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of the table."
             )
             found.warn("response.early", text)
