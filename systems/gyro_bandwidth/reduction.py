@@ -202,8 +202,8 @@ class Reduction(MeasureReduction):
         early = -T
         if self.run.measured and early > max(CLEAR * u, EARLY * float(self.figures.value[3])):
             text = (
-                f"The phase lags by {early * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros of "
-                "the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of the table."
+                f"The phase lags by {early * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros "
+                "of the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of the table."
             )
             found.warn("response.early", text)
         peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
