@@ -150,8 +150,8 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     moves = {(a, b): abs(rest.value[b] - found.value[a]) / rest.u[b] for a, b in both if rest.u[b] > 0.0}
     a, b = max(moves, key=moves.__getitem__, default=both[0])  # u of a quantity that is none is 0
     q = found.quantities[a]
-    values = f"{rest.value[b] / q.scale:.6g}{q.unit and ' '}{q.unit} (u = {rest.u[b] / q.scale:.2g})"
-    plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})"
+    values = f"{rest.value[b] / q.scale:.6g}{q.unit and ' '}{q.unit} (u = {rest.u[b] / q.scale:.2g})".replace("-", "−")
+    plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})".replace("-", "−")
     what, them = ("Row", "it") if rows.size == 1 else ("Rows", "them")
     verb = "lies" if rows.size == 1 else "lie"
     text = (
