@@ -349,22 +349,19 @@ class Findings:
         size = np.where(size > 0.0, size, 1.0)
         new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
         there = s > 1e-6
-        k, p = int(np.count_nonzero(there)), basis.shape[1]
-        Q = np.column_stack([basis, new[:, there]])
-        dof = self.y.size - Q.shape[1]
+        k = int(np.count_nonzero(there))
+        dof = self.y.size - basis.shape[1] - k
         if self.ideal or not k or dof < minimum:
             return None
-        M, xy, yy = self._whitened_moments(np.column_stack([Q, self.y - basis @ (basis.T @ self.y)]))
-        inner = np.linalg.inv(M[:, :p, :p])
-        rss0 = yy - np.einsum("gp,gpq,gq->g", xy[:, :p], inner, xy[:, :p])
-        inverse = np.linalg.inv(M)
-        rss1 = yy - np.einsum("gp,gpq,gq->g", xy, inverse, xy)
-        f = ((rss0 - rss1) / k) / (np.maximum(rss1, 1e-300) / dof)
-        probability = float(self.est.noise.models[:, 3] @ special.fdtrc(k, dof, f))
+        square, own, squares, weight = self.beside(new[:, there])
+        amplitude = np.linalg.solve(square, own[..., None])[..., 0]
+        left = np.maximum(squares - np.einsum("gk,gk->g", amplitude, own), 1e-300)
+        f = ((squares - left) / k) / (left / dof)
+        probability = float(weight @ special.fdtrc(k, dof, f))
         self.tests.append(Test(id, name, float(f[0]), probability, what, bad if probability < 0.05 else good))
         back = turned[there].T / s[there] / size[:, None]
-        covariance = back @ inverse[0, p:, p:] @ back.T * (rss1[0] / dof)
-        return back @ (inverse[0] @ xy[0])[p:], np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        covariance = back @ np.linalg.inv(square[0]) @ back.T * (left[0] / dof)
+        return back @ amplitude[0], np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def beside(self, extra: Array) -> tuple[Array, Array, Array, Array]:
         """Return what the fit leaves of ``extra`` columns (n, k), by noise model: their moments (g, k, k), those
