@@ -345,12 +345,10 @@ class Findings:
         test, for ideal data, fewer than ``minimum`` degrees of freedom, or columns that the fit holds all.
         """
         basis = self._basis()
-        size = np.linalg.norm(extra, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
+        size = np.maximum(np.linalg.norm(extra, axis=0), 1e-300)
         new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
         there = s > 1e-6
-        k = int(np.count_nonzero(there))
-        dof = self.y.size - basis.shape[1] - k
+        dof = self.y.size - basis.shape[1] - (k := int(np.count_nonzero(there)))
         if self.ideal or not k or dof < minimum:
             return None
         square, own, squares, weight = self.beside(new[:, there])
@@ -368,16 +366,9 @@ class Findings:
         with the data (g, k), the squares of the data (g,), probabilities (g,): fits of one amplitude add theirs.
         """
         basis = self._basis()
-        p = basis.shape[1]
-        M, xy, yy = self._whitened_moments(
-            np.column_stack([basis, *(v - basis @ (basis.T @ v) for v in (extra, self.y))])
-        )
-        taken = M[:, p:, :p] @ np.linalg.inv(M[:, :p, :p])
-        own = np.linalg.solve(M[:, :p, :p], xy[:, :p, None])[..., 0]
-        return (
-            M[:, p:, p:] - taken @ M[:, :p, p:], xy[:, p:] - np.einsum("gkp,gp->gk", taken, xy[:, :p]),
-            yy - np.einsum("gp,gp->g", own, xy[:, :p]), self.est.noise.models[:, 3],
-        )  # fmt: skip
+        left = [v - basis @ (basis.T @ v) for v in (extra, self.y)]
+        moments = self._whitened_moments(np.column_stack([basis, *left]))
+        return *normal_equations.beside(*moments, basis.shape[1]), self.est.noise.models[:, 3]
 
     def _basis(self) -> Array:
         """Return what the fit holds as orthonormal columns: of what joined some may be alike."""

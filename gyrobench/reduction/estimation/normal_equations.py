@@ -107,3 +107,14 @@ def moments(t0: Array, t1: Array, columns: Array, grid: noise.NoiseGrid) -> tupl
                 square[g] += zt @ zt.transpose(0, 2, 1)
                 logdet[g] += part
     return square[:, :-1, :-1], square[:, :-1, -1], square[:, -1, -1], logdet
+
+
+def beside(square: Array, own: Array, data: Array, p: int) -> tuple[Array, Array, Array]:
+    """Return moments (g, c, c), those with the data (g, c) and the squares of these (g,) of what the first p columns
+    leave of the others.
+    """
+    first = square[:, :p, :p]
+    taken = square[:, p:, :p] @ np.linalg.inv(first)
+    value = np.linalg.solve(first, own[:, :p, None])[..., 0]
+    left = own[:, p:] - np.einsum("gkp,gp->gk", taken, own[:, :p])
+    return square[:, p:, p:] - taken @ square[:, :p, p:], left, data - np.einsum("gp,gp->g", value, own[:, :p])
