@@ -12,9 +12,10 @@ with the column ``time`` instead of t_start and t_end holds time series, see :mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,8 @@ from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, re
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
 from gyrobench.system.lab_series import faults_of_series, is_time_series, windows_of_series
+from gyrobench.system.system import MeasuredData, System
 from gyrobench.system.values import InvalidValueError
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 SERIES = """\
 Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
@@ -73,6 +72,11 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
     if "t_start" in lines[-1] and "mean" in lines[-1]:
         notes.append(SERIES)
     return "\n".join([*lines[:head], *(f"# {note}" for note in notes), *lines[head:]]) + "\n"  # fmt: skip
+
+
+def laboratory_rows(template: str, **reading: Any) -> MeasuredData:
+    """Return the template of a laboratory's record and its reader; reading: the keywords of :func:`read_record`."""
+    return MeasuredData(template, partial(read_record, **reading))
 
 
 def read_record(
