@@ -114,8 +114,7 @@ def rotation(axis: ArrayLike, angle: float) -> Array:
         raise ValueError(f"rotation axis {n.tolist()} has no direction")
     x, y, z = n / size
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    out: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
-    return out
+    return np.asarray(np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k))
 
 
 def check_rotation(matrix: ArrayLike, name: str, tolerance: float = 1e-9) -> Array:
@@ -195,8 +194,7 @@ def tumble_faces(latitude: float) -> dict[str, Array]:
 
 def to_face(vector: ArrayLike, face: ArrayLike, base: ArrayLike, angle: float) -> Array:
     """A local (E, N, U) vector in face axes with the table at ``angle`` (rad)."""
-    out: Array = np.asarray(face) @ passive_z(angle) @ np.asarray(base) @ np.asarray(vector)
-    return out
+    return np.asarray(np.asarray(face) @ passive_z(angle) @ np.asarray(base) @ np.asarray(vector))
 
 
 def rows(matrix: Sequence[Sequence[float]]) -> list[float]:

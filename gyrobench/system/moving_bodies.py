@@ -150,8 +150,7 @@ def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
     if not faces or not order or phases is None:
         return None
     mounts = np.asarray(faces, dtype=float).reshape(-1, 3, 3)
-    found: Array = mounts[np.asarray(order, dtype=int)[phases - 1] - 1]
-    return found
+    return np.asarray(mounts[np.asarray(order, dtype=int)[phases - 1] - 1])
 
 
 def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
@@ -168,8 +167,7 @@ def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
     held = np.stack([x, y, np.cross(x, y)], axis=1) @ np.reshape(parameters[f"{slot}.base"], (3, 3)).T
     for axis, angle in enumerate(parameters[f"{slot}.misalignment"]):
         held = passive(axis, np.asarray([angle])) @ held
-    found: Array = held[phases - 1]
-    return found
+    return np.asarray(held[phases - 1])
 
 
 def _phases(slot: str, record: Record, at: AnyArray) -> AnyArray | None:

@@ -199,9 +199,6 @@ class Reduction(DriftReduction[FourSetup]):
         ]
 
 
-reduce = Reduction.reduce
-
-
 def estimate(alpha: Array, U: Array, setup: FourSetup, scale: Array) -> Findings:
     """Return the joint fit of voltages U (n, 4) at the nominal angles; scale (4,): first scale factors, V/g."""
     first = joint(alpha, U, setup, scale).fit()
@@ -251,8 +248,7 @@ def _first_harmonic(scale: Array, D1: tuple[float, float]) -> Array:
     """Return what takes the first harmonic out of terms (4, 5) fitted with it.  [Dong 2014, eq. 27, 28, by EA8]"""
     c, s = D1
     of_unit = np.array([[-c, 0, 0, -s, c], [s, 0, 0, c, -s], [c, 0, 0, s, -c], [-s, 0, 0, -c, s]])
-    out: Array = scale[:, None] * of_unit
-    return out
+    return np.asarray(scale[:, None] * of_unit)
 
 
 def sensor_truth(run: RunDocument) -> dict[str, float] | None:

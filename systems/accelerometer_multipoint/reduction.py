@@ -306,9 +306,6 @@ class Reduction(DriftReduction[MultipointSetup]):
         ]
 
 
-reduce = Reduction.reduce
-
-
 def _mounts_apart(fits: Mapping[str, Mapping[str, float]]) -> list[Table]:
     if len(fits) < 2:
         return []

@@ -168,8 +168,7 @@ class Rows:
 
 def in_turn(x: Array) -> Array:
     """Return angles less whole turns, within half a turn."""
-    out: Array = x - 2.0 * math.pi * np.round(x / (2.0 * math.pi))
-    return out
+    return np.asarray(x - 2.0 * math.pi * np.round(x / (2.0 * math.pi)))
 
 
 @dataclass(frozen=True)

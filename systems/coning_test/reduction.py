@@ -277,6 +277,3 @@ def true_values(run: RunDocument, axis: str) -> dict[str, float] | None:
         drift = chain.drift(f, theta, AXES.index(axis), matrix)
         found |= {cones.names(a)[k]: float(d) for a, d in zip(AXES, drift, strict=True)}
     return found
-
-
-reduce = Reduction.reduce

@@ -292,9 +292,6 @@ class Reduction(ChannelTests[EightPositionSetup]):
         return reduce_days(numbered, lambda windows: cls.reduce(windows, setup))
 
 
-reduce = Reduction.reduce
-
-
 def closed_formulas(windows: Mapping[str, Array], s: EightPositionSetup) -> dict[str, float]:
     """Return the formulas of Hu 1981 of all readings; empty where they divide by zero (the fit says why)."""
     position = np.asarray(windows["position"]).astype(int)

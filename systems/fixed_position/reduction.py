@@ -72,8 +72,7 @@ class FixedPositionSetup(SiteSetup):
     @property
     def xyz(self) -> Array:
         """(X, Y, Z) = -f/g0 along I, O, S."""
-        out: Array = self.attitude @ -frames.U * self.gravity / frames.G0
-        return out
+        return np.asarray(self.attitude @ -frames.U * self.gravity / frames.G0)
 
     @property
     def input_rate(self) -> float:
@@ -200,9 +199,6 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         """Return what a record says; a long one has a table of its noise coefficients."""
         result = super().from_record(record)
         return replace(result, tables=[*result.tables, *noise_coefficients_table(result, record)])
-
-
-reduce = Reduction.reduce
 
 
 def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:

@@ -354,9 +354,6 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         return Table("integrity", "Integrity", caption, ["quantity", "value", "unit"], rows)
 
 
-reduce = Reduction.reduce
-
-
 def _doubt(id: str, text: str, *blocks: str) -> Reason:
     return Reason(id, text, blocks or ("pass", "fail"), severity="doubt")
 

@@ -79,8 +79,7 @@ class OpenLoopSetup(SiteSetup):
         """Return X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
         c, s = math.cos(angle), math.sin(angle)
         I, O, S = self.attitude  # noqa: E741
-        out: Array = np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0
-        return out
+        return np.asarray(np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0)
 
     def true_drift(self, angle: float) -> float:
         """Return the drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
@@ -96,8 +95,7 @@ def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array
     move = np.zeros_like(pause) if wait is None else np.clip(pause - wait, 0.0, pause)
     before = (t1[:-1] - t0[:-1]) / 2.0 + move / 2.0
     share = before / ((t0[1:] + t1[1:] - t0[:-1] - t1[:-1]) / 2.0)
-    out: Array = share * theta[:-1] + (1.0 - share) * theta[1:]
-    return out
+    return np.asarray(share * theta[:-1] + (1.0 - share) * theta[1:])
 
 
 def null_angles(
@@ -110,8 +108,7 @@ def null_angles(
     spin = np.cos(between) * setup.earth(2) - np.sin(between) * setup.earth(1)
 
     def coupled(null: Array) -> Array:
-        out: Array = spin * setup.float_gain * (between - (null[1:] + null[:-1]) / 2.0)
-        return out
+        return np.asarray(spin * setup.float_gain * (between - (null[1:] + null[:-1]) / 2.0))
 
     if float(np.max(np.abs(u))) == 0.0:
         return theta, None, coupled(theta)
@@ -268,9 +265,6 @@ class Reduction(DriftReduction[OpenLoopSetup]):
             found.noise_sentence("intervals"),
             *found.nuisance_sentences(),
         ]
-
-
-reduce = Reduction.reduce
 
 
 def _float_gain(run: RunDocument) -> float:

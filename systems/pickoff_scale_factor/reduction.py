@@ -85,8 +85,7 @@ def float_angle(angle: Array, gain: float, channel: str = "") -> Array:
     """
     if channel:
         return angle
-    out: Array = 2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain
-    return out
+    return np.asarray(2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain)
 
 
 class Reduction(DriftReduction[PickoffSetup]):
@@ -241,9 +240,6 @@ class Reduction(DriftReduction[PickoffSetup]):
             f"The test took {self.duration:.3g} s: a drift of {self.setup.drift / DPH:.3g} °/h is at most "
             f"{self.bound / ARCSEC:.3g}″, {self.bound / self.span * 100:.2g} % of the span.",
         ]
-
-
-reduce = Reduction.reduce
 
 
 def setup_of(record: Record) -> PickoffSetup:

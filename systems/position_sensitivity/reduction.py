@@ -75,8 +75,7 @@ class PositionSetup(SiteSetup):
     @property
     def earth(self) -> Array:
         """Earth rate along x, y, z, rad/s."""
-        out: Array = self.attitude @ frames.earth_rate_local(self.latitude, self.earth_rate)
-        return out
+        return np.asarray(self.attitude @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
 class PositionChannel(DriftReduction[PositionSetup]):
@@ -252,9 +251,6 @@ class Reduction(ChannelTests[PositionSetup]):
         every = [c for r in results.values() for c in r.coefficients]
         stiff = "Quadrature stiffness {Kx_q} and {Ky_q}, in phase {Kx_φ} and {Ky_φ}."
         return told(every, stiff, "Composite drift at null {ω_dx} and {ω_dy}.")
-
-
-reduce = Reduction.reduce
 
 
 def true_values(run: RunDocument, s: PositionSetup) -> dict[str, float] | None:

@@ -269,9 +269,6 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
         ]
 
 
-reduce = Reduction.reduce
-
-
 def design(x: Array, std: Array, full: float) -> Array:
     """Return the window means (n, 5) of 1, x, |x|, x2/I and x3/I2 for normal x of this mean and standard deviation."""
     safe = np.maximum(std, 1e-30)

@@ -256,6 +256,3 @@ def true_values(run: RunDocument, gravity: float) -> dict[str, float] | None:
     frequencies = sorted({row.target for row in run.plan} - {0.0})
     angle = float(run.options["angle"])
     return {f"d({f:g} Hz)": chain.rise(ScullingMotion(f, angle, vibration), unit) for f in frequencies}
-
-
-reduce = Reduction.reduce

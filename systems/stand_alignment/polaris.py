@@ -113,5 +113,4 @@ def refraction(altitude: Array, pressure: float = 101325.0, temperature: float =
     """Return by how much air raises a star at a true altitude (rad); Pa, K.  Meeus 1998, eq. 16.4."""
     h = np.degrees(altitude)
     bent = 1.02 / 60.0 / np.tan(np.radians(h + 10.3 / (h + 5.11)))
-    out: Array = np.radians(bent) * pressure / 101000.0 * 283.0 / temperature
-    return out
+    return np.asarray(np.radians(bent) * pressure / 101000.0 * 283.0 / temperature)

@@ -232,6 +232,3 @@ class Reduction(DriftReduction[AlignmentSetup]):
             *told(coefficients, "Axis off the pole: {about east} about east, {about p × east} across."),
             f"Residual standard deviation {found.residual_std:.3g}″ of a sight.",
         ]
-
-
-reduce = Reduction.reduce

@@ -277,9 +277,6 @@ class Reduction:
         return found
 
 
-reduce = Reduction.reduce
-
-
 def truth_of(
     parameters: Mapping[str, Any], currents: Array, channel: str = "", warm: float = 0.0
 ) -> dict[str, float] | None:

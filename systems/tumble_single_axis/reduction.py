@@ -146,6 +146,3 @@ class Reduction(TurningTest[TumbleSetup]):
             return []
         text = "The tilt of the input axis makes most of the uncertainty of D_O; tilt=yes estimates it."
         return [Reason("tumble.tilt_dominates", text)]
-
-
-reduce = Reduction.reduce

@@ -62,8 +62,7 @@ def attitude(
     x, y = _turned(0, outer), _turned(1, inner)
     if any(wobble):
         x, y = x @ _wobble(0, outer, wobble[0], phase), y @ _wobble(1, inner, wobble[1], phase)
-    out: Array = FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude)
-    return out
+    return np.asarray(FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude))
 
 
 def frequencies(m: int, n: int) -> list[int]:

@@ -113,8 +113,7 @@ class Reduction(RestTest[TwoAxisSetup]):
     @cached_property
     def theta(self) -> Array:
         """Place on the path, rad."""
-        out: Array = self.angles[0] / self.setup.m
-        return out
+        return np.asarray(self.angles[0] / self.setup.m)
 
     def group(self) -> Group:
         """Return drift against the path, or against the number of the visit where the positions lie on none."""
@@ -247,6 +246,3 @@ class Reduction(RestTest[TwoAxisSetup]):
             harmonics=self.harmonics,
             reasons=drift_terms.folded(s),
         )
-
-
-reduce = Reduction.reduce

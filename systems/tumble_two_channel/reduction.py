@@ -204,9 +204,6 @@ class Reduction(ChannelTests[TwoChannelSetup]):
         return [Table("notation.book", "Quantities of Hu 1981", caption, head, rows)]
 
 
-reduce = Reduction.reduce
-
-
 def _conventions(s: TwoChannelSetup) -> list[str]:
     sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
     k = {a: f"{v * 1e-3 / DPH:.6g} °/h/mA" for a, v in s.k.items()}

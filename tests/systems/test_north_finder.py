@@ -26,7 +26,7 @@ from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
 from systems.north_finder import plans
-from systems.north_finder.reduction import NorthFinderSetup, Reduction, reduce
+from systems.north_finder.reduction import NorthFinderSetup, Reduction
 
 NAME = "north_finder"
 DPH = math.pi / 648000.0
@@ -318,7 +318,7 @@ def heading_of(method: str, w: dict[str, np.ndarray], latitude: float, **u: floa
     setup = NorthFinderSetup(
         method=method, latitude=latitude, gravity=9.80665, rough=1.0, nuisances=False, **with_sizes(u)
     )
-    return reduce(w, setup)
+    return Reduction.reduce(w, setup)
 
 
 @pytest.mark.parametrize("method", ["tilt", "strapdown two"])

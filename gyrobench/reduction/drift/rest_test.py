@@ -126,8 +126,7 @@ class RestTest(DriftReduction[S]):
 
         def misalignment(k: int) -> Array:
             other = frames.rotation(np.eye(3)[k], SMALL) @ self.axes
-            out: Array = (self.rate(other) - rate - (self.design(other) - X) @ start) / SMALL
-            return out
+            return np.asarray((self.rate(other) - rate - (self.design(other) - X) @ start) / SMALL)
 
         text = "misalignment of the input axis towards the"
         return [

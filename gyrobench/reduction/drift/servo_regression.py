@@ -79,8 +79,7 @@ class HeldWindows:
     @property
     def rate(self) -> Array:
         """Return the mean table rate of each window (n,), rad/s."""
-        out: Array = (self.angle_end - self.angle_start) / (self.t_end - self.t_start)
-        return out
+        return np.asarray((self.angle_end - self.angle_start) / (self.t_end - self.t_start))
 
     @functools.cached_property
     def nodes(self) -> Array:
@@ -256,8 +255,7 @@ def candidates(
 
     def misalignment(k: int) -> Array:
         other = _mounted(held, k)
-        out: Array = (drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL
-        return out
+        return np.asarray((drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL)
 
     text = "misalignment of the input axis towards the"
     return [

@@ -125,8 +125,7 @@ def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:
 def standard_changes(fit: Findings, effect: Effect) -> Array:
     """Return the changes (m, q) by one standard uncertainty of each part: the source's, or that of its correction."""
     changes = effect.changes(fit)
-    out: Array = changes * _standard_sizes(effect, len(changes), fit.corrections)[:, None]
-    return out
+    return np.asarray(changes * _standard_sizes(effect, len(changes), fit.corrections)[:, None])
 
 
 def _standard_sizes(effect: Effect, parts: int, corrections: Sequence[Correction]) -> Array:
