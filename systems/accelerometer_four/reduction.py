@@ -20,26 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER, Effect
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Location, Quantity, Setup, told
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC
 
 from . import chain, geometry

@@ -14,15 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    LoopReduction,
-    ReductionError,
-    Table,
-    over_time,
-    thinned,
-)
+from gyrobench.reduction.loops.loop_curves import over_time, thinned
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, LoopReduction, ReductionError, Table
 from gyrobench.units import DEG, DPH
 
 SHOWN = 800  # points of a drawn line

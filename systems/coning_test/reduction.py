@@ -24,26 +24,12 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
-from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.setup.sources import TIME_BASE, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Record,
-    Regression,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.setups import Setup, weighed
+from gyrobench.reduction.setup.sources import TIME_BASE, TURNED, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DEG, DPH
 
 from . import mistakes

@@ -11,14 +11,8 @@ from scipy import special
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    MeasureReduction,
-    ReductionError,
-    RunDocument,
-    over_time,
-)
+from gyrobench.reduction.loops.loop_reduction import MeasureReduction
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, ReductionError, RunDocument, over_time
 from gyrobench.units import ARCSEC, DPH
 
 from .closed_form import CompensatedDrift, ExpectedErrors, expected

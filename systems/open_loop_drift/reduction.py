@@ -26,30 +26,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import attitude_effects
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    ReductionError,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    attitude_of,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, Effect
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, told, truth_of
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
 from . import refusals

@@ -23,33 +23,25 @@ import numpy as np
 
 from gyrobench import drift as drift_model
 from gyrobench import frames, units
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.fit_result import with_values
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_LEVEL_POLE, INPUT_TO_OUTPUT, VOLTMETER
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
+from gyrobench.reduction.estimation.fit_result import Account, with_values
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import Location, truth_of
+from gyrobench.reduction.setup.sources import (
+    ANGLE_ONCE,
+    ANGLE_TWICE,
+    AXIS_LEVEL_POLE,
+    INPUT_TO_OUTPUT,
+    VOLTMETER,
     Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    Record,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Setup,
-    told,
-    truth_of,
-    window_problems,
 )
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Array, DriftReduction, Findings, Group, Quantity, Record, Setup, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason
 from gyrobench.system.families.servo_channel import own_name
 from gyrobench.units import ARCSEC, DPH
 

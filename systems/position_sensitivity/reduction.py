@@ -23,31 +23,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
-from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET_OF, TORQUER_SCALE_OF, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    attitude_of,
-    number,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.setup.run_metadata import number, truth_of
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET_OF, TORQUER_SCALE_OF, TURNED, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Regression, told
+from gyrobench.result import Coefficient, DriftTestResult, Table
 from gyrobench.units import ARCSEC, DPH
 
 from .sources import PICKOFF

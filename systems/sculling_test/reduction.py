@@ -21,27 +21,13 @@ from gyrobench.frames import G0
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.setup.run_metadata import Location
-from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Record,
-    Regression,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.setup.setups import Setup, weighed
+from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.system.families.strapdown_motion import FACES
 from gyrobench.units import DEG
 

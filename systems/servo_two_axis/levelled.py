@@ -21,18 +21,8 @@ import numpy as np
 from gyrobench import drift
 from gyrobench.reduction.drift import composite, drift_terms
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Regression,
-    Table,
-)
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, Regression
+from gyrobench.result import Coefficient, Table
 from gyrobench.units import DPH
 
 from . import budget

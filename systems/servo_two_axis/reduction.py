@@ -19,28 +19,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels, drift_terms, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.sentences import told
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    Table,
-    truth_of,
-)
-from gyrobench.result import DriftTestResult
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, truth_of
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 from . import budget, closed, geometry, levelled, refusals

@@ -23,18 +23,9 @@ from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.rest_test import SMALL, RestTest
 from gyrobench.reduction.setup import sources
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Effect,
-    Findings,
-    Group,
-    ReductionError,
-    RunDocument,
-    Table,
-    window_problems,
-)  # fmt: skip
-from gyrobench.result import Harmonic
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, Effect, Findings, Group, RunDocument
+from gyrobench.result import Harmonic, Table
 from gyrobench.units import DPH
 
 from . import closed, geometry

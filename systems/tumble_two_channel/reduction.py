@@ -24,22 +24,11 @@ from gyrobench.reduction.drift import drift_terms, window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import TurningSetup, scale_factor_problems
 from gyrobench.reduction.setup.sources import TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    Findings,
-    Location,
-    Quantity,
-    Reason,
-    RunDocument,
-    Table,
-    number,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.toolkit import Account, Array, Findings, Quantity, RunDocument, window_problems
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import DPH
 
 from . import closed, geometry
