@@ -30,15 +30,8 @@ from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.fit_result import Account, with_values
 from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.run_metadata import Location, truth_of
-from gyrobench.reduction.setup.sources import (
-    ANGLE_ONCE,
-    ANGLE_TWICE,
-    AXIS_LEVEL_POLE,
-    INPUT_TO_OUTPUT,
-    VOLTMETER,
-    Effect,
-)
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.reduction.toolkit import Array, DriftReduction, Findings, Group, Quantity, Record, Setup, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason
@@ -130,7 +123,7 @@ class Reduction(DriftReduction[PickoffSetup]):
             wanted.append(Quantity("drift", meaning, "°/h", DPH, truth.get("drift")))
         return found.derive(wanted, lambda b: [b[0], b[0] / gain, *([-b[1] / b[0]] if both else [])])
 
-    def effects(self, found: Findings) -> list[Effect]:
+    def effects(self, found: Findings) -> list[sources.Effect]:
         """Return all sources with their sensitivities.
 
         An encoder that is off once a turn is off in proportion to a small angle, so the sine is an error of the scale.
@@ -153,11 +146,11 @@ class Reduction(DriftReduction[PickoffSetup]):
         return [
             GAIN.effect(s, values=only),
             SCALE.effect(s, stretched(found.X[:, 0])),
-            ANGLE_ONCE.effect(s, misread(1)),
-            ANGLE_TWICE.effect(s, misread(2)),
-            VOLTMETER.effect(s, found.error(found.y)),
-            AXIS_LEVEL_POLE.effect(s, earth, note=EARTH_ONLY),
-            INPUT_TO_OUTPUT.effect(s, earth, note=EARTH_ONLY),
+            sources.ANGLE_ONCE.effect(s, misread(1)),
+            sources.ANGLE_TWICE.effect(s, misread(2)),
+            sources.VOLTMETER.effect(s, found.error(found.y)),
+            sources.AXIS_LEVEL_POLE.effect(s, earth, note=EARTH_ONLY),
+            sources.INPUT_TO_OUTPUT.effect(s, earth, note=EARTH_ONLY),
             *([] if self.both else [DRIFT.effect(s.drift / 2.0, found.error(slope))]),
         ]
 
