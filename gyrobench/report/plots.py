@@ -71,9 +71,7 @@ def fit(series: Sequence[Series], key: str, alike: Sequence[Series], everything:
     The scale is shared with the series that are ``alike``, that of the residuals with ``everything``.
     """
     wide = style.WIDE if len(series) > 1 else style.WIDE * 0.75
-    fig, axes = style.figure(
-        wide, 84, nrows=2, ncols=len(series), sharex="col", sharey="row", height_ratios=[2.2, 1]
-    )  # fmt: skip
+    fig, axes = style.figure(wide, 84, nrows=2, ncols=len(series), sharex="col", sharey="row", height_ratios=[2.2, 1])
     for k, s in enumerate(series):
         top, bottom = axes[0, k], axes[1, k]
         x, y = finite(s.x, s.y)

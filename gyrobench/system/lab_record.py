@@ -33,9 +33,7 @@ Time series may stand here instead of windows: columns `time [s]`, `current` for
 #   column `phase` phases are found in the motion of the table and must fit the plan.  '# window = 60s': their length.
 #   Samples that may be aliased are warned of: say what they are by '# samples = means' (each since the one before) or
 #   points, and how far the signal reaches by '# bandwidth = 14Hz'."""
-TEXTS = (
-    "title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement",
-)  # fmt: skip
+TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement")
 ARRANGED = ("phase", "cycle", "current", "t_start")  # first columns of what is arranged by attitudes or settings
 POLARITY = "polarity"  # read by the tumbles alone: RebalanceSetup
 WITH_POLARITY = (*TEXTS, POLARITY)

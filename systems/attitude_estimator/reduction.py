@@ -53,9 +53,7 @@ class Reduction(LoopReduction):
         self._consistency()
         found.tables.append(self._phases())
         self._figures()
-        found.facts |= {
-            "residual_std": _rms(errors[whole]) / DEG, "residual_unit": "°", "dof": float(whole.size),
-        }  # fmt: skip
+        found.facts |= {"residual_std": _rms(errors[whole]) / DEG, "residual_unit": "°", "dof": float(whole.size)}
         return Account(
             method="Estimated attitude and gyro biases against the true ones, in rest, rocking, acceleration and turn",
             sources=["EST-ATTITUDE; Mahony 2008; Markley 2014, chapter 6",

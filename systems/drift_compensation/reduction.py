@@ -61,9 +61,7 @@ class Reduction(MeasureReduction):
         found.warn("torquer.limit", text if share > 0.0 else "")
         self._consistency(half)
         self._against_closed()
-        found.facts |= {
-            "dof": float(error.size), "residual_std": found["error"].estimate, "residual_unit": "°/h",
-        }  # fmt: skip
+        found.facts |= {"dof": float(error.size), "residual_std": found["error"].estimate, "residual_unit": "°/h"}
         self._figures(n, float(run.options["Ts"]))
         return Account(
             method="Rms of residual rate and angle over records that each begin with the table at zero",

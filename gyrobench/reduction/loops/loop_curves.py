@@ -48,9 +48,7 @@ def trace(
     """
     pick, few = thinned(t.size, shown), thinned(t.size, marked or shown)
     curves = [line(label, t[pick], np.asarray(x)[pick]) for label, x in (lines or {}).items()]
-    return Response(
-        name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), y_name, y_unit, curves=curves
-    )  # fmt: skip
+    return Response(name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), y_name, y_unit, curves=curves)
 
 
 def over_time(
