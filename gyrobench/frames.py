@@ -22,27 +22,10 @@ from gyrobench.arrays import Array
 from gyrobench.units import EARTH_RATE, G0
 
 __all__ = [
-    "EARTH_RATE",
-    "G0",
-    "MOUNTS",
-    "E",
-    "N",
-    "U",
-    "check_rotation",
-    "earth_rate_local",
-    "equatorial_base",
-    "equatorial_problems",
-    "gravity_problems",
-    "latitude_problems",
-    "normal_gravity",
-    "passive_z",
-    "polar_base",
-    "pole",
-    "rotation",
-    "rotation_problems",
-    "to_face",
-    "tumble_faces",
-]
+    "EARTH_RATE", "G0", "MOUNTS", "E", "N", "U", "check_rotation", "earth_rate_local", "equatorial_base",
+    "equatorial_problems", "gravity_problems", "latitude_problems", "normal_gravity", "passive_z", "polar_base", "pole",
+    "rotation", "rotation_problems", "to_face", "tumble_faces",
+]  # fmt: skip
 
 
 E = np.array([1.0, 0.0, 0.0])

@@ -48,27 +48,9 @@ if TYPE_CHECKING:
     from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
-    "Comparison",
-    "Experiment",
-    "GyrobenchError",
-    "Record",
-    "Result",
-    "Run",
-    "SuiteExperiment",
-    "SuiteRun",
-    "campaign",
-    "compare",
-    "design",
-    "identify",
-    "load",
-    "load_suite",
-    "multisine",
-    "open_run",
-    "reduce",
-    "site",
-    "sweep",
-    "tune",
-]
+    "Comparison", "Experiment", "GyrobenchError", "Record", "Result", "Run", "SuiteExperiment", "SuiteRun", "campaign",
+    "compare", "design", "identify", "load", "load_suite", "multisine", "open_run", "reduce", "site", "sweep", "tune",
+]  # fmt: skip
 
 
 @checked

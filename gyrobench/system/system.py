@@ -53,15 +53,8 @@ if TYPE_CHECKING:
     from gyrobench.system.part_values import PartValues
 
 __all__ = [
-    "InvalidConfigurationError",
-    "MeasuredData",
-    "OnRequest",
-    "Option",
-    "Slot",
-    "System",
-    "Windows",
-    "load_system",
-]
+    "InvalidConfigurationError", "MeasuredData", "OnRequest", "Option", "Slot", "System", "Windows", "load_system",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -41,15 +41,9 @@ class NorthFinding(TableTest):
 
     title = "North finding by gyro"
     spec = (
-        "NORTH-COMMON",
-        "NORTH-2POS",
-        "NORTH-4POS",
-        "NORTH-CONT",
-        "NORTH-TILT",
-        "NORTH-STRAPDOWN",
-        "NORTH-DRIFT",
+        "NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT",
         "NORTH-AFTER",
-    )
+    )  # fmt: skip
     reduction = "reduction"
     protocol = "design"
     slots = {

@@ -223,13 +223,8 @@ class Reduction(ChannelTests[PositionSetup]):
             "1/s without integral; with one the angle that stays is the null of the pickoff"
         )
         head = [
-            "pickoff",
-            "loop gain / (1/s)",
-            "integral",
-            "angle at Earth rate / ″",
-            "drift of it / (°/h)",
-            "within 1″",
-        ]
+            "pickoff", "loop gain / (1/s)", "integral", "angle at Earth rate / ″", "drift of it / (°/h)", "within 1″",
+        ]  # fmt: skip
         return [Table("springs.loops", "The loops", caption, head, rows)]
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:

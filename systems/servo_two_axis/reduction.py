@@ -255,16 +255,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
             scatter = [float(np.std(f.est.residual[k])) / DPH for f in found.values()]
             rows.append([label, p, int(k.sum()), time / 3600.0, *map(math.degrees, angles), *scatter])
         head = [
-            "mount",
-            "phase",
-            "windows",
-            "time / h",
-            "outer / °",
-            "inner / °",
-            "no drift / °",
-            "x / (°/h)",
-            "y / (°/h)",
-        ]
+            "mount", "phase", "windows", "time / h", "outer / °", "inner / °", "no drift / °", "x / (°/h)", "y / (°/h)",
+        ]  # fmt: skip
         caption = "Turn of the outer axis, largest inner angle and that of a gyro without drift; scatter of residuals"
         return Table("mounts", "Mounts", caption, head, rows)
 

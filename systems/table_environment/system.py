@@ -122,12 +122,8 @@ class TableEnvironment(RebalanceTest):
         field="sampler_field.mean",
     )
     channels = (
-        *RebalanceTest.channels,
-        "site.tilt[1]",
-        "site.tilt[2]",
-        "surroundings.temperature",
-        "surroundings.B[1]",
-    )
+        *RebalanceTest.channels, "site.tilt[1]", "site.tilt[2]", "surroundings.temperature", "surroundings.B[1]",
+    )  # fmt: skip
     shown = ("gyro.drift", "site.tilt", "surroundings.temperature", "surroundings.B")
 
     def plan(self) -> Plan:

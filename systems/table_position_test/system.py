@@ -122,13 +122,8 @@ class TablePositionTest(System):
     done = "sequencer.done"
     step = 1e-3
     channels = (
-        "command.angle",
-        "controller.e",
-        "reference.deviation",
-        "reference.level_x",
-        "drive.torque",
-        "body.angle",
-    )
+        "command.angle", "controller.e", "reference.deviation", "reference.level_x", "drive.torque", "body.angle",
+    )  # fmt: skip
     bodies = """
         table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle
     """

@@ -114,10 +114,5 @@ class TwoChannelTest(RebalanceTest):
     }
     noises: ClassVar[tuple[str, ...]] = (*TWO_AXIS_NOISES, "rebalance_x.meter", "rebalance_y.meter")
     channels: ClassVar[tuple[str, ...]] = (
-        "gyro.u_x",
-        "gyro.u_y",
-        "rebalance_x.i",
-        "rebalance_y.i",
-        "gyro.drift_x",
-        "gyro.drift_y",
-    )
+        "gyro.u_x", "gyro.u_y", "rebalance_x.i", "rebalance_y.i", "gyro.drift_x", "gyro.drift_y",
+    )  # fmt: skip
