@@ -23,8 +23,8 @@ from gyrobench.units import EARTH_RATE, G0
 
 __all__ = [
     "EARTH_RATE", "G0", "MOUNTS", "E", "N", "U", "check_rotation", "earth_rate_local", "equatorial_base",
-    "equatorial_problems", "gravity_problems", "latitude_problems", "normal_gravity", "passive_z", "polar_base", "pole",
-    "rotation", "rotation_problems", "to_face", "tumble_faces",
+    "equatorial_problems", "gravity_problems", "latitude_problems", "normal_gravity", "passive", "passive_z",
+    "polar_base", "pole", "rotation", "rotation_problems", "to_face", "tumble_faces",
 ]  # fmt: skip
 
 
@@ -79,12 +79,20 @@ def earth_rate_local(latitude: float, rate: float = EARTH_RATE) -> Array:
     return rate * pole(latitude)
 
 
+def passive(axis: int, angle: ArrayLike) -> Array:
+    """Coordinates in axes turned by +``angle`` (rad) about one of them (0, 1, 2), (..., 3, 3): ``v_new = R v_old``."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.zeros((*np.shape(angle), 3, 3))
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    R[..., axis, axis] = 1.0
+    R[..., second, second] = R[..., third, third] = c
+    R[..., second, third], R[..., third, second] = s, -s
+    return R
+
+
 def passive_z(angle: float) -> Array:
-    """Coordinates in axes turned by +``angle`` (rad) about the third axis: ``v_new = passive_z(angle)
-    v_old``.
-    """
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    """Return :func:`passive` about the third axis, of one angle."""
+    return passive(2, angle)
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:

@@ -72,6 +72,13 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
     return "\n".join([*lines[:head], *(f"# {note}" for note in notes), *lines[head:]]) + "\n"  # fmt: skip
 
 
+def of_positions(record: Record) -> Record:
+    """Return a record of readings on a head with a plan of the positions that its rows name."""
+    numbers = dict.fromkeys(np.asarray(record.windows["phase"]).astype(int).tolist())
+    plan = [PlanRow(phase=p, label=f"position {p}", mode="hold", face="head") for p in numbers]
+    return Record(record.windows, {}, record.run.replace(plan=plan))
+
+
 def laboratory_rows(template: str, **reading: Any) -> MeasuredData:
     """Return the template of a laboratory's record and its reader; reading: the keywords of :func:`read_record`."""
     return MeasuredData(template, partial(read_record, **reading))

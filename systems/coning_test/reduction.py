@@ -25,6 +25,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import with_plan
 from gyrobench.reduction.setup.setups import Setup, weighed
 from gyrobench.reduction.setup.sources import TIME_BASE, TURNED, Effect
 from gyrobench.reduction.setup.window_checks import window_problems
@@ -169,7 +170,7 @@ class Reduction(ChannelTests[ConingSetup]):
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
-        return cls.reduce(labelled(record), cls.setup_of(record.run))
+        return cls.reduce(with_plan(record, frequency="target", half_angle="target_y"), cls.setup_of(record.run))
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> ConingSetup:
@@ -232,17 +233,6 @@ class Reduction(ChannelTests[ConingSetup]):
             every, f"Largest drift along the axis of the cone: {said[0]} = {{{said[0]}}}.",
             f"Largest drift across it: {said[1]} = {{{said[1]}}}.",
         )  # fmt: skip
-
-
-def labelled(record: Record) -> dict[str, Array]:
-    """Return the windows with frequency and half_angle; of a run those of the plan."""
-    windows = dict(record.windows)
-    if not record.run.measured:
-        rows = {row.phase: row for row in record.run.plan}
-        phase = np.asarray(windows["phase"]).astype(int)
-        windows["frequency"] = np.array([rows[p].target for p in phase.tolist()])
-        windows["half_angle"] = np.array([rows[p].target_y for p in phase.tolist()])
-    return windows
 
 
 def true_values(run: RunDocument, axis: str) -> dict[str, float] | None:

@@ -79,16 +79,9 @@ class ServoChannel(DriftReduction[TwoAxisServoSetup]):
         end = f",{self.channel}"
         weighed = [*nuisances.common(rows, end), nuisances.scatter("mount", w.phase.tolist(), end)]
         return Regression(
-            quantities, w.X[self.channel], y, seen.t_start, seen.t_end, [self._group(p) for p in s.labels],
+            quantities, w.X[self.channel], y, seen.t_start, seen.t_end, [self.whole.group(p) for p in s.labels],
             noise="readings", limit=1e6, candidates=weighed if s.nuisances else (),
         )  # fmt: skip
-
-    def _group(self, p: int) -> Group:
-        """Return drift against time in a mount."""
-        rows, seen = self.whole.phase == p, self.whole.seen
-        middle = (seen.t_start + seen.t_end) / 2.0
-        x = (middle[rows] - seen.t_start[rows][0]) / 3600.0
-        return Group(self.setup.name(p), rows, x, "time in the mount", "h")
 
     def effects(self, found: Findings) -> list[Effect]:
         return budget.effects(self.axis, found, self.whole.seen, self.whole.phase, self.names, self.setup)
@@ -151,6 +144,13 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
 
     def of_channel(self, name: str) -> ServoChannel | levelled.LevelChannel:
         return levelled.LevelChannel(self, name) if self.setup.levelled else ServoChannel(self, name)
+
+    def group(self, p: int) -> Group:
+        """Return the windows of a phase against the time in its mount."""
+        rows, seen = self.phase == p, self.seen
+        middle = (seen.t_start + seen.t_end) / 2.0
+        x = (middle[rows] - seen.t_start[rows][0]) / 3600.0
+        return Group(self.setup.name(p), rows, x, "time in the mount", "h")
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         """Return the numbers that matter, as sentences."""

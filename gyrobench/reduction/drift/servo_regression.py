@@ -245,10 +245,8 @@ def candidates(
         other = _mounted(held, k)
         return np.asarray((drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL)
 
-    text = "misalignment of the input axis towards the"
     return [
-        Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2), PART),
-        Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1), PART),
+        *nuisances.misalignments(misalignment, PART),
         *nuisances.common({**windows, "t_start": held.t_start, "t_end": held.t_end}),
         nuisances.scatter("mount", phase.tolist()),
     ]
