@@ -15,12 +15,13 @@
         done = "sequencer.done"
         channels = ["gyro.u", "rebalance.i"]
         noises = ("gyro.white", "rebalance.meter")          # set to 0 by --check-step
-        reduction = "reduction"                             # reduction.py beside it, with a class Reduction
         measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
         def parameters(self, parts): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
         def check(self): return [...]
+
+Its reduction is the class Reduction of a file reduction.py beside it, unless it names another one.
 
 An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``system.set("gyro.H", 0.3)``.
 """
@@ -28,6 +29,7 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -137,7 +139,8 @@ class System(Configurable):
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
-    #: a class, or the module beside system.py that has it as Reduction; its from_record(record) returns the findings
+    #: a class, or the module beside system.py that has it as Reduction; its from_record(record) returns the findings;
+    #: where a class names and inherits none, the module reduction.py if there is one
     reduction: ClassVar[str | type] = ""
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
@@ -166,6 +169,9 @@ class System(Configurable):
                 f"{cls.__name__}.reduce: what a record says, without limits and verdict, is returned by "
                 "findings(record); reduce judges it, for every system alike"
             )
+        file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+        if not cls.reduction and file and Path(file).with_name("reduction.py").is_file():
+            cls.reduction = "reduction"
         if isinstance(cls.reduction, type):
             from gyrobench.system.declared_sources import take_sources
 

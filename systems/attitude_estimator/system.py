@@ -35,7 +35,6 @@ class AttitudeEstimatorTest(LoopTest):
 
     title = "Attitude estimation on a moving base"
     spec = ("EST-ATTITUDE", "GYRO-STATIC-ERR", "GYRO-DYNAMIC-ERR")
-    reduction = "reduction"
     bodies = """
         vehicle: z motion.angle[3], x motion.angle[1], y motion.angle[2]
         estimated: z estimator.angle[3], x estimator.angle[1], y estimator.angle[2]

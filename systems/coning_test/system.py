@@ -43,7 +43,6 @@ class ConingTest(strapdown_motion.StrapdownMotion):
 
     title = "Coning test of a strapdown unit"
     spec = ("TEST-CONING", "IMU-POSITIONS")
-    reduction = "reduction"
     kind, amplitude, updated, senses = "axis of the cone vertical", "half_angle", "attitude", True
     slots = {
         "site": Slot("Site", "site"),

@@ -29,7 +29,6 @@ class EightPosition(TwoChannelTest):
 
     title = "Eight-position test"
     spec = ("TEST-8POS", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     protocol = "design"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"

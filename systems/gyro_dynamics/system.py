@@ -34,7 +34,6 @@ class GyroDynamics(System):
 
     title = "Dynamics of a floated gyro"
     spec = ("TEST-GYRO-DYNAMICS", "GYRO-DYN-1", "GYRO-DYN-3")
-    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "exciter": Slot("Excitation", "exciter"),

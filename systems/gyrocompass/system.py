@@ -64,7 +64,6 @@ class GyrocompassTest(LoopTest):
 
     title = "Gyrocompass"
     spec = ("GYROCOMPASS",)
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "ship": Slot(SHIP, "ship_motion"),

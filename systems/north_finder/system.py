@@ -44,7 +44,6 @@ class NorthFinding(TableTest):
         "NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT",
         "NORTH-AFTER",
     )  # fmt: skip
-    reduction = "reduction"
     protocol = "design"
     slots = {
         **on_table(

@@ -34,7 +34,6 @@ class PickoffScaleFactor(ChannelTest, OpenLoopTest):
 
     title = "Pickoff scale factor"
     spec = ("TEST-PICKOFF", "GYRO-DYN-1")
-    reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (

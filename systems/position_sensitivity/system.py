@@ -69,7 +69,6 @@ class PositionSensitivity(TwoChannelTest):
 
     title = "Position sensitivity test"
     spec = ("TEST-POSITION", "GYRO-POSITION", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = {
         **TwoChannelTest.with_parts(
             table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"

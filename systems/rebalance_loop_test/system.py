@@ -32,7 +32,6 @@ class RebalanceLoopTest(RebalanceTest):
 
     title = "Rebalance loop test"
     spec = ("TEST-REBAL-LOOP", "REBAL-ANALOG", "REBAL-PWM", "REBAL-PULSE")
-    reduction = "reduction"
     slots = {
         **RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_pwm"),
         FLOAT: Slot("Sampler", "sampler"),

@@ -58,7 +58,6 @@ class ScullingTest(strapdown_motion.StrapdownMotion):
 
     title = "Sculling test of a strapdown unit"
     spec = ("TEST-SCULLING", "TEST-CONING")
-    reduction = "reduction"
     kind, amplitude, updated = "axis of the drift vertical", "angle", "velocity"
     slots = {
         "site": Slot("Site", "site"),

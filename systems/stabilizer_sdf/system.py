@@ -28,7 +28,6 @@ class StabilizerSdf(OneAxisTest):
 
     title = "Stabilizer with a gyro of one degree of freedom"
     spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
-    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "stabilizer": stabilizer("stabilizer_lead_lag"),

@@ -60,7 +60,6 @@ class TableEnvironment(RebalanceTest):
 
     title = "Surroundings of a table"
     spec = ("ENV-DISTURBANCE", "ENV-FOUNDATION", "ALIGN-ERRORS", "ERROR-BUDGET")
-    reduction = "reduction"
     on_request: ClassVar[Mapping[str, OnRequest]] = {
         "foundation": OnRequest({"foundation": Slot("Foundation", "foundation_passive")}, ABOVE, {}, MOVED, DIRECT)
     }

@@ -39,7 +39,6 @@ class TableMotorTest(LoopTest):
 
     title = "Motor of a turntable"
     spec = ("MOTOR-TEST", "MOTOR-DC", "MOTOR-SQUARELAW")
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "site": Slot("Site", "site"),

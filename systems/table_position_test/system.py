@@ -65,7 +65,6 @@ class TablePositionTest(System):
 
     title = "Position test of a table"
     spec = ("TABLE-POSITION", "TABLE-PROGRAM", "ANGLE-INDUCTOSYN")
-    reduction = "reduction"
     measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),

@@ -32,7 +32,6 @@ class TableRateTest(System):
 
     title = "Rate test of a table"
     spec = ("TABLE-RATE", "READOUT-RATE", "CTRL-SAMPLED", "TABLE-TACHO")
-    reduction = "reduction"
     measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),

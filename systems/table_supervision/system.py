@@ -77,7 +77,6 @@ class TableSupervision(System):
 
     title = "Supervision of a table"
     spec = ("CTRL-SUPERVISION", "TABLE-MODES")
-    reduction = "reduction"
     slots = {
         "faults": Slot(SOURCE, "fault_source"),
         "monitor": Slot(MONITOR, "fault_monitor"),

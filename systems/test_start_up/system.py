@@ -96,7 +96,6 @@ class TestStartUp(System):
 
     title = "Start, self-test and shutdown by program"
     spec = ("TEST-START-UP", "TABLE-PROGRAM", "THERMOSTAT", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "program": Slot(PROGRAM, "test_program"),

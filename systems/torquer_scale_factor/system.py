@@ -33,7 +33,6 @@ class TorquerScaleFactor(ChannelTest, TableTest):
 
     title = "Torquer scale factor and linearity"
     spec = ("TEST-TORQUER", "SF-APP1", "LIN-TABLE", "LOOP-TABLE-SERVO")
-    reduction = "reduction"
     slots = on_table(
         table=Slot("ServoTable", "table_servo"), source=Slot("CurrentSource", "current_source"),
         gyro=Slot("SdfGyro", "floated_gyro"),

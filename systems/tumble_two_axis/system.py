@@ -34,7 +34,6 @@ class TumbleTwoAxis(RebalanceTest):
 
     title = "Two-axis tumble test"
     spec = ("TEST-TUMBLE2-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
-    reduction = "reduction"
     protocol = "design"
     slots = RebalanceTest.with_parts(gyro="floated_gyro", rebalance="rebalance_analog") | {
         "table": Slot("TwoAxisTable", "table_two_axis"),

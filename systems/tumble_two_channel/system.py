@@ -31,7 +31,6 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
 
     title = "Single-axis tumble test of a two-degree-of-freedom gyro"
     spec = ("TEST-TUMBLE1-2DOF-A", "TEST-TUMBLE1-2DOF-B", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
     )
