@@ -112,7 +112,6 @@ class GyrocompassTest(LoopTest):
         "ship.latitude_now", "ship.angle[1]",
     )  # fmt: skip
     shown = ("compass.psi ship.heading", "compass.tilt", "ship.speed", "ship.angle", "exciter.test")
-    channel_period = 1.0
 
     @property
     def north(self) -> float:

@@ -119,7 +119,6 @@ class TablePositionTest(System):
     }
     windows = Windows.of("sampler", **{n: f"{n}.mean" for n in SAMPLED if n != "sampler"})
     done = "sequencer.done"
-    step = 1e-3
     channels = (
         "command.angle", "controller.e", "reference.deviation", "reference.level_x", "drive.torque", "body.angle",
     )  # fmt: skip

@@ -94,7 +94,6 @@ class TableRateTest(System):
         inverse_start="inverse.t_start",
     )
     done = "sequencer.done"
-    step = 1e-3
     channels = ("command.rate", "controller.e", "controller.demand", "drive.torque", "body.rate", "body.angle")
     bodies = """
         table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle

@@ -150,7 +150,6 @@ class TestStartUp(System):
     )
     done = "program.done"
     closed_loop = True
-    step = 1e-3
     channel_period = 0.1
     channels = (
         "program.state", "program.reason", "heater.temperature", "stand.wheel_speed", "stand.wheel_current",

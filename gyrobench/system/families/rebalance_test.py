@@ -88,7 +88,6 @@ class TwoChannelTest(RebalanceTest):
         **{f"rebalance_{a}": Slot("Rebalance") for a in "xy"},
         **{f"sampler_{a}": Slot("Sampler", "sampler") for a in "xy"},
     }
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings() | supply()
     wires = (
         TABLE
         + """
