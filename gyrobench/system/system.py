@@ -73,6 +73,9 @@ class Slot:
     quantities: Mapping[str, str] = field(default_factory=dict)
 
 
+SAMPLED = "t_start t_end angle_start angle_end mean std n flagged"
+
+
 @dataclass(frozen=True)
 class Windows:
     """Windows of a record: a row is written when ``watch`` changes; column name -> "slot.output"."""
@@ -81,10 +84,10 @@ class Windows:
     columns: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, slot: str = "sampler", **more: str) -> Windows:
-        """The columns of the Sampler socket, and ``more``: mean_y="sampler_y.mean"."""
-        names = ("t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged")
-        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}, **more})
+    def of(cls, slot: str = "sampler", names: str = SAMPLED, **more: str) -> Windows:
+        """The columns ``names`` of the Sampler socket, all by default, and ``more``: mean_y="sampler_y.mean"."""
+        own = {n: f"{slot}.{n}" for n in names.split()}
+        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **own, **more})
 
 
 @dataclass(frozen=True)
@@ -151,9 +154,8 @@ class System(Configurable):
     #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
     takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
-    assumed: ClassVar[
-        tuple[str, ...]
-    ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    #: "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    assumed: ClassVar[tuple[str, ...]] = ()
     sampled_gyro: ClassVar[bool] = False  # a gyro with an output rate is read by its samples, each once
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none

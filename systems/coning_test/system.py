@@ -97,13 +97,8 @@ class ConingTest(strapdown_motion.StrapdownMotion):
     )
     noises = tuple(f"imu.{a}_{n}" for a in strapdown_motion.AXES for n in ("gyro", "gyro_bias"))
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "n")},
-            **{f"drift_{a}": f"sampler_{a}.mean" for a in strapdown_motion.AXES},
-        },
+    windows = Windows.of(
+        "sampler_x", "t_start t_end n", **{f"drift_{a}": f"sampler_{a}.mean" for a in strapdown_motion.AXES}
     )
     channels = tuple(f"user.error[{k}]" for k in (1, 2, 3))
 

@@ -99,16 +99,11 @@ class PositionSensitivity(TwoChannelTest):
         | type_b(sources, "attitude", "scale_factor", "current")
     )
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "angle_start", "angle_end", "n", "flagged")},
-            "flagged_y": "sampler_y.flagged",
-            **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
-            **{f"u_{a}": f"angle_{a}.mean" for a in "xy"},
-        },
-    )
+    windows = Windows.of(
+        "sampler_x", "t_start t_end angle_start angle_end n flagged", flagged_y="sampler_y.flagged",
+        **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
+        **{f"u_{a}": f"angle_{a}.mean" for a in "xy"},
+    )  # fmt: skip
     channel_period = 1.0
 
     def plan(self) -> Plan:

@@ -101,14 +101,7 @@ class ScullingTest(strapdown_motion.StrapdownMotion):
     )  # fmt: skip
     noises = tuple(f"imu.{a}_{n}" for a in strapdown_motion.AXES for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     measured_data = MEASURED
-    windows = Windows(
-        "sampler.count",
-        {
-            "phase": "sampler.window_phase",
-            **{n: f"sampler.{n}" for n in ("t_start", "t_end", "n")},
-            "acceleration": "sampler.mean",
-        },
-    )
+    windows = Windows.of("sampler", "t_start t_end n", acceleration="sampler.mean")
     channels = ("sampler.mean",)
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:

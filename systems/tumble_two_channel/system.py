@@ -55,15 +55,10 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
     )  # fmt: skip
     takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis()}
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "angle_start", "angle_end", "n", "flagged")},
-            "flagged_y": "sampler_y.flagged",
-            **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
-        },
-    )
+    windows = Windows.of(
+        "sampler_x", "t_start t_end angle_start angle_end n flagged", flagged_y="sampler_y.flagged",
+        **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
+    )  # fmt: skip
     channels = ("table.angle", *TwoChannelTest.channels)
 
     def faces(self) -> dict[str, Any]:
