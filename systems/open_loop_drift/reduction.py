@@ -67,10 +67,6 @@ class OpenLoopSetup(SiteSetup):
         I, O, S = self.attitude  # noqa: E741
         return np.asarray(np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0)
 
-    def true_drift(self, angle: float) -> float:
-        """Return the drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
-        return float(drift.drift(self.xyz(angle), self.truth or {}))
-
 
 def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
     """Return the mean case angle (rad) between the middles of successive readings.
@@ -162,7 +158,7 @@ class Reduction(DriftReduction[OpenLoopSetup]):
         self.book = float((self.null[-1] - self.null[0]) / span) + s.earth() - mean_cross
         true = None
         if s.truth is not None:
-            true = float(np.array([s.true_drift(a) for a in between]) @ dt / span)
+            true = float(np.array([drift.drift(s.xyz(a), s.truth) for a in between]) @ dt / span)
         wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, self.book)
         names = drift.terms(9)
         share = dt @ drift.regressors(np.array([s.xyz(a) for a in between]), names) / span
