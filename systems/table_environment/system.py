@@ -112,14 +112,9 @@ class TableEnvironment(RebalanceTest):
     )  # fmt: skip
     step = 2.5e-3  # s: nothing is fast here
     windows = Windows.of(
-        "sampler",
-        temperature="thermometer.mean",
-        ground_rate="sampler_rate.mean",
-        tilt_east="sampler_east.mean",
-        tilt_north="sampler_north.mean",
-        difference="sampler_difference.mean",
-        field="sampler_field.mean",
-    )
+        "sampler", temperature="thermometer.mean", ground_rate="sampler_rate.mean", tilt_east="sampler_east.mean",
+        tilt_north="sampler_north.mean", difference="sampler_difference.mean", field="sampler_field.mean",
+    )  # fmt: skip
     channels = (
         *RebalanceTest.channels, "site.tilt[1]", "site.tilt[2]", "surroundings.temperature", "surroundings.B[1]",
     )  # fmt: skip

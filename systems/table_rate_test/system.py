@@ -83,16 +83,10 @@ class TableRateTest(System):
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }
     windows = Windows.of(
-        "sampler",
-        jitter="jitter.std",
-        angle_true="body.angle",
-        gate="gate.rate",
-        gate_valid="gate.valid",
-        gate_start="gate.t_start",
-        inverse="inverse.rate",
-        inverse_valid="inverse.valid",
+        "sampler", jitter="jitter.std", angle_true="body.angle", gate="gate.rate", gate_valid="gate.valid",
+        gate_start="gate.t_start", inverse="inverse.rate", inverse_valid="inverse.valid",
         inverse_start="inverse.t_start",
-    )
+    )  # fmt: skip
     done = "sequencer.done"
     channels = ("command.rate", "controller.e", "controller.demand", "drive.torque", "body.rate", "body.angle")
     bodies = """
