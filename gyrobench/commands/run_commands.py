@@ -86,19 +86,10 @@ def run(
     elif title and not test["instrument"]:
         test.set("instrument", title)
     request = RunRequest(
-        parts=parts,
-        maps=maps,
-        seed=getattr(test, "seed", 1) if seed is None else seed,
-        engine=engine.value if engine else None,
-        step=time_step,
-        out=out,
-        force=force,
-        spec=spec,
-        check_step=check_step,
-        timeout=parse_time("--timeout", timeout),
-        resume=resume,
-        formats=("json",) if no_report else FORMATS,
-    )
+        parts=parts, maps=maps, seed=getattr(test, "seed", 1) if seed is None else seed,
+        engine=engine.value if engine else None, step=time_step, out=out, force=force, spec=spec, check_step=check_step,
+        timeout=parse_time("--timeout", timeout), resume=resume, formats=("json",) if no_report else FORMATS,
+    )  # fmt: skip
     with reports_in(language, test.name, Bench.find().folder):
         exit_on_fail(print_runs.run(request, test, as_json), strict)
 

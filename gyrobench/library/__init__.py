@@ -240,15 +240,9 @@ def identify(
 
     limits = parse_band(band) if isinstance(band, str) else band
     return identify_loop(
-        Path(data),
-        at=at,
-        period=period,
-        band=limits,
-        columns=None if columns is None else Path(columns),
-        fit=fit,
-        want=want,
-        against=None if against is None else Path(against),
-    )
+        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns), fit=fit,
+        want=want, against=None if against is None else Path(against),
+    )  # fmt: skip
 
 
 @checked

@@ -177,15 +177,9 @@ def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, st
     """Return the run.json of measured data; ``texts``: circumstances, which may replace the title of the system."""
     circumstances: dict[str, Any] = {"title": system.title, **texts}
     return RunDocument(
-        system=system.name,
-        spec=list(system.spec),
-        measured=True,
-        complete=True,
-        options=dict(system.values),
-        parameters={},
-        plan=list(plan),
-        **circumstances,
-    )
+        system=system.name, spec=list(system.spec), measured=True, complete=True, options=dict(system.values),
+        parameters={}, plan=list(plan), **circumstances,
+    )  # fmt: skip
 
 
 def _plan(

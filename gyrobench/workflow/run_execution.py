@@ -62,14 +62,9 @@ def open_session(request: RunRequest, system: System) -> Session:
     require_slots(system).refuse()
     check_fmu_files(request.parts)
     return Session(
-        system,
-        request.parts,
-        request.maps,
-        engine=request.engine,
-        bench=Bench.find().folder,
-        child=True,
+        system, request.parts, request.maps, engine=request.engine, bench=Bench.find().folder, child=True,
         timeout=request.timeout or TIMEOUT,
-    )
+    )  # fmt: skip
 
 
 def execute_run(

@@ -53,17 +53,10 @@ class RebalanceLoopTest(RebalanceTest):
         | NUISANCES
         | CORRECTIONS
         | type_b(
-            sources,
-            "mount",
-            "wobble",
-            "angle1",
-            "angle2",
-            "scale_factor",
-            "current",
-            "time",
+            sources, "mount", "wobble", "angle1", "angle2", "scale_factor", "current", "time",
             axis="standard uncertainty of the table axis against the vertical",
         )
-    )
+    )  # fmt: skip
     measured_data = MEASURED
     assumed = TableTest.assumed  # errors of the pulses are what the test finds
     windows = Windows.of(ripple=f"{FLOAT}.std")

@@ -61,14 +61,11 @@ class TorquerScaleFactor(ChannelTest, TableTest):
             "windows": Option(20, int, "readings of the angle over each range", 5, 500),
         }
         | type_b(
-            sources,
-            "angle1",
-            "angle2",
-            "time",
+            sources, "angle1", "angle2", "time",
             axis="standard uncertainty of the right angle between table axis and pole",
             mount="standard uncertainty of the input axis against the table axis",
         )
-    )
+    )  # fmt: skip
     noises = (*SDF_NOISES, "table.rumble", "source.meter")
     measured_data = MEASURED
     channels = ("table.angle", "source.i", "gyro.u", "table.motor")

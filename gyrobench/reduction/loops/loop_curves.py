@@ -106,17 +106,11 @@ def step_figure(
     size = f"{gate.amplitude:g}".replace("-", "−")
     cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
     return Response(
-        name=f"{gate.label}, {what}",
-        kind="step",
+        name=f"{gate.label}, {what}", kind="step",
         caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear model.",
-        x=t[pick].tolist(),
-        x_name="time",
-        x_unit="s",
-        y=(y[pick] / scale).tolist(),
-        y_name=what,
-        y_unit=unit,
+        x=t[pick].tolist(), x_name="time", x_unit="s", y=(y[pick] / scale).tolist(), y_name=what, y_unit=unit,
         curves=curves,
-    )
+    )  # fmt: skip
 
 
 def simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:

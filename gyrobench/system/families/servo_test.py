@@ -110,17 +110,12 @@ class ServoTest(ChannelTest, TableTest):
         | {"settle": Option(10.0, "s", "wait after the loop has closed", 0.5)}
         | TRACKING
         | type_b(
-            "unbalance",
-            "remount",
-            "time",
-            "wobble",
-            "angle1",
-            "angle2",
+            "unbalance", "remount", "time", "wobble", "angle1", "angle2",
             axis="standard uncertainty of the table axis, about each axis, each phase",
             mount="standard uncertainty of the input axis against the table axis",
         )
         | SUPPLY
-    )
+    )  # fmt: skip
     shorter: ClassVar[str] = "ask for less travel"  # what to do where a travel takes too long
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, "stand.base", "stand.mounts")
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "table.rumble")
