@@ -32,8 +32,10 @@ def readme_text(readme: Path, part: type[Component]) -> str:
         return f"{match[1]}:\n\n{tables(shared)}" if shared else match[0]
 
     text = SHARED.sub(rows, read_text(readme, UsageError))
-    if every := [d for n, d in declared.items() if f"| `{n}" not in text]:
-        text = text.replace("\n## Accuracy", f"\nIn none of these tables:\n\n{tables(every)}\n\n## Accuracy", 1)
+    if every := [d for n, d in declared.items() if not re.search(rf"^\| `{n}[`\[]", text, re.M)]:
+        text = text.replace(
+            "\n## Accuracy", f"\nBesides, as the part declares them:\n\n{tables(every)}\n\n## Accuracy", 1
+        )
     return LINK.sub(lambda m: "" if m[1] else m[2], text)
 
 

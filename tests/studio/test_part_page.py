@@ -12,8 +12,8 @@ from gyrobench.component import Input, Output, Parameter
 from gyrobench.packaging import load_part
 from gyrobench.studio.part_page import readme_text
 
-#: shares with its kind, with another part, with both, with nobody
-PARTS = ("estimator_aided", "compliant_gyro", "estimator_coloured", "cage")
+#: shares with its kind, with another part, with both, with nobody; has `steps` beside the `step` of every part
+PARTS = ("estimator_aided", "compliant_gyro", "estimator_coloured", "cage", "sequencer")
 
 
 @pytest.mark.parametrize("name", PARTS)
