@@ -33,9 +33,7 @@ def readme_text(readme: Path, part: type[Component]) -> str:
 
     text = SHARED.sub(rows, read_text(readme, UsageError))
     if every := [d for n, d in declared.items() if not re.search(rf"^\| `{n}[`\[]", text, re.M)]:
-        text = text.replace(
-            "\n## Accuracy", f"\nBesides, as the part declares them:\n\n{tables(every)}\n\n## Accuracy", 1
-        )
+        text = text.replace("\n## Accuracy", f"\nBesides, as declared:\n\n{tables(every)}\n\n## Accuracy", 1)
     return LINK.sub(lambda m: "" if m[1] else m[2], text)
 
 
