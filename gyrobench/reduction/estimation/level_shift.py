@@ -58,4 +58,5 @@ def _whitened(found: Findings, columns: Array) -> Array:
     if found.white:
         return columns if found.weights is None else columns * np.sqrt(found.weights)[:, None]
     one = tuple(np.array([m]) for m in found.est.noise.best)
-    return np.asarray(noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :])
+    out: Array = noise_model.whiten(found.t_start, found.t_end, columns, *one)[0][:, 0, :]
+    return out
