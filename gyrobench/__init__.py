@@ -37,27 +37,9 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "Comparison",
-    "Experiment",
-    "GyrobenchError",
-    "Record",
-    "Result",
-    "Run",
-    "SuiteExperiment",
-    "SuiteRun",
-    "campaign",
-    "compare",
-    "design",
-    "identify",
-    "load",
-    "load_suite",
-    "multisine",
-    "open_run",
-    "reduce",
-    "site",
-    "sweep",
-    "tune",
-]
+    "Comparison", "Experiment", "GyrobenchError", "Record", "Result", "Run", "SuiteExperiment", "SuiteRun", "campaign",
+    "compare", "design", "identify", "load", "load_suite", "multisine", "open_run", "reduce", "site", "sweep", "tune",
+]  # fmt: skip
 
 
 if not TYPE_CHECKING:  # a type checker would take any name for one of the module

@@ -1,7 +1,5 @@
 """``python -m gyrobench``: the commands, where no ``gyrobench`` is on the path."""
 
-from __future__ import annotations
-
 from gyrobench.commands.cli import main
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """The one name for an array of double precision numbers; shapes stand in the docstrings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

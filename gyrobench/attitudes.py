@@ -78,14 +78,9 @@ LEVEL = tuple(_LEVEL)
 POLAR = ("polar S", "polar N")
 
 
-def numbered_directions(latitude: float) -> dict[int, Array]:
-    """Return the unit vectors in (E, N, U) by number."""
-    return dict(enumerate(directions(latitude).values(), 1))
-
-
 def axes(x: int, y: int, latitude: float) -> Array:
     """Return the rows x, y, z = x cross y in (E, N, U) of two numbered directions, minus: the opposite."""
-    known = numbered_directions(latitude)
+    known = dict(enumerate(directions(latitude).values(), 1))
     first, second = (np.sign(k) * known[abs(k)] for k in (x, y))
     return np.array([first, second, np.cross(first, second)])
 

@@ -22,27 +22,10 @@ from gyrobench.arrays import Array
 from gyrobench.units import EARTH_RATE, G0
 
 __all__ = [
-    "EARTH_RATE",
-    "G0",
-    "MOUNTS",
-    "E",
-    "N",
-    "U",
-    "check_rotation",
-    "earth_rate_local",
-    "equatorial_base",
-    "equatorial_problems",
-    "gravity_problems",
-    "latitude_problems",
-    "normal_gravity",
-    "passive_z",
-    "polar_base",
-    "pole",
-    "rotation",
-    "rotation_problems",
-    "to_face",
-    "tumble_faces",
-]
+    "EARTH_RATE", "G0", "MOUNTS", "E", "N", "U", "check_rotation", "earth_rate_local", "equatorial_base",
+    "equatorial_problems", "gravity_problems", "latitude_problems", "normal_gravity", "passive", "passive_z",
+    "polar_base", "pole", "rotation", "rotation_problems", "to_face", "tumble_faces",
+]  # fmt: skip
 
 
 E = np.array([1.0, 0.0, 0.0])
@@ -96,12 +79,20 @@ def earth_rate_local(latitude: float, rate: float = EARTH_RATE) -> Array:
     return rate * pole(latitude)
 
 
+def passive(axis: int, angle: ArrayLike) -> Array:
+    """Coordinates in axes turned by +``angle`` (rad) about one of them (0, 1, 2), (..., 3, 3): ``v_new = R v_old``."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.zeros((*np.shape(angle), 3, 3))
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    R[..., axis, axis] = 1.0
+    R[..., second, second] = R[..., third, third] = c
+    R[..., second, third], R[..., third, second] = s, -s
+    return R
+
+
 def passive_z(angle: float) -> Array:
-    """Coordinates in axes turned by +``angle`` (rad) about the third axis: ``v_new = passive_z(angle)
-    v_old``.
-    """
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    """Return :func:`passive` about the third axis, of one angle."""
+    return passive(2, angle)
 
 
 def rotation(axis: ArrayLike, angle: float) -> Array:
@@ -114,8 +105,7 @@ def rotation(axis: ArrayLike, angle: float) -> Array:
         raise ValueError(f"rotation axis {n.tolist()} has no direction")
     x, y, z = n / size
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    out: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
-    return out
+    return np.asarray(np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k))
 
 
 def check_rotation(matrix: ArrayLike, name: str, tolerance: float = 1e-9) -> Array:
@@ -195,8 +185,7 @@ def tumble_faces(latitude: float) -> dict[str, Array]:
 
 def to_face(vector: ArrayLike, face: ArrayLike, base: ArrayLike, angle: float) -> Array:
     """A local (E, N, U) vector in face axes with the table at ``angle`` (rad)."""
-    out: Array = np.asarray(face) @ passive_z(angle) @ np.asarray(base) @ np.asarray(vector)
-    return out
+    return np.asarray(np.asarray(face) @ passive_z(angle) @ np.asarray(base) @ np.asarray(vector))
 
 
 def rows(matrix: Sequence[Sequence[float]]) -> list[float]:

@@ -44,35 +44,11 @@ if TYPE_CHECKING:
     import pandas
 
 __all__ = [
-    "NO_VERDICT",
-    "AllanDeviation",
-    "AllanSlope",
-    "Autocorrelation",
-    "BudgetLine",
-    "Coefficient",
-    "Curve",
-    "DriftColumn",
-    "DriftRecordResult",
-    "DriftTestResult",
-    "Harmonic",
-    "Limit",
-    "LoopResult",
-    "PowerSpectrum",
-    "Reason",
-    "Response",
-    "Result",
-    "Series",
-    "SetBy",
-    "Specification",
-    "StepChange",
-    "StepCheck",
-    "SuiteComparison",
-    "SuiteResult",
-    "Table",
-    "Test",
-    "TypeB",
-    "VarianceShare",
-]
+    "NO_VERDICT", "AllanDeviation", "AllanSlope", "Autocorrelation", "BudgetLine", "Coefficient", "Curve",
+    "DriftColumn", "DriftRecordResult", "DriftTestResult", "Harmonic", "Limit", "LoopResult", "PowerSpectrum", "Reason",
+    "Response", "Result", "Series", "SetBy", "Specification", "StepChange", "StepCheck", "SuiteComparison",
+    "SuiteResult", "Table", "Test", "TypeB", "VarianceShare",
+]  # fmt: skip
 
 #: what :meth:`Result.array` reads of a coefficient
 NUMBERS: Mapping[str, Callable[[Coefficient], float | None]] = {

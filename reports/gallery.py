@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from gyrobench.report.style import BLUE, GRID, INK, MUTED, ORANGE, PAPER, PURPLE, SHADE, THEMED
 
@@ -47,6 +48,15 @@ def on_any_page(svg: str) -> str:
     for colour, shown in ON_ANY_PAGE.items():
         svg = svg.replace(colour, shown)
     return svg.replace("<svg ", f'<svg fill="{ON_ANY_PAGE[INK]}" ', 1)
+
+
+def save(figure: Any, target: Path, salt: str) -> None:
+    """Save a figure of matplotlib as a picture for a page of any colour; salt: its ids are the same each time."""
+    import matplotlib.pyplot as plt
+
+    plt.rcParams["svg.hashsalt"] = salt
+    figure.savefig(target, metadata={"Date": None})
+    target.write_text(on_any_page(target.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def figure(system: str) -> str:

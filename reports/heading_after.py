@@ -25,7 +25,7 @@ from gyrobench.bench import Bench, standard_folder
 from gyrobench.units import DEG, DPH
 from gyrobench.workflow.instruments import Instrument, find_instrument
 from gyrobench.workflow.sheet_values import FLOOR
-from reports.gallery import on_any_page
+from reports.gallery import save
 from systems.north_finder.after import RandomErrors, heading, in_words, position, reached_after, running
 
 PAGE = standard_folder() / "docs" / "heading_after_minutes.md"
@@ -168,9 +168,7 @@ def draw(every: list[Sheet]) -> None:
     keys = [plt.Line2D([], [], color=c, label=k) for k, c in COLOURS.items()]
     keys.append(plt.Line2D([], [], color="0.3", linestyle="--", label="bias instability not stated"))
     figure.legend(handles=keys, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    plt.rcParams["svg.hashsalt"] = "heading"
-    figure.savefig(PICTURE, metadata={"Date": None})
-    PICTURE.write_text(on_any_page(PICTURE.read_text(encoding="utf-8")), encoding="utf-8")
+    save(figure, PICTURE, "heading")
 
 
 def main() -> None:

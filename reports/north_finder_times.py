@@ -19,7 +19,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from reports.gallery import on_any_page
+from reports.gallery import save
 from systems.north_finder import plans
 
 DEG = math.pi / 180.0
@@ -54,9 +54,7 @@ def main() -> None:
         plt.Line2D([], [], color=c, label=g) for c, g in zip(("#1b6ca8", "#c2571a", "#3b7d3a"), GYROS, strict=True)
     ]
     figure.legend(handles=[*keys, *grades], loc="outside lower center", ncols=7, fontsize=8, frameon=False)
-    plt.rcParams["svg.hashsalt"] = "north"
-    figure.savefig(target, metadata={"Date": None})
-    target.write_text(on_any_page(target.read_text(encoding="utf-8")), encoding="utf-8")
+    save(figure, target, "north")
     print(target)
 
 

@@ -20,7 +20,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from reports.gallery import on_any_page
+from reports.gallery import save
 from systems.platform_alignment import planning, plans
 
 DEG, ARCMIN = math.pi / 180.0, math.pi / 10800.0
@@ -58,9 +58,7 @@ def main() -> None:
         plt.Line2D([], [], color="0.2", linestyle=s, label=n) for s, n in (("-", "one position"), ("--", "two"))
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False)
-    plt.rcParams["svg.hashsalt"] = "alignment"
-    figure.savefig(target, metadata={"Date": None})
-    target.write_text(on_any_page(target.read_text(encoding="utf-8")), encoding="utf-8")
+    save(figure, target, "alignment")
     print(target)
 
 

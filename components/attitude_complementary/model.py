@@ -2,13 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Parameter, sampled
 from gyrobench.component.blocks.angle import wrapped
-from gyrobench.component.blocks.attitude import (
-    AttitudeEstimator,
-    angles_of,
-    matrix_of,
-    quaternion_of,
-    turned,
-)
+from gyrobench.component.blocks.attitude import AttitudeEstimator, angles_of, matrix_of, quaternion_of, turned
 from gyrobench.component.math import cross, sqrt, vector
 
 

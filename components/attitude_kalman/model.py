@@ -2,13 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Output, sampled
 from gyrobench.component.blocks.angle import wrapped
-from gyrobench.component.blocks.attitude import (
-    ZEROS,
-    AttitudeEstimator,
-    SensorNoise,
-    matrix_of,
-    quaternion_of,
-)
+from gyrobench.component.blocks.attitude import ZEROS, AttitudeEstimator, SensorNoise, matrix_of, quaternion_of
 from gyrobench.component.math import Number, cos, exp, index, sin, sqrt, vector
 
 

@@ -39,10 +39,7 @@ class CurrentSource(Component):
     @sampled(every=1)
     def tick(self) -> None:
         wanted = self.command if self.mode == SERVO else 0.0
-        self.refuse(
-            wanted > self.i_max or wanted < -self.i_max,
-            "command {command} A is beyond i_max = {i_max} A",
-        )
+        self.refuse(wanted > self.i_max or wanted < -self.i_max, "command {command} A is beyond i_max = {i_max} A")
         most = self.slew * self.h
         self.level = self.level + clip(wanted - self.level, -most, most)
 

@@ -85,8 +85,7 @@ class EstimatorWavelet(RunningMedians, SampledEstimator):
             )
             kind = 1.0 if self.moments == 1.0 else 2.0
         self.refuse(
-            kind == 4.0 and self.J > 5.0,
-            "J = {J}: coif4 (wavelet = 4) has 5 levels at most, 713 readings late",
+            kind == 4.0 and self.J > 5.0, "J = {J}: coif4 (wavelet = 4) has 5 levels at most, 713 readings late"
         )
         self.long = taps(kind)
         self.short = short_taps(kind)

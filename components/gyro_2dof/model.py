@@ -222,16 +222,14 @@ class Gyro2dof(Component):
         self.refuse(n < 9.0 and self.Dy_x != 0.0, "Dy_x must be 0 with terms_y = {terms_y} (from 9 on)")
         self.refuse(n < 10.0 and self.Dy_xx != 0.0, "Dy_xx must be 0 with terms_y = {terms_y} (from 10 on)")
         self.refuse(
-            (self.J_x > 0.0) != (self.J_y > 0.0),
-            "J_x = {J_x} and J_y = {J_y} kg.m2: give both (nutation) or neither",
+            (self.J_x > 0.0) != (self.J_y > 0.0), "J_x = {J_x} and J_y = {J_y} kg.m2: give both (nutation) or neither"
         )
         self.refuse(
             self.J_x == 0.0 and (self.C_x > 0.0 or self.C_y > 0.0),
             "C_x and C_y must be 0 without nutation (J_x = J_y = 0)",
         )
         self.refuse(
-            self.full and self.J_x == 0.0,
-            "full = 1 (gimbals at full size) needs nutation: J_x and J_y above 0 kg.m2",
+            self.full and self.J_x == 0.0, "full = 1 (gimbals at full size) needs nutation: J_x and J_y above 0 kg.m2"
         )
         springs = self.K_q != 0.0 or self.K_phi > 0.0
         self.refuse(self.full and springs, "K_q and K_phi are of small angles: they must be 0 with full = 1")

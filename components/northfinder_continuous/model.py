@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from gyrobench.component.blocks.north import RotatingFinder
 
 

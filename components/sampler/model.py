@@ -104,8 +104,7 @@ class Sampler(Component):
             )
             self.refuse(self.window <= 0.0, "window = {window} must be above 0 (s for gate 1, rad for gate 2)")
             self.refuse(
-                self.gate == 1.0 and self.window < 4.0 * self.h,
-                "window = {window} s is shorter than four steps",
+                self.gate == 1.0 and self.window < 4.0 * self.h, "window = {window} s is shorter than four steps"
             )
             self.kind = self.gate
             self.part = self.phase

@@ -49,9 +49,7 @@ class Sequencer(Component):
     settle = Parameter([0.1] * 99, "s", "time between the end of the move and the gate", min=0.0)
     dwell = Parameter([1.0] * 99, "s", "time the gate is open (hold, index, servo, each stop; rate without travel)")
     travel = Parameter(
-        [0.0] * 99,
-        "rad",
-        "angle turned while the gate is open (rate, 0: by dwell; servo: at least); all stops (step)",
+        [0.0] * 99, "rad", "angle turned while the gate is open (rate, 0: by dwell; servo: at least); all stops (step)"
     )
     steps = Parameter([0.0] * 99, "rad", "angle from stop to stop, with its sense (step)")
     windows = Parameter([0.5] * 99, "1", "length of one window: s (hold, index, servo, step) or rad (rate)")
@@ -139,8 +137,7 @@ class Sequencer(Component):
             det = det - m[1] * (m[3] * m[8] - m[5] * m[6])
             det = det + m[2] * (m[3] * m[7] - m[4] * m[6])
             self.refuse(
-                det < 0.0,
-                "phase {bad_phase}: face {bad_face} is left-handed (determinant -1): reverse one row",
+                det < 0.0, "phase {bad_phase}: face {bad_face} is left-handed (determinant -1): reverse one row"
             )
 
     @sampled(every=1)

@@ -37,8 +37,7 @@ class TableCommand(Component):
 
     clock = SampleClock(period="period")
     reference = CountCommand(
-        period="period",
-        rate_step=Parameter(0.01 * ERU, "rad/s", "step of the rate (0.01 ERU); 0: none", min=0.0),
+        period="period", rate_step=Parameter(0.01 * ERU, "rad/s", "step of the rate (0.01 ERU); 0: none", min=0.0)
     )
 
     def start(self) -> None:

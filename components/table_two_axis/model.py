@@ -51,8 +51,7 @@ class TableTwoAxis(TwoAxisTable):
     def start(self) -> None:
         self.refuse(self.limits_y[0] >= self.limits_y[1], "limits_y: the lower must be below the upper")
         self.refuse(
-            self.angle0[1] < self.limits_y[0] or self.angle0[1] > self.limits_y[1],
-            "angle0[2] is outside limits_y",
+            self.angle0[1] < self.limits_y[0] or self.angle0[1] > self.limits_y[1], "angle0[2] is outside limits_y"
         )
         self.outer.rest(self.angle0[0])
         self.inner.rest(self.angle0[1])

@@ -9,29 +9,13 @@ from typing import Annotated
 import typer
 
 from gyrobench.bench import UsageError
+from gyrobench.commands import options
 from gyrobench.commands.app import app, echo
-from gyrobench.commands.options import (
-    Columns,
-    Json,
-    Map,
-    Part,
-    Retry,
-    Scheduler,
-    Seed,
-    Set,
-    Spec,
-    Store,
-    Strict,
-    System,
-    WithCertificate,
-    WithSite,
-    Workers,
-)
 
 
 @app.command()
 def sweep(
-    system: System,
+    system: options.System,
     over: Annotated[
         list[str] | None,
         typer.Option(
@@ -48,11 +32,11 @@ def sweep(
         Path | None, typer.Option(metavar="FILE.csv", help='One row a point, columns "name [unit]".')
     ] = None,
     data: Annotated[str | None, typer.Option(metavar="'DIR/*.csv'", help="Reduce measured files, a run each.")] = None,
-    columns: Columns = None,
-    values: Set = None,
-    part: Part = None,
-    mapping: Map = None,
-    spec: Spec = None,
+    columns: options.Columns = None,
+    values: options.Set = None,
+    part: options.Part = None,
+    mapping: options.Map = None,
+    spec: options.Spec = None,
     fixed_design: Annotated[
         bool,
         typer.Option(
@@ -66,14 +50,14 @@ def sweep(
     ] = None,
     time_limit: Annotated[str | None, typer.Option(metavar="TIME", help="Of one run, default 1h.")] = None,
     memory_limit: Annotated[str | None, typer.Option(metavar="SIZE", help="Of a worker, for example 1GB.")] = None,
-    out: Store = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    retry: Retry = False,
-    site: WithSite = False,
-    certificate: WithCertificate = False,
-    strict: Strict = False,
-    as_json: Json = False,
+    out: options.Store = None,
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
+    retry: options.Retry = False,
+    site: options.WithSite = False,
+    certificate: options.WithCertificate = False,
+    strict: options.Strict = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run a system over values and seeds, a row each.
 
@@ -105,13 +89,13 @@ def sweep(
 @app.command()
 def campaign(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Definition of the campaign.")],
-    out: Store = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    retry: Retry = False,
-    site: WithSite = False,
-    strict: Strict = False,
-    as_json: Json = False,
+    out: options.Store = None,
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
+    retry: options.Retry = False,
+    site: options.WithSite = False,
+    strict: options.Strict = False,
+    as_json: options.Json = False,
 ) -> None:
     """Execute a campaign: many runs, a row of results each.
 
@@ -157,7 +141,7 @@ def site(
 
 @app.command()
 def design(
-    system: System,
+    system: options.System,
     want: Annotated[
         list[str] | None,
         typer.Option(
@@ -183,11 +167,11 @@ def design(
     count: Annotated[
         int, typer.Option(metavar="N", min=0, help="Count the prediction in N runs of the plan.")
     ] = 0,
-    values: Set = None,
-    part: Part = None,
-    mapping: Map = None,
-    seed: Seed = 1,
-    as_json: Json = False,
+    values: options.Set = None,
+    part: options.Part = None,
+    mapping: options.Map = None,
+    seed: options.Seed = 1,
+    as_json: options.Json = False,
 ) -> None:  # fmt: skip
     """Find the shortest plan of a test for wanted uncertainties.
 

@@ -79,15 +79,9 @@ def identify(
     if twin is not None and not fit:
         raise UsageError("--twin: what is to be found? Name the parameters, such as --fit J --fit viscous")
     found = identify_loop(
-        file,
-        at=at,
-        period=period,
-        band=parse_band(band),
-        columns=columns,
-        fit=fit or [],
-        want=want or [],
+        file, at=at, period=period, band=parse_band(band), columns=columns, fit=fit or [], want=want or [],
         against=against,
-    )
+    )  # fmt: skip
     echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False) if as_json else str(found))
     if twin is not None and found.fit is not None:
         write_whole(twin, found.fit.toml(found.record.name).encode())

@@ -1,7 +1,5 @@
 """Arguments and options that several commands share, and the values that some of them accept."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated

@@ -8,52 +8,29 @@ from typing import Annotated
 import typer
 
 from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.commands import options
 from gyrobench.commands.app import app, echo, exit_on_fail
-from gyrobench.commands.options import (
-    Columns,
-    Coupling,
-    Data,
-    Engine,
-    FitTo,
-    Force,
-    From,
-    FromRun,
-    Json,
-    Language,
-    Map,
-    NoReport,
-    Order,
-    Out,
-    Part,
-    Resume,
-    Set,
-    Spec,
-    Strict,
-    System,
-    TableFormat,
-    WithCertificate,
-)
 
 
 @app.command()
 def run(
-    system: System,
-    values: Set = None,
-    part: Part = None,
-    mapping: Map = None,
+    system: options.System,
+    values: options.Set = None,
+    part: options.Part = None,
+    mapping: options.Map = None,
     instrument: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME", help="Data sheet (instruments/NAME.toml, or a file) of a gyro, of a turntable.  Repeatable."
         ),
     ] = None,
-    from_run: FromRun = None,
+    from_run: options.FromRun = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the noise; default 1.", min=0)] = None,
     engine: Annotated[
-        Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
+        options.Engine | None, typer.Option(help="Default: native with a C compiler, linked in long runs.")
     ] = None,
     step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, for example 1ms.")] = None,
-    coupling: Coupling = Order.sequential,
+    coupling: options.Coupling = options.Order.sequential,
     check_step: Annotated[
         bool | None,
         typer.Option(
@@ -66,16 +43,16 @@ def run(
         str | None,
         typer.Option(metavar="TIME", help="Stop the run when one call of an FMU takes longer.  Default: 1min."),
     ] = None,
-    spec: Spec = None,
-    strict: Strict = False,
-    no_report: NoReport = False,
+    spec: options.Spec = None,
+    strict: options.Strict = False,
+    no_report: options.NoReport = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder of the run; default reports/out/SYSTEM/ID.")
     ] = None,
-    force: Force = False,
-    resume: Resume = False,
-    language: Language = "en",
-    as_json: Json = False,
+    force: options.Force = False,
+    resume: options.Resume = False,
+    language: options.Language = "en",
+    as_json: options.Json = False,
 ) -> None:
     """Run a system: record, reduction, report.
 
@@ -109,45 +86,36 @@ def run(
     elif title and not test["instrument"]:
         test.set("instrument", title)
     request = RunRequest(
-        parts=parts,
-        maps=maps,
-        seed=getattr(test, "seed", 1) if seed is None else seed,
-        engine=engine.value if engine else None,
-        step=time_step,
-        out=out,
-        force=force,
-        spec=spec,
-        check_step=check_step,
-        timeout=parse_time("--timeout", timeout),
-        resume=resume,
-        formats=("json",) if no_report else FORMATS,
-    )
+        parts=parts, maps=maps, seed=getattr(test, "seed", 1) if seed is None else seed,
+        engine=engine.value if engine else None, step=time_step, out=out, force=force, spec=spec, check_step=check_step,
+        timeout=parse_time("--timeout", timeout), resume=resume, formats=("json",) if no_report else FORMATS,
+    )  # fmt: skip
     with reports_in(language, test.name, Bench.find().folder):
         exit_on_fail(print_runs.run(request, test, as_json), strict)
 
 
 @app.command()
 def reduce(
-    system: System,
-    data: Data = None,
-    columns: Columns = None,
-    source: From = None,
-    values: Set = None,
-    from_run: FromRun = None,
-    part: Part = None,
-    mapping: Map = None,
+    system: options.System,
+    data: options.Data = None,
+    columns: options.Columns = None,
+    source: options.From = None,
+    values: options.Set = None,
+    from_run: options.FromRun = None,
+    part: options.Part = None,
+    mapping: options.Map = None,
     template: Annotated[
         bool, typer.Option("--template", help="Print an empty record: its columns, their units, the values to state.")
     ] = False,
-    spec: Spec = None,
-    strict: Strict = False,
-    no_report: NoReport = False,
-    fit_to: FitTo = None,
-    out: Out = None,
-    force: Force = False,
-    language: Language = "en",
-    certificate: WithCertificate = False,
-    as_json: Json = False,
+    spec: options.Spec = None,
+    strict: options.Strict = False,
+    no_report: options.NoReport = False,
+    fit_to: options.FitTo = None,
+    out: options.Out = None,
+    force: options.Force = False,
+    language: options.Language = "en",
+    certificate: options.WithCertificate = False,
+    as_json: options.Json = False,
 ) -> None:
     """Reduce measured data, or a run of another tool, and report.
 
@@ -201,11 +169,11 @@ def reduce(
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
-    spec: Spec = None,
-    strict: Strict = False,
-    fit_to: FitTo = None,
-    language: Language = "en",
-    as_json: Json = False,
+    spec: options.Spec = None,
+    strict: options.Strict = False,
+    fit_to: options.FitTo = None,
+    language: options.Language = "en",
+    as_json: options.Json = False,
 ) -> None:
     """Reduce the record of a run again and rewrite its report.
 
@@ -226,8 +194,8 @@ def report(
 @app.command()
 def compare(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders; the first is the baseline.")],
-    out: Out = None,
-    as_json: Json = False,
+    out: options.Out = None,
+    as_json: options.Json = False,
 ) -> None:
     """Compare runs side by side, or two campaigns.
 
@@ -250,7 +218,8 @@ def compare(
 def record(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     to: Annotated[
-        TableFormat, typer.Option("--to", help="csv: a file a table, those of the report in report/; xlsx: a workbook.")
+        options.TableFormat,
+        typer.Option("--to", help="csv: a file a table, those of the report in report/; xlsx: a workbook."),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder; default: of the run, csv/ in it for csv.")

@@ -55,8 +55,7 @@ def variances(information: Array, wanted: Array) -> Array:
     inverse, estimable = _inverse(information)
     if not np.allclose(wanted @ estimable, wanted, atol=1e-7 * float(np.max(np.abs(wanted), initial=1e-300))):
         raise SingularDesignError("the candidates do not determine every wanted value")
-    out: Array = np.einsum("qi,ij,qj->q", wanted, inverse, wanted)
-    return out
+    return np.asarray(np.einsum("qi,ij,qj->q", wanted, inverse, wanted))
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +23,7 @@ from gyrobench.report.page_model import (
     Section,
     Text,
     columns,
+    document_id,
     pictures,
     text_cell,
 )
@@ -53,7 +52,7 @@ def write_bearing(design: BearingDesign, folder: Path) -> dict[str, Path]:
 
 def page(d: BearingDesign) -> Page:
     """Return the page."""
-    report_id = hashlib.sha256(json.dumps(d.as_dict(), sort_keys=True).encode()).hexdigest()[:12]
+    report_id = document_id(d.as_dict())
     given = [Row([text_cell(n), text_cell(f"{getattr(d.bearing, n):.6g} {display(u) if u != '1' else ''}".rstrip())])
              for n, u in UNITS.items()]  # fmt: skip
     found = [Row([text_cell(n), text_cell(v, "strong")]) for n, v in rows(d)]

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from gyrobench.report.plain_text import align_columns
 from gyrobench.report.result_json import plain
 
 SHOWN = 12  # places in the table of the plan
@@ -104,7 +105,7 @@ def format_design(found: DesignedTest) -> str:
             u, error, _ = found.counted.get(name, (float("nan"), float("nan"), 0))
             row += [f"{u:.3g}", f"{error:.3g}"]
     chosen = found.plan[0][0] if found.tried else f"{len(found.plan)} visits"
-    lines = [f"{found.system}: {chosen}, {_time(found.time)}", "", *_table(rows), ""]
+    lines = [f"{found.system}: {chosen}, {_time(found.time)}", "", *align_columns(rows, {0, 5}), ""]
     if found.tried:
         each = [f"{n} {x:.3g} u/wanted" if found.timed else f"{n} {_time(x)}" for n, x in found.tried]
         lines += [f"Compared: {'; '.join(each)}.", "", _saving(found), ""]
@@ -152,16 +153,6 @@ def _time(seconds: float) -> str:
     if seconds < 600.0:
         return f"{seconds:.4g} s"
     return f"{seconds / 60.0:.4g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.4g} h"
-
-
-def _table(rows: list[list[str]]) -> list[str]:
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [
-        "  ".join(
-            cell.ljust(w) if k in (0, 5) else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    ]
 
 
 def format_suite_design(found: DesignedSuite) -> str:

@@ -66,13 +66,9 @@ def export_container(
     with tempfile.TemporaryDirectory(prefix="gyrobench-") as name:
         folder = Path(name)
         node = AssemblyNode(
-            path.name,
-            step_size=assembly.system.step,
-            sequential=True,
-            auto_link=False,
-            auto_input=False,
+            path.name, step_size=assembly.system.step, sequential=True, auto_link=False, auto_input=False,
             auto_output=False,
-        )
+        )  # fmt: skip
         gain = gain_fmu(bench) if gains.parts or in_si else b""
         for part in (*gains.order, *in_si.values()):
             data = assembly.paths[part].read_bytes() if part in assembly.paths else gain

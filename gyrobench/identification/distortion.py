@@ -107,7 +107,5 @@ def with_distortion(excited: LineAmplitudes, omitted: LineAmplitudes, period: fl
     diagonal, own = (np.einsum("nkk->nk", c).real[:, 1:] for c in (cov, excited.cov))
     above = np.mean(diagonal / np.maximum(own, 1e-300), axis=1) > 1.0
     return replace(
-        excited,
-        cov=np.where(above[:, None, None], cov, excited.cov),
-        dof=np.where(above, float(count), excited.dof),
+        excited, cov=np.where(above[:, None, None], cov, excited.cov), dof=np.where(above, float(count), excited.dof)
     )

@@ -18,6 +18,7 @@ from gyrobench.identification.loop_record import LoopRecord
 from gyrobench.identification.plant_fit import PlantFit, shown_values
 from gyrobench.identification.ratios import MeasuredResponse
 from gyrobench.identification.wanted_margins import MarginVerdict
+from gyrobench.report.plain_text import align_columns
 
 
 @dataclass(frozen=True)
@@ -115,10 +116,10 @@ class LoopIdentification:
             [m.name, m.shown(m.value), f"{m.shown(m.low)} to {m.shown(m.high)}", f"at {m.f:.4g} Hz"]
             for m in self.margins
         ]
-        lines += _aligned([["", "", "95 %", ""], *rows]) if rows else []
+        lines += align_columns([["", "", "95 %", ""], *rows], {0, 1, 2, 3}, "  ") if rows else []
         lines += ["", *(f"  {v}" for v in self.verdicts)] if self.verdicts else []
         if self.fit:
-            lines += ["", "plant:", *_aligned([["", "", "95 %"], *shown_values(self.fit)])]
+            lines += ["", "plant:", *align_columns([["", "", "95 %"], *shown_values(self.fit)], {0, 1, 2}, "  ")]
             lines += [f"  {self.fit.sentence}"]
         if self.linear:
             levels = " and ".join(
@@ -127,11 +128,6 @@ class LoopIdentification:
             lines += ["", f"no nonlinearity above the noise, which is {levels} of the excited lines".replace("-", "−")]
         lines += ["", *(f"note: {n}" for n in self.notes)] if self.notes else []
         return "\n".join(lines)
-
-
-def _aligned(rows: list[list[str]]) -> list[str]:
-    width = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
-    return [("  " + "  ".join(c.ljust(n) for c, n in zip(r, width, strict=True))).rstrip() for r in rows]
 
 
 def _points(g: MeasuredResponse) -> dict[str, list[float | None]]:

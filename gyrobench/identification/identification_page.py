@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ from gyrobench.identification.loop_record import PLANT_INPUT, PLANT_OUTPUT
 from gyrobench.identification.plant_fit import shown_values
 from gyrobench.identification.plant_model import PARAMETERS
 from gyrobench.report import FORMATS
+from gyrobench.report.numbers import minus
 from gyrobench.report.page_model import (
     BulletList,
     Page,
@@ -26,7 +25,9 @@ from gyrobench.report.page_model import (
     Section,
     Text,
     columns,
+    document_id,
     pictures,
+    remarks,
     text_cell,
 )
 from gyrobench.report.report_files import write_files
@@ -44,7 +45,7 @@ def write_identification(found: LoopIdentification, folder: Path, formats: Seque
 def page(t: LoopIdentification) -> Page:
     """Return the page."""
     told = {k: v for k, v in t.as_dict().items() if k != "seconds"}
-    report_id = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+    report_id = document_id(told)
     head = [
         ("Report", report_id),
         ("File", t.record.name),
@@ -55,7 +56,9 @@ def page(t: LoopIdentification) -> Page:
     with styled():
         sections = [
             Section(
-                "Margins", "margins", [_margins(t), *_verdicts(t), *_notes(t), *(_near(t) if t.record.closed else [])]
+                "Margins",
+                "margins",
+                [_margins(t), *_verdicts(t), *remarks(t.notes), *(_near(t) if t.record.closed else [])],
             ),
             *(_loop(t) if t.record.closed else []),
             Section("Plant", "plant-section", _plant(t)),
@@ -64,11 +67,6 @@ def page(t: LoopIdentification) -> Page:
             Section("Method", "method", _method(t)),
         ]
     return Page(f"Identified loop: {t.record.name}", report_id, head, sections, what="Identification").finish()
-
-
-def minus(text: str) -> str:
-    """Return a number's text with the sign of print."""
-    return text.replace("-", "−")
 
 
 def _margins(t: LoopIdentification) -> Any:
@@ -92,11 +90,9 @@ def _verdicts(t: LoopIdentification) -> list[Any]:
     return [PageTable(columns("wanted", "verdict", "", wide=[""]), rows, caption)]
 
 
-def _notes(t: LoopIdentification) -> list[Any]:
-    return [BulletList([f"{n[:1].upper()}{n[1:]}." for n in t.notes], warn=True)] if t.notes else []
-
-
 def _near(t: LoopIdentification) -> list[Any]:
+    if not t.record.closed:
+        return []
     return pictures(
         Picture("nichols", draw.nichols(t), "Gain over phase of L; inside the dashed curve the disk margin is smaller.",
                 "Nichols plot of the open loop", half=True),

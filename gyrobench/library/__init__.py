@@ -48,27 +48,9 @@ if TYPE_CHECKING:
     from gyrobench.tuning.written_loop import TunedLoop
 
 __all__ = [
-    "Comparison",
-    "Experiment",
-    "GyrobenchError",
-    "Record",
-    "Result",
-    "Run",
-    "SuiteExperiment",
-    "SuiteRun",
-    "campaign",
-    "compare",
-    "design",
-    "identify",
-    "load",
-    "load_suite",
-    "multisine",
-    "open_run",
-    "reduce",
-    "site",
-    "sweep",
-    "tune",
-]
+    "Comparison", "Experiment", "GyrobenchError", "Record", "Result", "Run", "SuiteExperiment", "SuiteRun", "campaign",
+    "compare", "design", "identify", "load", "load_suite", "multisine", "open_run", "reduce", "site", "sweep", "tune",
+]  # fmt: skip
 
 
 @checked
@@ -258,15 +240,9 @@ def identify(
 
     limits = parse_band(band) if isinstance(band, str) else band
     return identify_loop(
-        Path(data),
-        at=at,
-        period=period,
-        band=limits,
-        columns=None if columns is None else Path(columns),
-        fit=fit,
-        want=want,
-        against=None if against is None else Path(against),
-    )
+        Path(data), at=at, period=period, band=limits, columns=None if columns is None else Path(columns), fit=fit,
+        want=want, against=None if against is None else Path(against),
+    )  # fmt: skip
 
 
 @checked

@@ -34,7 +34,8 @@ def linked_files(parts: Mapping[str, type[Component]]) -> dict[str, str]:
     for name, cls in parts.items():
         model = c_source(cls, "")
         files[f"part_{name}.c"] = model
-        names = list(dict.fromkeys(n for groups in DEFINED.findall(files["core.h"] + model) for n in groups if n))
+        text = files["core.h"] + files["integration.h"] + model
+        names = list(dict.fromkeys(n for groups in DEFINED.findall(text) for n in groups if n))
         lines = [f"#define {n} {n}_{name}" for n in names]
         lines += [f'#include "part_{name}.c"', *(f"#undef {n}" for n in (*names, *MACRO.findall(model)))]
         blocks.append("\n".join(lines))

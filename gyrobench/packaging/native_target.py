@@ -173,7 +173,8 @@ def header_folder() -> Path:
 
 def runtime_files() -> dict[str, str]:
     """Return what model.c includes, by name."""
-    files = {n: (HERE / n).read_text(encoding="utf-8") for n in ("core.h", "functions.h", "noise.h", "elementary.h")}
+    names = ("core.h", "integration.h", "functions.h", "noise.h", "elementary.h")
+    files = {n: (HERE / n).read_text(encoding="utf-8") for n in names}
     return files | {"elementary_tables.h": elementary_tables.tables()}
 
 

@@ -12,16 +12,6 @@ from gyrobench.report.specification import SpecificationError, check_units, load
 from gyrobench.result_content import ResultError
 
 __all__ = [
-    "FORMATS",
-    "NAMES",
-    "ReportError",
-    "ResultError",
-    "SpecificationError",
-    "check_units",
-    "compare",
-    "content_dir",
-    "load",
-    "load_specification",
-    "report_id",
-    "write",
-]
+    "FORMATS", "NAMES", "ReportError", "ResultError", "SpecificationError", "check_units", "compare", "content_dir",
+    "load", "load_specification", "report_id", "write",
+]  # fmt: skip

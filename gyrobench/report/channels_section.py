@@ -5,27 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from gyrobench.report import style
 from gyrobench.report.page_model import Picture, Section, pictures
 from gyrobench.report.plots import plain_log, short
 from gyrobench.report.result_json import Report
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    WIDE,
-    axis_label,
-    chart,
-    figure,
-    svg,
-)
 from gyrobench.report.tables import method_table
 from gyrobench.result import DriftColumn, DriftRecordResult, Table
 
-COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
+COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
 MARKS = ("o", "s", "^", "D", "v", "P")
 BY_TIME = "correlation_by_time"
 WIDE_HEADS = ("finding", "remarks", "amplitudes", "quantity")
@@ -62,7 +49,7 @@ def sections(report: Report[DriftRecordResult]) -> list[Section]:
 def deviations(columns: Sequence[DriftColumn], key: str) -> str:
     """Return the Allan deviations with the models, a panel for each unit."""
     units = list(dict.fromkeys(c.unit for c in columns))
-    fig, axes = figure(WIDE, 84, ncols=len(units))
+    fig, axes = style.figure(style.WIDE, 84, ncols=len(units))
     drawn = False
     for ax, unit in zip(axes[0], units, strict=True):
         ax.set_xscale("log")
@@ -80,10 +67,10 @@ def deviations(columns: Sequence[DriftColumn], key: str) -> str:
             ax.set_ylim(0.5 * min(every), 2.0 * max(every))
             plain_log(ax, 4.0 * max(every) / min(every))
             drawn = True
-        ax.set_xlabel(axis_label("averaging time", "s"))
-        ax.set_ylabel(axis_label("Allan deviation", unit))
+        ax.set_xlabel(style.axis_label("averaging time", "s"))
+        ax.set_ylabel(style.axis_label("Allan deviation", unit))
         ax.legend(loc="best", frameon=False)
-    return svg(fig, key) if drawn else ""
+    return style.svg(fig, key) if drawn else ""
 
 
 def correlation(table: Table, key: str) -> str:
@@ -93,19 +80,19 @@ def correlation(table: Table, key: str) -> str:
     shown = table.rows[:ROWS]
     if not shown:
         return ""
-    fig, ax = chart(WIDE, 16 + 4.6 * len(shown))
+    fig, ax = style.chart(style.WIDE, 16 + 4.6 * len(shown))
     ax.grid(False)
     for i, row in enumerate(shown):
         for j, r in enumerate(row[1:]):
             if r is None:
                 continue
-            colour, depth = (BLUE if r > 0.0 else VERMILION), 0.7 * min(1.0, abs(r))
+            colour, depth = (style.BLUE if r > 0.0 else style.VERMILION), 0.7 * min(1.0, abs(r))
             ax.add_patch(Rectangle((j - 0.47, i - 0.44), 0.94, 0.88, facecolor=colour, alpha=depth, linewidth=0))
             text = f"{100.0 * r:.0f}".replace("-", "−")
-            ax.text(j, i, "0" if text == "−0" else text, ha="center", va="center", color=INK, fontsize=6.5)
+            ax.text(j, i, "0" if text == "−0" else text, ha="center", va="center", color=style.INK, fontsize=6.5)
     ax.set_xlim(-0.5, len(table.columns) - 1.5)
     ax.set_ylim(len(shown) - 0.5, -0.5)
     ax.set_xticks(range(len(table.columns) - 1), [str(h).removesuffix(" s") for h in table.columns[1:]])
     ax.set_yticks(range(len(shown)), [short(str(row[0]), 28) for row in shown])
-    ax.set_xlabel(axis_label("averaging time", "s"))
-    return svg(fig, key)
+    ax.set_xlabel(style.axis_label("averaging time", "s"))
+    return style.svg(fig, key)

@@ -64,6 +64,11 @@ def write_number(
     return _power(value, significant, exponent, full, trim)
 
 
+def minus(text: str) -> str:
+    """Return a number's text with the sign of print."""
+    return text.replace("-", "−")
+
+
 def write_p(p: float | None) -> FormattedNumber:
     """Return a probability: three decimals, or "< 0.001"."""
     if p is None or not math.isfinite(p):

@@ -7,6 +7,8 @@ was read from.
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -232,6 +234,16 @@ def pictures(*items: Picture) -> list[Any]:
     """Return the pictures that have something to show, as one block; no block when none has."""
     shown = [p for p in items if p.svg]
     return [Pictures(shown)] if shown else []
+
+
+def remarks(texts: Sequence[str]) -> list[Any]:
+    """Return remarks as sentences, each with the sign of a warning; nothing without any."""
+    return [BulletList([f"{t[:1].upper()}{t[1:]}." for t in texts], warn=True)] if texts else []
+
+
+def document_id(doc: Any) -> str:
+    """Return the number of a report whose document has none: it is that of the content."""
+    return hashlib.sha256(json.dumps(doc, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def text_cell(value: Any, mark: str = "", link: str = "", own: bool = False) -> Cell:

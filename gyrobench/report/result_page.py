@@ -203,10 +203,6 @@ def what_u_is(report: Report[Result]) -> str:
     return f"standard uncertainty, type A only: {why}"
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def _channels(run: Provenance, record: Mapping[str, Any]) -> list[Any]:
     """Return the figure of the channels that the system shows."""
     shown = channel_figure.panels(record, run.units, run.shown)
@@ -249,12 +245,12 @@ def _fits(series: Sequence[Series]) -> list[Any]:
     number = 0
     for alike in groups:
         for k in range(0, len(alike), 2):
-            pair = alike[k : k + 2]
+            pair, name = alike[k : k + 2], alike[k].y_name
             number += 1
             key = f"fit-{number}"
             both = " and ".join(f"“{s.label}”" for s in pair)
             caption = (
-                f"{_capital(pair[0].y_name)} against {pair[0].x_name}, {both}. Points: window means; line: fitted "
+                f"{name[:1].upper()}{name[1:]} against {pair[0].x_name}, {both}. Points: window means; line: fitted "
                 "model; lower panel: residuals. A pattern in the residuals is evidence against the model."
             )
             alt = f"Points and fitted curve with residuals: {both}"

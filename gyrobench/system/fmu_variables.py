@@ -74,19 +74,10 @@ def variables(description: Any) -> dict[str, Variable]:
         declared = v.declaredType
         for index, (name, start) in enumerate(zip(names, start_values(v), strict=True)):
             found[name] = Variable(
-                name,
-                v.name,
-                v.causality or "local",
-                v.type,
-                FAMILIES.get(v.type, ""),
-                int(v.valueReference),
-                index,
-                len(names) if shape else 0,
-                v.unit or getattr(declared, "unit", None) or "",
-                v.quantity or getattr(declared, "quantity", None) or "",
-                start,
-                v.description or "",
-            )
+                name, v.name, v.causality or "local", v.type, FAMILIES.get(v.type, ""), int(v.valueReference), index,
+                len(names) if shape else 0, v.unit or getattr(declared, "unit", None) or "",
+                v.quantity or getattr(declared, "quantity", None) or "", start, v.description or "",
+            )  # fmt: skip
     return found
 
 

@@ -12,9 +12,10 @@ with the column ``time`` instead of t_start and t_end holds time series, see :mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,8 @@ from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, re
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
 from gyrobench.system.lab_series import faults_of_series, is_time_series, windows_of_series
+from gyrobench.system.system import MeasuredData, System
 from gyrobench.system.values import InvalidValueError
-
-if TYPE_CHECKING:
-    from gyrobench.system.system import System
 
 SERIES = """\
 Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
@@ -34,9 +33,7 @@ Time series may stand here instead of windows: columns `time [s]`, `current` for
 #   column `phase` phases are found in the motion of the table and must fit the plan.  '# window = 60s': their length.
 #   Samples that may be aliased are warned of: say what they are by '# samples = means' (each since the one before) or
 #   points, and how far the signal reaches by '# bandwidth = 14Hz'."""
-TEXTS = (
-    "title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement",
-)  # fmt: skip
+TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement")
 ARRANGED = ("phase", "cycle", "current", "t_start")  # first columns of what is arranged by attitudes or settings
 POLARITY = "polarity"  # read by the tumbles alone: RebalanceSetup
 WITH_POLARITY = (*TEXTS, POLARITY)
@@ -73,6 +70,18 @@ def explained(template: str, options: Iterable[str] = ()) -> str:
     if "t_start" in lines[-1] and "mean" in lines[-1]:
         notes.append(SERIES)
     return "\n".join([*lines[:head], *(f"# {note}" for note in notes), *lines[head:]]) + "\n"  # fmt: skip
+
+
+def of_positions(record: Record) -> Record:
+    """Return a record of readings on a head with a plan of the positions that its rows name."""
+    numbers = dict.fromkeys(np.asarray(record.windows["phase"]).astype(int).tolist())
+    plan = [PlanRow(phase=p, label=f"position {p}", mode="hold", face="head") for p in numbers]
+    return Record(record.windows, {}, record.run.replace(plan=plan))
+
+
+def laboratory_rows(template: str, **reading: Any) -> MeasuredData:
+    """Return the template of a laboratory's record and its reader; reading: the keywords of :func:`read_record`."""
+    return MeasuredData(template, partial(read_record, **reading))
 
 
 def read_record(
@@ -168,15 +177,9 @@ def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, st
     """Return the run.json of measured data; ``texts``: circumstances, which may replace the title of the system."""
     circumstances: dict[str, Any] = {"title": system.title, **texts}
     return RunDocument(
-        system=system.name,
-        spec=list(system.spec),
-        measured=True,
-        complete=True,
-        options=dict(system.values),
-        parameters={},
-        plan=list(plan),
-        **circumstances,
-    )
+        system=system.name, spec=list(system.spec), measured=True, complete=True, options=dict(system.values),
+        parameters={}, plan=list(plan), **circumstances,
+    )  # fmt: skip
 
 
 def _plan(

@@ -103,11 +103,11 @@ def _turn(kind: str, name: str, record: Record, at: AnyArray, windows: bool) -> 
         if mount is None:
             return None
     if name in record.channels:
-        return passive("xyz".index(kind), np.asarray(record.channels[name], dtype=float)[at])
+        return frames.passive("xyz".index(kind), np.asarray(record.channels[name], dtype=float)[at])
     if windows and (angles := _window_angles(record, at)) is not None:
-        return passive("xyz".index(kind), angles)
+        return frames.passive("xyz".index(kind), angles)
     value = _parameter(record.run.parameters, name)
-    return None if value is None else passive("xyz".index(kind), np.asarray([value]))
+    return None if value is None else frames.passive("xyz".index(kind), np.asarray([value]))
 
 
 def _window_angles(record: Record, at: AnyArray) -> Array | None:
@@ -131,17 +131,6 @@ def _parameter(parameters: Mapping[str, object], name: str) -> float | None:
     return float(held) if isinstance(held, int | float) else None
 
 
-def passive(axis: int, angle: Array) -> Array:
-    """Return v_turned = R v about an axis (0, 1, 2) by angles, rad: an array (angles, 3, 3).  [CONV-GIMBALS]"""
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.zeros((len(angle), 3, 3))
-    second, third = (axis + 1) % 3, (axis + 2) % 3
-    turn[:, axis, axis] = 1.0
-    turn[:, second, second] = turn[:, third, third] = c
-    turn[:, second, third], turn[:, third, second] = s, -s
-    return turn
-
-
 def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
     """Return the mounts of the plan at rows of the channels."""
     parameters = nest(record.run.parameters)
@@ -150,8 +139,7 @@ def _faces(slot: str, record: Record, at: AnyArray) -> Array | None:
     if not faces or not order or phases is None:
         return None
     mounts = np.asarray(faces, dtype=float).reshape(-1, 3, 3)
-    found: Array = mounts[np.asarray(order, dtype=int)[phases - 1] - 1]
-    return found
+    return np.asarray(mounts[np.asarray(order, dtype=int)[phases - 1] - 1])
 
 
 def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
@@ -167,9 +155,8 @@ def _mounts(slot: str, record: Record, at: AnyArray) -> Array | None:
     x, y = (np.sign(n)[:, None] * directions[np.abs(n) - 1] for n in chosen.T)
     held = np.stack([x, y, np.cross(x, y)], axis=1) @ np.reshape(parameters[f"{slot}.base"], (3, 3)).T
     for axis, angle in enumerate(parameters[f"{slot}.misalignment"]):
-        held = passive(axis, np.asarray([angle])) @ held
-    found: Array = held[phases - 1]
-    return found
+        held = frames.passive(axis, np.asarray([angle])) @ held
+    return np.asarray(held[phases - 1])
 
 
 def _phases(slot: str, record: Record, at: AnyArray) -> AnyArray | None:

@@ -15,12 +15,13 @@
         done = "sequencer.done"
         channels = ["gyro.u", "rebalance.i"]
         noises = ("gyro.white", "rebalance.meter")          # set to 0 by --check-step
-        reduction = "reduction"                             # reduction.py beside it, with a class Reduction
         measured_data = MeasuredData(TEMPLATE, read)        # gyrobench reduce: an empty file, and its reader
 
         def plan(self): return Plan([...])
         def parameters(self, parts): return {**self.plan().parameters(), "site.latitude": self["latitude"]}
         def check(self): return [...]
+
+Its reduction is the class Reduction of a file reduction.py beside it, unless it names another one.
 
 An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``system.set("gyro.H", 0.3)``.
 """
@@ -28,6 +29,7 @@ An instance holds one set of values: ``system.set("latitude", "45.75deg")``, ``s
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -53,15 +55,8 @@ if TYPE_CHECKING:
     from gyrobench.system.part_values import PartValues
 
 __all__ = [
-    "InvalidConfigurationError",
-    "MeasuredData",
-    "OnRequest",
-    "Option",
-    "Slot",
-    "System",
-    "Windows",
-    "load_system",
-]
+    "InvalidConfigurationError", "MeasuredData", "OnRequest", "Option", "Slot", "System", "Windows", "load_system",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,6 +73,9 @@ class Slot:
     quantities: Mapping[str, str] = field(default_factory=dict)
 
 
+SAMPLED = "t_start t_end angle_start angle_end mean std n flagged"
+
+
 @dataclass(frozen=True)
 class Windows:
     """Windows of a record: a row is written when ``watch`` changes; column name -> "slot.output"."""
@@ -86,10 +84,10 @@ class Windows:
     columns: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, slot: str = "sampler", **more: str) -> Windows:
-        """The columns of the Sampler socket, and ``more``: mean_y="sampler_y.mean"."""
-        names = ("t_start", "t_end", "angle_start", "angle_end", "mean", "std", "n", "flagged")
-        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **{n: f"{slot}.{n}" for n in names}, **more})
+    def of(cls, slot: str = "sampler", names: str = SAMPLED, **more: str) -> Windows:
+        """The columns ``names`` of the Sampler socket, all by default, and ``more``: mean_y="sampler_y.mean"."""
+        own = {n: f"{slot}.{n}" for n in names.split()}
+        return cls(f"{slot}.count", {"phase": f"{slot}.window_phase", **own, **more})
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,8 @@ class System(Configurable):
     loops: ClassVar[Mapping[str, str]] = {}  # name -> "slot.input" where it is opened, see gyrobench.linear
     #: the figures depend on the communication step as those of loops do: the step check runs unless it is refused
     closed_loop: ClassVar[bool] = False
-    #: a class, or the module beside system.py that has it as Reduction; its from_record(record) returns the findings
+    #: a class, or the module beside system.py that has it as Reduction; its from_record(record) returns the findings;
+    #: where a class names and inherits none, the module reduction.py if there is one
     reduction: ClassVar[str | type] = ""
     #: module beside system.py, its protocol_of(system, record) offers the test to gyrobench.design
     protocol: ClassVar[str] = ""
@@ -155,9 +154,8 @@ class System(Configurable):
     #: another system -> what its result says of options of this one, as texts; LookupError says what is missing
     takes: ClassVar[Mapping[str, Callable[[Result], Mapping[str, str]]]] = {}
     measured_data: ClassVar[MeasuredData | None] = None  # how a laboratory's record of this test is read
-    assumed: ClassVar[
-        tuple[str, ...]
-    ] = ()  # "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    #: "slot.parameter" whose value, of the system or the part, the method assumes; "?": of parts that have it
+    assumed: ClassVar[tuple[str, ...]] = ()
     sampled_gyro: ClassVar[bool] = False  # a gyro with an output rate is read by its samples, each once
     maps: ClassVar[Mapping[str, Path]] = {}  # mapping files of the parts that an archive brings
     seed: int = 1  # of a run that names none
@@ -173,6 +171,9 @@ class System(Configurable):
                 f"{cls.__name__}.reduce: what a record says, without limits and verdict, is returned by "
                 "findings(record); reduce judges it, for every system alike"
             )
+        file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+        if not cls.reduction and file and Path(file).with_name("reduction.py").is_file():
+            cls.reduction = "reduction"
         if isinstance(cls.reduction, type):
             from gyrobench.system.declared_sources import take_sources
 

@@ -202,9 +202,8 @@ class _Loop:
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
-            shape, wishes, models, decades, frequencies(models, decades, wishes), corners,
-            sights=self.sights(at),
-        )  # fmt: skip
+            shape, wishes, models, decades, frequencies(models, decades, wishes), corners, sights=self.sights(at)
+        )
 
 
 def _chosen(system: System, loop: str, parts: Mapping[str, str]) -> LoopPorts:

@@ -12,6 +12,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
 from gyrobench.reduction.loops.loop_measures import Point
+from gyrobench.report.plain_text import align_columns
 from gyrobench.tuning.proof import Proof, ProvenWish
 from gyrobench.tuning.sight_allowance import COLUMNS, AllowedSource
 from gyrobench.tuning.spread import Range
@@ -205,7 +206,7 @@ def _lines(t: LoopTuning) -> list[str]:
          where(w.at, t.spread)]
         for w in t.wishes
     ]  # fmt: skip
-    lines += _columns(rows)
+    lines += align_columns(rows, {0, 1, 2, 3}, "  ")
     for p in t.proofs:
         lines += ["", f"co-simulation, {where(p.values, t.spread)}:"]
         if p.why_not:
@@ -220,7 +221,8 @@ def _lines(t: LoopTuning) -> list[str]:
         if p.step is not None:
             lines.append(f"  {p.step}")
     if t.allowed:
-        lines += ["", f"jitter by source, and {ALLOWED}:", *_columns([list(COLUMNS), *(a.row for a in t.allowed)])]
+        allowed = align_columns([COLUMNS, *(a.row for a in t.allowed)], set(range(len(COLUMNS))), "  ")
+        lines += ["", f"jitter by source, and {ALLOWED}:", *allowed]
     if t.trade is not None:
         a, b = t.trade.wishes
         lines += ["", f"trade, worst case of the linear models: {a.name}, {b.name}"]
@@ -233,12 +235,6 @@ def _lines(t: LoopTuning) -> list[str]:
     values = ", ".join(f"{n} = {v:.5g}" for n, v in t.controller.values.items())
     title = "controller" if t.had else "the best that was found"
     return [*lines, "", f"{title}: {values}", "", t.command]
-
-
-def _columns(rows: list[list[str]]) -> list[str]:
-    """Return rows as lines with columns below one another."""
-    width = [max(len(r[k]) for r in rows) for k in range(len(rows[0]) - 1)]
-    return ["  " + "  ".join([*(c.ljust(n) for c, n in zip(r, width, strict=False)), r[-1]]) for r in rows]
 
 
 def measured_text(w: ProvenWish) -> str:

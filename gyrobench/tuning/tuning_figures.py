@@ -169,7 +169,7 @@ def load_step(t: LoopTuning) -> str:
     if not shown:
         return ""
     fig, ax = chart(WIDE * 0.8, 56)
-    styles = LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--"}
+    styles = LINE, {"color": VERMILION, "linewidth": 1.0, "linestyle": "--", "zorder": 4}
     for (at, step), style in zip(shown, styles, strict=False):
         ax.plot(step.t, 1e6 * step.angle, **style, label="worst point" if at else "nominal")
     zero_line(ax)

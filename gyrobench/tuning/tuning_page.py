@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from gyrobench.bench import Bench
 from gyrobench.report import FORMATS
+from gyrobench.report.numbers import minus
 from gyrobench.report.page_model import (
     BulletList,
     Page,
@@ -19,7 +18,9 @@ from gyrobench.report.page_model import (
     Section,
     Text,
     columns,
+    document_id,
     pictures,
+    remarks,
     text_cell,
 )
 from gyrobench.report.report_files import write_files
@@ -40,7 +41,7 @@ def write_tuning(tuned: LoopTuning, folder: Path, formats: Sequence[str] = FORMA
 
 def page(t: LoopTuning) -> Page:
     """Return the page."""
-    report_id = hashlib.sha256(json.dumps(t.as_dict(), sort_keys=True).encode()).hexdigest()[:12]
+    report_id = document_id(t.as_dict())
     over = "; ".join(range_text(r) for r in t.spread) or "none"
     head = [
         ("Report", report_id),
@@ -51,7 +52,7 @@ def page(t: LoopTuning) -> Page:
     ]
     with styled():
         sections = [
-            Section("Wishes", "wishes", [Text(summary(t)), _wishes(t), *_reasons(t)]),
+            Section("Wishes", "wishes", [Text(summary(t)), _wishes(t), *remarks(t.reasons)]),
             *([Section("Jitter by source", "sources", [_sources(t)])] if t.allowed else []),
             *([Section("Trade of two wishes", "trade", _trade(t.trade))] if t.trade else []),
             Section("Margins", "margins", _margins(t)),
@@ -71,11 +72,6 @@ def summary(t: LoopTuning) -> str:
     if t.had:
         return f"The linear model fulfils every wish {where_}; the co-simulation does not confirm it, see the proof."
     return f"What is wanted cannot be had {where_} with this structure; shown is the best compromise that was found."
-
-
-def minus(text: str) -> str:
-    """Return a number's text with the sign of print."""
-    return text.replace("-", "−")
 
 
 def _wishes(t: LoopTuning) -> PageTable:
@@ -99,10 +95,6 @@ def _sources(t: LoopTuning) -> PageTable:
         "the limit of the voltage."
     )
     return PageTable(columns(*COLUMNS, wide=["at most"]), rows, caption)
-
-
-def _reasons(t: LoopTuning) -> list[Any]:
-    return [BulletList(list(t.reasons), warn=True)] if t.reasons else []
 
 
 def _trade(trade: Trade) -> list[Any]:
@@ -174,8 +166,7 @@ def _step(t: LoopTuning) -> list[Any]:
 def _notes(t: LoopTuning) -> list[Any]:
     hidden = [f"{where(p.values, t.spread)}: {p.step}" for p in t.proofs if p.step and not p.step.seen]
     limited = [f"{where(p.values, t.spread)}: at its limit in the test sines: {p.limits}" for p in t.proofs if p.limits]
-    notes = [f"{n[:1].upper()}{n[1:]}." for n in (*hidden, *limited, *t.notes)]
-    return [BulletList(notes, warn=True)] if notes else []
+    return remarks([*hidden, *limited, *t.notes])
 
 
 def _controller(t: LoopTuning) -> list[Any]:

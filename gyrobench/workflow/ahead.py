@@ -13,15 +13,9 @@ if TYPE_CHECKING:
 
 #: in the order in which they are needed; each takes less than the time between two reports of progress, or little more
 MODULES = (
-    "scipy.stats",
-    "allantools",
-    "matplotlib.figure",
-    "matplotlib.backends.backend_svg",
-    "gyrobench.report.result_page",
-    "gyrobench.report.render",
-    "jinja2",
-    "typst",
-)
+    "scipy.stats", "allantools", "matplotlib.figure", "matplotlib.backends.backend_svg", "gyrobench.report.result_page",
+    "gyrobench.report.render", "jinja2", "typst",
+)  # fmt: skip
 
 
 def importing(progress: Progress | None) -> Progress:

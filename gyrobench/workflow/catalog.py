@@ -30,7 +30,8 @@ def _class_text(file: Path) -> tuple[str, dict[str, Any]]:
         end = OUTSIDE.search(text, match.end())
         body = text[match.end() : end.start() if end else len(text)]
         attributes = {}
-        for name, value in re.findall(rf"^{match[1]}(title|spec) = (\(.*?\)|[^\n]*)$", body, re.MULTILINE | re.DOTALL):
+        form = rf"^{match[1]}(title|spec) = (\(.*?\)(?: +#[^\n]*)?|[^\n]*)$"
+        for name, value in re.findall(form, body, re.MULTILINE | re.DOTALL):
             with contextlib.suppress(ValueError, SyntaxError, RecursionError, MemoryError):
                 attributes[name] = ast.literal_eval(value)
         found = match[2], attributes

@@ -189,9 +189,8 @@ def write_lesson(item: Lesson, path: Path, language: str = ENGLISH, bench: Bench
 
     system = load_system(item.system, item.values)
     export_page(
-        system, path, bench=bench.folder if bench else None, expose=exposed(item),
-        lesson=page_content(item, language),
-    )  # fmt: skip
+        system, path, bench=bench.folder if bench else None, expose=exposed(item), lesson=page_content(item, language)
+    )
 
 
 def exposed(item: Lesson) -> list[str]:

@@ -22,7 +22,7 @@ from gyrobench.workflow.ahead import importing
 from gyrobench.workflow.feedback import SILENT, Feedback
 from gyrobench.workflow.forecast import forecasting
 from gyrobench.workflow.inputs import check_fmu_files, find_specification, load_limits, require_slots
-from gyrobench.workflow.run_folders import prepare_run_folder, save_partial_record
+from gyrobench.workflow.run_folders import partial_folder, prepare_run_folder
 from gyrobench.workflow.saved_run import RunOutcome, write_report
 from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, record_kept, user_message
 
@@ -62,14 +62,9 @@ def open_session(request: RunRequest, system: System) -> Session:
     require_slots(system).refuse()
     check_fmu_files(request.parts)
     return Session(
-        system,
-        request.parts,
-        request.maps,
-        engine=request.engine,
-        bench=Bench.find().folder,
-        child=True,
+        system, request.parts, request.maps, engine=request.engine, bench=Bench.find().folder, child=True,
         timeout=request.timeout or TIMEOUT,
-    )
+    )  # fmt: skip
 
 
 def execute_run(
@@ -119,7 +114,7 @@ def _run(
     except RunError as error:
         if error.record is None or folder is None:
             raise
-        kept = save_partial_record(error.record, folder)
+        kept = error.record.save(partial_folder(folder))  # beside a complete record of the same run, not over it
         message = f"{error.text}\nthe record until then is kept in {display_path(kept)}"
         if isinstance(error, RunInterrupted):
             report = f"gyrobench report {shlex.quote(display_path(kept))}"

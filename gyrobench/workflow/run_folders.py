@@ -176,11 +176,6 @@ def _covers(old: Any, new: Any) -> bool:
     return bool(old == new) or (old is None and new == "")
 
 
-def save_partial_record(record: Record, folder: Path) -> Path:
-    """Save what a run left when it stopped, beside a complete record of the same run rather than over it."""
-    return record.save(partial_folder(folder))
-
-
 def has_complete_record(folder: Path) -> bool:
     """Return whether the folder holds a complete record."""
     try:

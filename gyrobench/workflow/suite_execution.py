@@ -126,12 +126,9 @@ def _test_requests(request: RunRequest, suite: Suite, members: Mapping[str, Syst
         raise UsageError(str(error)) from None
     check_fmu_files(request.parts)
     return {
-        name: replace(
-            request, parts=parts[name], maps=maps[name], spec=None,
-            seed=suite.seed_of(request.seed, name),
-        )
+        name: replace(request, parts=parts[name], maps=maps[name], spec=None, seed=suite.seed_of(request.seed, name))
         for name in members
-    }  # fmt: skip
+    }
 
 
 def _identity(

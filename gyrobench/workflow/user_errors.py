@@ -37,10 +37,6 @@ class CommandInterrupted(PostRunError):
     exit_code = 130
 
 
-def _content_folders(bench: Path) -> tuple[str, ...]:
-    return tuple(str(bench / room) + os.sep for room in CONTENT)
-
-
 def _frames(error: BaseException) -> list[tuple[str, int | None]]:
     """Return file and line of every call on the way to an error, the innermost last."""
     frames = [(f.filename, f.lineno) for f in traceback.extract_tb(error.__traceback__)]
@@ -55,7 +51,8 @@ def content_location(error: BaseException) -> str | None:
     An OSError that gyrobench itself met on the user's behalf (a file named in an option) has no location.
     """
     frames = _frames(error)
-    user, standard = (_content_folders(folder) for folder in (Bench.find().folder, standard_folder()))
+    benches = (Bench.find().folder, standard_folder())
+    user, standard = (tuple(f"{bench / room}{os.sep}" for room in CONTENT) for bench in benches)
     if isinstance(error, OSError):
         known = [file for file, _ in frames if file.startswith((*user, *standard, str(TOOL) + os.sep))]
         if not known or not known[-1].startswith((*user, *standard)):

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError
 from gyrobench.record.record import Record
-from gyrobench.record.run_document import PlanRow
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import of_positions, read_record
 from gyrobench.system.system import MeasuredData, System
 
 TEMPLATE = """\
@@ -47,9 +44,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
             "D1c and D1s are not given: write '# D1c = 3.1arcsec' and '# D1s = -0.4arcsec' in the file, from an "
             "autocollimator or a polygon, or 'd1_unknown = true' (K_F, K_IO and K_II are biased by K_I D1 then)"
         ])  # fmt: skip
-    numbers = dict.fromkeys(np.asarray(record.windows["phase"]).astype(int).tolist())
-    plan = [PlanRow(phase=p, label=f"position {p}", mode="hold", face="head") for p in numbers]
-    return Record(record.windows, {}, record.run.replace(plan=plan))
+    return of_positions(record)
 
 
 MEASURED = MeasuredData(TEMPLATE, read)

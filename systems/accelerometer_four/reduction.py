@@ -20,26 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER, Effect
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Location, Quantity, Setup, told
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC
 
 from . import chain, geometry
@@ -199,9 +185,6 @@ class Reduction(DriftReduction[FourSetup]):
         ]
 
 
-reduce = Reduction.reduce
-
-
 def estimate(alpha: Array, U: Array, setup: FourSetup, scale: Array) -> Findings:
     """Return the joint fit of voltages U (n, 4) at the nominal angles; scale (4,): first scale factors, V/g."""
     first = joint(alpha, U, setup, scale).fit()
@@ -251,8 +234,7 @@ def _first_harmonic(scale: Array, D1: tuple[float, float]) -> Array:
     """Return what takes the first harmonic out of terms (4, 5) fitted with it.  [Dong 2014, eq. 27, 28, by EA8]"""
     c, s = D1
     of_unit = np.array([[-c, 0, 0, -s, c], [s, 0, 0, c, -s], [c, 0, 0, s, -c], [-s, 0, 0, -c, s]])
-    out: Array = scale[:, None] * of_unit
-    return out
+    return np.asarray(scale[:, None] * of_unit)
 
 
 def sensor_truth(run: RunDocument) -> dict[str, float] | None:

@@ -44,7 +44,6 @@ class AccelerometerFour(TableTest):
 
     title = "Four accelerometers on one indexing head"
     spec = ("TEST-ACCEL4", "ACCEL-MODEL")
-    reduction = "reduction"
     protocol = "design"
     slots = {
         **on_table(table=Slot("Table", "index_head")),

@@ -92,8 +92,7 @@ def _stations(angle: Array) -> Array:
     """Return the positions (n,) within a turn, degrees, neighbours to closed.EQUAL the same."""
     step = 10.0 * closed.EQUAL
     turn: Array = np.mod(angle + closed.EQUAL, 2.0 * math.pi)
-    out: Array = np.round(np.rint(turn / step) * math.degrees(step), 2)
-    return out
+    return np.asarray(np.round(np.rint(turn / step) * math.degrees(step), 2))
 
 
 def _mounted(

@@ -1,11 +1,6 @@
 """A laboratory's record of the multi-position test: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
-from functools import partial
-
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 from .geometry import FACES
 
@@ -28,6 +23,4 @@ TEMPLATE = """\
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
 NEEDED = {"gravity": "9.8067m/s2", "scale": "9806.65m/s2/A"}
-MEASURED = MeasuredData(
-    TEMPLATE, partial(read_record, needed=NEEDED, attitudes=lambda _: dict.fromkeys(FACES, "index"))
-)
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, attitudes=lambda _: dict.fromkeys(FACES, "index"))

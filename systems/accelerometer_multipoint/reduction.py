@@ -21,32 +21,15 @@ from typing import Any
 import numpy as np
 
 from gyrobench.frames import G0
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
-from gyrobench.reduction.setup.run_metadata import phases
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import Location, number, phases, truth_of
 from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Table,
-    number,
-    told,
-    truth_of,
-    window_problems,
-)
-from gyrobench.result import Harmonic
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, told
+from gyrobench.result import Coefficient, DriftTestResult, Harmonic, Reason, Table
 from gyrobench.units import ARCSEC
 
 from . import budget, closed
@@ -304,9 +287,6 @@ class Reduction(DriftReduction[MultipointSetup]):
             found.noise_sentence("positions"),
             *found.nuisance_sentences(),
         ]
-
-
-reduce = Reduction.reduce
 
 
 def _mounts_apart(fits: Mapping[str, Mapping[str, float]]) -> list[Table]:

@@ -1,7 +1,5 @@
 """Sources of error of the test, in the order of its options."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gyrobench.reduction.setup import sources as shared

@@ -35,7 +35,6 @@ class AccelerometerMultipoint(TableTest):
 
     title = "Multi-position test of an accelerometer"
     spec = ("TEST-ACC-MULTI", "ACC-EXACT", "ACC-4PT", "ACC-MINPTS")
-    reduction = "reduction"
     protocol = "design"
     slots = on_table(table=Slot("Table", "index_head"), accelerometer=Slot("Accelerometer", "accelerometer_pendulous"))
     wires = f"""

@@ -168,8 +168,7 @@ class Rows:
 
 def in_turn(x: Array) -> Array:
     """Return angles less whole turns, within half a turn."""
-    out: Array = x - 2.0 * math.pi * np.round(x / (2.0 * math.pi))
-    return out
+    return np.asarray(x - 2.0 * math.pi * np.round(x / (2.0 * math.pi)))
 
 
 @dataclass(frozen=True)
@@ -240,9 +239,7 @@ def _positions(rows: Rows, a: AngleSystemSetup, at: At, d: Array, d_2: Array, fi
     one, two = d[first], d_2[first]
     rows.add(a, POSITIONS, one - two, 2 * q * q / 12.0, at[first], E=here - there, h=-ones)
     variance = (0.5 * q * q + q_ref * q_ref) / 12.0
-    rows.add(
-        a, MEANS, 0.5 * (one + two), variance, at[first], E=0.5 * (here + there), R=other, c=ones, h=0.5 * ones
-    )  # fmt: skip
+    rows.add(a, MEANS, 0.5 * (one + two), variance, at[first], E=0.5 * (here + there), R=other, c=ones, h=0.5 * ones)
 
 
 def _rates(rows: Rows, a: AngleSystemSetup, w: Mapping[str, Array], at: At, d: Array) -> None:

@@ -16,23 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.reduction.estimation.findings import NORMAL_RESIDUALS
-from gyrobench.reduction.toolkit import (
-    Account,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.estimation.findings import NORMAL_RESIDUALS, Findings
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Group, Quantity, Regression, RunDocument, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import ARCSEC
 
 from . import harmonics

@@ -48,7 +48,6 @@ class AngleSystemTest(TableTest):
 
     title = "Angle system test"
     spec = ("ANGLE-INDUCTOSYN", "READOUT-RATE")
-    reduction = "reduction"
     measured_data = MEASURED
     slots = on_table(
         table=Slot("Table", "table_rate"),

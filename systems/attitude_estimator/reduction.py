@@ -14,15 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    LoopReduction,
-    ReductionError,
-    Table,
-    over_time,
-    thinned,
-)
+from gyrobench.reduction.loops.loop_curves import over_time, thinned
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, LoopReduction, ReductionError, Table
 from gyrobench.units import DEG, DPH
 
 SHOWN = 800  # points of a drawn line
@@ -60,9 +53,7 @@ class Reduction(LoopReduction):
         self._consistency()
         found.tables.append(self._phases())
         self._figures()
-        found.facts |= {
-            "residual_std": _rms(errors[whole]) / DEG, "residual_unit": "°", "dof": float(whole.size),
-        }  # fmt: skip
+        found.facts |= {"residual_std": _rms(errors[whole]) / DEG, "residual_unit": "°", "dof": float(whole.size)}
         return Account(
             method="Estimated attitude and gyro biases against the true ones, in rest, rocking, acceleration and turn",
             sources=["EST-ATTITUDE; Mahony 2008; Markley 2014, chapter 6",

@@ -35,7 +35,6 @@ class AttitudeEstimatorTest(LoopTest):
 
     title = "Attitude estimation on a moving base"
     spec = ("EST-ATTITUDE", "GYRO-STATIC-ERR", "GYRO-DYNAMIC-ERR")
-    reduction = "reduction"
     bodies = """
         vehicle: z motion.angle[3], x motion.angle[1], y motion.angle[2]
         estimated: z estimator.angle[3], x estimator.angle[1], y estimator.angle[2]
@@ -76,7 +75,6 @@ class AttitudeEstimatorTest(LoopTest):
     }  # fmt: skip
     noises = (*(f"imu.noise_{a}_{n}" for a in AXES for n in ("bias", "gyro", "acc_bias", "acc")), "imu.heading_noise")
     step = 1e-2
-    channel_period = 1.0
     channels = (
         "exciter.phase", "exciter.gate", *three("motion.angle", "imu.static", "imu.bias", "compensation.static",
         "estimator.angle", "estimator.bias"), "estimator.aided", "estimator.nis", "estimator.used",

@@ -80,15 +80,13 @@ class Chain:
         if self.samples == 1:
             return increments[0]
         one, two = increments
-        out: Array = one + two + (2.0 / 3.0) * np.cross(one, two)
-        return out
+        return np.asarray(one + two + (2.0 / 3.0) * np.cross(one, two))
 
     def drift(self, f: float, theta: float, axis: int, matrix: Array | None = None) -> Array:
         """Return the drift (3,) of the attitude along the axes of the case, rad/s; matrix: errors of the gyros."""
         M = np.eye(3) + (np.zeros((3, 3)) if matrix is None else matrix)
         cofactor = np.linalg.det(M) * np.linalg.inv(M).T
-        out: Array = cone_rate(f, theta) * (self.kappa(f, theta) * cofactor - M)[:, axis]
-        return out
+        return np.asarray(cone_rate(f, theta) * (self.kappa(f, theta) * cofactor - M)[:, axis])
 
 
 def _along(phi: Array, half: float) -> tuple[Array, float]:

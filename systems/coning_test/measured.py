@@ -1,12 +1,7 @@
 """A laboratory's record of a coning test: the drift of the user's attitude, reading by reading."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import READING_TIMES, CsvColumn
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 TEMPLATE = """\
 # Coning of a strapdown unit: one row for each reading, of cones and of the rest between them.
@@ -33,4 +28,4 @@ COLUMNS = (
     CsvColumn("half_angle", "rad", "half-angle of the cone"),
     *(CsvColumn(f"drift_{a}", "rad/s", f"drift of the attitude along {a}") for a in "xyz"),
 )
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time="t_start"))
+MEASURED = laboratory_rows(TEMPLATE, columns=COLUMNS, time="t_start")

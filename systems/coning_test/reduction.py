@@ -24,26 +24,13 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
-from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.setup.sources import TIME_BASE, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Record,
-    Regression,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import with_plan
+from gyrobench.reduction.setup.setups import Setup, weighed
+from gyrobench.reduction.setup.sources import TIME_BASE, TURNED, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DEG, DPH
 
 from . import mistakes
@@ -183,7 +170,7 @@ class Reduction(ChannelTests[ConingSetup]):
 
     @classmethod
     def of_record(cls, record: Record) -> DriftTestResult:
-        return cls.reduce(labelled(record), cls.setup_of(record.run))
+        return cls.reduce(with_plan(record, frequency="target", half_angle="target_y"), cls.setup_of(record.run))
 
     @classmethod
     def setup_of(cls, run: RunDocument) -> ConingSetup:
@@ -248,17 +235,6 @@ class Reduction(ChannelTests[ConingSetup]):
         )  # fmt: skip
 
 
-def labelled(record: Record) -> dict[str, Array]:
-    """Return the windows with frequency and half_angle; of a run those of the plan."""
-    windows = dict(record.windows)
-    if not record.run.measured:
-        rows = {row.phase: row for row in record.run.plan}
-        phase = np.asarray(windows["phase"]).astype(int)
-        windows["frequency"] = np.array([rows[p].target for p in phase.tolist()])
-        windows["half_angle"] = np.array([rows[p].target_y for p in phase.tolist()])
-    return windows
-
-
 def true_values(run: RunDocument, axis: str) -> dict[str, float] | None:
     """Return the drift that the parameters of a simulated unit make by the closed form; None where it has none."""
     p = run.parameters
@@ -277,6 +253,3 @@ def true_values(run: RunDocument, axis: str) -> dict[str, float] | None:
         drift = chain.drift(f, theta, AXES.index(axis), matrix)
         found |= {cones.names(a)[k]: float(d) for a, d in zip(AXES, drift, strict=True)}
     return found
-
-
-reduce = Reduction.reduce

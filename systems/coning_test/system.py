@@ -7,18 +7,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families import strapdown_motion
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
-from gyrobench.system.families.strapdown_motion import (
-    AXES,
-    FACES,
-    GONE_THROUGH,
-    INCREMENTS,
-    RAMP,
-    UNIT,
-    USER,
-    StrapdownMotion,
-    motion_table,
-)
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, Windows
@@ -27,7 +17,7 @@ from . import sources
 from .closed import Chain
 from .measured import MEASURED
 
-TABLE = motion_table(
+TABLE = strapdown_motion.motion_table(
     "ConingTable",
     "table whose plate cones about the vertical: rates and forces of the case, attitude as read",
     inp("half_angle_wanted", "", "half-angle of the cone, rad"),
@@ -36,14 +26,14 @@ USER_OF_ANGLES = Socket(
     "StrapdownUser",
     "attitude from angle increments; by how much it changes against the reference",
     (
-        *USER,
+        *strapdown_motion.USER,
         inp("gate", "1", "0: the error is not counted", whole=True),
         out("drift", "rad/s", "change of the error over the step, by the step", 3),
     ),
 )
 
 
-class ConingTest(StrapdownMotion):
+class ConingTest(strapdown_motion.StrapdownMotion):
     """A table moves one axis of a strapdown unit round a cone, at one frequency after another.  The case comes back to
     where it was, the attitude that its user computes does not: the drift against the rest between the cones shows what
     filter, output rate, coning terms, scale factors and misalignments cost him.
@@ -53,21 +43,27 @@ class ConingTest(StrapdownMotion):
 
     title = "Coning test of a strapdown unit"
     spec = ("TEST-CONING", "IMU-POSITIONS")
-    reduction = "reduction"
     kind, amplitude, updated, senses = "axis of the cone vertical", "half_angle", "attitude", True
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),
         "table": Slot(TABLE, "table_coning"),
         "imu": Slot(
-            Socket("StrapdownGyros", "three gyros: inertial rate and specific force in, rates out", UNIT), "imu"
+            Socket(
+                "StrapdownGyros", "three gyros: inertial rate and specific force in, rates out", strapdown_motion.UNIT
+            ),
+            "imu",
         ),
         "increments": Slot(
-            Socket("AngleIncrements", "rates in, angle increments at the output rate of the unit out", INCREMENTS),
+            Socket(
+                "AngleIncrements",
+                "rates in, angle increments at the output rate of the unit out",
+                strapdown_motion.INCREMENTS,
+            ),
             "angle_increments",
         ),
         "user": Slot(USER_OF_ANGLES, "strapdown_attitude"),
-        **{f"sampler_{a}": Slot("Sampler", "sampler") for a in AXES},
+        **{f"sampler_{a}": Slot("Sampler", "sampler") for a in strapdown_motion.AXES},
     }
     wires = f"""
         site -> table: f=f_local omega=omega_local
@@ -82,7 +78,7 @@ class ConingTest(StrapdownMotion):
         user.drift[1] -> sampler_x.x
         user.drift[2] -> sampler_y.x
         user.drift[3] -> sampler_z.x
-        {"".join(sampled(f"sampler_{a}", "table: angle") for a in AXES)}
+        {"".join(sampled(f"sampler_{a}", "table: angle") for a in strapdown_motion.AXES)}
     """
     options = (
         SITE
@@ -93,21 +89,16 @@ class ConingTest(StrapdownMotion):
             "bandwidth": Option("200Hz", "Hz", "3 dB of its filter; 0: none", 0.0, sets="increments.bandwidth"),
             "coning": Option(True, bool, "its increments are rotation vectors, with coning", sets="increments.coning"),
         }
-        | GONE_THROUGH
+        | strapdown_motion.GONE_THROUGH
         | NUISANCES
         | CORRECTIONS
         | type_b("time", mount="standard uncertainty of the case about each of its axes on the plate")
         | type_b(sources)
     )
-    noises = tuple(f"imu.{a}_{n}" for a in AXES for n in ("gyro", "gyro_bias"))
+    noises = tuple(f"imu.{a}_{n}" for a in strapdown_motion.AXES for n in ("gyro", "gyro_bias"))
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "n")},
-            **{f"drift_{a}": f"sampler_{a}.mean" for a in AXES},
-        },
+    windows = Windows.of(
+        "sampler_x", "t_start t_end n", **{f"drift_{a}": f"sampler_{a}.mean" for a in strapdown_motion.AXES}
     )
     channels = tuple(f"user.error[{k}]" for k in (1, 2, 3))
 
@@ -116,14 +107,14 @@ class ConingTest(StrapdownMotion):
         return Chain.of(self.values, self.step)
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        face = FACES.get(self["axis"], np.eye(3)).tolist()
+        face = strapdown_motion.FACES.get(self["axis"], np.eye(3)).tolist()
         return {
             **self.plan().parameters(),
             **self.owned(),
-            "table.ramp": RAMP,
+            "table.ramp": strapdown_motion.RAMP,
             "table.face": face,
             "user.face": face,
-            **{f"sampler_{a}.integrated?": 1 for a in AXES},
+            **{f"sampler_{a}.integrated?": 1 for a in strapdown_motion.AXES},
         }
 
     def warnings(self) -> list[str]:

@@ -11,14 +11,8 @@ from scipy import special
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import consistency_test
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    MeasureReduction,
-    ReductionError,
-    RunDocument,
-    over_time,
-)
+from gyrobench.reduction.loops.loop_reduction import MeasureReduction
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, ReductionError, RunDocument, over_time
 from gyrobench.units import ARCSEC, DPH
 
 from .closed_form import CompensatedDrift, ExpectedErrors, expected
@@ -67,9 +61,7 @@ class Reduction(MeasureReduction):
         found.warn("torquer.limit", text if share > 0.0 else "")
         self._consistency(half)
         self._against_closed()
-        found.facts |= {
-            "dof": float(error.size), "residual_std": found["error"].estimate, "residual_unit": "°/h",
-        }  # fmt: skip
+        found.facts |= {"dof": float(error.size), "residual_std": found["error"].estimate, "residual_unit": "°/h"}
         self._figures(n, float(run.options["Ts"]))
         return Account(
             method="Rms of residual rate and angle over records that each begin with the table at zero",

@@ -52,7 +52,6 @@ class DriftCompensation(System):
 
     title = "Compensation of random drift"
     spec = ("COMP-RANDOM-DRIFT",)
-    reduction = "reduction"
     slots = {"table": Slot(TABLE, "drifting_table"), "compensator": Slot(COMPENSATOR, "drift_compensator")}
     wires = """
         table.theta_read -> compensator.z

@@ -9,20 +9,9 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.record import sampling
+from gyrobench.record import drift_columns, sampling
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import (
-    DIRECT,
-    TIME,
-    DriftTable,
-    Signal,
-    find_signals,
-    harmonic_names,
-    named,
-    open_table,
-    with_harmonics,
-)
 from gyrobench.record.drift_series import DriftReader, Progress, as_dict
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.checks import SeriesError
@@ -58,7 +47,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
 
     run.series: acquisition, and how many samples a window is the mean of.  Raises DataError and InvalidValueError.
     """
-    table = open_table(data, values.get("channel", ""))
+    table = drift_columns.open_table(data, values.get("channel", ""))
     said = {**table.head.comments, **values}
     for name in values:
         if name in ELSEWHERE:
@@ -87,7 +76,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     columns = reader.read(lambda name, first, values: every[name].add(first, values), progress)
     about = reader.about
     length = about.step * reader.held.factor
-    middle = columns.pop(TIME)
+    middle = columns.pop(drift_columns.TIME)
     there, place = np.isfinite(middle), np.arange(float(middle.size))
     start = np.interp(place, place[there], middle[there]) - 0.5 * (length - about.step)
     windows: dict[str, Any] = {"t_start": start, "t_end": start + length, **columns}
@@ -105,7 +94,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
             for s in signals
         },
         "others": reader.others,
-        "unused": [n for n in named(table.head) if n not in si] if data.is_file() else [],
+        "unused": [n for n in drift_columns.named(table.head) if n not in si] if data.is_file() else [],
         "stated": [n for n in ("latitude", "gravity") if n in system.given],
         "factor": reader.held.factor,
         "samples": kind,
@@ -116,29 +105,31 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     return Record(windows, {}, run)
 
 
-def _opened(system: System, table: DriftTable) -> tuple[DriftTable, list[Signal], DriftReader]:
+def _opened(
+    system: System, table: drift_columns.DriftTable
+) -> tuple[drift_columns.DriftTable, list[drift_columns.Signal], DriftReader]:
     """Return the table with what is to be read of it.  Raises DataError."""
     regressors = system["regressors"]
     if system["angle"]:
-        table = with_harmonics(table, system["angle"], system["harmonics"])
-        regressors = " ".join([regressors, *harmonic_names(system["harmonics"])])
-    signals = find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
+        table = drift_columns.with_harmonics(table, system["angle"], system["harmonics"])
+        regressors = " ".join([regressors, *drift_columns.harmonic_names(system["harmonics"])])
+    signals = drift_columns.find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
     return table, signals, DriftReader(table, signals, regressors, system["sampling"])
 
 
-def _rounding(s: Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+def _rounding(s: drift_columns.Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Return the step to which rates, forces or an angle (SI) are rounded, 0: none; whether it is a white error.
 
     values: rates, or increments of the angle; angles: least and largest increment and largest value of those that are
     cumulative, whose rounding in the computer their increments have.
     """
     counts, step, largest = values / s.factor, 0.0, angles[s.name][2] if s.name in angles else 0.0
-    if s.unit in ("", "1") and s.kind not in DIRECT and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
+    if s.unit in ("", "1") and s.kind not in drift_columns.DIRECT and np.all(np.abs(counts - np.rint(counts)) < 1e-6):
         step = abs(s.factor)
     if largest and not step:
         values = np.rint(values / (EXACT * largest)) * (EXACT * largest)
     try:
-        q = quantization(values) if s.kind in DIRECT else angle_quantization(values, step)
+        q = quantization(values) if s.kind in drift_columns.DIRECT else angle_quantization(values, step)
     except SeriesError:
         return {"resolution": step, "white": not step}  # all the same number of counts
     return {"resolution": q.step, "white": q.white}

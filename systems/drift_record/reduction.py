@@ -186,8 +186,7 @@ def _stated(
     elif why and bound:
         why = f"{why}; below {max(abs(low), abs(high)):.2g} {unit} (95 %)"
     if why:
-        return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true,
-                           no_value=why)  # fmt: skip
+        return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true, no_value=why)
     u_a = (high - low) / (2.0 * NORMAL)
     u = math.hypot(u_a, relative * value)
     more = NORMAL * (u - u_a)

@@ -37,7 +37,6 @@ class DriftRecord(RateReading):
 
     title = "Drift record"
     spec = ("DRIFT-RANDOM-CLASSES", "DAQ-DRIFT", "RED-RATE", "GYRO-DYN-1", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = RateReading.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     rate_gyro = "gyro_rate"
     readings = (CURRENT, RATE, FORCE)

@@ -1,7 +1,5 @@
 """Drift tests of one gyro by several methods, with one report."""
 
-from __future__ import annotations
-
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import Option
 

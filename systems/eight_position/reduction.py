@@ -19,36 +19,20 @@ from dataclasses import replace
 import numpy as np
 
 from gyrobench import frames, units
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.estimation import nuisances, residual_series
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.effects import one_by_one
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
-from gyrobench.reduction.setup.run_metadata import phases
-from gyrobench.reduction.setup.sources import LATITUDE, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Candidate,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Reason,
-    Record,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Source,
-    Table,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.setup.run_metadata import phases, truth_of
+from gyrobench.reduction.setup.sources import LATITUDE, TURNED, Effect, Source
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, Candidate, DriftReduction, Findings, Group, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 from . import model, positions, refusals, tables
@@ -290,9 +274,6 @@ class Reduction(ChannelTests[EightPositionSetup]):
         columns = {n: np.array([of[p] for p in of_rows]) for n, of in (("position", place), ("cycle", turn))}
         numbered = Record({**record.windows, **columns}, {}, record.run)
         return reduce_days(numbered, lambda windows: cls.reduce(windows, setup))
-
-
-reduce = Reduction.reduce
 
 
 def closed_formulas(windows: Mapping[str, Array], s: EightPositionSetup) -> dict[str, float]:

@@ -29,7 +29,6 @@ class EightPosition(TwoChannelTest):
 
     title = "Eight-position test"
     spec = ("TEST-8POS", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     protocol = "design"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
@@ -53,15 +52,10 @@ class EightPosition(TwoChannelTest):
                  mount="standard uncertainty of the gyro in its fixture, about each axis")
     )  # fmt: skip
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "angle_start", "angle_end")},
-            **{f"{n}_{c}": f"sampler_{c}.{n}" for c in "xy" for n in ("mean", "std", "flagged")},
-            "n": "sampler_x.n",
-        },
-    )
+    windows = Windows.of(
+        "sampler_x", "t_start t_end angle_start angle_end",
+        **{f"{n}_{c}": f"sampler_{c}.{n}" for c in "xy" for n in ("mean", "std", "flagged")}, n="sampler_x.n",
+    )  # fmt: skip
 
     def plan(self) -> Plan:
         """Return the eight positions, ``cycles`` times, or visits; the table does not turn, the mount changes."""

@@ -10,16 +10,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.loops.estimator_result import RANKED, Signals, measure
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    MeasureReduction,
-    ReductionError,
-    Response,
-    line,
-    told,
-    trace,
-)
+from gyrobench.reduction.loops.loop_curves import line, trace
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, ReductionError, Response, told
 
 from .benchmarks import BENCHMARKS
 

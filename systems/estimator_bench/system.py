@@ -27,7 +27,6 @@ class EstimatorBench(System):
 
     title = "Bench of estimators"
     spec = ("BENCH-DYN-SINE", "BENCH-DRIFT-LL", "BENCH-DRIFT-AR3", "EST-KF-AR", "EST-SAGE-HUSA", "EST-WAVELET-ONLINE")
-    reduction = "reduction"
     slots = {"source": Slot(SOURCE, "signal_source"), "estimator": Slot("Estimator", "estimator_kalman_rate")}
     wires = """
         source.z -> estimator.z

@@ -19,36 +19,20 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY, attitude_effects
 from gyrobench.reduction.drift.supplies import Supplies, rebalanced
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate
-from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Record,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    attitude_of,
-    told,
-    truth_of,
-    window_problems,
-)  # fmt: skip
+from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate, truth_of
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 LEAST = 8  # readings
@@ -72,8 +56,7 @@ class FixedPositionSetup(SiteSetup):
     @property
     def xyz(self) -> Array:
         """(X, Y, Z) = -f/g0 along I, O, S."""
-        out: Array = self.attitude @ -frames.U * self.gravity / frames.G0
-        return out
+        return np.asarray(self.attitude @ -frames.U * self.gravity / frames.G0)
 
     @property
     def input_rate(self) -> float:
@@ -200,9 +183,6 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         """Return what a record says; a long one has a table of its noise coefficients."""
         result = super().from_record(record)
         return replace(result, tables=[*result.tables, *noise_coefficients_table(result, record)])
-
-
-reduce = Reduction.reduce
 
 
 def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:

@@ -22,7 +22,6 @@ class FixedPosition(RateReading):
 
     title = "Fixed-position test"
     spec = ("TEST-FIXED", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = RateReading.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     rate_gyro = "gyro_rate"
     options = (

@@ -74,8 +74,7 @@ class AngleFit:
 
     def widened(self) -> Array:
         """Return the covariance, of points that the curve does not fit with their scatter about it."""
-        out: Array = self.cov * max(1.0, self.chi2 / self.dof)
-        return out
+        return np.asarray(self.cov * max(1.0, self.chi2 / self.dof))
 
 
 def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> AngleFit | None:
@@ -95,8 +94,7 @@ def fitted(r: AngleResponse, elastic: bool, near: AngleFit | None = None) -> Ang
         ratio = (
             np.log(np.where(np.abs(value) > TINY, value, TINY) / r.value) / r.u
         )  # about the output axis it has a zero
-        out: Array = np.concatenate([ratio.real, ratio.imag])
-        return out
+        return np.asarray(np.concatenate([ratio.real, ratio.imag]))
 
     starts = [near.p / units] if near else _starts(r, free, top)
 
@@ -206,5 +204,4 @@ def _variances(fit: AngleFit, highest: float, H: float, output: bool) -> Array:
         up, down = (read_off(fit.p + sign * step, highest, H, output) for sign in (1.0, -1.0))
         columns.append((up - down) / (2.0 * step[k]))
     J = np.column_stack(columns)
-    out: Array = np.einsum("ij,jk,ik->i", J, fit.widened(), J)
-    return out
+    return np.asarray(np.einsum("ij,jk,ik->i", J, fit.widened(), J))

@@ -14,18 +14,9 @@ import numpy as np
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
-from gyrobench.reduction.loops.loop_curves import bode, curve
-from gyrobench.reduction.loops.loop_toolkit import (
-    ARCMIN,
-    Account,
-    Array,
-    MeasureReduction,
-    Point,
-    ReductionError,
-    Table,
-    told,
-    trace,
-)
+from gyrobench.reduction.loops.loop_curves import bode, curve, trace
+from gyrobench.reduction.loops.loop_reduction import MeasureReduction
+from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, Array, Point, ReductionError, Table, told
 from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 

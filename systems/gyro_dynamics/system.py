@@ -10,17 +10,9 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.arrays import Array
+from gyrobench.system.families import vibrating_table
 from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import ON_TABLE, SDF_NOISES
-from gyrobench.system.families.vibrating_table import (
-    FREQUENCIES,
-    MOUNT,
-    SHAKEN,
-    STATED,
-    TABLE,
-    TIMES,
-    frequency_problems,
-)
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, System
@@ -42,25 +34,24 @@ class GyroDynamics(System):
 
     title = "Dynamics of a floated gyro"
     spec = ("TEST-GYRO-DYNAMICS", "GYRO-DYN-1", "GYRO-DYN-3")
-    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "exciter": Slot("Excitation", "exciter"),
-        "table": Slot(TABLE, "rate_table_vibrating"),
+        "table": Slot(vibrating_table.TABLE, "rate_table_vibrating"),
         "gyro": Slot("SdfGyro", "compliant_gyro"),
     }
-    wires = SHAKEN + "table -> gyro: omega alpha f"
+    wires = vibrating_table.SHAKEN + "table -> gyro: omega alpha f"
     open = ("gyro.i",)
     options = (
         SITE
         | {"axis": Option("input", str, "axis of the gyro along that of the table: input or output")}
-        | FREQUENCIES
+        | vibrating_table.FREQUENCIES
         | {
             "highest": Option("300Hz", "Hz", "highest frequency", 1e-2),
             "angle": Option("1arcmin", "rad", "amplitude of the table angle, and its steps", 1e-9),
             "acceleration": Option("200rad/s2", "rad/s2", "largest amplitude of the table's acceleration", 1e-6),
         }
-        | TIMES
+        | vibrating_table.TIMES
         | {
             "steps": Option(8, int, "steps of the table angle, about the input axis alone", 0, 50),
             "rise": Option(0.02, "s", "time in which a step turns", 1e-4),
@@ -70,9 +61,9 @@ class GyroDynamics(System):
                 0.0, "N.m.s", "spin angular momentum, for the stiffnesses; 0: the parameter H of the gyro", 0.0
             ),
         }
-        | STATED
+        | vibrating_table.STATED
         | type_b(sources)
-        | MOUNT
+        | vibrating_table.MOUNT
     )
     assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
     noises = ("table.reading", *SDF_NOISES)
@@ -120,7 +111,7 @@ class GyroDynamics(System):
         return base[[2, 1, 0]] * [[1.0], [-1.0], [1.0]] if self["axis"] == "output" else base
 
     def check(self) -> list[str]:
-        problems = frequency_problems(self["lowest"], self["highest"], self.step)
+        problems = vibrating_table.frequency_problems(self["lowest"], self["highest"], self.step)
         if self["axis"] not in FACES:
             problems.append(f"axis = {self['axis']}: must be input or output")
         if 0 < self["steps"] < 3:

@@ -62,7 +62,6 @@ class GyroMagneticCompass(LoopTest):
 
     title = "Gyro-magnetic compass"
     spec = ("GYRO-MAGNETIC-COMPASS",)
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "motion": Slot("Motion", "manoeuvre"),

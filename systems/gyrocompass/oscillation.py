@@ -195,8 +195,6 @@ def _averaged(J: Array, left: Array, prior: Array, drifts: list[Array]) -> tuple
     weights = np.exp([least - v[0] for v in values])
     weights /= weights.sum()
     mean = np.asarray(sum(w * v[1] for w, v in zip(weights, values, strict=True)))
-    covariance = sum(
-        w * (v[2] + np.outer(v[1] - mean, v[1] - mean)) for w, v in zip(weights, values, strict=True)
-    )  # fmt: skip
+    covariance = sum(w * (v[2] + np.outer(v[1] - mean, v[1] - mean)) for w, v in zip(weights, values, strict=True))
     white, drift = (float(sum(w * v[k] for w, v in zip(weights, values, strict=True))) for k in (3, 4))
     return mean, np.asarray(covariance), math.sqrt(white), math.sqrt(drift)

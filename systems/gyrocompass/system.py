@@ -64,7 +64,6 @@ class GyrocompassTest(LoopTest):
 
     title = "Gyrocompass"
     spec = ("GYROCOMPASS",)
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "ship": Slot(SHIP, "ship_motion"),
@@ -113,7 +112,6 @@ class GyrocompassTest(LoopTest):
         "ship.latitude_now", "ship.angle[1]",
     )  # fmt: skip
     shown = ("compass.psi ship.heading", "compass.tilt", "ship.speed", "ship.angle", "exciter.test")
-    channel_period = 1.0
 
     @property
     def north(self) -> float:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.record.record import Record
-from gyrobench.record.run_document import PlanRow
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import of_positions, read_record
 from gyrobench.system.system import MeasuredData, System
 
 TEMPLATE = """\
@@ -45,10 +42,8 @@ COLUMNS = (
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     """Return the CSV as a record, see :func:`gyrobench.system.lab_record.read_record`."""
-    record = read_record(system, data, values, needed={"latitude": "45.75deg", "method": "four"}, columns=COLUMNS)
-    numbers = dict.fromkeys(np.asarray(record.windows["phase"]).astype(int).tolist())
-    plan = [PlanRow(phase=p, label=f"position {p}", mode="hold", face="head") for p in numbers]
-    return Record(record.windows, {}, record.run.replace(plan=plan))
+    needed = {"latitude": "45.75deg", "method": "four"}
+    return of_positions(read_record(system, data, values, needed=needed, columns=COLUMNS))
 
 
 MEASURED = MeasuredData(TEMPLATE, read)

@@ -24,31 +24,17 @@ import numpy as np
 from scipy import special
 
 from gyrobench import frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
+from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
-from gyrobench.reduction.setup.sources import LATITUDE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    Record,
-    ReductionError,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.setup.setups import SiteSetup
+from gyrobench.reduction.setup.sources import LATITUDE, Effect
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Group, Location, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import after, plans
@@ -352,9 +338,6 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             ]
         caption = "What speaks for the heading besides its interval"
         return Table("integrity", "Integrity", caption, ["quantity", "value", "unit"], rows)
-
-
-reduce = Reduction.reduce
 
 
 def _doubt(id: str, text: str, *blocks: str) -> Reason:

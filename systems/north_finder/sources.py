@@ -1,7 +1,5 @@
 """Sources of error of a head and its instruments that are this test's own."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import Source
 
 ZERO = Source("head.zero", "zero of the head against the reference", "rad", "u_angle")

@@ -41,16 +41,9 @@ class NorthFinding(TableTest):
 
     title = "North finding by gyro"
     spec = (
-        "NORTH-COMMON",
-        "NORTH-2POS",
-        "NORTH-4POS",
-        "NORTH-CONT",
-        "NORTH-TILT",
-        "NORTH-STRAPDOWN",
-        "NORTH-DRIFT",
+        "NORTH-COMMON", "NORTH-2POS", "NORTH-4POS", "NORTH-CONT", "NORTH-TILT", "NORTH-STRAPDOWN", "NORTH-DRIFT",
         "NORTH-AFTER",
-    )
-    reduction = "reduction"
+    )  # fmt: skip
     protocol = "design"
     slots = {
         **on_table(
@@ -172,8 +165,7 @@ class NorthFinding(TableTest):
             frames.rotation(axis, angle).T
             for axis, angle in ((frames.N, self["roll"]), (frames.E, self["pitch"]), (frames.U, -self["heading"]))
         ]
-        out: Array = R[0] @ R[1] @ R[2]
-        return out
+        return np.asarray(R[0] @ R[1] @ R[2])
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
         gravity = self["gravity"] or frames.normal_gravity(self["latitude"], self["height"])

@@ -26,30 +26,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift.drift_terms import attitude_effects
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    ReductionError,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    attitude_of,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
+from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, Effect
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, told, truth_of
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
 from . import refusals
@@ -79,12 +65,7 @@ class OpenLoopSetup(SiteSetup):
         """Return X, Y, Z = -f/g0 with the case turned by ``angle`` (rad) about I."""
         c, s = math.cos(angle), math.sin(angle)
         I, O, S = self.attitude  # noqa: E741
-        out: Array = np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0
-        return out
-
-    def true_drift(self, angle: float) -> float:
-        """Return the drift of the simulated gyro with the case turned by ``angle`` (rad) about I."""
-        return float(drift.drift(self.xyz(angle), self.truth or {}))
+        return np.asarray(np.array([I, c * O + s * S, c * S - s * O]) @ -frames.U * self.gravity / frames.G0)
 
 
 def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array:
@@ -96,8 +77,7 @@ def case_angles(theta: Array, t0: Array, t1: Array, wait: float | None) -> Array
     move = np.zeros_like(pause) if wait is None else np.clip(pause - wait, 0.0, pause)
     before = (t1[:-1] - t0[:-1]) / 2.0 + move / 2.0
     share = before / ((t0[1:] + t1[1:] - t0[:-1] - t1[:-1]) / 2.0)
-    out: Array = share * theta[:-1] + (1.0 - share) * theta[1:]
-    return out
+    return np.asarray(share * theta[:-1] + (1.0 - share) * theta[1:])
 
 
 def null_angles(
@@ -110,8 +90,7 @@ def null_angles(
     spin = np.cos(between) * setup.earth(2) - np.sin(between) * setup.earth(1)
 
     def coupled(null: Array) -> Array:
-        out: Array = spin * setup.float_gain * (between - (null[1:] + null[:-1]) / 2.0)
-        return out
+        return np.asarray(spin * setup.float_gain * (between - (null[1:] + null[:-1]) / 2.0))
 
     if float(np.max(np.abs(u))) == 0.0:
         return theta, None, coupled(theta)
@@ -179,7 +158,7 @@ class Reduction(DriftReduction[OpenLoopSetup]):
         self.book = float((self.null[-1] - self.null[0]) / span) + s.earth() - mean_cross
         true = None
         if s.truth is not None:
-            true = float(np.array([s.true_drift(a) for a in between]) @ dt / span)
+            true = float(np.array([drift.drift(s.xyz(a), s.truth) for a in between]) @ dt / span)
         wanted = Quantity.of("ω_d", "drift along the input axis at the mean attitude", "deg/h", true, self.book)
         names = drift.terms(9)
         share = dt @ drift.regressors(np.array([s.xyz(a) for a in between]), names) / span
@@ -268,9 +247,6 @@ class Reduction(DriftReduction[OpenLoopSetup]):
             found.noise_sentence("intervals"),
             *found.nuisance_sentences(),
         ]
-
-
-reduce = Reduction.reduce
 
 
 def _float_gain(run: RunDocument) -> float:

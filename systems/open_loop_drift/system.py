@@ -37,7 +37,6 @@ class OpenLoopDrift(OpenLoopTest):
 
     title = "Open-loop drift test"
     spec = ("TEST-OPEN", "GYRO-DYN-1", "GYRO-STATIC-9")
-    reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     options = (
         SITE

@@ -1,13 +1,9 @@
 """A laboratory's record of the pickoff test: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from functools import partial
 
 from gyrobench.record.csv_reader import WINDOW_COLUMNS
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 TEMPLATE = """\
 # Pickoff of a gyro, open loop, input axis along the table axis and at right angles to the pole: one row per reading.
@@ -32,4 +28,4 @@ COLUMNS = tuple(
     else c
     for c in WINDOW_COLUMNS
 )
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed={"gain": "1", "drift": "2deg/h"}, columns=COLUMNS))
+MEASURED = laboratory_rows(TEMPLATE, needed={"gain": "1", "drift": "2deg/h"}, columns=COLUMNS)

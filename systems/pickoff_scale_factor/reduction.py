@@ -23,33 +23,18 @@ import numpy as np
 
 from gyrobench import drift as drift_model
 from gyrobench import frames, units
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels
 from gyrobench.reduction.drift.drift_terms import EARTH_ONLY
 from gyrobench.reduction.estimation import noise as noise_model
-from gyrobench.reduction.estimation.fit_result import with_values
-from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_LEVEL_POLE, INPUT_TO_OUTPUT, VOLTMETER
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    Record,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Setup,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.estimation.fit_result import Account, with_values
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup import sources
+from gyrobench.reduction.setup.run_metadata import Location, truth_of
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Array, DriftReduction, Findings, Group, Quantity, Record, Setup, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason
 from gyrobench.system.families.servo_channel import own_name
 from gyrobench.units import ARCSEC, DPH
 
@@ -85,8 +70,7 @@ def float_angle(angle: Array, gain: float, channel: str = "") -> Array:
     """
     if channel:
         return angle
-    out: Array = 2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain
-    return out
+    return np.asarray(2.0 * np.arctan(np.tanh(gain * angle / 2.0)) / gain)
 
 
 class Reduction(DriftReduction[PickoffSetup]):
@@ -139,7 +123,7 @@ class Reduction(DriftReduction[PickoffSetup]):
             wanted.append(Quantity("drift", meaning, "°/h", DPH, truth.get("drift")))
         return found.derive(wanted, lambda b: [b[0], b[0] / gain, *([-b[1] / b[0]] if both else [])])
 
-    def effects(self, found: Findings) -> list[Effect]:
+    def effects(self, found: Findings) -> list[sources.Effect]:
         """Return all sources with their sensitivities.
 
         An encoder that is off once a turn is off in proportion to a small angle, so the sine is an error of the scale.
@@ -162,11 +146,11 @@ class Reduction(DriftReduction[PickoffSetup]):
         return [
             GAIN.effect(s, values=only),
             SCALE.effect(s, stretched(found.X[:, 0])),
-            ANGLE_ONCE.effect(s, misread(1)),
-            ANGLE_TWICE.effect(s, misread(2)),
-            VOLTMETER.effect(s, found.error(found.y)),
-            AXIS_LEVEL_POLE.effect(s, earth, note=EARTH_ONLY),
-            INPUT_TO_OUTPUT.effect(s, earth, note=EARTH_ONLY),
+            sources.ANGLE_ONCE.effect(s, misread(1)),
+            sources.ANGLE_TWICE.effect(s, misread(2)),
+            sources.VOLTMETER.effect(s, found.error(found.y)),
+            sources.AXIS_LEVEL_POLE.effect(s, earth, note=EARTH_ONLY),
+            sources.INPUT_TO_OUTPUT.effect(s, earth, note=EARTH_ONLY),
             *([] if self.both else [DRIFT.effect(s.drift / 2.0, found.error(slope))]),
         ]
 
@@ -241,9 +225,6 @@ class Reduction(DriftReduction[PickoffSetup]):
             f"The test took {self.duration:.3g} s: a drift of {self.setup.drift / DPH:.3g} °/h is at most "
             f"{self.bound / ARCSEC:.3g}″, {self.bound / self.span * 100:.2g} % of the span.",
         ]
-
-
-reduce = Reduction.reduce
 
 
 def setup_of(record: Record) -> PickoffSetup:

@@ -1,7 +1,5 @@
 """Sources of error that are this test's own."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import Source
 
 GAIN = Source("float.gain", "gain H/C", "1", "u_gain", "relative", doc="relative standard uncertainty of that gain")

@@ -34,7 +34,6 @@ class PickoffScaleFactor(ChannelTest, OpenLoopTest):
 
     title = "Pickoff scale factor"
     spec = ("TEST-PICKOFF", "GYRO-DYN-1")
-    reduction = "reduction"
     slots = OpenLoopTest.with_parts(table="table_rate", gyro="floated_gyro")
     axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (
@@ -53,14 +52,11 @@ class PickoffScaleFactor(ChannelTest, OpenLoopTest):
             ),
         }
         | type_b(
-            sources,
-            "voltage",
-            "angle1",
-            "angle2",
+            sources, "voltage", "angle1", "angle2",
             axis="standard uncertainty of the right angle between table axis and pole",
             mount="standard uncertainty of the input axis against the table axis",
         )
-    )
+    )  # fmt: skip
     step = 1e-4  # s: the rate of a move of 0.2 s reaches the gyro as held values, wrong by acceleration step2/4 at most
     measured_data = MEASURED
     channels = ("table.angle", "gyro.u", "gyro.drift")

@@ -23,31 +23,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift, frames
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
-from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET_OF, TORQUER_SCALE_OF, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    attitude_of,
-    number,
-    told,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.setup.run_metadata import number, truth_of
+from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
+from gyrobench.reduction.setup.sources import CURRENT_OFFSET_OF, TORQUER_SCALE_OF, TURNED, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Regression, told
+from gyrobench.result import Coefficient, DriftTestResult, Table
 from gyrobench.units import ARCSEC, DPH
 
 from .sources import PICKOFF
@@ -75,8 +60,7 @@ class PositionSetup(SiteSetup):
     @property
     def earth(self) -> Array:
         """Earth rate along x, y, z, rad/s."""
-        out: Array = self.attitude @ frames.earth_rate_local(self.latitude, self.earth_rate)
-        return out
+        return np.asarray(self.attitude @ frames.earth_rate_local(self.latitude, self.earth_rate))
 
 
 class PositionChannel(DriftReduction[PositionSetup]):
@@ -239,22 +223,14 @@ class Reduction(ChannelTests[PositionSetup]):
             "1/s without integral; with one the angle that stays is the null of the pickoff"
         )
         head = [
-            "pickoff",
-            "loop gain / (1/s)",
-            "integral",
-            "angle at Earth rate / ″",
-            "drift of it / (°/h)",
-            "within 1″",
-        ]
+            "pickoff", "loop gain / (1/s)", "integral", "angle at Earth rate / ″", "drift of it / (°/h)", "within 1″",
+        ]  # fmt: skip
         return [Table("springs.loops", "The loops", caption, head, rows)]
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         every = [c for r in results.values() for c in r.coefficients]
         stiff = "Quadrature stiffness {Kx_q} and {Ky_q}, in phase {Kx_φ} and {Ky_φ}."
         return told(every, stiff, "Composite drift at null {ω_dx} and {ω_dy}.")
-
-
-reduce = Reduction.reduce
 
 
 def true_values(run: RunDocument, s: PositionSetup) -> dict[str, float] | None:

@@ -69,7 +69,6 @@ class PositionSensitivity(TwoChannelTest):
 
     title = "Position sensitivity test"
     spec = ("TEST-POSITION", "GYRO-POSITION", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = {
         **TwoChannelTest.with_parts(
             table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
@@ -100,16 +99,11 @@ class PositionSensitivity(TwoChannelTest):
         | type_b(sources, "attitude", "scale_factor", "current")
     )
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "angle_start", "angle_end", "n", "flagged")},
-            "flagged_y": "sampler_y.flagged",
-            **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
-            **{f"u_{a}": f"angle_{a}.mean" for a in "xy"},
-        },
-    )
+    windows = Windows.of(
+        "sampler_x", "t_start t_end angle_start angle_end n flagged", flagged_y="sampler_y.flagged",
+        **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
+        **{f"u_{a}": f"angle_{a}.mean" for a in "xy"},
+    )  # fmt: skip
     channel_period = 1.0
 
     def plan(self) -> Plan:

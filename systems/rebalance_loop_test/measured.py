@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData, System
+from gyrobench.system.lab_record import laboratory_rows
+from gyrobench.system.system import System
 
 TEMPLATE = """\
 # Test of a rebalance loop: one row for each reading of the current, at rest and at rates along the input axis.
@@ -39,4 +37,4 @@ def attitudes(system: System) -> dict[str, str]:
     return {REST: "hold", TURNING: "rate"}
 
 
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes))
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, attitudes=attitudes)

@@ -25,35 +25,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.window_regressors import BelievedGeometry, Turning, axis_rate, wobbles
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.estimation.fit_result import with_values
+from gyrobench.reduction.estimation.fit_result import Account, with_values
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup import sources
-from gyrobench.reduction.setup.run_metadata import phases
-from gyrobench.reduction.setup.setups import scale_factor_problems
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    number,
-    told,
-    window_problems,
-)  # fmt: skip
+from gyrobench.reduction.setup.run_metadata import Location, number, phases
+from gyrobench.reduction.setup.setups import SiteSetup, scale_factor_problems
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Array, DriftReduction, Effect, Findings, Group, Quantity, Regression, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.system.families.table_test import FACE, ON_TABLE
 from gyrobench.units import ARCSEC, DPH
 
@@ -267,9 +251,6 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             *self.small.sentence(),
             *found.nuisance_sentences(),
         ]
-
-
-reduce = Reduction.reduce
 
 
 def design(x: Array, std: Array, full: float) -> Array:

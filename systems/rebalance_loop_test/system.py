@@ -32,7 +32,6 @@ class RebalanceLoopTest(RebalanceTest):
 
     title = "Rebalance loop test"
     spec = ("TEST-REBAL-LOOP", "REBAL-ANALOG", "REBAL-PWM", "REBAL-PULSE")
-    reduction = "reduction"
     slots = {
         **RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_pwm"),
         FLOAT: Slot("Sampler", "sampler"),
@@ -54,17 +53,10 @@ class RebalanceLoopTest(RebalanceTest):
         | NUISANCES
         | CORRECTIONS
         | type_b(
-            sources,
-            "mount",
-            "wobble",
-            "angle1",
-            "angle2",
-            "scale_factor",
-            "current",
-            "time",
+            sources, "mount", "wobble", "angle1", "angle2", "scale_factor", "current", "time",
             axis="standard uncertainty of the table axis against the vertical",
         )
-    )
+    )  # fmt: skip
     measured_data = MEASURED
     assumed = TableTest.assumed  # errors of the pulses are what the test finds
     windows = Windows.of(ripple=f"{FLOAT}.std")

@@ -133,14 +133,12 @@ def _update(parts: list[tuple[Array, Array]]) -> Array:
     p2 = np.maximum((angle**2).sum(axis=1), 1e-8)[:, None]
     p = np.sqrt(p2)
     once = np.cross(angle, v)
-    out: Array = v + (1.0 - np.cos(p)) / p2 * once + (1.0 - np.sin(p) / p) / p2 * np.cross(angle, once)
-    return out
+    return np.asarray(v + (1.0 - np.cos(p)) / p2 * once + (1.0 - np.sin(p) / p) / p2 * np.cross(angle, once))
 
 
 def _fourier(values: Array, gains: list[complex]) -> Array:
     """Return the Fourier coefficients (k, .) of values (PHASES, .), k = 0 ... PHASES/2, times gains."""
-    out: Array = np.fft.rfft(values, axis=0) / PHASES * np.array(gains)[:, None]
-    return out
+    return np.asarray(np.fft.rfft(values, axis=0) / PHASES * np.array(gains)[:, None])
 
 
 def _series(c: Array, psi: Array) -> Array:
@@ -148,8 +146,7 @@ def _series(c: Array, psi: Array) -> Array:
     k = np.arange(len(c))
     weight = np.where((k == 0) | (k == PHASES // 2), 1.0, 2.0)
     turned = np.exp(1j * np.multiply.outer(psi, k)) * weight
-    out: Array = (turned @ c).real
-    return out
+    return np.asarray((turned @ c).real)
 
 
 def reading(m: ScullingMotion, gravity: float) -> float:

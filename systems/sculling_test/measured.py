@@ -1,12 +1,7 @@
 """A laboratory's record of a sculling test: the mean acceleration that the user computes, reading by reading."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import READING_TIMES, CsvColumn
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 TEMPLATE = """\
 # Sculling of a strapdown unit: one row for each reading, in motion and at rest between.
@@ -36,4 +31,4 @@ COLUMNS = (
     CsvColumn("vibration", "m/s2", "amplitude of the vibration"),
     CsvColumn("acceleration", "m/s2", "mean acceleration that the user computes"),
 )
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time="t_start"))
+MEASURED = laboratory_rows(TEMPLATE, columns=COLUMNS, time="t_start")

@@ -21,27 +21,13 @@ from gyrobench.frames import G0
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
-from gyrobench.reduction.setup.run_metadata import Location
-from gyrobench.reduction.setup.setups import weighed
-from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Record,
-    Regression,
-    Setup,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import Location, with_plan
+from gyrobench.reduction.setup.setups import Setup, weighed
+from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.system.families.strapdown_motion import FACES
 from gyrobench.units import DEG
 
@@ -215,14 +201,9 @@ def _slope(
 
 def labelled(record: Record) -> dict[str, Array]:
     """Return the windows with frequency, angle and vibration; of a run those of the plan."""
-    windows = dict(record.windows)
+    windows = with_plan(record, frequency="target", angle="target_y")
     if not record.run.measured:
-        rows = {row.phase: row for row in record.run.plan}
-        phase = np.asarray(windows["phase"]).astype(int).tolist()
-        windows["frequency"] = np.array([rows[p].target for p in phase])
-        windows["angle"] = np.array([rows[p].target_y for p in phase])
-        vibration = float(record.run.options["vibration"])
-        windows["vibration"] = np.array([vibration if rows[p].target else 0.0 for p in phase])
+        windows["vibration"] = np.where(windows["frequency"], float(record.run.options["vibration"]), 0.0)
     return windows
 
 
@@ -256,6 +237,3 @@ def true_values(run: RunDocument, gravity: float) -> dict[str, float] | None:
     frequencies = sorted({row.target for row in run.plan} - {0.0})
     angle = float(run.options["angle"])
     return {f"d({f:g} Hz)": chain.rise(ScullingMotion(f, angle, vibration), unit) for f in frequencies}
-
-
-reduce = Reduction.reduce

@@ -1,7 +1,5 @@
 """Sources of error of a table that turns and vibrates, which are this test's own."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import Source
 
 ANGLE = Source("table.angle_gain", "amplitude of the angle", "1", "u_angle", "relative, positive where it is larger")

@@ -7,18 +7,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench.system.connectors import Socket, inp, out
+from gyrobench.system.families import strapdown_motion
 from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
-from gyrobench.system.families.strapdown_motion import (
-    AXES,
-    FACES,
-    GONE_THROUGH,
-    INCREMENTS,
-    RAMP,
-    UNIT,
-    USER,
-    StrapdownMotion,
-    motion_table,
-)
 from gyrobench.system.families.table_test import sampled
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot, Windows
@@ -27,7 +17,7 @@ from . import sources
 from .measured import MEASURED
 
 FORCES = "specific force that the accelerometers x, y, z read"
-TABLE = motion_table(
+TABLE = strapdown_motion.motion_table(
     "ScullingTable",
     "table that rocks about one horizontal axis and shakes along the other: rates and forces of the case, attitude",
     inp("angle_wanted", "", "amplitude of the angle, rad"),
@@ -35,13 +25,13 @@ TABLE = motion_table(
 IMU = Socket(
     "StrapdownUnit",
     "three gyros and three accelerometers: inertial rate and specific force in, readings out",
-    (*UNIT, out("f_read", "m/s2", FORCES, 3)),
+    (*strapdown_motion.UNIT, out("f_read", "m/s2", FORCES, 3)),
 )
 BOTH_INCREMENTS = Socket(
     "Increments",
     "rates and specific force in, angle and velocity increments at the output rate of the unit out",
     (
-        *INCREMENTS,
+        *strapdown_motion.INCREMENTS,
         inp("f_read", "m/s2", FORCES, 3),
         out("dvelocity", "m/s", "velocity increments of the last output", 3),
     ),
@@ -50,7 +40,7 @@ USER_OF_VELOCITY = Socket(
     "StrapdownVelocity",
     "velocity from angle and velocity increments: by how much it changes beyond gravity",
     (
-        *USER,
+        *strapdown_motion.USER,
         inp("dvelocity", "m/s", "velocity increments", 3),
         inp("f_local", "m/s2", "specific force at rest", 3),
         out("acceleration", "m/s2", "change of the velocity over the step, by the step, table axes", 3),
@@ -58,7 +48,7 @@ USER_OF_VELOCITY = Socket(
 )
 
 
-class ScullingTest(StrapdownMotion):
+class ScullingTest(strapdown_motion.StrapdownMotion):
     """A table rocks a strapdown unit about one horizontal axis and shakes it along the other, in phase, at one
     frequency after another.  The case stays where it was, the velocity that its user computes does not: its change
     along the vertical against that at rest shows what filters, output rate, sculling terms and lever arms cost him.
@@ -68,7 +58,6 @@ class ScullingTest(StrapdownMotion):
 
     title = "Sculling test of a strapdown unit"
     spec = ("TEST-SCULLING", "TEST-CONING")
-    reduction = "reduction"
     kind, amplitude, updated = "axis of the drift vertical", "angle", "velocity"
     slots = {
         "site": Slot("Site", "site"),
@@ -105,30 +94,23 @@ class ScullingTest(StrapdownMotion):
             "sculling": Option(True, bool, "its velocity increments have sculling", sets="increments.sculling"),
             "size": Option(0.0, "m", "height of the third axis' accelerometer above that of the vertical"),
         }
-        | GONE_THROUGH
+        | strapdown_motion.GONE_THROUGH
         | NUISANCES
         | CORRECTIONS
         | type_b("time", "gravity", sources)
     )  # fmt: skip
-    noises = tuple(f"imu.{a}_{n}" for a in AXES for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
+    noises = tuple(f"imu.{a}_{n}" for a in strapdown_motion.AXES for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     measured_data = MEASURED
-    windows = Windows(
-        "sampler.count",
-        {
-            "phase": "sampler.window_phase",
-            **{n: f"sampler.{n}" for n in ("t_start", "t_end", "n")},
-            "acceleration": "sampler.mean",
-        },
-    )
+    windows = Windows.of("sampler", "t_start t_end n", acceleration="sampler.mean")
     channels = ("sampler.mean",)
 
     def parameters(self, parts: PartValues) -> dict[str, Any]:
-        face = FACES.get(self["axis"], np.eye(3))
+        face = strapdown_motion.FACES.get(self["axis"], np.eye(3))
         levers = self["size"] * np.outer(face[:, 1], face[:, 2])
         return {
             **self.plan().parameters(),
             **self.owned(),
-            "table.ramp": RAMP,
+            "table.ramp": strapdown_motion.RAMP,
             "table.face": face.tolist(),
             "table.levers": levers.tolist(),
             "user.face": face.tolist(),

@@ -1,7 +1,5 @@
 """A laboratory's record of the polar servo test: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
 from gyrobench.attitudes import POLAR
 from gyrobench.system.families.servo_test import laboratory_data
 

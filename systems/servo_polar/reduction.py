@@ -23,21 +23,9 @@ from gyrobench.attitudes import POLAR, SERVO_ATTITUDES, on_servo_table
 from gyrobench.reduction.drift import drift_terms, harmonic, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup, HeldTest
 from gyrobench.reduction.drift.turns import Turns
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftTestResult,
-    Findings,
-    Group,
-    Reason,
-    Record,
-    ReductionError,
-    Regression,
-    RunDocument,
-    Table,
-    told,
-)
+from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Record, Regression, RunDocument, told
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 from . import closed, live, refusals

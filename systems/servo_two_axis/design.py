@@ -121,8 +121,7 @@ class TestModel:
         V = self.noise[c].covariance(t0, t1)
         error = self.reading[c] * (np.cos(inner) if c == "x" else np.ones_like(t0)) / (t1 - t0)
         shared = np.where(np.abs(t0[1:] - t1[:-1]) < 1e-6 * (t1 - t0)[1:], -error[1:] * error[:-1], 0.0)
-        out: Array = V + np.diag(2.0 * error**2) + np.diag(shared, 1) + np.diag(shared, -1)
-        return out
+        return np.asarray(V + np.diag(2.0 * error**2) + np.diag(shared, 1) + np.diag(shared, -1))
 
     # ------------------------------------------------------------------------------------------ choices
     def choice(self, mounts: Sequence[int], start: float) -> Choice:
@@ -218,8 +217,7 @@ class TestModel:
             sizes = np.where(seen[:, None], size[:, index], math.nan) * np.array([wanted[names[i]] for i in index])
             squares.append(np.nan_to_num(variance[:, index] / sizes**2, nan=math.inf))
         both = np.concatenate(squares, axis=1)
-        out: Array = both.max(axis=1) if criterion == "minimax" else both.mean(axis=1)
-        return out
+        return np.asarray(both.max(axis=1) if criterion == "minimax" else both.mean(axis=1))
 
     def _before(self, sets: NDArray[np.bool_], back: Array, length: float) -> Array:
         """Return when each mount of each set begins (m, 12), in days: those with the shortest way back come first."""

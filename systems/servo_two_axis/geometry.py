@@ -40,8 +40,7 @@ def attitude(x: ArrayLike, y: ArrayLike) -> Array:
     cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
     zero = np.zeros_like(cx * cy)
     rows = [[cy + zero, sx * sy, -cx * sy], [zero, cx + zero, sx + zero], [sy + zero, -cy * sx, cx * cy]]
-    out: Array = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-    return out
+    return np.asarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
 
 def swing(mount: int, latitude: float) -> float:
@@ -100,5 +99,4 @@ def path(
 
 def force(mount: int, latitude: float, x: Array, y: Array) -> Array:
     """Return SF / g along the gyro axes (n, 3): gamma of Hu 1981."""
-    out: Array = attitude(x, y) @ (base(mount, latitude) @ -frames.U)
-    return out
+    return np.asarray(attitude(x, y) @ (base(mount, latitude) @ -frames.U))

@@ -21,18 +21,8 @@ import numpy as np
 from gyrobench import drift
 from gyrobench.reduction.drift import composite, drift_terms
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Regression,
-    Table,
-)
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Quantity, Regression
+from gyrobench.result import Coefficient, Table
 from gyrobench.units import DPH
 
 from . import budget
@@ -92,15 +82,9 @@ class LevelChannel(DriftReduction["TwoAxisServoSetup"]):
         if len(s.labels) > len(self.mounts):
             weighed.append(nuisances.scatter("mount", w.phase.tolist(), end))
         return Regression(
-            quantities, X, y, seen.t_start, seen.t_end, [self._group(p) for p in s.labels],
+            quantities, X, y, seen.t_start, seen.t_end, [self.whole.group(p) for p in s.labels],
             noise="readings", candidates=weighed if s.nuisances else (),
         )  # fmt: skip
-
-    def _group(self, p: int) -> Group:
-        rows, seen = self.whole.phase == p, self.whole.seen
-        middle = (seen.t_start + seen.t_end) / 2.0
-        x = (middle[rows] - seen.t_start[rows][0]) / 3600.0
-        return Group(self.setup.name(p), rows, x, "time in the mount", "h")
 
     def effects(self, found: Findings) -> list[Effect]:
         s, w = self.setup, self.whole

@@ -1,12 +1,7 @@
 """A laboratory's record of the two-axis servo test: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 from .geometry import MOUNTS
 from .windows import ANGLES
@@ -45,4 +40,4 @@ COLUMNS = (
 )
 NEEDED = {"latitude": "45.75deg"}
 ATTITUDES = {f"mount {m}": "servo" for m in MOUNTS}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=lambda _: ATTITUDES, columns=COLUMNS))
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, attitudes=lambda _: ATTITUDES, columns=COLUMNS)

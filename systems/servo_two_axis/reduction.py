@@ -19,28 +19,16 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.drift import channels, drift_terms, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.sentences import told
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    Table,
-    truth_of,
-)
-from gyrobench.result import DriftTestResult
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, truth_of
+from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
 from . import budget, closed, geometry, levelled, refusals
@@ -91,16 +79,9 @@ class ServoChannel(DriftReduction[TwoAxisServoSetup]):
         end = f",{self.channel}"
         weighed = [*nuisances.common(rows, end), nuisances.scatter("mount", w.phase.tolist(), end)]
         return Regression(
-            quantities, w.X[self.channel], y, seen.t_start, seen.t_end, [self._group(p) for p in s.labels],
+            quantities, w.X[self.channel], y, seen.t_start, seen.t_end, [self.whole.group(p) for p in s.labels],
             noise="readings", limit=1e6, candidates=weighed if s.nuisances else (),
         )  # fmt: skip
-
-    def _group(self, p: int) -> Group:
-        """Return drift against time in a mount."""
-        rows, seen = self.whole.phase == p, self.whole.seen
-        middle = (seen.t_start + seen.t_end) / 2.0
-        x = (middle[rows] - seen.t_start[rows][0]) / 3600.0
-        return Group(self.setup.name(p), rows, x, "time in the mount", "h")
 
     def effects(self, found: Findings) -> list[Effect]:
         return budget.effects(self.axis, found, self.whole.seen, self.whole.phase, self.names, self.setup)
@@ -163,6 +144,13 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
 
     def of_channel(self, name: str) -> ServoChannel | levelled.LevelChannel:
         return levelled.LevelChannel(self, name) if self.setup.levelled else ServoChannel(self, name)
+
+    def group(self, p: int) -> Group:
+        """Return the windows of a phase against the time in its mount."""
+        rows, seen = self.phase == p, self.seen
+        middle = (seen.t_start + seen.t_end) / 2.0
+        x = (middle[rows] - seen.t_start[rows][0]) / 3600.0
+        return Group(self.setup.name(p), rows, x, "time in the mount", "h")
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         """Return the numbers that matter, as sentences."""
@@ -267,16 +255,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
             scatter = [float(np.std(f.est.residual[k])) / DPH for f in found.values()]
             rows.append([label, p, int(k.sum()), time / 3600.0, *map(math.degrees, angles), *scatter])
         head = [
-            "mount",
-            "phase",
-            "windows",
-            "time / h",
-            "outer / °",
-            "inner / °",
-            "no drift / °",
-            "x / (°/h)",
-            "y / (°/h)",
-        ]
+            "mount", "phase", "windows", "time / h", "outer / °", "inner / °", "no drift / °", "x / (°/h)", "y / (°/h)",
+        ]  # fmt: skip
         caption = "Turn of the outer axis, largest inner angle and that of a gyro without drift; scatter of residuals"
         return Table("mounts", "Mounts", caption, head, rows)
 

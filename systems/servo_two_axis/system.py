@@ -33,7 +33,6 @@ class ServoTwoAxis(TableTest):
 
     title = "Two-axis servo test"
     spec = ("TEST-SERVO2-2DOF", "LOOP-TABLE-SERVO", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF")
-    reduction = "reduction"
     protocol = "design"
     slots = {
         "site": Slot("Site", "site"),

@@ -103,8 +103,7 @@ class Track:
 
 def average(values: Array) -> Array:
     """Return the mean over the nodes (axis 1)."""
-    out: Array = np.einsum("nk...,k->n...", values, WEIGHTS)
-    return out
+    return np.asarray(np.einsum("nk...,k->n...", values, WEIGHTS))
 
 
 def stretches(t_start: Array, t_end: Array, phase: NDArray[np.int_]) -> list[NDArray[np.int_]]:

@@ -1,7 +1,5 @@
 """A laboratory's record of vertical and level servo tests: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
 from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.record.csv_reader import CsvColumn
 from gyrobench.system.families.servo_test import laboratory_data

@@ -21,19 +21,8 @@ import numpy as np
 from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup, HeldTest
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    Table,
-    told,
-)
+from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Quantity, Regression, RunDocument, told
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import DPH
 
 from . import closed, compensation, refusals

@@ -48,7 +48,6 @@ class ServoVerticalLevel(ServoTest):
 
     title = "Vertical and level servo test"
     spec = ("TEST-SERVO-VERT", "TEST-SERVO-LEVEL", "TEST-COMPOSITE", "LOOP-TABLE-SERVO", "GYRO-DYN-1", "GYRO-STATIC-9")
-    reduction = "reduction"
     slots = ServoTest.with_parts(stand="fixture", table="table_servo", gyro="floated_gyro", cage="cage")
     axis_parts: ClassVar[Mapping[str, str]] = {"gyro": "gyro_2dof", "lock": "rebalance_two_axis"}
     options = (

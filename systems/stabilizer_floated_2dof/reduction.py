@@ -14,17 +14,8 @@ import numpy as np
 
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.loops import platform_measures as common
-from gyrobench.reduction.loops.loop_toolkit import (
-    DRIFTS,
-    Account,
-    Gate,
-    LoopReduction,
-    Point,
-    drift,
-    isolation,
-    margins,
-    told,
-)
+from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins
+from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction, Point, drift, told
 from gyrobench.reduction.loops.margins import interpolate_response, measured_values
 from gyrobench.result import Table
 from gyrobench.units import ARCSEC

@@ -61,7 +61,6 @@ class StabilizerFloated2dof(OneAxisTest):
 
     title = "Stabilizer with a floated two-degree-of-freedom gyro"
     spec = ("STAB-FLOATED-2DOF", "STAB-TWO-LOOP")
-    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),
         "stabilizer": stabilizer("stabilizer_lead_lag"),

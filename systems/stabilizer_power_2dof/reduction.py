@@ -139,8 +139,7 @@ class Reduction(LoopReduction):
         factor, u = values["upper"]
         self.found.measure("K_m limit", "K_m at which the loop is at its limit", "N·m/rad", self.K_m * factor,
                            self.K_m * u, closed=routh_limit(**self.gyro))  # fmt: skip
-        self.found.measure("f_n", "undamped nutation frequency", "Hz", *values["f_upper"],
-                           closed=nutation(**self.gyro))  # fmt: skip
+        self.found.measure("f_n", "undamped nutation frequency", "Hz", *values["f_upper"], closed=nutation(**self.gyro))
 
     def _transmission(self, f: float) -> complex | None:
         linear = self.found.excited("discrete", "motion", 1, ALPHA, [f], plus=BASE)

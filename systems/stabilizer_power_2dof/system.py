@@ -29,7 +29,6 @@ class StabilizerPower2dof(LoopTest):
 
     title = "Power gyro stabilizer with a two-degree-of-freedom gyro"
     spec = ("STAB-POWER-2DOF",)
-    reduction = "reduction"
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "stabilizer": stabilizer("stabilizer_power"),
         "gyro": Slot("TwoAxisGyro", "gyro_2dof"),

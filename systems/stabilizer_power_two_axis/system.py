@@ -45,7 +45,6 @@ class StabilizerPowerTwoAxis(LoopTest):
 
     title = "Two-axis stabilizer with two power gyros"
     spec = ("STAB-POWER-TWO-AXIS", "STAB-POWER-2DOF")
-    reduction = "reduction"
     slots = LoopTest.with_parts(motion="base_motion", load="load_torque") | {
         "stabilizer_x": stabilizer("stabilizer_power"),
         "stabilizer_y": stabilizer("stabilizer_power"),

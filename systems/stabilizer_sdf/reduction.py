@@ -9,16 +9,8 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Gate,
-    LoopFindings,
-    LoopReduction,
-    isolation,
-    margins,
-    told,
-    trace,
-)
+from gyrobench.reduction.loops.loop_summary import isolation, margins
+from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopFindings, LoopReduction, told, trace
 from gyrobench.reduction.loops.platform_measures import level_drift
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table

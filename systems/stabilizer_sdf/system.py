@@ -28,7 +28,6 @@ class StabilizerSdf(OneAxisTest):
 
     title = "Stabilizer with a gyro of one degree of freedom"
     spec = ("STAB-SDF-INT", "STAB-SDF-RATEINT", "STAB-SDF-RATE")
-    reduction = "reduction"
     slots = OneAxisTest.with_parts(motion="base_motion", load="load_torque", platform="platform_single_axis") | {
         "gyro": Slot("SdfGyro", "floated_gyro"),
         "stabilizer": stabilizer("stabilizer_lead_lag"),
@@ -55,7 +54,6 @@ class StabilizerSdf(OneAxisTest):
         "offload": Option(0.0, "N.m/rad", "motor torque for the float angle; 0: no motor", sets="stabilizer.K"),
         "viscous": Option(0.0, "N.m.s/rad", "friction of the axis against the base", sets="platform.viscous"),
     }
-    step = 1e-3
     channels = (*OneAxisTest.channels, "gyro.b", "stabilizer.e")
     shown = ("platform.attitude", "platform.omega", "gyro.b", "exciter.torque", "exciter.motion_angle")
     channel_period = 1e-2

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from gyrobench import frames
 from gyrobench.arrays import Array
 from gyrobench.units import ARCSEC, DEG
 
@@ -36,15 +37,6 @@ def julian(text: str) -> float:
     when = datetime.fromisoformat(text)
     when = when.replace(tzinfo=UTC) if when.tzinfo is None else when.astimezone(UTC)
     return 2451545.0 + (when - datetime(2000, 1, 1, 12, tzinfo=UTC)).total_seconds() / 86400.0
-
-
-def _turned(axis: int, angle: float) -> Array:
-    """Return the rotation of axes by ``angle`` about x (0), y (1), z (2)."""
-    c, s = math.cos(angle), math.sin(angle)
-    m = np.eye(3)
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    m[j, j], m[j, k], m[k, j], m[k, k] = c, s, -s, c
-    return m
 
 
 def _nutation(T: float) -> tuple[float, float, float]:
@@ -82,9 +74,9 @@ def apparent(jd_utc: float, ut1_utc: float = 0.0) -> tuple[float, float, float]:
     velocity = kappa * np.array([
         math.sin(sun) - e * math.sin(perihelion), -math.cos(sun) + e * math.cos(perihelion), 0.0
     ])  # fmt: skip
-    r = _turned(2, -z) @ _turned(1, theta) @ _turned(2, -zeta) @ (r / np.linalg.norm(r))
-    r = r + _turned(0, -mean) @ velocity
-    r = _turned(0, -mean - eps) @ _turned(2, -psi) @ _turned(0, mean) @ (r / np.linalg.norm(r))
+    r = frames.passive(2, -z) @ frames.passive(1, theta) @ frames.passive(2, -zeta) @ (r / np.linalg.norm(r))
+    r = r + frames.passive(0, -mean) @ velocity
+    r = frames.passive(0, -mean - eps) @ frames.passive(2, -psi) @ frames.passive(0, mean) @ (r / np.linalg.norm(r))
     days = jd_utc + ut1_utc / 86400.0 - 2451545.0
     gmst = 280.46061837 + 360.98564736629 * days + 0.000387933 * T**2
     gast = gmst * DEG + psi * math.cos(mean + eps)
@@ -113,5 +105,4 @@ def refraction(altitude: Array, pressure: float = 101325.0, temperature: float =
     """Return by how much air raises a star at a true altitude (rad); Pa, K.  Meeus 1998, eq. 16.4."""
     h = np.degrees(altitude)
     bent = 1.02 / 60.0 / np.tan(np.radians(h + 10.3 / (h + 5.11)))
-    out: Array = np.radians(bent) * pressure / 101000.0 * 283.0 / temperature
-    return out
+    return np.asarray(np.radians(bent) * pressure / 101000.0 * 283.0 / temperature)

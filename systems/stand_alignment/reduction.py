@@ -21,22 +21,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.toolkit import (
-    Account,
-    Coefficient,
-    DriftReduction,
-    Effect,
-    Findings,
-    Group,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    Table,
-    told,
-    window_problems,
-)
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Findings, Group, Quantity, Regression, told
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC, DEG, EARTH_RATE
 
 from . import polaris
@@ -232,6 +221,3 @@ class Reduction(DriftReduction[AlignmentSetup]):
             *told(coefficients, "Axis off the pole: {about east} about east, {about p × east} across."),
             f"Residual standard deviation {found.residual_std:.3g}″ of a sight.",
         ]
-
-
-reduce = Reduction.reduce

@@ -1,7 +1,5 @@
 """Sources of error of sights and inclinometer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gyrobench.component.set_up import SINES

@@ -58,7 +58,6 @@ class StandAlignment(System):
 
     title = "Alignment of a test stand"
     spec = ("STAND-ALIGNMENT", "ALIGN-ERRORS")
-    reduction = "reduction"
     slots: ClassVar[Mapping[str, Slot]] = {
         "sequencer": Slot("Sequencer", "sequencer"),
         "theodolite": Slot(SIGHTS, "theodolite"),

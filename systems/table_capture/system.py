@@ -34,7 +34,6 @@ class TableCapture(System):
 
     title = "Capture of a servo table"
     spec = ("CTRL-CAPTURE", "TABLE-SERVO")
-    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "sequencer": Slot("Sequencer", "sequencer"),

@@ -20,26 +20,13 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.record.record import Record
+from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.toolkit import (
-    Account,
-    Coefficient,
-    DriftReduction,
-    DriftTestResult,
-    Effect,
-    Findings,
-    Group,
-    Location,
-    Quantity,
-    Regression,
-    RunDocument,
-    SiteSetup,
-    Table,
-    number,
-    told,
-    window_problems,
-)
-from gyrobench.result import BudgetLine
+from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.setup.run_metadata import Location, number
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Findings, Group, Quantity, SiteSetup, told
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Table
 from gyrobench.units import ARCSEC, DPH, G0
 
 from . import budgets, isolation, set_up

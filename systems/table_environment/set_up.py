@@ -64,5 +64,4 @@ def _rate(t0: Array, t1: Array, mean: Array) -> Array:
     """Return the mean rate (n,) over windows that follow one another of what has the means ``mean`` over them."""
     edges, length = np.append(t0[:1], t1), t1 - t0
     integral = CubicSpline(edges, np.concatenate([[0.0], np.cumsum(mean * length)]))
-    out: Array = np.diff(integral(edges, 1)) / np.diff(edges)
-    return out
+    return np.asarray(np.diff(integral(edges, 1)) / np.diff(edges))

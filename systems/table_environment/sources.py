@@ -1,7 +1,5 @@
 """Sources of error that are this test's own."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import RELATIVE, Source
 
 RECORDED = Source(

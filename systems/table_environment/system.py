@@ -60,7 +60,6 @@ class TableEnvironment(RebalanceTest):
 
     title = "Surroundings of a table"
     spec = ("ENV-DISTURBANCE", "ENV-FOUNDATION", "ALIGN-ERRORS", "ERROR-BUDGET")
-    reduction = "reduction"
     on_request: ClassVar[Mapping[str, OnRequest]] = {
         "foundation": OnRequest({"foundation": Slot("Foundation", "foundation_passive")}, ABOVE, {}, MOVED, DIRECT)
     }
@@ -113,21 +112,12 @@ class TableEnvironment(RebalanceTest):
     )  # fmt: skip
     step = 2.5e-3  # s: nothing is fast here
     windows = Windows.of(
-        "sampler",
-        temperature="thermometer.mean",
-        ground_rate="sampler_rate.mean",
-        tilt_east="sampler_east.mean",
-        tilt_north="sampler_north.mean",
-        difference="sampler_difference.mean",
-        field="sampler_field.mean",
-    )
+        "sampler", temperature="thermometer.mean", ground_rate="sampler_rate.mean", tilt_east="sampler_east.mean",
+        tilt_north="sampler_north.mean", difference="sampler_difference.mean", field="sampler_field.mean",
+    )  # fmt: skip
     channels = (
-        *RebalanceTest.channels,
-        "site.tilt[1]",
-        "site.tilt[2]",
-        "surroundings.temperature",
-        "surroundings.B[1]",
-    )
+        *RebalanceTest.channels, "site.tilt[1]", "site.tilt[2]", "surroundings.temperature", "surroundings.B[1]",
+    )  # fmt: skip
     shown = ("gyro.drift", "site.tilt", "surroundings.temperature", "surroundings.B")
 
     def plan(self) -> Plan:

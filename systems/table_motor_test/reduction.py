@@ -25,16 +25,8 @@ import numpy as np
 from scipy import integrate, linalg, optimize, special
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.loop_toolkit import (
-    ARCSEC,
-    Account,
-    Array,
-    Gate,
-    LoopReduction,
-    ReductionError,
-    Table,
-    told,
-)
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Array, Gate, LoopReduction, Table, told
+from gyrobench.reduction.setup.window_checks import ReductionError
 
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise

@@ -39,7 +39,6 @@ class TableMotorTest(LoopTest):
 
     title = "Motor of a turntable"
     spec = ("MOTOR-TEST", "MOTOR-DC", "MOTOR-SQUARELAW")
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "site": Slot("Site", "site"),
@@ -48,17 +47,14 @@ class TableMotorTest(LoopTest):
         "reader": Slot("AngleReader", "inductosyn"),
         **{name: Slot(METER, "meter") for name in METERS},
     }
-    wires = (
-        """
+    wires = """
         site -> body: f=f_local omega=omega_local
         exciter.torque[1] -> drive.demand
         exciter.torque[2] -> body.M_load
         body.rate -> drive.rate
         drive.torque -> body.torque
         body -> reader: angle rate
-        """
-        + "".join(f"{source} -> {name}.x\n" for name, source in METERS.items())
-    )  # fmt: skip
+        """ + "".join(f"{source} -> {name}.x\n" for name, source in METERS.items())
     raw = dict(zip(element_names("body.face", (3, 3)), ALONG, strict=True))
     options = {
         "torque": Option(4.0, "N.m", "demanded torque of the runs; half of it too", 1e-3),

@@ -184,8 +184,7 @@ def _not_negative(F: Array, q: Array) -> Array:
     size, axes = np.linalg.eigh(F * np.outer(unit, unit))
     root = np.sqrt(np.where(size > ALONE * size[-1], size, 0.0))
     y = np.divide(axes.T @ (unit * q), root, out=np.zeros_like(q), where=root > 0.0)
-    x: Array = unit * nnls(root[:, None] * axes.T, y)[0]
-    return x
+    return np.asarray(unit * nnls(root[:, None] * axes.T, y)[0])
 
 
 def _units(F: Array) -> Array:

@@ -19,13 +19,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from gyrobench.reduction.loops.loop_toolkit import (
-    ARCSEC,
-    Account,
-    MeasureReduction,
-    ReductionError,
-    told,
-)
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, MeasureReduction, ReductionError, told
 from gyrobench.reduction.loops.scale_errors import truth, waves
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.result import BudgetLine, Series, Table

@@ -65,7 +65,6 @@ class TablePositionTest(System):
 
     title = "Position test of a table"
     spec = ("TABLE-POSITION", "TABLE-PROGRAM", "ANGLE-INDUCTOSYN")
-    reduction = "reduction"
     measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),
@@ -120,15 +119,9 @@ class TablePositionTest(System):
     }
     windows = Windows.of("sampler", **{n: f"{n}.mean" for n in SAMPLED if n != "sampler"})
     done = "sequencer.done"
-    step = 1e-3
     channels = (
-        "command.angle",
-        "controller.e",
-        "reference.deviation",
-        "reference.level_x",
-        "drive.torque",
-        "body.angle",
-    )
+        "command.angle", "controller.e", "reference.deviation", "reference.level_x", "drive.torque", "body.angle",
+    )  # fmt: skip
     bodies = """
         table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle
     """

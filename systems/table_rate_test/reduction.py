@@ -15,18 +15,9 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
 from gyrobench.reduction.estimation.fit_result import UNSTATED
-from gyrobench.reduction.loops.loop_toolkit import (
-    ARCSEC,
-    Account,
-    MeasureReduction,
-    ReductionError,
-    line,
-    over_time,
-    told,
-    trace,
-)
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, MeasureReduction, line, over_time, told, trace
 from gyrobench.reduction.setup.sources import Source
-from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.result import BudgetLine, Reason, Response, Table
 
 from .axis_as_data import SampledLoopError, margins_table

@@ -1,7 +1,5 @@
 """Sources of error of the readings of an angle."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.units import ARCSEC
 

@@ -32,7 +32,6 @@ class TableRateTest(System):
 
     title = "Rate test of a table"
     spec = ("TABLE-RATE", "READOUT-RATE", "CTRL-SAMPLED", "TABLE-TACHO")
-    reduction = "reduction"
     measured_data = MEASURED
     slots = {
         "site": Slot("Site", "site"),
@@ -84,18 +83,11 @@ class TableRateTest(System):
         "quantum": Option(0.0, "rad", "angle of a count, of measured data; 0: of the reader", 0.0),
     }
     windows = Windows.of(
-        "sampler",
-        jitter="jitter.std",
-        angle_true="body.angle",
-        gate="gate.rate",
-        gate_valid="gate.valid",
-        gate_start="gate.t_start",
-        inverse="inverse.rate",
-        inverse_valid="inverse.valid",
+        "sampler", jitter="jitter.std", angle_true="body.angle", gate="gate.rate", gate_valid="gate.valid",
+        gate_start="gate.t_start", inverse="inverse.rate", inverse_valid="inverse.valid",
         inverse_start="inverse.t_start",
-    )
+    )  # fmt: skip
     done = "sequencer.done"
-    step = 1e-3
     channels = ("command.rate", "controller.e", "controller.demand", "drive.torque", "body.rate", "body.angle")
     bodies = """
         table: base body.base, x body.tilt[1], y body.tilt[2], z body.angle

@@ -9,18 +9,8 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.record import Record
-from gyrobench.reduction.loops.loop_toolkit import (
-    Account,
-    Array,
-    Drift,
-    Gate,
-    LoopReduction,
-    Point,
-    Table,
-    drift,
-    margins,
-    told,
-)
+from gyrobench.reduction.loops.loop_drift import Drift, drift
+from gyrobench.reduction.loops.loop_toolkit import Account, Array, Gate, LoopReduction, Point, Table, margins, told
 from gyrobench.reduction.loops.margins import measured_values
 from gyrobench.reduction.loops.platform_measures import lower_limit
 from gyrobench.units import ARCSEC

@@ -38,7 +38,6 @@ class TableServoLoop(LoopTest):
 
     title = "Servo loop of a turntable"
     spec = ("TABLE-SERVO", "MOTOR-SQUARELAW", "SLIPRING-FOLLOWER")
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "site": Slot("Site", "site"),

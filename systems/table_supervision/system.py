@@ -77,7 +77,6 @@ class TableSupervision(System):
 
     title = "Supervision of a table"
     spec = ("CTRL-SUPERVISION", "TABLE-MODES")
-    reduction = "reduction"
     slots = {
         "faults": Slot(SOURCE, "fault_source"),
         "monitor": Slot(MONITOR, "fault_monitor"),
@@ -121,14 +120,9 @@ class TableSupervision(System):
     )
     done = "faults.done"
     channels = (
-        "table.rate",
-        "monitor.alarm",
-        "monitor.outside",
-        "supervisor.tripped",
-        "supervisor.mode",
-        "faults.pressure",
+        "table.rate", "monitor.alarm", "monitor.outside", "supervisor.tripped", "supervisor.mode", "faults.pressure",
         "table.angle",
-    )
+    )  # fmt: skip
     bodies = "table: base table.base, x table.tilt[1], y table.tilt[2], z table.angle"
     shown = ("table.rate", "monitor.alarm supervisor.tripped", "monitor.outside", "faults.pressure")
     channel_period = 0.05

@@ -15,18 +15,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from gyrobench.reduction.loops.loop_toolkit import (
-    ARCSEC,
-    Account,
-    Array,
-    MeasureReduction,
-    Reason,
-    ReductionError,
-    Table,
-    told,
-    trace,
-)
-from gyrobench.result import Limit
+from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Array, MeasureReduction, ReductionError, told, trace
+from gyrobench.result import Limit, Reason, Table
 
 STEPS = (
     "heater on", "wheel on", "reference", "pickoff null", "excitation on", "torquer", "loop closed", "loop step",

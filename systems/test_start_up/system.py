@@ -96,7 +96,6 @@ class TestStartUp(System):
 
     title = "Start, self-test and shutdown by program"
     spec = ("TEST-START-UP", "TABLE-PROGRAM", "THERMOSTAT", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = {
         "site": Slot("Site", "site"),
         "program": Slot(PROGRAM, "test_program"),
@@ -151,7 +150,6 @@ class TestStartUp(System):
     )
     done = "program.done"
     closed_loop = True
-    step = 1e-3
     channel_period = 0.1
     channels = (
         "program.state", "program.reason", "heater.temperature", "stand.wheel_speed", "stand.wheel_current",

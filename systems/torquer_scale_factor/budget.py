@@ -23,16 +23,8 @@ from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.drift.channels import errors_in
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.setups import Setup
-from gyrobench.reduction.setup.sources import (
-    ANGLE_ONCE,
-    ANGLE_TWICE,
-    AXIS_LEVEL_POLE,
-    INPUT_TO_OUTPUT,
-    INPUT_TO_SPIN,
-    TIME_BASE,
-    Effect,
-)
 
 from .sources import AMMETER, ZERO
 
@@ -52,7 +44,7 @@ class TorquerSetup(Setup):
         return replace(made, errors=errors_in(made.errors, made.channel))
 
 
-def effects(found: Findings, currents: int, start: Array, end: Array, setup: TorquerSetup) -> Sequence[Effect]:
+def effects(found: Findings, currents: int, start: Array, end: Array, setup: TorquerSetup) -> Sequence[sources.Effect]:
     """Return all sources of a fit to windows; start, end (n,): table angle, rad.
 
     currents: their number; the first columns of the fit are the current of each, then the constant of each.
@@ -75,10 +67,10 @@ def effects(found: Findings, currents: int, start: Array, end: Array, setup: Tor
     return [
         AMMETER.effect(setup, design(K, K)),
         ZERO.effect(setup, design(K, constant)),
-        ANGLE_ONCE.effect(setup, read(1)),
-        ANGLE_TWICE.effect(setup, read(2)),
-        AXIS_LEVEL_POLE.effect(setup, found.error(-setup.earth_rate)),
-        INPUT_TO_OUTPUT.effect(setup, found.error(-setup.earth_rate * along_o)),
-        INPUT_TO_SPIN.effect(setup, found.error(setup.earth_rate * along_s)),
-        TIME_BASE.effect(setup, found.error(-found.y), note="relative, seconds read too long"),
+        sources.ANGLE_ONCE.effect(setup, read(1)),
+        sources.ANGLE_TWICE.effect(setup, read(2)),
+        sources.AXIS_LEVEL_POLE.effect(setup, found.error(-setup.earth_rate)),
+        sources.INPUT_TO_OUTPUT.effect(setup, found.error(-setup.earth_rate * along_o)),
+        sources.INPUT_TO_SPIN.effect(setup, found.error(setup.earth_rate * along_s)),
+        sources.TIME_BASE.effect(setup, found.error(-found.y), note="relative, seconds read too long"),
     ]

@@ -127,8 +127,7 @@ def range_step(i: Array, K_n: Array, w: Array) -> RangeStep | None:
 
 def _shortness(w: Array) -> Array:
     """Return 1 for the shortest range and 0 for the longest, between them as the variance of the marks is."""
-    out: Array = (1.0 / w - 1.0 / w.max()) / max(1.0 / w.min() - 1.0 / w.max(), 1e-300)
-    return out
+    return np.asarray((1.0 / w - 1.0 / w.max()) / max(1.0 / w.min() - 1.0 / w.max(), 1e-300))
 
 
 def of_windows(i: Array, found: Precession) -> TorquerEstimates:

@@ -1,12 +1,7 @@
 """A laboratory's table of the torquer test: one row for each current."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import CsvColumn
-from gyrobench.system.lab_record import read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import laboratory_rows
 
 TEMPLATE = """\
 # Torquer of a gyro on a servo table: one row for each current, both senses over the same angle range.
@@ -24,4 +19,4 @@ COLUMNS = (
     CsvColumn("range_plus", "rad", "angle range with positive current", required=False),
     CsvColumn("range_minus", "rad", "angle range with negative current", required=False),
 )
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, columns=COLUMNS, time=None))
+MEASURED = laboratory_rows(TEMPLATE, columns=COLUMNS, time=None)

@@ -52,8 +52,7 @@ class Precession:
         size = np.sqrt(np.diag(C))
         A, B = columns / size[:, None], C / np.outer(size, size)
         gain = np.linalg.solve(A.T @ np.linalg.solve(B, A), np.linalg.solve(B, A).T)
-        out: Array = gain / size
-        return out
+        return np.asarray(gain / size)
 
     def u(self, of_K: Array | None = None, of_drift: Array | None = None) -> tuple[float, float]:
         """Return the standard uncertainty and degrees of freedom of a combination of the K and the drifts."""
@@ -100,5 +99,4 @@ def _mean_legendre(j: int, start: Array, end: Array) -> Array:
     def integral(x: Array) -> Any:
         return (special.eval_legendre(j + 1, x) - special.eval_legendre(j - 1, x)) / (2.0 * j + 1.0)
 
-    out: Array = (integral(end) - integral(start)) / (end - start)
-    return out
+    return np.asarray((integral(end) - integral(start)) / (end - start))

@@ -33,19 +33,8 @@ from gyrobench.reduction.estimation.effects import correction_table, simulated_t
 from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, changes_by_source
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.sources import TIME_BASE
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    DriftTestResult,
-    Location,
-    Reason,
-    Record,
-    ReductionError,
-    Table,
-    told,
-)
-from gyrobench.result import BudgetLine, Series, Test
+from gyrobench.reduction.toolkit import Account, Array, Location, Record, ReductionError, told
+from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Series, Table, Test
 from gyrobench.system.families.servo_channel import OTHER, own_name
 
 from . import marks, row_checks
@@ -275,9 +264,6 @@ class Reduction:
             rows = np.column_stack([i / MA, fit.K / KU, u[0] / KU, fit.drift / DPH, u[1] / DPH]).tolist()
             found.append(Table("torquer.windows", "Scale factors from the windows", caption, head, rows))
         return found
-
-
-reduce = Reduction.reduce
 
 
 def truth_of(

@@ -1,7 +1,5 @@
 """Sources of error of the current that are this test's own."""
 
-from __future__ import annotations
-
 from gyrobench.reduction.setup.sources import Source
 
 AMMETER = Source("ammeter.scale", "ammeter", "1", "u_current", "relative")

@@ -33,7 +33,6 @@ class TorquerScaleFactor(ChannelTest, TableTest):
 
     title = "Torquer scale factor and linearity"
     spec = ("TEST-TORQUER", "SF-APP1", "LIN-TABLE", "LOOP-TABLE-SERVO")
-    reduction = "reduction"
     slots = on_table(
         table=Slot("ServoTable", "table_servo"), source=Slot("CurrentSource", "current_source"),
         gyro=Slot("SdfGyro", "floated_gyro"),
@@ -62,14 +61,11 @@ class TorquerScaleFactor(ChannelTest, TableTest):
             "windows": Option(20, int, "readings of the angle over each range", 5, 500),
         }
         | type_b(
-            sources,
-            "angle1",
-            "angle2",
-            "time",
+            sources, "angle1", "angle2", "time",
             axis="standard uncertainty of the right angle between table axis and pole",
             mount="standard uncertainty of the input axis against the table axis",
         )
-    )
+    )  # fmt: skip
     noises = (*SDF_NOISES, "table.rumble", "source.meter")
     measured_data = MEASURED
     channels = ("table.angle", "source.i", "gyro.u", "table.motor")

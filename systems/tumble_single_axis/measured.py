@@ -1,12 +1,7 @@
 """A laboratory's record of the single-axis tumble: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.system.families.tumble_test import attitudes
-from gyrobench.system.lab_record import WITH_POLARITY, read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import WITH_POLARITY, laboratory_rows
 
 TEMPLATE = """\
 # Single-axis tumble of a floated gyro in torque rebalance: one row for each averaging window, of a table that turns
@@ -37,4 +32,4 @@ TEMPLATE = """\
 phase,t_start [s],t_end [s],angle_start [deg],angle_end [deg],mean [mA],std [mA],n,flagged
 """
 NEEDED = {"k": "...", "latitude": "45.75deg"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, texts=WITH_POLARITY))
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, attitudes=attitudes, texts=WITH_POLARITY)

@@ -24,19 +24,9 @@ from gyrobench.reduction.drift import drift_terms, supplies, window_regressors
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
 from gyrobench.reduction.setup.setups import TurningSetup
-from gyrobench.reduction.setup.sources import INPUT_TO_OUTPUT, INPUT_TO_SPIN, TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Effect,
-    Findings,
-    Location,
-    Quantity,
-    Reason,
-    Regression,
-    RunDocument,
-    window_problems,
-)
+from gyrobench.reduction.setup.sources import INPUT_TO_OUTPUT, INPUT_TO_SPIN, TURNED, Effect
+from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import Account, Array, Findings, Location, Quantity, Reason, Regression, RunDocument
 
 from . import closed
 from .refusals import refusals
@@ -146,6 +136,3 @@ class Reduction(TurningTest[TumbleSetup]):
             return []
         text = "The tilt of the input axis makes most of the uncertainty of D_O; tilt=yes estimates it."
         return [Reason("tumble.tilt_dominates", text)]
-
-
-reduce = Reduction.reduce

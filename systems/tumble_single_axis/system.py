@@ -26,7 +26,6 @@ class TumbleSingleAxis(TumbleTest, RebalanceTest):
 
     title = "Single-axis tumble test"
     spec = ("TEST-TUMBLE1-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
-    reduction = "reduction"
     protocol = "design"
     slots = RebalanceTest.with_parts(table="table_rate", gyro="floated_gyro", rebalance="rebalance_analog")
     options = (

@@ -32,23 +32,12 @@ def base(latitude: float) -> Array:
     return np.array([p, inner, np.cross(p, inner)])
 
 
-def _turned(axis: int, angle: Array) -> Array:
-    """Return passive rotations (k, 3, 3) about an axis (0 X, 1 Y, 2 Z)."""
-    j, m = (axis + 1) % 3, (axis + 2) % 3
-    R = np.zeros((angle.size, 3, 3))
-    R[:, axis, axis] = 1.0
-    R[:, j, j] = R[:, m, m] = np.cos(angle)
-    R[:, j, m] = np.sin(angle)
-    R[:, m, j] = -R[:, j, m]
-    return R
-
-
 def _wobble(axis: int, angle: Array, size: float, phase: float) -> Array:
     """Return rotations (k, 3, 3) of an axis that goes round a cone of ``size`` twice a turn, as of the part
     table_two_axis.
     """
     a = 2.0 * angle + phase
-    return _turned((axis + 2) % 3, size * np.sin(a)) @ _turned((axis + 1) % 3, size * np.cos(a))
+    return frames.passive((axis + 2) % 3, size * np.sin(a)) @ frames.passive((axis + 1) % 3, size * np.cos(a))
 
 
 def attitude(
@@ -59,11 +48,10 @@ def attitude(
 
     wobble: of the outer and the inner axis, twice a turn, at this phase at angle 0.
     """
-    x, y = _turned(0, outer), _turned(1, inner)
+    x, y = frames.passive(0, outer), frames.passive(1, inner)
     if any(wobble):
         x, y = x @ _wobble(0, outer, wobble[0], phase), y @ _wobble(1, inner, wobble[1], phase)
-    out: Array = FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude)
-    return out
+    return np.asarray(FACE @ y @ frames.passive_z(squareness) @ x @ base(latitude))
 
 
 def frequencies(m: int, n: int) -> list[int]:

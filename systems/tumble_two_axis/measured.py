@@ -1,12 +1,7 @@
 """A laboratory's record of the two-axis tumble."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
-from gyrobench.system.lab_record import WITH_POLARITY, read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import WITH_POLARITY, laboratory_rows
 
 from .geometry import ANGLES
 
@@ -36,4 +31,4 @@ COLUMNS = (
     *(CsvColumn(a, "rad", f"{a.split('_')[0]} table angle, cumulative") for a in ANGLES),
 )
 NEEDED = {"latitude": "45.75deg", "k": "17.2deg/h/mA"}
-MEASURED = MeasuredData(TEMPLATE, partial(read_record, needed=NEEDED, columns=COLUMNS, texts=WITH_POLARITY))
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, columns=COLUMNS, texts=WITH_POLARITY)

@@ -23,18 +23,9 @@ from gyrobench.reduction.drift import drift_terms
 from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.rest_test import SMALL, RestTest
 from gyrobench.reduction.setup import sources
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Effect,
-    Findings,
-    Group,
-    ReductionError,
-    RunDocument,
-    Table,
-    window_problems,
-)  # fmt: skip
-from gyrobench.result import Harmonic
+from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Account, Array, Effect, Findings, Group, RunDocument
+from gyrobench.result import Harmonic, Table
 from gyrobench.units import DPH
 
 from . import closed, geometry
@@ -113,8 +104,7 @@ class Reduction(RestTest[TwoAxisSetup]):
     @cached_property
     def theta(self) -> Array:
         """Place on the path, rad."""
-        out: Array = self.angles[0] / self.setup.m
-        return out
+        return np.asarray(self.angles[0] / self.setup.m)
 
     def group(self) -> Group:
         """Return drift against the path, or against the number of the visit where the positions lie on none."""
@@ -247,6 +237,3 @@ class Reduction(RestTest[TwoAxisSetup]):
             harmonics=self.harmonics,
             reasons=drift_terms.folded(s),
         )
-
-
-reduce = Reduction.reduce

@@ -34,7 +34,6 @@ class TumbleTwoAxis(RebalanceTest):
 
     title = "Two-axis tumble test"
     spec = ("TEST-TUMBLE2-SDF", "GYRO-DYN-1", "GYRO-STATIC-9", "LOOP-REBALANCE")
-    reduction = "reduction"
     protocol = "design"
     slots = RebalanceTest.with_parts(gyro="floated_gyro", rebalance="rebalance_analog") | {
         "table": Slot("TwoAxisTable", "table_two_axis"),
@@ -82,15 +81,11 @@ class TumbleTwoAxis(RebalanceTest):
     )  # fmt: skip
     takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis("outer axis")}
     measured_data = MEASURED
-    windows = Windows(
-        "sampler.count",
-        {
-            "phase": "sampler.window_phase",
-            **{c: f"sampler.{c}" for c in ("t_start", "t_end", "mean", "std", "n", "flagged")},
-            **{f"outer_{e}": f"sampler.angle_{e}" for e in ("start", "end")},
-            **{f"inner_{e}": f"sampler_inner.angle_{e}" for e in ("start", "end")},
-        },
-    )
+    windows = Windows.of(
+        "sampler", "t_start t_end mean std n flagged",
+        **{f"outer_{e}": f"sampler.angle_{e}" for e in ("start", "end")},
+        **{f"inner_{e}": f"sampler_inner.angle_{e}" for e in ("start", "end")},
+    )  # fmt: skip
     channels = ("table.angle_x", "table.angle_y", *RebalanceTest.channels)
 
     def base(self) -> Array:

@@ -1,13 +1,8 @@
 """A laboratory's record of the two-channel tumble: which columns it has, and how it becomes a record."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn
 from gyrobench.system.families.tumble_test import attitudes
-from gyrobench.system.lab_record import WITH_POLARITY, read_record
-from gyrobench.system.system import MeasuredData
+from gyrobench.system.lab_record import WITH_POLARITY, laboratory_rows
 
 TEMPLATE = """\
 # Single-axis tumble of a two-degree-of-freedom gyro, both torquers in rebalance: one row for each averaging window.
@@ -49,6 +44,4 @@ COLUMNS = (
     CsvColumn("std_y", "A", "standard deviation of the samples of mean_y", required=False),
 )
 NEEDED = {"latitude": "45.75deg", "k_x": "17.227deg/h/mA", "k_y": "17.180deg/h/mA"}
-MEASURED = MeasuredData(
-    TEMPLATE, partial(read_record, needed=NEEDED, attitudes=attitudes, columns=COLUMNS, texts=WITH_POLARITY)
-)
+MEASURED = laboratory_rows(TEMPLATE, needed=NEEDED, attitudes=attitudes, columns=COLUMNS, texts=WITH_POLARITY)

@@ -24,22 +24,11 @@ from gyrobench.reduction.drift import drift_terms, window_regressors
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.turning_test import Formulas, TurningTest
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import TurningSetup, scale_factor_problems
 from gyrobench.reduction.setup.sources import TURNED
-from gyrobench.reduction.toolkit import (
-    Account,
-    Array,
-    Coefficient,
-    Findings,
-    Location,
-    Quantity,
-    Reason,
-    RunDocument,
-    Table,
-    number,
-    truth_of,
-    window_problems,
-)
+from gyrobench.reduction.toolkit import Account, Array, Findings, Quantity, RunDocument, window_problems
+from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import DPH
 
 from . import closed, geometry
@@ -202,9 +191,6 @@ class Reduction(ChannelTests[TwoChannelSetup]):
         )
         head = ["symbol", "is", "least squares", "u", "closed formula", "unit"]
         return [Table("notation.book", "Quantities of Hu 1981", caption, head, rows)]
-
-
-reduce = Reduction.reduce
 
 
 def _conventions(s: TwoChannelSetup) -> list[str]:

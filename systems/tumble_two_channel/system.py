@@ -31,7 +31,6 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
 
     title = "Single-axis tumble test of a two-degree-of-freedom gyro"
     spec = ("TEST-TUMBLE1-2DOF-A", "TEST-TUMBLE1-2DOF-B", "GYRO-DYN-2DOF", "GYRO-STATIC-2DOF", "LOOP-REBALANCE")
-    reduction = "reduction"
     slots = TwoChannelTest.with_parts(
         table="table_rate", gyro="gyro_2dof", rebalance_x="rebalance_analog", rebalance_y="rebalance_analog"
     )
@@ -56,15 +55,10 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
     )  # fmt: skip
     takes: ClassVar[Mapping[str, Any]] = {"stand_alignment": pole_axis()}
     measured_data = MEASURED
-    windows = Windows(
-        "sampler_x.count",
-        {
-            "phase": "sampler_x.window_phase",
-            **{n: f"sampler_x.{n}" for n in ("t_start", "t_end", "angle_start", "angle_end", "n", "flagged")},
-            "flagged_y": "sampler_y.flagged",
-            **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
-        },
-    )
+    windows = Windows.of(
+        "sampler_x", "t_start t_end angle_start angle_end n flagged", flagged_y="sampler_y.flagged",
+        **{f"{n}_{a}": f"sampler_{a}.{n}" for n in ("mean", "std") for a in "xy"},
+    )  # fmt: skip
     channels = ("table.angle", *TwoChannelTest.channels)
 
     def faces(self) -> dict[str, Any]:

@@ -27,7 +27,6 @@ class VerticalGyroBench(LoopTest):
 
     title = "Vertical gyro"
     spec = ("VERTICAL-GYRO",)
-    reduction = "reduction"
     slots = {
         "exciter": Slot("Excitation", "exciter"),
         "motion": Slot("Motion", "manoeuvre"),

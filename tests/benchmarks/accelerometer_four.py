@@ -21,7 +21,7 @@ from asked import asked
 
 from gyrobench.frames import G0
 from systems.accelerometer_four import chain
-from systems.accelerometer_four.reduction import FourSetup, estimate, reduce
+from systems.accelerometer_four.reduction import FourSetup, Reduction, estimate
 
 KNOWN = 5e-7  # rad
 CASES: dict[str, tuple[float, float, tuple[float, float] | None]] = {
@@ -52,7 +52,9 @@ def main() -> None:
                 errors[method].append(found.est.beta[:5] - TRUE[0])
                 spread[method].append(found.residual_std)
             if n < given.reports:
-                c = reduce(windows(U), FourSetup(gravity=G0, D1=measured, sizes={"u_D1": KNOWN})).coefficients[:20]
+                c = Reduction.reduce(
+                    windows(U), FourSetup(gravity=G0, D1=measured, sizes={"u_D1": KNOWN})
+                ).coefficients[:20]
                 held.append([x.interval[0] <= t <= x.interval[1] for x, t in zip(c, TRUE.ravel(), strict=True)])
         for method, e in errors.items():
             rms = 1e6 * np.sqrt(np.mean(np.array(e) ** 2, axis=0))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gyrobench.report import channel_figure, plots
+from gyrobench.report import channel_figure, plots, style
 from gyrobench.report.style import WIDE, axis_label, chart, styled, svg
 from gyrobench.result import Series
 
@@ -16,7 +16,7 @@ from gyrobench.result import Series
 @pytest.fixture(autouse=True)
 def figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Plots return what they have drawn."""
-    monkeypatch.setattr(plots, "svg", lambda fig, key, **zoom: (svg(fig, key, **zoom), fig)[1])
+    monkeypatch.setattr(style, "svg", lambda fig, key, **zoom: (svg(fig, key, **zoom), fig)[1])
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_least_squares_and_closed_formulas_recover(model: str, latitude: float, 
     names = NAMES[model]
     truth = random_truth(int(latitude) + turn + 90, names)
     s = T.setup(latitude, model, truth=truth)
-    r = T.reduction.reduce(T.record(s, truth, turn=turn, rates=(rate,)), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth, turn=turn, rates=(rate,)), s)
     scale = max(abs(c.truth) for c in r.coefficients)
     assert sorted(c.name for c in r.coefficients) == sorted(names) and r.rank == len(names)
     for c in r.coefficients:
@@ -90,7 +90,7 @@ def test_channels_measure_each_other() -> None:
     w = T.record(s, truth)
     turning = w["phase"] == 2
     assert w["mean_y"][turning] == pytest.approx(-DPH / T.K["y"]) and w["mean_x"][turning] == pytest.approx(0.0)
-    found = {c.name: c.estimate for c in T.reduction.reduce(w, s).coefficients}
+    found = {c.name: c.estimate for c in T.reduction.Reduction.reduce(w, s).coefficients}
     assert found == pytest.approx({n: v / DPH for n, v in truth.items()}, abs=1e-9)
 
 
@@ -99,7 +99,7 @@ def test_opposite_polarity(model: str) -> None:
     truth = random_truth(4, NAMES[model])
     w = T.record(T.setup(model=model), truth)
     w["mean_x"], w["mean_y"] = -w["mean_x"], -w["mean_y"]
-    r = T.reduction.reduce(w, T.setup(model=model, truth=truth, polarity="book"))
+    r = T.reduction.Reduction.reduce(w, T.setup(model=model, truth=truth, polarity="book"))
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
 
 
@@ -119,7 +119,7 @@ def test_symbols_of_the_simple_model() -> None:
         b = symbols
         w["mean_x"][j] = (-b["R_x"] + b["u_zx"] * gy - b["u_y"] * gz - b["Q_x"] * gy * gz) * DPH / T.K["x"]
         w["mean_y"][j] = (b["R_y"] - b["u_x"] * gz + b["u_zy"] * gx + b["Q_y"] * gx * gz) * DPH / T.K["y"]
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     (table,) = [t for t in r.tables if t.title == "Quantities of Hu 1981"]
     for row in table.rows:
         assert row[2] == pytest.approx(symbols[row[0]], abs=1e-6)  # windows of finite width: 1 - sinc(0.1 deg)
@@ -133,7 +133,7 @@ def test_tilt_of_the_measuring_axes_needs_both_senses() -> None:
     truth, tilt = random_truth(8), (3e-4, -2e-4)
     phi, gamma = math.radians(45.75), 9.8 / frames.G0
     s = T.setup(truth=truth)
-    found = {c.name: c for c in T.reduction.reduce(T.record(s, truth, tilt=tilt), s).coefficients}
+    found = {c.name: c for c in T.reduction.Reduction.reduce(T.record(s, truth, tilt=tilt), s).coefficients}
     # mount 1: omega_z = W - 10 W, Z = -gamma s; y = omega_d - eps omega_z there
     expected = tilt[0] * -9.0 * frames.EARTH_RATE / (gamma * math.sin(phi)) / DPH
     assert found["Dx_z"].closed - found["Dx_z"].truth == pytest.approx(expected, rel=1e-9)
@@ -142,11 +142,11 @@ def test_tilt_of_the_measuring_axes_needs_both_senses() -> None:
     moved = []
     for w in (T.record(s, truth), T.record(s, truth, tilt=tilt)):
         noisy = {**w, "mean_x": w["mean_x"] + noise[0] / s.k["y"], "mean_y": w["mean_y"] + noise[1] / s.k["x"]}
-        moved.append({c.name: c.estimate for c in T.reduction.reduce(noisy, s).coefficients}["Dx_z"])
+        moved.append({c.name: c.estimate for c in T.reduction.Reduction.reduce(noisy, s).coefficients}["Dx_z"])
     assert moved[1] - moved[0] == pytest.approx(expected, rel=0.05)
     assert found["Dx_x"].closed == pytest.approx(found["Dx_x"].truth, abs=1e-9)
     both = T.setup(truth=truth, tilt=True)
-    r = T.reduction.reduce(T.record(s, truth, rates=(-10.0, 10.0), tilt=tilt), both)
+    r = T.reduction.Reduction.reduce(T.record(s, truth, rates=(-10.0, 10.0), tilt=tilt), both)
     for c in r.coefficients:
         if c.name.startswith("ε"):
             size = tilt["xy".index(c.name[2])]
@@ -160,7 +160,7 @@ def test_terms_outside_the_simple_model_shift_it_as_predicted() -> None:
     """By hand: Dx_xx X2 = Dx_xx gamma2 c2 (1 + cos 2 theta)/2 goes to the constant with half, Dx_zz Z2 with s2."""
     truth = {**random_truth(5, SIMPLE), "Dx_xx": 0.05 * DPH, "Dx_zz": -0.03 * DPH, "Dy_x": 0.1 * DPH}
     s = T.setup(52.0, "simple", truth=truth)
-    r = T.reduction.reduce(T.record(s, truth), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth), s)
     shift = {c.name: c.estimate - c.truth for c in r.coefficients}
     gamma2, phi = (9.8 / frames.G0) ** 2, math.radians(52.0)
     hand = gamma2 * (0.05 * math.cos(phi) ** 2 / 2.0 - 0.03 * math.sin(phi) ** 2)
@@ -304,7 +304,7 @@ def test_cross_squares_are_refused_without_fold_and_fold_exactly_with_it() -> No
     w = T.record(T.setup(), truth)
     text = message(T.reduction, w, T.setup(truth=truth))
     assert "Dx_yy = 0.2 °/h/g²" in text and "Dy_xx = -0.3 °/h/g²" in text and "set fold" in text
-    r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
+    r = T.reduction.Reduction.reduce(w, T.setup(truth=truth, fold=True))
     g2 = (9.8 / frames.G0) ** 2
     folded = {
         "Dx_0 + γ² Dx_yy": truth["Dx_0"] / DPH + 0.2 * g2, "Dx_xx − Dx_yy": truth["Dx_xx"] / DPH - 0.2,

@@ -105,7 +105,7 @@ def test_recovery_from_ideal_currents(seed: int) -> None:
             assert closed[n] == pytest.approx(p[n], rel=1e-9, abs=1e-9 * DPH), n
         assert all(np.ptp(v) < 1e-9 * DPH for v in P.estimates(I_x, I_y, W, phi).values())
         for terms in (4, 6):
-            found = named(R.reduce(rows(I_x, I_y), setup(phi, terms=terms)))
+            found = named(R.Reduction.reduce(rows(I_x, I_y), setup(phi, terms=terms)))
             for n in NAMES:
                 assert si(found[n]) == pytest.approx(p[n], rel=1e-9, abs=1e-9 * DPH), (n, terms)
                 assert found[n].closed == pytest.approx(found[n].estimate, rel=1e-9, abs=1e-9)
@@ -170,7 +170,7 @@ def test_uncertainty_factors() -> None:
     sigma = 0.01 * DPH
     for c in "xy":
         w[f"mean_{c}"] = w[f"mean_{c}"] + rng.normal(size=160) * sigma / p[f"k_{c}"]
-    found = named(R.reduce(w, setup(phi, terms=4, nuisances=False)))  # weighed set-up effects widen u
+    found = named(R.Reduction.reduce(w, setup(phi, terms=4, nuisances=False)))  # weighed set-up effects widen u
     size = 0.01 / math.sqrt(20.0)  # of a position's mean, deg/h
     for c, (constant, unbalance) in {"x": ("R_x", "u_y"), "y": ("R_y", "u_x")}.items():
         assert found[constant].u == pytest.approx(0.5 * size, rel=0.15)
@@ -186,7 +186,7 @@ def test_compliance() -> None:
     phi, rng = math.radians(-33.0), np.random.default_rng(7)
     p, K = gyro(rng), np.random.default_rng(8).normal(size=(3, 3)) * 0.1 * DPH
     I_x, I_y = torque_balance(p, phi, K)
-    found = named(R.reduce(rows(I_x, I_y), setup(phi)))
+    found = named(R.Reduction.reduce(rows(I_x, I_y), setup(phi)))
     shifted = p | {"u_x": p["u_x"] - K[0, 2], "u_y": p["u_y"] - K[1, 2]}
     for n in NAMES:
         assert si(found[n]) == pytest.approx(shifted[n], rel=1e-9, abs=1e-9 * DPH), n
@@ -195,7 +195,7 @@ def test_compliance() -> None:
     assert single["u_zy"][0] - single["u_zy"][1] == pytest.approx(-2.0 * K[2, 0], rel=1e-6)
     assert si(found["Dy_yy − Dy_xx"]) == pytest.approx(-K[2, 1], rel=1e-9)  # D(y)_yy = -K_zy, D(x)_xx = -K_zx
     assert si(found["Dx_xx − Dx_yy"]) == pytest.approx(-K[2, 0], rel=1e-9)
-    four = named(R.reduce(rows(I_x, I_y), setup(phi, terms=4)))
+    four = named(R.Reduction.reduce(rows(I_x, I_y), setup(phi, terms=4)))
     assert abs(si(four["R_x"]) - p["R_x"]) > 0.2 * abs(K[2, 1])
 
 
@@ -211,7 +211,7 @@ def test_coefficients_of_the_general_gyro() -> None:
         parts = {c: {m: v for m, v in D.items() if m[1] == c} for c in "xy"}
         I["x"][n] = (w[1] - float(drift.drift(X, parts["y"]))) / k["x"]
         I["y"][n] = (w[0] - float(drift.drift(X, parts["x"]))) / k["y"]
-    result = R.reduce(rows(I["x"], I["y"]), setup(phi, gravity=g, truth={**D, "k_x": k["x"], "k_y": k["y"]}))
+    result = R.Reduction.reduce(rows(I["x"], I["y"]), setup(phi, gravity=g, truth={**D, "k_x": k["x"], "k_y": k["y"]}))
     assert len(result.coefficients) == 12
     for c in result.coefficients:
         assert c.truth is not None
@@ -263,7 +263,7 @@ def test_days_together() -> None:
         w = rows(*torque_balance(p | {"R_x": constant}, phi), cycles=3)
         for c in "xy":
             w[f"mean_{c}"] = w[f"mean_{c}"] + rng.normal(size=48) * 0.003 * DPH / p[f"k_{c}"]
-        each[f"{day + 1}"] = R.reduce(w, setup(phi))
+        each[f"{day + 1}"] = R.Reduction.reduce(w, setup(phi))
     result = repeatability.combine_days(each)
     c = named(result)["R_x"]
     values = [named(r)["R_x"].estimate for r in each.values()]
@@ -302,7 +302,7 @@ def test_intervals_cover(colour: str) -> None:
             **w,
             **{f"mean_{c}": w[f"mean_{c}"] + size @ rng.normal(size=n) * 0.01 * DPH / p[f"k_{c}"] for c in "xy"},
         }
-        for c in R.reduce(noisy, setup(phi)).coefficients:
+        for c in R.Reduction.reduce(noisy, setup(phi)).coefficients:
             if c.name.startswith(("ε", "σ", "trend")):  # a set-up effect that chance has joined
                 continue
             true = p.get(c.name, 0.0) / (KU if c.name.startswith("k") else DPH)
@@ -319,7 +319,9 @@ def test_sensitivities() -> None:
     phi, p = math.radians(45.75), gyro(np.random.default_rng(12)) | {n: 0.0 for n in NAMES[2:]}
     arcsec = math.pi / 648000.0
     I_x, I_y = torque_balance(p, phi)
-    result = R.reduce(rows(I_x, I_y), setup(phi, u_latitude=10 * arcsec, u_attitude=10 * arcsec, u_mount=10 * arcsec))
+    result = R.Reduction.reduce(
+        rows(I_x, I_y), setup(phi, u_latitude=10 * arcsec, u_attitude=10 * arcsec, u_mount=10 * arcsec)
+    )
     lines = {(b.source, b.coefficient): b for b in result.budget}
     k = named(result)["k_x"]
     assert lines["latitude", "k_x"].contribution == pytest.approx(k.estimate * math.tan(phi) * 10 * arcsec, rel=1e-4)
@@ -338,7 +340,7 @@ def test_attitude_shift_as_predicted() -> None:
     p, s = gyro(rng), setup(math.radians(38.0))
     I_x, I_y = torque_balance(p, phi)
     w = rows(I_x, I_y)
-    plain, eps = named(R.reduce(w, s)), 20.0 * math.pi / 648000.0
+    plain, eps = named(R.Reduction.reduce(w, s)), 20.0 * math.pi / 648000.0
     position = w["position"]
     d = M.directions(position, phi)
     for n, axis in itertools.product((1, 4, 5, 6), "xyz"):
@@ -346,7 +348,7 @@ def test_attitude_shift_as_predicted() -> None:
         C = turned[n]
         omega, g = C @ (W * np.array([0.0, math.cos(phi), math.sin(phi)])), C @ -U
         M_x = p["R_x"] - p["u_zx"] * g[1] + p["u_y"] * g[2]
-        moved = named(R.reduce(rows({**I_x, n: (omega[1] - M_x) / p["k_x"]}, I_y), s))
+        moved = named(R.Reduction.reduce(rows({**I_x, n: (omega[1] - M_x) / p["k_x"]}, I_y), s))
         lin = M.linear("x", w["mean_x"], d, s)
         found = fit([str(j) for j in range(6)], lin.X, lin.y, w["t_start"], w["t_end"], [], "", "", DPH)
         found = M.reported(found, M.quantities("x", s, {}), s, lin.k0)
@@ -365,7 +367,7 @@ def ideal(phi: float = math.radians(45.75)) -> dict[str, np.ndarray]:
 
 def refused(w: dict[str, np.ndarray], **changes: Any) -> str:
     with pytest.raises(ReductionError) as error:
-        R.reduce(w, setup(**changes))
+        R.Reduction.reduce(w, setup(**changes))
     return str(error.value)
 
 
@@ -380,7 +382,7 @@ def test_refusals() -> None:
     assert "I_y2 = I_y4" in refused({**w, "mean_y": np.where(w["position"] > 4, 2e-4, 1e-4)})
     assert "negative" in refused({**w, "mean_x": -w["mean_x"]})
     assert "1 cycle" in refused({k: v[:16] for k, v in w.items()})
-    assert R.reduce({k: v[:16] for k, v in w.items()}, setup(sigma=False)).repeatability == {}
+    assert R.Reduction.reduce({k: v[:16] for k, v in w.items()}, setup(sigma=False)).repeatability == {}
     assert "y current: flagged" in refused({**w, "flagged_y": np.eye(32)[3]})
     assert "non-finite" in refused({**w, "mean_x": np.where(np.arange(32) == 5, np.nan, w["mean_x"])})
     assert "time does not increase" in refused({**w, "t_start": w["t_start"][::-1], "t_end": w["t_end"][::-1]})
@@ -392,6 +394,6 @@ def test_refusals() -> None:
 
 def test_warning_beyond_80_degrees() -> None:
     phi = math.radians(82.0)
-    result = R.reduce(ideal(phi), setup(phi))
+    result = R.Reduction.reduce(ideal(phi), setup(phi))
     assert any("beyond 80°" in w for w in result.warnings)
-    assert not any("beyond 80°" in w for w in R.reduce(ideal(), setup()).warnings)
+    assert not any("beyond 80°" in w for w in R.Reduction.reduce(ideal(), setup()).warnings)

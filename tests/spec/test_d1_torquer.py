@@ -70,14 +70,14 @@ def made(
 
 def test_drift_cancels_and_is_reported() -> None:
     """[SF-APP1]"""
-    c = named(R.reduce(made(drift=0.3)))
+    c = named(R.Reduction.reduce(made(drift=0.3)))
     assert c["K"].estimate == pytest.approx(17.0, rel=1e-12)
     assert c["K_LS"].estimate == pytest.approx(17.0, rel=1e-12)
     assert c["drift"].estimate == pytest.approx(0.3, rel=1e-9)
 
 
 def test_cubic_torquer() -> None:
-    r = R.reduce(made(cubic=1e-3, noise=1e-5))
+    r = R.Reduction.reduce(made(cubic=1e-3, noise=1e-5))
     c = named(r)
     assert c["K_3/K_1"].estimate == pytest.approx(0.1, abs=3 * c["K_3/K_1"].u) and c["K_3/K_1"].u < 0.005
     assert r.tests[0].p < 1e-4 and "depends on the current" in r.tests[0].finding
@@ -92,7 +92,7 @@ def test_intervals_cover() -> None:
     truth = {"K": 17.0, "K_LS": 17.0, "K_1": 17.0, "K_3/K_1": 0.0, "drift": 0.3}
     ratio = []
     for seed in range(runs):
-        c = named(R.reduce(made(noise=1e-4, seed=seed)))
+        c = named(R.Reduction.reduce(made(noise=1e-4, seed=seed)))
         for n in hits:
             hits[n] += c[n].interval[0] <= truth[n] <= c[n].interval[1]
         ratio.append((c["K_LS"].estimate - 17.0) / (c["K"].estimate - 17.0))
@@ -103,11 +103,11 @@ def test_intervals_cover() -> None:
 
 def test_ammeter() -> None:
     plain, with_b = (
-        named(R.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": u})))["K"] for u in (0.0, 1e-4)
+        named(R.Reduction.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": u})))["K"] for u in (0.0, 1e-4)
     )
     assert with_b.u == pytest.approx(math.hypot(plain.u, 17.0e-4), rel=1e-3)
     limits = {"K": (16.9, 17.1), "linearity": (-1e-6, 1e-6)}
-    r = conclude(R.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": 1e-4})), None, limits)
+    r = conclude(R.Reduction.reduce(made(noise=1e-5), R.TorquerSetup(sizes={"u_current": 1e-4})), None, limits)
     assert named(r)["K"].verdict == "pass" and r.verdict in ("fail", "inconclusive")
 
 
@@ -125,12 +125,12 @@ def test_ammeter() -> None:
 def test_refusals(change: dict[str, Any], text: str) -> None:
     rows = {**made(), **change}
     with pytest.raises(ReductionError, match=text):
-        R.reduce({n: v for n, v in rows.items() if v is not None})
+        R.Reduction.reduce({n: v for n, v in rows.items() if v is not None})
 
 
 def test_two_currents_are_too_few() -> None:
     with pytest.raises(ReductionError, match="2 currents: at least 3"):
-        R.reduce({n: v[:2] for n, v in made().items()})
+        R.Reduction.reduce({n: v[:2] for n, v in made().items()})
 
 
 @pytest.mark.long

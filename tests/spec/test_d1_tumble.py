@@ -23,7 +23,7 @@ NAMES = T.NAMES
 def test_least_squares_and_closed_formulas_recover_to_1e_9(latitude: float, turn: int, rate: float) -> None:
     truth = T.random_truth(int(latitude) + turn + 90)
     s = T.setup(latitude, truth=truth)
-    r = T.reduction.reduce(T.record(s, truth, turn=turn, rate=rate), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth, turn=turn, rate=rate), s)
     for c in r.coefficients:
         assert abs(c.estimate - c.truth) < 1e-9 * abs(c.truth), c.name
         assert abs(c.closed - c.truth) < 1e-9 * abs(c.truth), c.name
@@ -37,10 +37,10 @@ def test_averaging_windows_are_allowed_for() -> None:
     truth = {**dict.fromkeys(NAMES, 0.0), "D_IS": DPH}
     s = T.setup(truth=truth)
     w = T.record(s, truth, turn=12)
-    assert T.reduction.reduce(w, s).coefficients[-1].estimate == pytest.approx(1.0, rel=1e-9)
+    assert T.reduction.Reduction.reduce(w, s).coefficients[-1].estimate == pytest.approx(1.0, rel=1e-9)
     middle = (w["angle_start"] + w["angle_end"]) / 2
     w2 = {**w, "angle_start": middle - 1e-3, "angle_end": middle + 1e-3}
-    damped = next(c for c in T.reduction.reduce(w2, s).coefficients if c.name == "D_IS")
+    damped = next(c for c in T.reduction.Reduction.reduce(w2, s).coefficients if c.name == "D_IS")
     assert damped.estimate == pytest.approx(0.9549, abs=2e-3)
 
 
@@ -50,7 +50,7 @@ def test_opposite_polarity() -> None:
     s = T.setup(truth=truth)
     w = T.record(s, truth)
     w["mean"] = -w["mean"]
-    r = T.reduction.reduce(w, T.setup(truth=truth, polarity="book"))
+    r = T.reduction.Reduction.reduce(w, T.setup(truth=truth, polarity="book"))
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
 
 
@@ -141,7 +141,7 @@ def test_d_oo_is_refused_without_fold_and_folds_exactly_with_it() -> None:
     s = T.setup(truth=truth)
     w = T.record(s, truth)
     assert "cannot be told from D_F, D_II and D_SS; set fold" in message(T.reduction, w, s)
-    r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
+    r = T.reduction.Reduction.reduce(w, T.setup(truth=truth, fold=True))
     g2 = (9.8 / frames.G0) ** 2
     D = {n: v / DPH for n, v in truth.items()}
     expected = {
@@ -158,18 +158,18 @@ def test_ten_terms() -> None:
     truth = T.random_truth(2, drift.NAMES)
     s = T.setup(terms=10)
     assert "ten terms have rank 9" in message(T.reduction, T.record(s, truth), s)
-    r = T.reduction.reduce(T.record(s, truth), T.setup(terms=10, fold=True, truth=truth))
+    r = T.reduction.Reduction.reduce(T.record(s, truth), T.setup(terms=10, fold=True, truth=truth))
     assert all(abs(c.estimate - c.truth) < 1e-10 for c in r.coefficients)
 
 
 def test_fewer_terms() -> None:
     truth = {n: v for n, v in T.random_truth(3).items() if n in drift.terms(4)}
     s = T.setup(terms=4, truth=truth)
-    r = T.reduction.reduce(T.record(s, truth), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth), s)
     assert [c.name for c in r.coefficients] == ["D_F", "D_I", "D_S", "D_IS"]
     assert all(abs(c.estimate - c.truth) < 1e-10 for c in r.coefficients)
     full = T.random_truth(3)
-    r = T.reduction.reduce(T.record(T.setup(), full), T.setup(terms=8, truth=full))
+    r = T.reduction.Reduction.reduce(T.record(T.setup(), full), T.setup(terms=8, truth=full))
     assert any("D_O is simulated but not in the 8-term model" in text for text in r.warnings)
 
 
@@ -268,7 +268,7 @@ def test_partial_turns_have_no_closed_formulas() -> None:
     w = T.record(s, truth)
     keep = np.ones(w["phase"].size, dtype=bool)
     keep[np.flatnonzero(w["phase"] == 2)[-9:]] = False
-    r = T.reduction.reduce({n: v[keep] for n, v in w.items()}, s)
+    r = T.reduction.Reduction.reduce({n: v[keep] for n, v in w.items()}, s)
     assert all(c.closed is None for c in r.coefficients)
     assert any("covers 315°, no whole turns" in text for text in r.warnings)
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
@@ -280,6 +280,6 @@ def test_other_attitudes_have_no_closed_formulas() -> None:
     tilt = frames.rotation([1, 0, 0], math.radians(20)).T
     s0 = T.setup()
     s = T.setup(truth=truth, faces={p: tilt @ f for p, f in s0.faces.items()})
-    r = T.reduction.reduce(T.record(s, truth), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth), s)
     assert all(abs(c.estimate - c.truth) < 1e-8 for c in r.coefficients)
     assert r.coefficients[0].closed is None and any("attitudes of Hu 1981; least squares only" in x for x in r.warnings)

@@ -30,7 +30,7 @@ def test_sensitivities_of_the_method() -> None:
     phi, eps, W = s.latitude, 1e-4, frames.EARTH_RATE / DPH
 
     def closed(real: Any) -> dict[str, float]:
-        r = T.reduction.reduce(T.record(real, truth), s)
+        r = T.reduction.Reduction.reduce(T.record(real, truth), s)
         return {c.name: c.closed for c in r.coefficients}
 
     tilt = frames.rotation([0, 0, 1], eps).T
@@ -53,11 +53,11 @@ def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
     sizes = {"u_axis": 1e-5, "u_mount": 1e-5, "u_scale_factor": 1e-4, "u_nonlinearity": 1e-4, "u_current": 1e-9}
     s = T.setup(truth=truth, **{n: v * faint for n, v in sizes.items()})
     w = T.record(s, truth, noise=T.white(1e-6))
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     base = {c.name: c.estimate for c in r.coefficients}
 
     def change(windows: Any) -> dict[str, float]:
-        found = T.reduction.reduce(windows, s)
+        found = T.reduction.Reduction.reduce(windows, s)
         return {c.name: c.estimate - base[c.name] for c in found.coefficients}
 
     line = {(b.source, b.coefficient): b for b in r.budget}
@@ -75,7 +75,7 @@ def test_budget_lines_are_what_a_wrong_assumption_does() -> None:
     turned = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
     off = change(T.record(turned, truth, noise=T.white(1e-6)))
     assert line["input axis towards output axis", "D_O"].sensitivity == pytest.approx(off["D_O"] / 1e-9, rel=2e-2)
-    full = T.reduction.reduce(w, T.setup(truth=truth, **sizes))
+    full = T.reduction.Reduction.reduce(w, T.setup(truth=truth, **sizes))
     for c in full.coefficients:
         total = math.sqrt(sum(b.contribution**2 for b in full.budget if b.coefficient == c.name))
         assert c.u == pytest.approx(total, rel=1e-9)
@@ -89,21 +89,23 @@ def test_tilt_of_the_input_axis_can_be_estimated() -> None:
     s = T.setup(truth=truth, tilt=True, u_mount=1e-4)
     tilt = frames.rotation([0, 0, 1], eps).T
     tilted = T.setup(faces={p: tilt @ f for p, f in s.faces.items()})
-    r = T.reduction.reduce(T.record(tilted, truth, noise=T.white(1e-5)), s)
+    r = T.reduction.Reduction.reduce(T.record(tilted, truth, noise=T.white(1e-5)), s)
     found = {c.name: c for c in r.coefficients}
     assert found["ε_IO"].estimate == pytest.approx(math.degrees(eps) * 3600, rel=1e-3) and found["ε_IO"].unit == "″"
     assert all(abs(c.estimate - c.truth) < 5e-4 for c in r.coefficients if c.truth is not None)  # eps times D
     size = {b.coefficient: b.contribution for b in r.budget if b.source == "input axis towards output axis"}
     assert size["D_O"] < 1e-4 * 1.01  # only eps D_I, no rate any more
-    loose = T.reduction.reduce(T.record(tilted, truth, noise=T.white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
+    loose = T.reduction.Reduction.reduce(
+        T.record(tilted, truth, noise=T.white(1e-5)), T.setup(truth=truth, u_mount=1e-4)
+    )
     assert abs(loose.coefficients[2].z) < 2  # the steps between the mounts are taken for slow noise
-    plain = T.reduction.reduce(T.record(s, truth, noise=T.white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
+    plain = T.reduction.Reduction.reduce(T.record(s, truth, noise=T.white(1e-5)), T.setup(truth=truth, u_mount=1e-4))
     assert any("tilt=yes" in text for text in plain.warnings)
 
 
 def test_result_is_whole_and_json() -> None:
     s = T.setup(truth=drift.STANDARD)
-    found = T.reduction.reduce(T.record(s, drift.STANDARD, turns=2, noise=T.white(0.003)), s)
+    found = T.reduction.Reduction.reduce(T.record(s, drift.STANDARD, turns=2, noise=T.white(0.003)), s)
     r = conclude(found, None, {"D_F": (-0.5, 0.5), "D_I": (None, -1.0), "D_S": (-0.701, None)})
     text = json.dumps(r.as_dict(), allow_nan=False)
     assert Result.from_dict(json.loads(text)).coefficients[0].estimate == r.coefficients[0].estimate
@@ -133,12 +135,12 @@ def test_model_errors_are_found() -> None:
     mount = np.isin(w["phase"], (2, 4))
     angle = (w["angle_start"] + w["angle_end"]) / 2
     third = {**w, "mean": w["mean"] + np.where(mount, 0.003 * DPH / s.k * np.cos(3 * angle), 0.0)}
-    p = {t.name: t.p for t in T.reduction.reduce(third, s).tests}
+    p = {t.name: t.p for t in T.reduction.Reduction.reduce(third, s).tests}
     assert p["harmonics 3 and higher"] < 1e-3 < p["turn to turn"]
     two = np.flatnonzero(w["phase"] == 2)[72:]
     changed = np.array(w["mean"])
     changed[two] += 0.005 * DPH / s.k * np.sin(2 * angle[two])
-    p = {t.name: t.p for t in T.reduction.reduce({**w, "mean": changed}, s).tests}
+    p = {t.name: t.p for t in T.reduction.Reduction.reduce({**w, "mean": changed}, s).tests}
     assert p["turn to turn"] < 1e-2 < p["harmonics 3 and higher"]
 
 
@@ -149,14 +151,14 @@ def test_correlated_noise_is_seen_and_said() -> None:
 
     s = T.setup(truth=drift.STANDARD)
     w = T.record(s, drift.STANDARD, noise=markov)
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     p = {t.name: t.p for t in r.tests}
     assert p["Ljung-Box, residuals"] < 1e-6 < 1e-2 < p["Ljung-Box, whitened residuals"]
     assert r.noise["weight of white noise alone"] < 1e-3
     low, high = r.noise["correlation time, 90 % range / s"]
     assert low < 360.0 < high
     assert "correlation time about" in r.summary[2]
-    quiet = T.reduction.reduce(T.record(s, drift.STANDARD, noise=T.white(0.005)), s)
+    quiet = T.reduction.Reduction.reduce(T.record(s, drift.STANDARD, noise=T.white(0.005)), s)
     assert r.coefficients[0].u > 1.5 * quiet.coefficients[0].u
 
 

@@ -66,7 +66,7 @@ def test_recovery(latitude: float, m: int, n: int, positions: int) -> None:
     """[TUM2AX-REDUCE, TUM2AX-LS] both ways to 1e-9 of the largest; no closed value where the frequencies collide."""
     truth = random_truth(int(latitude) + m + 90)
     s = T.setup(latitude, m=m, n=n, truth=truth)
-    r = T.reduction.reduce(T.record(s, truth, positions), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth, positions), s)
     scale = max(abs(c.truth) for c in r.coefficients)
     assert [c.name for c in r.coefficients] == list(NAMES) and r.rank == 9
     for c in r.coefficients:
@@ -81,7 +81,7 @@ def test_recovery(latitude: float, m: int, n: int, positions: int) -> None:
 def test_equator_needs_least_squares() -> None:
     truth = random_truth(3)
     s = T.setup(0.0, truth=truth)
-    r = T.reduction.reduce(T.record(s, truth), s)
+    r = T.reduction.Reduction.reduce(T.record(s, truth), s)
     assert all(abs(c.estimate - c.truth) < 1e-9 and c.closed is None for c in r.coefficients)
     assert "divide by sin φ" in message(T.reduction, T.record(s, truth), T.setup(0.0, harmonic=True))
 
@@ -98,7 +98,7 @@ def test_any_positions_will_do_for_least_squares() -> None:
     C = [T.attitude(s.latitude, a, b) for a, b in zip(outer, inner, strict=True)]
     xyz = np.array([-c @ frames.U for c in C]) * s.gravity / frames.G0
     w["mean"] = -drift.drift(xyz, truth) / s.k
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     assert all(abs(c.estimate - c.truth) < 1e-9 for c in r.coefficients)
     assert any("the inner angle is not 1/5 of the outer" in t and "not equally spaced" in t for t in r.warnings)
 
@@ -108,14 +108,14 @@ def test_opposite_polarity_and_cycles() -> None:
     s = T.setup(truth=truth, polarity="book")
     w = T.record(s, truth, 30, each=1, cycles=2)
     w["mean"] = -w["mean"]
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     assert all(abs(c.estimate - c.truth) < 1e-9 and abs(c.closed - c.truth) < 1e-9 for c in r.coefficients)
     rng = np.random.default_rng(2)
     w = T.record(T.setup(), truth, 30, cycles=2, noise=lambda: rng.normal() * 0.01 * DPH)
-    names = {t.name: t.p for t in T.reduction.reduce(w, T.setup()).tests}
+    names = {t.name: t.p for t in T.reduction.Reduction.reduce(w, T.setup()).tests}
     assert names["cycle to cycle"] > 1e-3 and names["harmonics of the positions"] > 1e-3
     w["mean"][60:] += 0.03 * np.cos(w["outer_start"][60:]) * DPH / T.K  # D_I of the second cycle
-    names = {t.name: t.p for t in T.reduction.reduce(w, T.setup()).tests}
+    names = {t.name: t.p for t in T.reduction.Reduction.reduce(w, T.setup()).tests}
     assert names["cycle to cycle"] < 1e-3
 
 
@@ -190,12 +190,12 @@ def test_consistency_of_the_harmonics_is_shown() -> None:
     truth = random_truth(11)
     s = T.setup()
     w = T.record(s, truth)
-    (table,) = [t for t in T.reduction.reduce(w, s).tables if t.title == "Consistency of the harmonics"]
+    (table,) = [t for t in T.reduction.Reduction.reduce(w, s).tables if t.title == "Consistency of the harmonics"]
     assert len(table.rows) == 8 and all(abs(row[2]) < 1e-9 for row in table.rows)
     w["mean"] = w["mean"] - 0.01 * DPH * np.sin(w["outer_start"]) / s.k  # B5 of a gyro has no cause in the model
     rng = np.random.default_rng(1)
     w["mean"] += rng.normal(size=72) * 1e-3 * DPH / s.k
-    r = T.reduction.reduce(w, s)
+    r = T.reduction.Reduction.reduce(w, s)
     (table,) = [t for t in r.tables if t.title == "Consistency of the harmonics"]
     assert {row[0]: row[2] for row in table.rows}["B5"] == pytest.approx(0.01, abs=1e-3)
     assert {t.name: t.p for t in r.tests}["harmonics of the positions"] < 1e-6
@@ -206,7 +206,7 @@ def test_d_oo_folds() -> None:
     truth = random_truth(2, drift.NAMES)
     w = T.record(T.setup(), truth)
     assert "set fold" in message(T.reduction, w, T.setup(truth=truth))
-    r = T.reduction.reduce(w, T.setup(truth=truth, fold=True))
+    r = T.reduction.Reduction.reduce(w, T.setup(truth=truth, fold=True))
     oo, g2 = truth["D_OO"] / DPH, (9.8 / frames.G0) ** 2
     extra = {"D_F + γ² D_OO": ("D_F", g2), "D_II − D_OO": ("D_II", -1.0), "D_SS − D_OO": ("D_SS", -1.0)}
     assert set(extra) <= {c.name for c in r.coefficients}
@@ -228,7 +228,7 @@ def test_tilted_gyro_shifts_as_the_budget_says(axis: int, which: str) -> None:
     for rotation in (None, turned):
         rng = np.random.default_rng(4)
         w = T.record(s, truth, noise=lambda rng=rng: rng.normal() * 0.01 * DPH, turned=rotation)
-        found.append(T.reduction.reduce(w, s))
+        found.append(T.reduction.Reduction.reduce(w, s))
     noisy, tilted = found
     shift = {c.name: d.estimate - c.estimate for c, d in zip(noisy.coefficients, tilted.coefficients, strict=True)}
     lines = {b.coefficient: b.contribution for b in noisy.budget if f"its {which} axis" in b.source}

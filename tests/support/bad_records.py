@@ -27,7 +27,7 @@ def cut(w: Columns, keep: np.ndarray) -> None:
 def message(reduction: Any, windows: Columns, setup: Any) -> str:
     """Return what a reduction's refusal says."""
     with pytest.raises(ReductionError) as error:
-        reduction.reduce(windows, setup)
+        reduction.Reduction.reduce(windows, setup)
     return str(error.value)
 
 

@@ -62,7 +62,9 @@ def windows(
 def reduced(data: dict[str, Any], gamma: float, mounted: dict[str, float], scale: float = 9806.65, **more: Any) -> Any:
     R = module("reduction")
     mounts = dict(enumerate(mounted, 1))
-    return R.reduce(data, R.MultipointSetup(gravity=gamma * G0, scale=scale, mounts=mounts, **with_sizes(more)))
+    return R.Reduction.reduce(
+        data, R.MultipointSetup(gravity=gamma * G0, scale=scale, mounts=mounts, **with_sizes(more))
+    )
 
 
 def estimates(result: Any) -> dict[str, float]:

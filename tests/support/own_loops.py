@@ -15,6 +15,8 @@ from scipy import signal
 
 H = 1e-3  # s
 PLACES = ("plant input", "reference", "plant output")
+UNITS = {"excitation": "N.m", "input": "N.m", "output": "rad/s"}
+PERIOD = 4000  # samples
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from gyrobench.bench import Bench
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
-from gyrobench.system.moving_bodies import attitudes, parse_bodies, passive
+from gyrobench.system.moving_bodies import attitudes, parse_bodies
 from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
 
@@ -185,11 +185,11 @@ def test_every_other_system_has_a_picture() -> None:
 
 def test_rotations_are_passive_and_right_handed() -> None:
     """A turn by +90 degrees about z brings x to where y was: east in the new axes is -y."""
-    assert np.allclose(passive(2, np.array([np.pi / 2]))[0] @ [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])
-    assert np.allclose(passive(2, np.array([0.3]))[0], frames.passive_z(0.3))
+    assert np.allclose(frames.passive(2, np.array([np.pi / 2]))[0] @ [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])
+    assert np.allclose(frames.passive(2, np.array([0.3]))[0], frames.passive_z(0.3))
     for axis in range(3):
         about = np.eye(3)[axis]
-        assert np.allclose(passive(axis, np.array([0.7]))[0], frames.rotation(about, 0.7).T)
+        assert np.allclose(frames.passive(axis, np.array([0.7]))[0], frames.rotation(about, 0.7).T)
 
 
 def test_what_the_record_lacks_is_left_out() -> None:
@@ -199,7 +199,7 @@ def test_what_the_record_lacks_is_left_out() -> None:
     bodies = parse_bodies("one: x a.tilt[2], z a.q\ntwo: one, y b.q\nthree: two, x a.q\nfour: ENU, z a.tilt[1]")
     found = attitudes(bodies, record, np.arange(2))
     assert list(found) == ["one", "four"]
-    assert np.allclose(found["one"][1], passive(2, np.array([0.5]))[0] @ passive(0, np.array([0.2]))[0])
+    assert np.allclose(found["one"][1], frames.passive(2, np.array([0.5]))[0] @ frames.passive(0, np.array([0.2]))[0])
     for text in ("one", "one: w a.q", "one: x a.q or else", "ENU: x a.q", "one: x a.q\none: x a.q", "one: two, x a.q"):
         with pytest.raises(ValueError, match="bodies: "):
             parse_bodies(text)

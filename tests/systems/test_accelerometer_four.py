@@ -20,7 +20,7 @@ from gyrobench.frames import G0
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.system.system import load_system
 from systems.accelerometer_four import chain, geometry
-from systems.accelerometer_four.reduction import FourSetup, Reduction, reduce
+from systems.accelerometer_four.reduction import FourSetup, Reduction
 
 NAME = "accelerometer_four"
 D1 = (1.5e-5, -1.9e-6)
@@ -32,7 +32,7 @@ def setup(**values: object) -> FourSetup:
 
 def reduced(U: np.ndarray, **values: object) -> np.ndarray:
     """The coefficients (4, 5) of a record."""
-    found = reduce(windows(U), setup(**values))
+    found = Reduction.reduce(windows(U), setup(**values))
     return np.array([c.estimate for c in found.coefficients[:20]]).reshape(4, 5)
 
 
@@ -40,7 +40,7 @@ def test_exact_without_noise() -> None:
     """Errors of +-11 arcsec: coefficients to 1e-7 V, and the harmonics of the head are those put in."""
     rng = np.random.default_rng(1)
     D = head(rng, 11 * ARCSEC, D1)
-    found = reduce(windows(voltages(rng, D, 0.0)), setup())
+    found = Reduction.reduce(windows(voltages(rng, D, 0.0)), setup())
     assert np.array([c.estimate for c in found.coefficients[:20]]).reshape(4, 5) == pytest.approx(TRUE, abs=1e-7)
     table = next(t for t in found.tables if t.title.startswith("Angle errors"))
     back = sum(a * ARCSEC * (np.cos(k * ALPHA) if kind == "cos" else np.sin(k * ALPHA)) for k, kind, a, _ in table.rows)
@@ -49,7 +49,9 @@ def test_exact_without_noise() -> None:
 
 def test_41_unknowns_of_96_readings() -> None:
     """Rank 41, 55 degrees of freedom; columns of the harmonics 0 and 1 of the head raise the rank by none."""
-    found = reduce(windows(voltages(np.random.default_rng(2), head(np.random.default_rng(3), 1e-5), 3e-6)), setup())
+    found = Reduction.reduce(
+        windows(voltages(np.random.default_rng(2), head(np.random.default_rng(3), 1e-5), 3e-6)), setup()
+    )
     assert found.dof == pytest.approx(55) and len(geometry.orders(N)) == 21
     X = np.zeros((4 * N, 44))
     for j, i in enumerate(geometry.SENSORS):
@@ -71,7 +73,7 @@ def test_errors_and_intervals() -> None:
     for _ in range(80):
         U = voltages(rng, head(rng, 11 * ARCSEC, D1), 3e-6)
         measured = (D1[0] + 5e-7 * rng.normal(), D1[1] + 5e-7 * rng.normal())
-        found = reduce(windows(U), setup(D1=measured, u_D1=5e-7))
+        found = Reduction.reduce(windows(U), setup(D1=measured, u_D1=5e-7))
         c = found.coefficients[:20]
         error.append([x.estimate - t for x, t in zip(c, TRUE.ravel(), strict=True)])
         held.append([x.interval[0] <= t <= x.interval[1] for x, t in zip(c, TRUE.ravel(), strict=True)])
@@ -102,7 +104,7 @@ def test_unknown_first_harmonic() -> None:
     known, unknown = reduced(U), reduced(U, D1=None)
     shift = (unknown - known)[0]
     assert shift == pytest.approx([1.95e-5, 0.0, 0.0, -1.3 * 1.9e-6, -1.95e-5], abs=1e-7)
-    found = reduce(windows(U), setup(D1=None))
+    found = Reduction.reduce(windows(U), setup(D1=None))
     assert found.residual_std < 3e-7
     assert any("biased by K_I D1" in w for w in found.warnings)
 
@@ -181,7 +183,7 @@ def test_a_missing_position_and_a_reversed_voltage_are_refused() -> None:
     rng = np.random.default_rng(9)
     w = windows(voltages(rng, head(rng, 1e-5), 3e-6))
     with pytest.raises(ReductionError, match=r"position 345° is read 0 times"):
-        reduce({n: v[:-1] for n, v in w.items()}, setup())
+        Reduction.reduce({n: v[:-1] for n, v in w.items()}, setup())
     with pytest.raises(ReductionError, match="must be positive"):
-        reduce({**w, "mean_3": -w["mean_3"]}, setup())
+        Reduction.reduce({**w, "mean_3": -w["mean_3"]}, setup())
     assert math.isclose(geometry.axes(3, ALPHA)[0][6], -1.0)

@@ -95,7 +95,7 @@ def test_closed_formula_by_hand() -> None:
     C, phi = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]), math.radians(45.75)
     t = np.arange(10.0)
     setup = R.FixedPositionSetup(latitude=phi, gravity=9.8, k=17.2 * DPH / 1e-3, attitude=C)
-    result = R.reduce({"t_start": t, "t_end": t + 1.0, "mean": np.full(10, 6e-4)}, setup)
+    result = R.Reduction.reduce({"t_start": t, "t_end": t + 1.0, "mean": np.full(10, 6e-4)}, setup)
     assert result.coefficients[0].estimate == pytest.approx(15.041069 * math.sin(phi) - 10.32, abs=1e-6)
     assert result.tables[-1].rows[0][1] == pytest.approx(10.7740, abs=1e-4)
 
@@ -122,7 +122,7 @@ def test_intervals_cover(correlated: float) -> None:
     hits = 0
     for _ in range(100):
         mean = (L @ rng.normal(size=n)) * DPH / k
-        lo, hi = R.reduce({"t_start": t0, "t_end": t0 + window, "mean": mean}, setup).coefficients[0].interval
+        lo, hi = R.Reduction.reduce({"t_start": t0, "t_end": t0 + window, "mean": mean}, setup).coefficients[0].interval
         hits += lo <= 0.0 <= hi
     assert hits >= int(stats.binom.ppf(1e-4, 100, 0.93)), hits
 
@@ -183,10 +183,12 @@ def test_refusals(session: Session) -> None:
     t = np.arange(6.0)
     setup = R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=math.nan, attitude=2.0 * np.eye(3))
     with pytest.raises(ReductionError) as error:
-        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, setup)
+        R.Reduction.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, setup)
     assert "scale factor" in str(error.value) and "attitude: rows are not orthonormal" in str(error.value)
     with pytest.raises(ReductionError, match="6 readings"):
-        R.reduce({"t_start": t, "t_end": t + 1.0, "mean": t}, R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=1.0))
+        R.Reduction.reduce(
+            {"t_start": t, "t_end": t + 1.0, "mean": t}, R.FixedPositionSetup(latitude=0.7, gravity=9.8, k=1.0)
+        )
 
 
 def test_trend_is_seen(session: Session) -> None:

@@ -132,7 +132,7 @@ def made(rng: np.random.Generator, points: int, size: float, **setup: Any) -> tu
     off = (rng.normal(size=points) * size * ARCSEC).tolist()
     R = module("reduction")
     own = R.MultipointSetup(gravity=gamma * G0, scale=9806.65, mounts={1: "a", 2: "b"}, **with_sizes(setup))
-    return R.reduce(windows(k, zeros, gamma, points, sigma=5e-7, rng=rng, off=off), own), {
+    return R.Reduction.reduce(windows(k, zeros, gamma, points, sigma=5e-7, rng=rng, off=off), own), {
         **k, **{f"θ₀ {m}": z for m, z in zeros.items()}
     }  # fmt: skip
 

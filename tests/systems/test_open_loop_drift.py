@@ -166,7 +166,7 @@ def readings(**changes: Any) -> dict[str, np.ndarray]:
 
 def test_refused_records() -> None:
     setup = R.OpenLoopSetup(latitude=0.0, gravity=9.8)
-    assert R.reduce(readings(), setup).coefficients[0].estimate == pytest.approx(-2e-7 / DPH, abs=1e-6)
+    assert R.Reduction.reduce(readings(), setup).coefficients[0].estimate == pytest.approx(-2e-7 / DPH, abs=1e-6)
     for w, said in (
         (readings(mean=-readings()["mean"]), "must be positive"),
         (readings(angle_start=np.zeros(11), angle_end=np.zeros(11)), "never stood over and under the null"),
@@ -174,7 +174,7 @@ def test_refused_records() -> None:
         (readings(mean=np.full(11, np.inf)), "non-finite"),
     ):
         with pytest.raises(ReductionError, match=said):
-            R.reduce(w, setup)
+            R.Reduction.reduce(w, setup)
 
 
 # ------------------------------------------------------------------------------------------ laboratory files

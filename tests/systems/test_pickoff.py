@@ -28,7 +28,7 @@ def test_ideal_input() -> None:
     rng = np.random.default_rng(1)
     for _ in range(10):
         slope, gain, drift = rng.uniform(1.0, 30.0), rng.uniform(0.5, 2.0), rng.uniform(-1.5, 1.5)
-        r = R.reduce(made(slope, gain, drift), R.PickoffSetup(gain, 2.0 * DPH))
+        r = R.Reduction.reduce(made(slope, gain, drift), R.PickoffSetup(gain, 2.0 * DPH))
         c = named(r)
         assert c["S"].estimate == pytest.approx(slope, rel=1e-9)
         assert c["K_sg"].estimate == pytest.approx(slope / gain, rel=1e-9)
@@ -44,12 +44,12 @@ def test_drift_in_a_single_pass() -> None:
     """Angles from -20' to 20' within 10 intervals of 0.4 s: drift of 1 deg/h = 1 arcsec/s turns up in the slope as
     -1/(240 arcsec / 0.4 s) = -1/600; there and back it does not.  The bound of 2 deg/h covers it.
     """
-    once = R.reduce(made(drift=1.0, both=False), R.PickoffSetup(1.0, 2.0 * DPH))
+    once = R.Reduction.reduce(made(drift=1.0, both=False), R.PickoffSetup(1.0, 2.0 * DPH))
     c = named(once)["S"]
     assert c.estimate / 12.0 - 1.0 == pytest.approx(-1.0 / 600.0, rel=1e-3)
     assert c.interval[0] < 12.0 < c.interval[1] and c.u / 12.0 == pytest.approx(1.0 / 600.0, rel=5e-3)
     assert "drift" not in named(once) and any("gone over once" in w for w in once.warnings)
-    assert named(R.reduce(made(drift=1.0), R.PickoffSetup(1.0, 2.0 * DPH)))["S"].estimate == pytest.approx(
+    assert named(R.Reduction.reduce(made(drift=1.0), R.PickoffSetup(1.0, 2.0 * DPH)))["S"].estimate == pytest.approx(
         12.0, rel=1e-9
     )
 
@@ -57,7 +57,7 @@ def test_drift_in_a_single_pass() -> None:
 def test_bound_of_the_method() -> None:
     """[PICKOFF] 1 deg/h over 5 s = 5 arcsec."""
     assert 1.0 * DPH * 5.0 / (math.pi / 648000.0) == pytest.approx(5.0)
-    r = R.reduce(made(), R.PickoffSetup(1.0, 1.0 * DPH))
+    r = R.Reduction.reduce(made(), R.PickoffSetup(1.0, 1.0 * DPH))
     assert "8.1 s" in r.summary[2] and "8.1″" in r.summary[2]
 
 
@@ -67,12 +67,12 @@ def test_a_bent_pickoff_is_seen() -> None:
     span = 40.0 * ARCMIN
     bend = 1e-3 * 12.0 * span / (span / 2.0) ** 3
     data = made(bend=bend)
-    r = R.reduce({**data, "mean": data["mean"] + noise}, R.PickoffSetup(1.0, 2.0 * DPH))
+    r = R.Reduction.reduce({**data, "mean": data["mean"] + noise}, R.PickoffSetup(1.0, 2.0 * DPH))
     c = named(r)["linearity"]
     assert 0.02 < abs(c.estimate) < 0.05
     assert any("not straight" in t.finding for t in r.tests)
     limits = {"linearity": (-0.01, 0.01), "S": (11.9, 12.1)}
-    r = conclude(R.reduce(data, R.PickoffSetup(1.0, 2.0 * DPH)), None, limits)
+    r = conclude(R.Reduction.reduce(data, R.PickoffSetup(1.0, 2.0 * DPH)), None, limits)
     assert named(r)["linearity"].verdict == "fail" and r.verdict == "fail"
 
 
@@ -85,13 +85,17 @@ def test_the_largest_of_many_departures_is_no_bend() -> None:
     for seed in range(100):
         data = made(drift=0.0)
         noise = 1e-5 * np.random.default_rng(seed).standard_normal(21)
-        c = named(R.reduce({**data, "mean": data["mean"] + noise}, R.PickoffSetup(1.0, 2.0 * DPH)))["linearity"]
+        c = named(R.Reduction.reduce({**data, "mean": data["mean"] + noise}, R.PickoffSetup(1.0, 2.0 * DPH)))[
+            "linearity"
+        ]
         held += c.interval[0] <= 0.0 <= c.interval[1]
     assert held >= 88
 
 
 def test_effects() -> None:
-    r = R.reduce(made(), R.PickoffSetup(2.0, 2.0 * DPH, sizes={"u_gain": 1e-3, "u_angle": 2e-3, "u_voltage": 3e-3}))
+    r = R.Reduction.reduce(
+        made(), R.PickoffSetup(2.0, 2.0 * DPH, sizes={"u_gain": 1e-3, "u_angle": 2e-3, "u_voltage": 3e-3})
+    )
     lines = {(b.source, b.coefficient): b.contribution for b in r.budget}
     S, K = named(r)["S"].estimate, named(r)["K_sg"].estimate
     assert ("gain H/C", "S") not in lines and lines["gain H/C", "K_sg"] == pytest.approx(1e-3 * K)
@@ -107,7 +111,7 @@ def test_drift_that_changes_evenly_is_not_taken_for_scale_factor() -> None:
     ideal = made(drift=0.0)
     t = ideal["t_start"] - 4.0
     way = DPH * t**2 / 8.0  # of the float: the integral of t / 4 deg/h
-    c = named(R.reduce({**ideal, "mean": ideal["mean"] - 12.0 * way}, R.PickoffSetup(1.0, 2.0 * DPH)))
+    c = named(R.Reduction.reduce({**ideal, "mean": ideal["mean"] - 12.0 * way}, R.PickoffSetup(1.0, 2.0 * DPH)))
     assert c["S"].estimate == pytest.approx(12.0, rel=1e-9)
     assert c["drift"].estimate == pytest.approx(0.0, abs=1e-6) and abs(c["linearity"].estimate) < 1e-9
 
@@ -186,7 +190,7 @@ def test_refused_records() -> None:
         (made(n=9), {}, "9 angles: at least 10"),
     ):
         with pytest.raises(ReductionError, match=match):
-            R.reduce({**good, **change}, R.PickoffSetup(**{"gain": 1.0, "drift": 2.0 * DPH, **setup}))
+            R.Reduction.reduce({**good, **change}, R.PickoffSetup(**{"gain": 1.0, "drift": 2.0 * DPH, **setup}))
 
 
 # ----------------------------------------------------------------------------------------- measured data

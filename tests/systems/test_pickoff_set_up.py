@@ -86,7 +86,7 @@ def test_stated_errors_of_the_encoder_are_held() -> None:
     for _ in range(40):
         windows = record(rng, 30.0 * ARCSEC)
         for k, size in enumerate((30.0 * ARCSEC, 0.0)):
-            r = R.reduce(windows, R.PickoffSetup(gain=1.0, drift=2.0 * DPH, sizes={"u_angle1": size}))
+            r = R.Reduction.reduce(windows, R.PickoffSetup(gain=1.0, drift=2.0 * DPH, sizes={"u_angle1": size}))
             pairs = ((r["S"], 12.0), (r["K_sg"], 12.0), (r["drift"], 0.7))
             held[k] += [abs(c.estimate - x) <= c.k * c.u for c, x in pairs]
     assert held[0].min() >= 35 and held[1, 0] < 13

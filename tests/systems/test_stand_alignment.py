@@ -124,7 +124,7 @@ def test_intervals_cover() -> None:
         y = np.where(star | mirror, y, LAT + e + f * z) + rng.normal(size=code.size) * 0.3 * ARCSEC
         windows = {"phase": np.arange(1, code.size + 1), "t_start": t, "t_end": t + 20.0, "angle_start": code,
                    "angle_end": code, "mean": y, "level": f * v + zl}  # fmt: skip
-        found = R.reduce(windows, setup)
+        found = R.Reduction.reduce(windows, setup)
         true = (e / ARCSEC, a / ARCSEC, c / ARCSEC, i / ARCSEC, o / DEG, z / ARCSEC)
         held += sum(found[n].interval[0] <= x <= found[n].interval[1] for n, x in zip(FITTED, true, strict=True))
     assert held / (6 * runs) == pytest.approx(0.95, abs=0.02)
@@ -197,7 +197,7 @@ def test_records_that_are_not_of_this_test() -> None:
     ):
         rows = {n: v for n, v in {**windows, **change}.items() if v is not None}
         with pytest.raises(ReductionError, match=text):
-            R.reduce(rows, setup)
+            R.Reduction.reduce(rows, setup)
 
 
 # ------------------------------------------------------------------------------------------------ measured data

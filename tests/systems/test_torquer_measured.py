@@ -117,7 +117,7 @@ def stepped(rng: np.random.Generator, step: float, marks: float) -> Any:
     rows = {"current": i * 1e-3, "rate_plus": plus * DPH, "rate_minus": minus * DPH}
     rows |= dict.fromkeys(("range_plus", "range_minus"), np.radians(theta))
     reduction = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
-    return conclude(reduction.reduce(rows), None, {"K": (17.1, 17.3)})
+    return conclude(reduction.Reduction.reduce(rows), None, {"K": (17.1, 17.3)})
 
 
 def test_a_gain_that_changes_with_the_range_is_named_and_in_u() -> None:

@@ -12,8 +12,9 @@ import pytest
 
 import gyrobench as gb
 from gyrobench.report.loop_plane import disk, nichols
+from gyrobench.report.numbers import minus
 from gyrobench.report.style import chart
-from gyrobench.tuning.tuning_page import minus, page
+from gyrobench.tuning.tuning_page import page
 
 
 @pytest.fixture(scope="module")

@@ -163,8 +163,7 @@ def main_effects(measures: CampaignMeasures) -> list[Json]:
 def _dummies(codes: Codes) -> Array:
     """Return the columns of a factor: 1 at each level but the first."""
     present = np.unique(codes)
-    dummies: Array = (codes[:, None] == present[None, 1:]).astype(float)
-    return dummies
+    return np.asarray((codes[:, None] == present[None, 1:]).astype(float))
 
 
 def _partial_tests(y: Array, designs: list[Array], blocks: Codes | None) -> list[tuple[float | None, float | None]]:

@@ -24,15 +24,7 @@ from scipy import stats
 
 from gyrobench.arrays import Array
 from gyrobench.bench import UsageError
-from gyrobench.campaign.analysis.measures import (
-    SEED_KINDS,
-    CampaignMeasures,
-    Json,
-    error,
-    normalized_error,
-    numbers,
-    shared_seeds,
-)
+from gyrobench.campaign.analysis import measures
 from gyrobench.campaign.execution.store import Campaign
 from gyrobench.reduction.suite.ranking import LEVEL, ROUNDING, adjusted
 from gyrobench.report.numbers import write_number
@@ -55,21 +47,21 @@ class DifferenceTest:
     p: float
 
 
-def compare_campaigns(a: Campaign, b: Campaign) -> Json:
+def compare_campaigns(a: Campaign, b: Campaign) -> measures.Json:
     """Return the comparison of two campaigns, the first the baseline.  Raises UsageError where no measure is common."""
-    both = [CampaignMeasures.of(c.table(), c.units, c.axes) for c in (a, b)]
+    both = [measures.CampaignMeasures.of(c.table(), c.units, c.axes) for c in (a, b)]
     common = [n for n in both[0].names if n in both[1].names and both[0].unit(n) == both[1].unit(n)]
     if not common:
         raise UsageError(f"{a.url} and {b.url} have no measure of one name and unit in common: nothing to compare")
     pairs = _pairs(*both)
     sides = Sides.of(both, pairs)
-    tests: list[Json] = []
+    tests: list[measures.Json] = []
     for name in common:
         tests += _of_measure(name, both, sides)
     tests += _of_runs(both, sides)
     for test, p in zip(tests, adjusted([t["p"] for t in tests]), strict=True):
         test |= {"p_adjusted": p, "beyond_chance": p < LEVEL}
-    doc: Json = plain(
+    doc: measures.Json = plain(
         {
             "campaigns": [
                 {"name": c.name, "url": c.url, "runs": len(m.rows), "system": c.definition.get("system") or ""}
@@ -90,9 +82,9 @@ def compare_campaigns(a: Campaign, b: Campaign) -> Json:
 Pairs = tuple[Sequence[int], Sequence[int]] | None
 
 
-def _pairs(a: CampaignMeasures, b: CampaignMeasures) -> Pairs:
+def _pairs(a: measures.CampaignMeasures, b: measures.CampaignMeasures) -> Pairs:
     """Return the places of the runs that belong together, None where a setting does not name one run in each."""
-    axes = [n for n in (x["name"] for x in a.axes if x["kind"] not in (*SEED_KINDS, "data"))]
+    axes = [n for n in (x["name"] for x in a.axes if x["kind"] not in (*measures.SEED_KINDS, "data"))]
     columns = [f"in.{n}" for n in axes if f"in.{n}" in a.rows and f"in.{n}" in b.rows]
     keys = []
     for m in (a, b):
@@ -105,7 +97,7 @@ def _pairs(a: CampaignMeasures, b: CampaignMeasures) -> Pairs:
     return ([keys[0][k] for k in shared], [keys[1][k] for k in shared]) if len(shared) >= MIN_RUNS else None
 
 
-def _identical(names: Sequence[str], both: Sequence[CampaignMeasures], pairs: Pairs) -> int:
+def _identical(names: Sequence[str], both: Sequence[measures.CampaignMeasures], pairs: Pairs) -> int:
     """Return how many pairs have the same numbers, to the last bit, and the same state."""
     if not pairs:
         return 0
@@ -113,12 +105,12 @@ def _identical(names: Sequence[str], both: Sequence[CampaignMeasures], pairs: Pa
     same = rows[0]["state"].to_numpy() == rows[1]["state"].to_numpy()
     for name in names:
         for key in ("estimate", "u", "lo", "hi"):
-            x, y = (numbers(r, f"{name}.{key}") for r in rows)
+            x, y = (measures.numbers(r, f"{name}.{key}") for r in rows)
             same &= (x == y) | (np.isnan(x) & np.isnan(y))
     return int(same.sum())
 
 
-def _differing(a: Json, b: Json) -> list[Json]:
+def _differing(a: measures.Json, b: measures.Json) -> list[measures.Json]:
     """Return what was set differently: systems, options, parts, versions, axes."""
     found = []
     for key in ("system", "suite", "options", "parts", "versions"):
@@ -140,9 +132,9 @@ class Sides:
     clusters: tuple[Any, Any]
 
     @classmethod
-    def of(cls, both: Sequence[CampaignMeasures], pairs: Pairs) -> Sides:
+    def of(cls, both: Sequence[measures.CampaignMeasures], pairs: Pairs) -> Sides:
         rows = [m.rows.iloc[list(at)] for m, at in zip(both, pairs, strict=True)] if pairs else [m.rows for m in both]
-        return cls(pairs, (shared_seeds(rows[0]), shared_seeds(rows[1])))
+        return cls(pairs, (measures.shared_seeds(rows[0]), measures.shared_seeds(rows[1])))
 
     def choose(self, values: Sequence[Array]) -> tuple[Array, Array] | None:
         """Return the finite values of both, those of one seed as their mean; None for too few."""
@@ -162,17 +154,17 @@ def _means_of(values: Array, clusters: Any) -> Array:
     return np.asarray((np.bincount(clusters, values) / np.maximum(size, 1))[size > 0])
 
 
-def _of_measure(name: str, both: Sequence[CampaignMeasures], sides: Sides) -> list[Json]:
+def _of_measure(name: str, both: Sequence[measures.CampaignMeasures], sides: Sides) -> list[measures.Json]:
     rows = [m.rows for m in both]
-    known = all(np.isfinite(error(r, name)).any() for r in rows)
-    values = [error(r, name) if known else numbers(r, f"{name}.estimate") for r in rows]
+    known = all(np.isfinite(measures.error(r, name)).any() for r in rows)
+    values = [measures.error(r, name) if known else measures.numbers(r, f"{name}.estimate") for r in rows]
     found: dict[str, DifferenceTest | None] = {
         "error" if known else "estimate": _means(values, sides),
         "spread": _spreads(values, sides),
-        "u": _ratios([numbers(r, f"{name}.u") for r in rows], sides),
+        "u": _ratios([measures.numbers(r, f"{name}.u") for r in rows], sides),
     }
     if known:
-        e = [normalized_error(r, name) for r in rows]
+        e = [measures.normalized_error(r, name) for r in rows]
         found["coverage"] = _shares([np.where(np.isfinite(x), np.abs(x) <= 1.0, np.nan) for x in e], sides)
     unit = both[0].unit(name)
     units = {"u": "1", "coverage": "1"}
@@ -183,7 +175,7 @@ def _of_measure(name: str, both: Sequence[CampaignMeasures], sides: Sides) -> li
     ]
 
 
-def _of_runs(both: Sequence[CampaignMeasures], sides: Sides) -> list[Json]:
+def _of_runs(both: Sequence[measures.CampaignMeasures], sides: Sides) -> list[measures.Json]:
     """Return the tests of what runs have as a whole: a result, the verdict pass."""
     rows = [m.rows for m in both]
     verdicts = [np.where(r["verdict"].notna(), r["verdict"] == "pass", np.nan).astype(float) for r in rows]
@@ -259,7 +251,7 @@ def _shares(values: Sequence[Array], sides: Sides) -> DifferenceTest | None:
 
 
 # ------------------------------------------------------------------------------------------------- sentences
-def _answer(doc: Json) -> list[str]:
+def _answer(doc: measures.Json) -> list[str]:
     a, b = (c["name"] for c in doc["campaigns"])
     a, b = (f"A ({a})", f"B ({b})")
     pairs = doc["pairs"]

@@ -111,8 +111,7 @@ def _scaled(x: Array) -> Array:
     """Return the columns from their median, over their median absolute deviation (where this is 0: their deviation)."""
     x = x - np.median(x, axis=0)
     mad = np.median(np.abs(x), axis=0)
-    scaled: Array = x / np.where(mad > 0.0, mad, np.maximum(x.std(axis=0), np.finfo(float).tiny))
-    return scaled
+    return np.asarray(x / np.where(mad > 0.0, mad, np.maximum(x.std(axis=0), np.finfo(float).tiny)))
 
 
 def _independent(x: Array) -> Mask:
@@ -189,8 +188,7 @@ def _squared_distances(x: Array, rows: Mask) -> Array:
     off = x - x[rows].mean(axis=0)
     covariance = np.atleast_2d(np.cov(x[rows], rowvar=False))
     covariance = covariance + 1e-12 * max(float(np.trace(covariance)), 1e-300) * np.eye(len(covariance))
-    d2: Array = np.einsum("ij,ij->i", off, linalg.solve(covariance, off.T, assume_a="pos").T)
-    return d2
+    return np.asarray(np.einsum("ij,ij->i", off, linalg.solve(covariance, off.T, assume_a="pos").T))
 
 
 def _limit(m: int, p: int, each: float) -> float:

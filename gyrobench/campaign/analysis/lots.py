@@ -57,8 +57,7 @@ def seconds(rows: Any) -> Array:
         return np.full(len(rows), np.nan)
     dates = pd.to_datetime(rows["date"], errors="coerce", utc=True, format="ISO8601")
     elapsed = (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
-    found: Array = elapsed.to_numpy(float, na_value=np.nan)
-    return found
+    return np.asarray(elapsed.to_numpy(float, na_value=np.nan))
 
 
 def in_order(rows: Any) -> Any:
@@ -176,8 +175,7 @@ def standard_uncertainty(rows: Any, name: str) -> Array:
     """Return u, or where it is larger the half-width of the 95 % interval over 1.96: few degrees of freedom count."""
     u = numbers(rows, f"{name}.u")
     half = 0.5 * (numbers(rows, f"{name}.hi") - numbers(rows, f"{name}.lo")) / NORMAL
-    found: Array = np.fmax(u, half)
-    return found
+    return np.asarray(np.fmax(u, half))
 
 
 def _line(t: Array, y: Array, u: Array) -> tuple[float, float, float]:

@@ -78,8 +78,7 @@ def numbers(rows: Any, column: str) -> Array:
     """Return a column as floats, NaN where there is none."""
     if column not in rows:
         return np.full(len(rows), np.nan)
-    values: Array = rows[column].to_numpy(dtype=float, na_value=np.nan)
-    return values
+    return np.asarray(rows[column].to_numpy(dtype=float, na_value=np.nan))
 
 
 def error(rows: Any, name: str) -> Array:

@@ -11,22 +11,9 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.campaign.analysis.lots import all_dated, in_order
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, normalized_error, numbers
+from gyrobench.report import style
 from gyrobench.report.numbers import write_number
 from gyrobench.report.page_model import Picture
-from gyrobench.report.style import (
-    BLUE,
-    GREEN,
-    HALF,
-    INK,
-    MUTED,
-    ORANGE,
-    VERMILION,
-    axis_label,
-    chart,
-    figure,
-    svg,
-    zero_line,
-)
 
 MAX_BARS = 40
 FAR = 6.0  # quartile distances from the quartiles; what is farther off leaves no room for the rest
@@ -42,14 +29,14 @@ def distributions(measures: CampaignMeasures) -> list[Picture]:
         x = x[np.isfinite(x)]
         if len(x) < 5 or np.ptp(x) <= 1e-12 * np.abs(x).max():
             continue
-        fig, ax = chart(HALF, 45)
+        fig, ax = style.chart(style.HALF, 45)
         beyond = _histogram(ax, x)
-        ax.set_xlabel(axis_label(name, measures.unit(name)))
+        ax.set_xlabel(style.axis_label(name, measures.unit(name)))
         ax.locator_params(axis="x", nbins=5)
         ax.set_ylabel("runs")
         key = f"distribution-{i + 1}"
         caption = f"{name}: estimates of {len(x)} runs." + (f" {beyond} beyond the scale." if beyond else "")
-        pictures.append(Picture(key, svg(fig, key), caption, f"Histogram of {name}", half=True))
+        pictures.append(Picture(key, style.svg(fig, key), caption, f"Histogram of {name}", half=True))
     return pictures
 
 
@@ -60,7 +47,7 @@ def _histogram(ax: Any, x: Array) -> int:
     drawn = x[near] if high > low else x
     count = int(np.clip(len(np.histogram_bin_edges(drawn, bins="fd")) - 1, 5, MAX_BARS))
     counts, edges = np.histogram(drawn, bins=count)
-    ax.bar(edges[:-1], counts, np.diff(edges), align="edge", color=BLUE, alpha=0.75, edgecolor="none")
+    ax.bar(edges[:-1], counts, np.diff(edges), align="edge", color=style.BLUE, alpha=0.75, edgecolor="none")
     ax.set_ylim(bottom=0)
     return len(x) - len(drawn)
 
@@ -73,15 +60,15 @@ def normalized_errors(measures: CampaignMeasures, covered: Sequence[Json]) -> li
         e = e[np.isfinite(e)]
         if len(e) < 20:
             continue
-        fig, ax = chart(HALF, 45)
-        ax.axvspan(-1.0, 1.0, color=GREEN, alpha=0.2, linewidth=0, zorder=0)
+        fig, ax = style.chart(style.HALF, 45)
+        ax.axvspan(-1.0, 1.0, color=style.GREEN, alpha=0.2, linewidth=0, zorder=0)
         shown = np.clip(e, -3.0, 3.0)  # what is farther off stands in the last bar
         counts, edges = np.histogram(shown, bins=int(np.clip(2.0 * len(e) ** (1 / 3), 10, MAX_BARS)), range=(-3.0, 3.0))
-        ax.bar(edges[:-1], counts, np.diff(edges), align="edge", color=BLUE, alpha=0.75, edgecolor="none")
+        ax.bar(edges[:-1], counts, np.diff(edges), align="edge", color=style.BLUE, alpha=0.75, edgecolor="none")
         x = np.linspace(-3.0, 3.0, 121)
         k = float(special.ndtri(0.975))
         density = k * np.exp(-0.5 * (k * x) ** 2) / np.sqrt(2.0 * np.pi)
-        ax.plot(x, len(e) * density * (edges[1] - edges[0]), color=VERMILION)
+        ax.plot(x, len(e) * density * (edges[1] - edges[0]), color=style.VERMILION)
         ax.set_xlim(-3.0, 3.0)
         ax.set_ylim(bottom=0)
         ax.set_xlabel("error / half-width of the interval")
@@ -89,7 +76,9 @@ def normalized_errors(measures: CampaignMeasures, covered: Sequence[Json]) -> li
         key = f"normalized-{i + 1}"
         caption = f"{entry['name']}: {entry['hits']} of {entry['runs']} normalized errors within ±1."
         pictures.append(
-            Picture(key, svg(fig, key), caption, f"Histogram of the normalized errors of {entry['name']}", half=True)
+            Picture(
+                key, style.svg(fig, key), caption, f"Histogram of the normalized errors of {entry['name']}", half=True
+            )
         )
     return pictures
 
@@ -98,10 +87,10 @@ def coverage_strip(covered: Sequence[Mapping[str, Any]]) -> list[Picture]:
     """Return the coverage of each measure with its bounds, 0.95 dashed."""
     if not covered:
         return []
-    fig, ax = chart(HALF, 16 + 5.5 * len(covered))
-    ax.axvline(0.95, color=MUTED, linestyle="--", linewidth=0.9)
+    fig, ax = style.chart(style.HALF, 16 + 5.5 * len(covered))
+    ax.axvline(0.95, color=style.MUTED, linestyle="--", linewidth=0.9)
     for i, c in enumerate(covered):
-        colour, marker = (BLUE, "o") if c["consistent"] else (VERMILION, "D")
+        colour, marker = (style.BLUE, "o") if c["consistent"] else (style.VERMILION, "D")
         ax.plot([c["lo"], c["hi"]], [i, i], "-", color=colour, linewidth=1.4)
         ax.plot([c["share"]], [i], marker, color=colour, markersize=4.5, markeredgewidth=0)
     ax.set_yticks(range(len(covered)), [c["name"] for c in covered])
@@ -109,7 +98,9 @@ def coverage_strip(covered: Sequence[Mapping[str, Any]]) -> list[Picture]:
     ax.locator_params(axis="x", nbins=5)
     ax.set_xlabel("share of intervals that contain the true value")
     caption = "Coverage with 95 % bounds; dashed: 0.95; diamonds: not consistent with it."
-    return [Picture("coverage", svg(fig, "coverage"), caption, "Coverage of the 95 % intervals by measure", half=True)]
+    return [
+        Picture("coverage", style.svg(fig, "coverage"), caption, "Coverage of the 95 % intervals by measure", half=True)
+    ]
 
 
 def responses(doc: Json) -> tuple[list[Picture], int]:
@@ -129,22 +120,22 @@ def responses(doc: Json) -> tuple[list[Picture], int]:
         fig = (_against_numbers if axis["numeric"] else _against_texts)(axis, m["unit"], drawn)
         key = f"response-{i + 1}"
         caption = f"{m['name']} against {axis['axis']}: {' and '.join(drawn)}, mean with 95 % interval."
-        pictures.append(Picture(key, svg(fig, key), caption, f"{m['name']} against {axis['axis']}", half=True))
+        pictures.append(Picture(key, style.svg(fig, key), caption, f"{m['name']} against {axis['axis']}", half=True))
     return pictures, len(pairs) - len(chosen)
 
 
 def _against_numbers(axis: Json, unit: str, drawn: Mapping[str, Json]) -> Any:
-    fig, axes = figure(HALF, 14 + 31 * len(drawn), nrows=len(drawn), sharex=True)
+    fig, axes = style.figure(style.HALF, 14 + 31 * len(drawn), nrows=len(drawn), sharex=True)
     for ax, (quantity, r) in zip(axes[:, 0], drawn.items(), strict=True):
         mean, low, high = _numbers(r)
-        ax.plot(axis["levels"], mean, "o-", color=BLUE, linewidth=0.8, markersize=3.5, markeredgewidth=0)
-        ax.vlines(axis["levels"], low, high, color=BLUE, linewidth=1.4)
+        ax.plot(axis["levels"], mean, "o-", color=style.BLUE, linewidth=0.8, markersize=3.5, markeredgewidth=0)
+        ax.vlines(axis["levels"], low, high, color=style.BLUE, linewidth=1.4)
         if quantity == "error":
-            zero_line(ax)
-        ax.set_ylabel(axis_label(quantity, unit))
+            style.zero_line(ax)
+        ax.set_ylabel(style.axis_label(quantity, unit))
         ax.locator_params(axis="y", nbins=4)
     axes[-1, 0].locator_params(axis="x", nbins=6)
-    axes[-1, 0].set_xlabel(axis_label(axis["axis"], axis["unit"]))
+    axes[-1, 0].set_xlabel(style.axis_label(axis["axis"], axis["unit"]))
     fig.align_ylabels(axes[:, 0])
     return fig
 
@@ -152,17 +143,17 @@ def _against_numbers(axis: Json, unit: str, drawn: Mapping[str, Json]) -> Any:
 def _against_texts(axis: Json, unit: str, drawn: Mapping[str, Json]) -> Any:
     """Return one row for each text, which has the room of the left margin."""
     count = min(len(axis["levels"]), MAX_LEVELS_DRAWN)
-    fig, axes = figure(HALF, (14 + 5.5 * count) * len(drawn), nrows=len(drawn))
+    fig, axes = style.figure(style.HALF, (14 + 5.5 * count) * len(drawn), nrows=len(drawn))
     for ax, (quantity, r) in zip(axes[:, 0], drawn.items(), strict=True):
         mean, low, high = (v[:count] for v in _numbers(r))
         if quantity == "error":
-            ax.axvline(0.0, color=MUTED, linewidth=0.8)
-        ax.hlines(range(count), low, high, color=BLUE, linewidth=1.4)
-        ax.plot(mean, range(count), "o", color=BLUE, markersize=4, markeredgewidth=0)
+            ax.axvline(0.0, color=style.MUTED, linewidth=0.8)
+        ax.hlines(range(count), low, high, color=style.BLUE, linewidth=1.4)
+        ax.plot(mean, range(count), "o", color=style.BLUE, markersize=4, markeredgewidth=0)
         ax.set_yticks(range(count), [_short(t, 22) for t in axis["levels"][:count]])
         ax.set_ylim(count - 0.4, -0.6)
         ax.locator_params(axis="x", nbins=5)
-        ax.set_xlabel(axis_label(quantity, unit))
+        ax.set_xlabel(style.axis_label(quantity, unit))
     return fig
 
 
@@ -179,12 +170,12 @@ def indices(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
     pictures = []
     for i, (name, quantity) in enumerate(dict.fromkeys((r["name"], r["quantity"]) for r in rows)):
         shown = [r for r in rows if (r["name"], r["quantity"]) == (name, quantity)]
-        fig, ax = chart(HALF, 16 + 7.0 * len(shown))
-        ax.axvline(0.0, color=MUTED, linewidth=0.8)
+        fig, ax = style.chart(style.HALF, 16 + 7.0 * len(shown))
+        ax.axvline(0.0, color=style.MUTED, linewidth=0.8)
         for k, r in enumerate(shown):
             for key, low, high, shift, colour, marker in (
-                ("first", "lo", "hi", -0.14, BLUE, "o"),
-                ("total", "total_lo", "total_hi", 0.14, VERMILION, "D"),
+                ("first", "lo", "hi", -0.14, style.BLUE, "o"),
+                ("total", "total_lo", "total_hi", 0.14, style.VERMILION, "D"),
             ):
                 if r[key] is None:
                     continue
@@ -198,7 +189,7 @@ def indices(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
         total = "; diamonds: total" if shown[0]["total"] is not None else ""
         key = f"sobol-{i + 1}"
         caption = f"{name}, {quantity}: first-order indices{total}."
-        pictures.append(Picture(key, svg(fig, key), caption, f"Sobol' indices of {name}, {quantity}", half=True))
+        pictures.append(Picture(key, style.svg(fig, key), caption, f"Sobol' indices of {name}, {quantity}", half=True))
     return pictures
 
 
@@ -216,31 +207,31 @@ def control_charts(measures: CampaignMeasures, lot: Json) -> list[Picture]:
         y = np.where(done, numbers(rows, f"{name}.estimate"), np.nan)
         if limits is None:
             continue
-        fig, ax = chart(HALF, 50)
+        fig, ax = style.chart(style.HALF, 50)
         if entry["low"] is not None:
-            ax.axhspan(entry["low"], entry["high"], color=GREEN, alpha=0.18, linewidth=0, zorder=0)
+            ax.axhspan(entry["low"], entry["high"], color=style.GREEN, alpha=0.18, linewidth=0, zorder=0)
         control_lines(ax, limits)
         plain = ~outlier & ~doubtful
-        ax.plot(place[plain], y[plain], "o", color=BLUE, markersize=2.8, markeredgewidth=0)
-        ax.plot(place[doubtful], y[doubtful], "s", color=ORANGE, markersize=4, markeredgewidth=0)
-        ax.plot(place[outlier], y[outlier], "D", color=VERMILION, markersize=4, markeredgewidth=0)
+        ax.plot(place[plain], y[plain], "o", color=style.BLUE, markersize=2.8, markeredgewidth=0)
+        ax.plot(place[doubtful], y[doubtful], "s", color=style.ORANGE, markersize=4, markeredgewidth=0)
+        ax.plot(place[outlier], y[outlier], "D", color=style.VERMILION, markersize=4, markeredgewidth=0)
         cut = _scale(ax, y, limits, entry)
         ax.set_xlabel("measurement, by date" if dated else "measurement, in the order of the files")
-        ax.set_ylabel(axis_label(name, entry["unit"]))
+        ax.set_ylabel(style.axis_label(name, entry["unit"]))
         ax.margins(x=0.03)
         ax.locator_params(axis="x", nbins=6, integer=True)
         beyond = f" {cut} beyond the scale, marked at its edge." if cut else ""
         key = f"control-{i + 1}"
         caption = f"{name}: {entry['beyond']} beyond the control limits.{beyond}"
-        pictures.append(Picture(key, svg(fig, key), caption, f"Control chart of {name}", half=True))
+        pictures.append(Picture(key, style.svg(fig, key), caption, f"Control chart of {name}", half=True))
     return pictures
 
 
 def control_lines(ax: Any, limits: Mapping[str, float]) -> None:
     """Draw centre and limits of a control chart."""
-    ax.axhline(limits["centre"], color=INK, linewidth=0.8)
+    ax.axhline(limits["centre"], color=style.INK, linewidth=0.8)
     for key in ("low", "high"):
-        ax.axhline(limits[key], color=MUTED, linewidth=0.9, linestyle="--")
+        ax.axhline(limits[key], color=style.MUTED, linewidth=0.9, linestyle="--")
 
 
 def _scale(ax: Any, y: Array, limits: Json, entry: Json) -> int:
@@ -256,7 +247,7 @@ def _scale(ax: Any, y: Array, limits: Json, entry: Json) -> int:
     with np.errstate(invalid="ignore"):
         for off, edge, marker in ((y > top, top, "^"), (y < bottom, bottom, "v")):
             at = np.flatnonzero(off)
-            ax.plot(at + 1, np.full(len(at), edge), marker, color=VERMILION, markersize=5, markeredgewidth=0)
+            ax.plot(at + 1, np.full(len(at), edge), marker, color=style.VERMILION, markersize=5, markeredgewidth=0)
         return int((y > top).sum() + (y < bottom).sum())
 
 
@@ -265,12 +256,12 @@ def distances(lot: Json) -> list[Picture]:
     found = [(k, i["distance"], i["outlier"]) for k, i in enumerate(lot["instruments"], 1) if i["distance"] is not None]
     if not found or lot["outliers"] is None:
         return []
-    fig, ax = chart(HALF, 50)
-    for flag, colour, marker in ((False, BLUE, "o"), (True, VERMILION, "D")):
+    fig, ax = style.chart(style.HALF, 50)
+    for flag, colour, marker in ((False, style.BLUE, "o"), (True, style.VERMILION, "D")):
         here = [(k, d) for k, d, o in found if o is flag]
         ax.plot([k for k, _ in here], [d for _, d in here], marker, color=colour, markersize=3.5, markeredgewidth=0)
     limit = lot["outliers"]["limit"]
-    ax.axhline(limit, color=MUTED, linestyle="--", linewidth=0.9)
+    ax.axhline(limit, color=style.MUTED, linestyle="--", linewidth=0.9)
     if max(d for _, d, _ in found) > 8.0 * limit:
         ax.set_yscale("log")
         ax.minorticks_off()
@@ -281,4 +272,4 @@ def distances(lot: Json) -> list[Picture]:
         f"Robust distance of each measurement; dashed: {number}, above which one is named as an outlier, as is one by "
         "a coefficient alone."
     )
-    return [Picture("distances", svg(fig, "distances"), caption, "Robust Mahalanobis distances", half=True)]
+    return [Picture("distances", style.svg(fig, "distances"), caption, "Robust Mahalanobis distances", half=True)]

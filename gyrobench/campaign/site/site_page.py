@@ -8,14 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json
-from gyrobench.campaign.site import site_figures
-from gyrobench.campaign.site.statistics_sections import (
-    coverage_section,
-    distributions_section,
-    pictures_of,
-    responses_section,
-    sobol_section,
-)
+from gyrobench.campaign.site import site_figures, statistics_sections
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
     BulletList,
@@ -67,10 +60,10 @@ def page(doc: Json, measures: CampaignMeasures, reports: Callable[[str], str]) -
             Section("Instruments", "instruments", _instruments(doc, reports)),
             Section("Control charts and tolerance intervals", "control", _control(doc, measures)),
             Section("Changes between dates", "dates", _changes(doc)),
-            Section("Coverage and normalized errors", "coverage", coverage_section(doc, measures)),
-            Section("Responses and main effects", "responses", responses_section(doc)),
-            Section("Sobol' indices", "sobol", sobol_section(doc)),
-            Section("Distributions", "distributions", distributions_section(doc, measures)),
+            Section("Coverage and normalized errors", "coverage", statistics_sections.coverage_section(doc, measures)),
+            Section("Responses and main effects", "responses", statistics_sections.responses_section(doc)),
+            Section("Sobol' indices", "sobol", statistics_sections.sobol_section(doc)),
+            Section("Distributions", "distributions", statistics_sections.distributions_section(doc, measures)),
             Section("Runs without result", "failures", _failures(doc)),
             Section("Runs", "runs", [Markup(RUNS)]),
             Section("Method and provenance", "method", _method(doc)),
@@ -114,7 +107,7 @@ def _instruments(doc: Json, reports: Callable[[str], str]) -> list[Any]:
     if lot["outliers"]:
         o = lot["outliers"]
         how = "in all coefficients together" if o["joint"] else "in each coefficient alone, as the lot is small"
-        blocks += pictures_of(site_figures.distances(lot), "")
+        blocks += statistics_sections.pictures_of(site_figures.distances(lot), "")
         blocks.append(
             Text(
                 f"Outliers are judged by robust Mahalanobis distances {how} ({', '.join(o['used'])}), {o['judged']} "
@@ -187,7 +180,7 @@ def _control(doc: Json, measures: CampaignMeasures) -> list[Any]:
         "Control charts: median and limits of three standard deviations from the median moving range (dashed); band: "
         "tolerance interval; diamonds: outliers; squares: contradicted by the own record."
     )
-    return [table, text, *pictures_of(site_figures.control_charts(measures, lot), "control charts")]
+    return [table, text, *statistics_sections.pictures_of(site_figures.control_charts(measures, lot), "control charts")]
 
 
 def _changes(doc: Json) -> list[Any]:

@@ -162,8 +162,7 @@ class SampledController(Block):
     def sample(self, counts: Number, acc: Number) -> None:
         """Take a sample: command count minus count, and the acceleration of the reference over the coming period."""
         self.refuse(
-            counts != floor(counts),
-            "command count minus count is not a whole number: both must be cumulative counts",
+            counts != floor(counts), "command count minus count is not a whole number: both must be cumulative counts"
         )
         x = counts * self.quantum
         self.refuse(
@@ -321,8 +320,7 @@ class TachoLoop(Block):
     def check(self, rate: Number) -> None:
         """Refuse a set rate outside the range of four digits; 0 is rest, and a rate that still changes is none."""
         self.refuse(
-            fabs(rate) > self.rate_most * (1.0 + 1e-12),
-            "the rate set is above {self}_rate_most = {rate_most} rad/s",
+            fabs(rate) > self.rate_most * (1.0 + 1e-12), "the rate set is above {self}_rate_most = {rate_most} rad/s"
         )
         self.refuse(
             rate == self.rate_last and rate != 0.0 and fabs(rate) < self.rate_least * (1.0 - 1e-12),

@@ -87,8 +87,7 @@ def in_channel(found: Findings, channel: str) -> Findings:
     before = found.function
 
     def turned(beta: Array) -> Array:
-        out: Array = signs * (beta if before is None else np.asarray(before(beta)))
-        return out
+        return np.asarray(signs * (beta if before is None else np.asarray(before(beta))))
 
     return found.derive([_named(q, channel, float(s)) for q, s in zip(own, signs, strict=True)], turned)
 

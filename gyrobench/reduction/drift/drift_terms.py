@@ -18,22 +18,9 @@ from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.drift.supplies import Supplies
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.run_metadata import number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, scale_factor_problems
-from gyrobench.reduction.setup.sources import (
-    CURRENT_OFFSET,
-    CURRENT_OFFSET_OF,
-    CURRENT_RESOLUTION,
-    CURRENT_RESOLUTION_OF,
-    IN_ATTITUDE,
-    PULSES,
-    TORQUER_NONLINEARITY,
-    TORQUER_NONLINEARITY_OF,
-    TORQUER_SCALE,
-    TORQUER_SCALE_OF,
-    Effect,
-    Source,
-)
 from gyrobench.result import Reason
 
 NO_OO = "D_OO is taken as zero; if it is not, D_F holds γ² D_OO, D_II and D_SS hold −D_OO."
@@ -116,7 +103,7 @@ def equation(left: str, names: Iterable[str]) -> str:
     return left + " + ".join(parts)
 
 
-def attitude_effects(s: Any, found: Findings, note: str = "") -> list[Effect]:
+def attitude_effects(s: Any, found: Findings, note: str = "") -> list[sources.Effect]:
     """Return what a gyro turned about its output and spin axes does to drift rates in one attitude: the Earth's rate.
 
     s: a setup with attitude (rows I, O, S in E, N, U), latitude and earth_rate.
@@ -125,30 +112,35 @@ def attitude_effects(s: Any, found: Findings, note: str = "") -> list[Effect]:
     for axis, name in ((1, "output"), (2, "spin")):
         R = frames.rotation(np.eye(3)[axis], SMALL).T @ s.attitude
         rate = float((R[0] - s.attitude[0]) @ earth) / SMALL
-        turned.append(IN_ATTITUDE[name].effect(s, found.error(-rate), note=note))
+        turned.append(sources.IN_ATTITUDE[name].effect(s, found.error(-rate), note=note))
     return turned
 
 
-def torquer_sources(axis: str = "", full: str = "") -> list[Source]:
+def torquer_sources(axis: str = "", full: str = "") -> list[sources.Source]:
     """Return scale factor and nonlinearity of a torquer, offset and resolution of the reading of its current.
 
     axis: of one of two torquers.  full: the largest current of the record, for the note.
     """
-    every = (TORQUER_SCALE, TORQUER_NONLINEARITY, CURRENT_OFFSET, CURRENT_RESOLUTION)
-    each = (TORQUER_SCALE_OF, TORQUER_NONLINEARITY_OF, CURRENT_OFFSET_OF, CURRENT_RESOLUTION_OF)
+    every = (sources.TORQUER_SCALE, sources.TORQUER_NONLINEARITY, sources.CURRENT_OFFSET, sources.CURRENT_RESOLUTION)
+    each = (
+        sources.TORQUER_SCALE_OF,
+        sources.TORQUER_NONLINEARITY_OF,
+        sources.CURRENT_OFFSET_OF,
+        sources.CURRENT_RESOLUTION_OF,
+    )
     return [s.of(axis=axis, full=full) for s in (each if axis else every)]
 
 
 def elsewhere(axis: str) -> list[str]:
     """Return names and ids of the sources of one of two torquers, which the other channel lacks."""
-    own = [*torquer_sources(axis), *(pulse_sources.of_loop(s, axis) for s in PULSES)]
+    own = [*torquer_sources(axis), *(pulse_sources.of_loop(s, axis) for s in sources.PULSES)]
     return [word for s in own for word in (s.name, s.id)]
 
 
 def torquer_effects(
     s: RebalanceSetup, found: Findings, k: float, read: CurrentWindows, quantum: float, pulses: Pulses | None = None,
     axis: str = "",
-) -> list[Effect]:  # fmt: skip
+) -> list[sources.Effect]:  # fmt: skip
     """Return what errors of torquer and current reading do to drift rates omega_IA - k i.
 
     k: rad/s/A.  read: currents with the sign of the precession convention.  quantum: resolution of the reading, A.

@@ -126,13 +126,10 @@ class RestTest(DriftReduction[S]):
 
         def misalignment(k: int) -> Array:
             other = frames.rotation(np.eye(3)[k], SMALL) @ self.axes
-            out: Array = (self.rate(other) - rate - (self.design(other) - X) @ start) / SMALL
-            return out
+            return np.asarray((self.rate(other) - rate - (self.design(other) - X) @ start) / SMALL)
 
-        text = "misalignment of the input axis towards the"
         return [
-            Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2)),
-            Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1)),
+            *nuisances.misalignments(misalignment),
             *nuisances.common(self.windows),
             *nuisances.torquer(nuisances.fitted(rate, X, y)),
         ]

@@ -30,20 +30,8 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
-from gyrobench.reduction.setup import window_checks
+from gyrobench.reduction.setup import sources, window_checks
 from gyrobench.reduction.setup.run_metadata import Location
-from gyrobench.reduction.setup.sources import (
-    ANGLE_ONCE,
-    ANGLE_TWICE,
-    ATTITUDE_SERVO,
-    AXIS_SERVO,
-    INPUT_TO_OUTPUT,
-    INPUT_TO_SPIN,
-    TIME_BASE,
-    UNBALANCE,
-    WOBBLE,
-    Effect,
-)
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 
@@ -79,8 +67,7 @@ class HeldWindows:
     @property
     def rate(self) -> Array:
         """Return the mean table rate of each window (n,), rad/s."""
-        out: Array = (self.angle_end - self.angle_start) / (self.t_end - self.t_start)
-        return out
+        return np.asarray((self.angle_end - self.angle_start) / (self.t_end - self.t_start))
 
     @functools.cached_property
     def nodes(self) -> Array:
@@ -173,7 +160,7 @@ def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gai
 def effects(
     held: HeldWindows, site: Location, fit: Findings, columns: Callable[[HeldWindows], Array], phase: NDArray[np.int_],
     sizes: Any,
-) -> list[Effect]:  # fmt: skip
+) -> list[sources.Effect]:  # fmt: skip
     """Return the effects of type B of the set-up of a held table.
 
     Axis of the table and its wobble, mount of the gyro on it, angle errors of order 1 and 2, time base.  sizes: u_axis,
@@ -219,16 +206,16 @@ def effects(
 
     each, phases = "each phase set up by itself", tuple(f"phase {p}" for p in np.unique(phase))
     return [
-        AXIS_SERVO.of(axis="y").effect(sizes, axis(1), note=each, parts=phases),
-        AXIS_SERVO.of(axis="z").effect(sizes, axis(2), note=each, parts=phases),
-        ATTITUDE_SERVO.effect(sizes, axis(0), note=each, parts=phases),
-        WOBBLE.effect(sizes, wobble()),
-        INPUT_TO_OUTPUT.effect(sizes, mount(2)),
-        INPUT_TO_SPIN.effect(sizes, -mount(1)),
-        ANGLE_ONCE.effect(sizes, order(1)),
-        ANGLE_TWICE.effect(sizes, order(2)),
-        UNBALANCE.effect(sizes, unbalance()),
-        TIME_BASE.effect(sizes, fit.error(-held.rate)),
+        sources.AXIS_SERVO.of(axis="y").effect(sizes, axis(1), note=each, parts=phases),
+        sources.AXIS_SERVO.of(axis="z").effect(sizes, axis(2), note=each, parts=phases),
+        sources.ATTITUDE_SERVO.effect(sizes, axis(0), note=each, parts=phases),
+        sources.WOBBLE.effect(sizes, wobble()),
+        sources.INPUT_TO_OUTPUT.effect(sizes, mount(2)),
+        sources.INPUT_TO_SPIN.effect(sizes, -mount(1)),
+        sources.ANGLE_ONCE.effect(sizes, order(1)),
+        sources.ANGLE_TWICE.effect(sizes, order(2)),
+        sources.UNBALANCE.effect(sizes, unbalance()),
+        sources.TIME_BASE.effect(sizes, fit.error(-held.rate)),
     ]
 
 
@@ -256,13 +243,10 @@ def candidates(
 
     def misalignment(k: int) -> Array:
         other = _mounted(held, k)
-        out: Array = (drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL
-        return out
+        return np.asarray((drift_rate(other, site) - columns(other) @ start - (y - X @ start)) / SMALL)
 
-    text = "misalignment of the input axis towards the"
     return [
-        Candidate.of("ε_IO", f"{text} output axis", "arcsec", misalignment(2), PART),
-        Candidate.of("ε_IS", f"{text} spin axis", "arcsec", -misalignment(1), PART),
+        *nuisances.misalignments(misalignment, PART),
         *nuisances.common({**windows, "t_start": held.t_start, "t_end": held.t_end}),
         nuisances.scatter("mount", phase.tolist()),
     ]

@@ -121,13 +121,10 @@ class SmallRates:
         caption = "Half the difference of both senses over the rate; a response: surely more than half"
         return [
             Table(
-                "rate.small",
-                "Response to small rates",
-                caption,
-                [f"rate / ({self.unit})", "ratio", "u", "response"],
+                "rate.small", "Response to small rates", caption, [f"rate / ({self.unit})", "ratio", "u", "response"],
                 rows,
             )
-        ]
+        ]  # fmt: skip
 
     def sentence(self) -> list[str]:
         found = self.coefficient(None)

@@ -42,8 +42,7 @@ class Turning:
         """Angles (n, 12) at which a window is averaged."""
         half = (self.angle_end - self.angle_start) / 2.0
         middle = (self.angle_end + self.angle_start) / 2.0
-        out: Array = middle[:, None] + half[:, None] * NODES
-        return out
+        return np.asarray(middle[:, None] + half[:, None] * NODES)
 
 
 def reading_spline(times: Array, readings: Array) -> BSpline:
@@ -120,8 +119,7 @@ def _in_face(vector: Array, turning: Turning) -> Array:
     a = turning.nodes()
     c, s = np.cos(a), np.sin(a)
     table = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, a.shape)], axis=-1)
-    out: Array = np.einsum("nij,nkj->nki", turning.face, table)
-    return out
+    return np.asarray(np.einsum("nij,nkj->nki", turning.face, table))
 
 
 def regressors(turning: Turning, base: Array, gravity: float, names: tuple[str, ...]) -> Array:
@@ -136,8 +134,7 @@ def axis_rate(turning: Turning, base: Array, latitude: float, earth_rate: float,
     """
     earth = average(_in_face(base @ (earth_rate * pole(latitude)), turning)[:, :, axis])
     table = (turning.angle_end - turning.angle_start) / (turning.t_end - turning.t_start)
-    out: Array = earth + turning.face[:, axis, 2] * table
-    return out
+    return np.asarray(earth + turning.face[:, axis, 2] * table)
 
 
 def wobbles(turning: Turning, base: Array, site: Location, names: tuple[str, ...]) -> list[tuple[Array, Array]]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -125,8 +125,7 @@ def one_by_one(error: Array, group: NDArray[np.int_]) -> Array:
 def standard_changes(fit: Findings, effect: Effect) -> Array:
     """Return the changes (m, q) by one standard uncertainty of each part: the source's, or that of its correction."""
     changes = effect.changes(fit)
-    out: Array = changes * _standard_sizes(effect, len(changes), fit.corrections)[:, None]
-    return out
+    return np.asarray(changes * _standard_sizes(effect, len(changes), fit.corrections)[:, None])
 
 
 def _standard_sizes(effect: Effect, parts: int, corrections: Sequence[Correction]) -> Array:
@@ -177,14 +176,20 @@ def simulated_table(fit: Findings, effects: Sequence[Effect], simulated: Errors 
                 known.append((name, value, e.unit, (value - taken.get(name, 0.0)) * change))
     if not known:
         return []
-    rows = []
-    for j, q in enumerate(fit.quantities):
-        each = [float(shift[j]) / q.scale for *_, shift in known]
-        rows.append([q.title, *each, sum(each), float(fit.u[j]) / q.scale, q.unit])
-    said = [f"({n}) {name}, {units.format_quantity(x, unit)}" for n, (name, x, unit, _) in enumerate(known, 1)]
+    shifts = [(q.title, [float(shift[j]) / q.scale for *_, shift in known], float(fit.u[j]) / q.scale, q.unit)
+              for j, q in enumerate(fit.quantities)]  # fmt: skip
+    return [shifts_table([e[:3] for e in known], shifts)]
+
+
+def shifts_table(
+    errors: Sequence[tuple[str, float, str]], shifts: Iterable[tuple[str, Sequence[float], float, str]]
+) -> Table:
+    """Return the table of the shifts by errors (name, SI, its unit): of each figure name, shift by each, u, unit."""
+    said = [f"({n}) {name}, {units.format_quantity(x, unit)}" for n, (name, x, unit) in enumerate(errors, 1)]
     caption = (
         "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
         f"{'; '.join(said)}."
     )
-    columns = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
-    return [Table(PREDICTED, "Predicted shifts by simulated errors", caption, columns, rows)]
+    columns = ["coefficient", *(f"({n + 1})" for n in range(len(errors))), "sum", "u", "unit"]
+    rows = [[name, *each, sum(each), u, unit] for name, each, u, unit in shifts]
+    return Table(PREDICTED, "Predicted shifts by simulated errors", caption, columns, rows)

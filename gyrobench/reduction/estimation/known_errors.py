@@ -42,8 +42,7 @@ def columns(errors: Array | None, residual: Array) -> Array:
     u, size, _ = np.linalg.svd(np.asarray(errors).T, full_matrices=False)
     rms = np.sqrt(np.mean(residual**2))
     seen = size > FAINT * rms
-    out: Array = u[:, seen] * np.minimum(size[seen], LOUD * rms * np.sqrt(residual.size))
-    return out
+    return np.asarray(u[:, seen] * np.minimum(size[seen], LOUD * rms * np.sqrt(residual.size)))
 
 
 @dataclass(frozen=True)
@@ -66,19 +65,16 @@ class Absorbed:
     @property
     def taken(self) -> Array:
         """(G, c, r): what is taken of X' R^-1 for each row of K' R^-1."""
-        out: Array = self.cross @ self.inner
-        return out
+        return np.asarray(self.cross @ self.inner)
 
     @property
     def pull(self) -> Array:
         """(G, c, r): X' (V/s^2)^-1 K, what the columns see of each error."""
-        out: Array = self.variance[:, None, None] * self.taken
-        return out
+        return np.asarray(self.variance[:, None, None] * self.taken)
 
     def predicted(self, g: int, index: list[int], b: Array) -> Array:
         """Return the best linear prediction of z (r,) under model g, with coefficients b (k,) of the columns index."""
-        out: Array = self.inner[g] @ (self.of_data[g] - b @ self.cross[g][index])
-        return out
+        return np.asarray(self.inner[g] @ (self.of_data[g] - b @ self.cross[g][index]))
 
 
 def absorb(moments: tuple[Array, Array, Array, Array], c: int, n: int, variance: Array | None = None) -> Absorbed:
@@ -109,8 +105,7 @@ def pulled(absorbed: Absorbed, cofactors: Array, counts: NDArray[np.bool_]) -> A
 
     cofactors (candidates, c, c): (X'V^-1 X)^-1 of each; counts (states, models).
     """
-    out: Array = cofactors @ absorbed.pull[np.nonzero(counts)[1]]
-    return out
+    return np.asarray(cofactors @ absorbed.pull[np.nonzero(counts)[1]])
 
 
 def _noise_variance(M: Array, xy: Array, yy: Array, c: int, n: int) -> Array:
@@ -140,5 +135,4 @@ def _noise_variance(M: Array, xy: Array, yy: Array, c: int, n: int) -> Array:
         s2 = new
         if done:
             break
-    out: Array = s2
-    return out
+    return np.asarray(s2)

@@ -103,8 +103,7 @@ def _nearly(dof: Array, t: Array) -> Array:
     """
     a = dof - 0.5
     z = np.copysign(np.sqrt(a * np.log1p(t * t / dof)), t)
-    out: Array = special.ndtr(z * (1.0 + (z * z + 3.0) / (48.0 * a * a)))
-    return out
+    return np.asarray(special.ndtr(z * (1.0 + (z * z + 3.0) / (48.0 * a * a))))
 
 
 def _half_width(w: Array, off: Array, sd: Array, dof: Array, level: float = 0.95) -> Array:
@@ -136,8 +135,7 @@ def _half_width(w: Array, off: Array, sd: Array, dof: Array, level: float = 0.95
             x = new
             if done:
                 break
-    out: Array = x
-    return out
+    return np.asarray(x)
 
 
 @functools.cache
@@ -151,5 +149,4 @@ def equivalent_dof(ratio: Array) -> Array:
     """Return the degrees of freedom whose t quantile over one standard uncertainty (of the scaled t) is ``ratio``."""
     quantile, dof = _quantiles()
     out = np.interp(ratio, quantile[::-1], dof[::-1])
-    result: Array = np.where(ratio <= quantile[-1], np.inf, out)
-    return result
+    return np.asarray(np.where(ratio <= quantile[-1], np.inf, out))

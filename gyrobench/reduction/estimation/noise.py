@@ -43,8 +43,7 @@ def relative_variance(t0: Array, t1: Array, model: tuple[float, float, float]) -
         slow = share * law / one
     else:
         slow = share * mean_variance(length / tau) / float(mean_variance(np.array(window / tau)))
-    out: Array = (1.0 - reading) * (slow + (1.0 - share) * window / length) + reading * (window / length) ** 2
-    return out
+    return np.asarray((1.0 - reading) * (slow + (1.0 - share) * window / length) + reading * (window / length) ** 2)
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,7 @@ def _taus(t0: Array, t1: Array) -> tuple[float, float, float]:
 
 
 def _least_odds(window: float, tau: Array) -> Array:
-    out: Array = FAINTEST * mean_variance(window / tau) * window / (2.0 * tau)
-    return out
+    return np.asarray(FAINTEST * mean_variance(window / tau) * window / (2.0 * tau))
 
 
 def noise_grid(t0: Array, t1: Array, readings: bool = False) -> NoiseGrid:
@@ -157,14 +155,12 @@ class _Filter:
     @functools.cached_property
     def scale(self) -> Array:
         """1/sqrt(s)."""
-        out: Array = 1.0 / np.sqrt(self.s)
-        return out
+        return np.asarray(1.0 / np.sqrt(self.s))
 
     @functools.cached_property
     def logdet(self) -> Array:
         """(G,): part of the log determinant."""
-        out: Array = np.log(self.s).sum(axis=0)
-        return out
+        return np.asarray(np.log(self.s).sum(axis=0))
 
 
 def _filters(t0: Array, t1: Array, tau: Array, share: Array, reading: Array | None, rows: int) -> Iterable[_Filter]:

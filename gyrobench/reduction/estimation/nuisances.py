@@ -11,7 +11,7 @@ they are reported with the coefficients, below it only the intervals hold them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -85,6 +85,13 @@ class Read:
 
 DRIFT = Read("drift", "°/h", DPH)
 FORCE = Read("bias", "µg", 1e-6 * G0)
+
+
+def misalignments(turned: Callable[[int], Array], visible: float = VISIBLE) -> list[Candidate]:
+    """Input axis towards output and spin axis; turned: data by rad about the gyro's axis k (0 I, 1 O, 2 S)."""
+    each = (("ε_IO", "output", turned(2)), ("ε_IS", "spin", -turned(1)))
+    text = "misalignment of the input axis towards the"
+    return [Candidate.of(name, f"{text} {to} axis", "arcsec", column, visible) for name, to, column in each]
 
 
 def trend(t_start: Array, t_end: Array, of: Read = DRIFT) -> Candidate:

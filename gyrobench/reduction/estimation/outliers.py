@@ -97,8 +97,7 @@ def _decorrelated(found: Findings) -> Array:
     unit[chosen, np.arange(chosen.size)] = 1.0
     W = noise_model.whiten(found.t_start, found.t_end, unit, *one)[0][:, 0, :]
     diagonal = np.sum(W * W, axis=0)
-    out: Array = inverse / np.sqrt(diagonal if n <= EXACT else np.median(diagonal))
-    return out
+    return np.asarray(inverse / np.sqrt(diagonal if n <= EXACT else np.median(diagonal)))
 
 
 def _spread(found: Findings, fitted: Findings) -> Array:
@@ -239,10 +238,8 @@ def bisquare(found: Findings) -> tuple[Array, Array, int]:
 
 
 def _huber(x: Array) -> Array:
-    out: Array = 1.0 / np.maximum(np.abs(x), 1.0)
-    return out
+    return np.asarray(1.0 / np.maximum(np.abs(x), 1.0))
 
 
 def _bisquare(x: Array) -> Array:
-    out: Array = np.where(np.abs(x) < 1.0, (1.0 - x * x) ** 2, 0.0)
-    return out
+    return np.asarray(np.where(np.abs(x) < 1.0, (1.0 - x * x) ** 2, 0.0))

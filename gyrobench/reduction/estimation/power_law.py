@@ -57,8 +57,7 @@ def processes(t0: Array, t1: Array, slopes: Array) -> tuple[Array, Array]:
 def variance(t0: Array, t1: Array, slopes: Array, length: Array | float) -> Array:
     """Return the variance (..., m) of means over ``length`` (s) of such noise of unit variance."""
     tau, part = processes(t0, t1, slopes)
-    out: Array = mean_variance(np.divide.outer(length, tau)) @ part.T
-    return out
+    return np.asarray(mean_variance(np.divide.outer(length, tau)) @ part.T)
 
 
 def candidates(t0: Array, t1: Array) -> tuple[Array, Array, Array]:
@@ -98,8 +97,7 @@ class _Gains:
     @functools.cached_property
     def logdet(self) -> Array:
         """(G,): part of the log determinant."""
-        out: Array = -2.0 * np.log(self.scale).sum(axis=0)
-        return out
+        return np.asarray(-2.0 * np.log(self.scale).sum(axis=0))
 
 
 def _all_gains(

@@ -116,8 +116,7 @@ class Fit:
     @property
     def u(self) -> Array:
         """Standard uncertainties."""
-        out: Array = np.sqrt(np.diag(self.covariance))
-        return out
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def t(self) -> Array:
@@ -129,13 +128,11 @@ class Fit:
     @property
     def p(self) -> Array:
         """Two-sided probability of |t| under a true zero."""
-        out: Array = 2.0 * special.stdtr(self.dof, -np.abs(self.t))
-        return out
+        return np.asarray(2.0 * special.stdtr(self.dof, -np.abs(self.t)))
 
     def half_width(self, level: float = 0.95) -> Array:
         """Half the confidence interval."""
-        out: Array = float(special.stdtrit(self.dof, 0.5 + level / 2.0)) * self.u
-        return out
+        return np.asarray(float(special.stdtrit(self.dof, 0.5 + level / 2.0)) * self.u)
 
 
 def correlation(covariance: Array) -> Array:

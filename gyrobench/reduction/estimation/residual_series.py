@@ -74,8 +74,7 @@ def fitted_noise(fitted: Array) -> Array | None:
     basis, size, _ = np.linalg.svd(fitted, full_matrices=False)
     basis = basis[:, size > 1e-9 * size[0]]
     z = _draws(len(fitted))
-    out: Array = z - (z @ basis) @ basis.T
-    return out
+    return np.asarray(z - (z @ basis) @ basis.T)
 
 
 @functools.lru_cache(maxsize=2)  # a fit asks twice, and the next one is mostly of a record as long
@@ -111,8 +110,7 @@ def _portmanteau(x: Array, group: NDArray[np.int_], lags: int) -> Array:
         if pairs := int(np.count_nonzero(pair)):
             later = x[..., k:] if pairs == pair.size else x[..., k:] * pair
             q += (np.einsum("...i,...i", later, x[..., :-k]) / power * n) ** 2 / pairs
-    out: Array = (n + 2) / n * q
-    return out
+    return np.asarray((n + 2) / n * q)
 
 
 def runs_test(x: Array, null: Array | None = None) -> tuple[float, float]:

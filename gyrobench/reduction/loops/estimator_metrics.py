@@ -199,8 +199,7 @@ def sine(time: Array, x: Array, frequency: float) -> Sine:
     basis = np.column_stack([np.sin(phase), np.cos(phase), np.ones(time.size)])
 
     def fit(rows: slice) -> Array:
-        out: Array = np.linalg.lstsq(basis[rows], x[rows], rcond=None)[0]
-        return out
+        return np.asarray(np.linalg.lstsq(basis[rows], x[rows], rcond=None)[0])
 
     whole = fit(slice(round(periods / frequency / step)))
     samples = periods // STRETCHES / frequency / step

@@ -134,9 +134,6 @@ def legs_table(flight: Flight, caption: str, columns: Mapping[str, Callable[[sli
         known = [gate.label, float(gate.t[-1] - gate.t[0]), float(base.max()) / DEG]
         rows.append([*known, *(float(value(s)) for value in columns.values()), float(error.max()), float(error[-1])])
     return Table(
-        "flight.legs",
-        "Legs of the flight",
-        caption,
-        ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"],
-        rows,
-    )
+        "flight.legs", "Legs of the flight", caption,
+        ["leg", "time / s", "base rate / (°/s)", *columns, "largest error / °", "at the end / °"], rows,
+    )  # fmt: skip

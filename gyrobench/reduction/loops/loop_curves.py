@@ -48,9 +48,7 @@ def trace(
     """
     pick, few = thinned(t.size, shown), thinned(t.size, marked or shown)
     curves = [line(label, t[pick], np.asarray(x)[pick]) for label, x in (lines or {}).items()]
-    return Response(
-        name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), y_name, y_unit, curves=curves
-    )  # fmt: skip
+    return Response(name, "step", caption, t[few].tolist(), "time", "s", y[few].tolist(), y_name, y_unit, curves=curves)
 
 
 def over_time(
@@ -108,17 +106,11 @@ def step_figure(
     size = f"{gate.amplitude:g}".replace("-", "−")
     cause = f"{size} {units.display(gate.row.unit)} on axis {gate.axis} from t = 0 on"
     return Response(
-        name=f"{gate.label}, {what}",
-        kind="step",
+        name=f"{gate.label}, {what}", kind="step",
         caption=f"{gate.label[:1].upper()}{gate.label[1:]}: {what}, {cause}. Points: measured; line: linear model.",
-        x=t[pick].tolist(),
-        x_name="time",
-        x_unit="s",
-        y=(y[pick] / scale).tolist(),
-        y_name=what,
-        y_unit=unit,
+        x=t[pick].tolist(), x_name="time", x_unit="s", y=(y[pick] / scale).tolist(), y_name=what, y_unit=unit,
         curves=curves,
-    )
+    )  # fmt: skip
 
 
 def simulated(model: LinearModel, gate: Gate, output: str) -> Array | None:

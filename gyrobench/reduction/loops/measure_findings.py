@@ -127,12 +127,7 @@ class MeasureFindings:
             **{"instrument": self.run.instrument, **self.facts},
         )
         return replace(
-            found,
-            tests=self.tests,
-            tables=[*self.tables, *account.tables],
-            budget=self.budget,
-            reasons=[*self.reasons, *account.reasons],
-            summary=list(summary),
-            simulated=not self.run.measured,
+            found, tests=self.tests, tables=[*self.tables, *account.tables], budget=self.budget,
+            reasons=[*self.reasons, *account.reasons], summary=list(summary), simulated=not self.run.measured,
             ranked_by=ranked_by,
-        )
+        )  # fmt: skip

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
-from gyrobench.reduction.estimation.effects import PREDICTED
+from gyrobench.reduction.estimation.effects import shifts_table
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor
 from gyrobench.reduction.setup.conditions import TYPE_B_UNSTATED
@@ -122,17 +121,9 @@ def predicted_shifts(
     known = [(s, float(e)) for s in by if isinstance(e := errors.get(s.source.id), float) and e]
     if not known:
         return None
-    rows = []
-    for k, name, unit, scale, u in figures:
-        each = [error * float(s.change[k]) / scale for s, error in known]
-        rows.append([name, *each, sum(each), u / scale, unit])
-    said = [f"({n}) {s.source.name}, {units.format_quantity(e, s.source.unit)}" for n, (s, e) in enumerate(known, 1)]
-    caption = (
-        "Change of each estimate against a set-up without these errors, sensitivity of the budget times error: "
-        f"{'; '.join(said)}."
-    )
-    head = ["coefficient", *(f"({n + 1})" for n in range(len(known))), "sum", "u", "unit"]
-    return Table(PREDICTED, "Predicted shifts by simulated errors", caption, head, rows)
+    shifts = [(name, [error * float(s.change[k]) / scale for s, error in known], u / scale, unit)
+              for k, name, unit, scale, u in figures]  # fmt: skip
+    return shifts_table([(s.source.name, e, s.source.unit) for s, e in known], shifts)
 
 
 def not_stated(

@@ -11,20 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.loops import sight_budget
 from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Gate, LoopReduction, Response, Table
 from gyrobench.reduction.loops.open_loop import limits_hit
 from gyrobench.reduction.loops.platform_measures import peak_noise
-from gyrobench.reduction.loops.sight_budget import (
-    FRICTION,
-    LOS,
-    OF_BASE,
-    JitterBudget,
-    MoreSources,
-    Ride,
-    by_source,
-    read_ride,
-)
 from gyrobench.reduction.loops.sight_quantities import coarse, set_by, shares
 from gyrobench.result import Curve, SetBy
 
@@ -45,7 +36,7 @@ class SightReduction(LoopReduction):
     sight: channels of the angles whose jitter it is; what: their name.
     """
 
-    sight: ClassVar[tuple[str, str]] = LOS
+    sight: ClassVar[tuple[str, str]] = sight_budget.LOS
     what: ClassVar[str] = "line of sight"
 
     def ride(self) -> Gate | None:
@@ -56,8 +47,8 @@ class SightReduction(LoopReduction):
         """Measure the largest angle of the line of sight after a step of the load."""
         k = 0 if gate.axis == 1 else 1
         name = tuple(AXES)[k]
-        rest = gate.rest(LOS[k])
-        y = gate[LOS[k]] - (float(rest.mean()) if rest.size else 0.0)
+        rest = gate.rest(sight_budget.LOS[k])
+        y = gate[sight_budget.LOS[k]] - (float(rest.mean()) if rest.size else 0.0)
         meaning = f"largest angle of the line of sight after {gate.amplitude:g} N·m"
         at = int(np.argmax(np.abs(y)))
         u = peak_noise(y[y.size // 2 :], 1, at, y)  # settled
@@ -65,12 +56,12 @@ class SightReduction(LoopReduction):
             # the gyro's random walk, which is in the long ride alone, makes the largest angle at any time of a flat top
             u = max(u, peak_noise(ride[self.sight[k]], 1, y.size - 1, y))
         self.found.measure(f"peak {name}", meaning, "µrad", abs(float(y[at])), u, scale=MICRO)
-        self.found.step(gate, LOS[k], scale=MICRO, unit="µrad", y_name=f"line of sight, {name}")
+        self.found.step(gate, sight_budget.LOS[k], scale=MICRO, unit="µrad", y_name=f"line of sight, {name}")
 
     def isolation(self) -> None:
         """Measure the angle of the line of sight over that of the base, about x and z."""
         found = self.found
-        for name, k, angle in (("x", 1, LOS[0]), ("z", 3, LOS[1])):
+        for name, k, angle in (("x", 1, sight_budget.LOS[0]), ("z", 3, sight_budget.LOS[1])):
             still = [g for g in found.of("motion", k, "sine") if swing(g, f"motion.angle[{k}]") < 0.5 * g.amplitude]
             if still:
                 meaning = f"line of sight over base, sines about {name}"
@@ -96,7 +87,7 @@ class SightReduction(LoopReduction):
         """Measure the jitter of the ride and explain it; return the largest source as words."""
         found = self.found
         lowest = float(self.run.options["jitter_from"])
-        ride = read_ride(gate, self.run.parameters, lowest, self.sight)
+        ride = sight_budget.read_ride(gate, self.run.parameters, lowest, self.sight)
         names = ("jitter pitch", "jitter yaw", "jitter")
         if ride is None:
             reason = f"the ride is shorter than the {shortest(lowest):g} s that a jitter from {lowest:g} Hz takes"
@@ -120,15 +111,15 @@ class SightReduction(LoopReduction):
         self._figures(spectra[:2], linear, f, use, df)
         return self._budget(budget, squares, df, spectra[2].rms(lowest).value)
 
-    def more_sources(self, ride: Ride, use: NDArray[np.bool_]) -> MoreSources | None:
+    def more_sources(self, ride: sight_budget.Ride, use: NDArray[np.bool_]) -> sight_budget.MoreSources | None:
         """Return sources beside those of the gimbal."""
         return None
 
-    def _sources(self, ride: Ride, use: NDArray[np.bool_]) -> JitterBudget:
+    def _sources(self, ride: sight_budget.Ride, use: NDArray[np.bool_]) -> sight_budget.JitterBudget:
         try:
-            return by_source(self.found, ride, use, self.more_sources(ride, use))
+            return sight_budget.by_source(self.found, ride, use, self.more_sources(ride, use))
         except (LookupError, ValueError):  # parts of another kind
-            return JitterBudget({})
+            return sight_budget.JitterBudget({})
 
     def _bands(self, spectra: Sequence[Spectra], linear: Sequence[Array], f: Array, lowest: float) -> None:
         """Add the table of the jitter by band."""
@@ -147,7 +138,7 @@ class SightReduction(LoopReduction):
         )
         self.found.tables.append(Table("jitter.bands", "Jitter by frequency", caption, ["band / Hz", *heads], rows))
 
-    def _budget(self, budget: JitterBudget, squares: Sequence[float], df: Array, measured: float) -> str:
+    def _budget(self, budget: sight_budget.JitterBudget, squares: Sequence[float], df: Array, measured: float) -> str:
         """Add the table of sources, warn where it does not explain the ride; return the largest as words."""
         sources, square = budget.sources, squares[2]
         if not square > 0.0:
@@ -167,7 +158,7 @@ class SightReduction(LoopReduction):
             "the variance of both. What the ride moves at once adds with its phases: a negative share cancels part "
             "of the others."
         )
-        if FRICTION in sources:
+        if sight_budget.FRICTION in sources:
             caption += " The joints slip: their dry friction is the torque that their angles make, not a spring."
         title = "Jitter budget, by source"
         self.found.tables.append(
@@ -189,7 +180,7 @@ class SightReduction(LoopReduction):
         else:
             self.found.facts["shares"] = shares(budget, df, self.run.parameters, self.set_by)
         largest = max(share, key=lambda n: share[n])
-        if largest in OF_BASE:
+        if largest in sight_budget.OF_BASE:
             self._rolls(share[largest], largest)
         return f", {share[largest]:.0f} % of its variance by {largest}"
 

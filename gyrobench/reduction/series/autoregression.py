@@ -58,8 +58,7 @@ class Autoregression:
     def residual(self, x: Any) -> Array:
         """Return w_t of a record, from its value p + 1 on."""
         y = np.asarray(x, dtype=float) - self.mean
-        out: Array = signal.lfilter(np.concatenate([[1.0], -self.phi]), [1.0], y)[self.phi.size :]
-        return out
+        return np.asarray(signal.lfilter(np.concatenate([[1.0], -self.phi]), [1.0], y)[self.phi.size :])
 
 
 def fit_ar(x: Any, order: int) -> Autoregression:
@@ -116,13 +115,11 @@ def covariance_of(phi: Array, n: int) -> Array:
     a = np.concatenate([[1.0], -phi])
     lower = linalg.toeplitz(a[:-1], np.zeros(phi.size))
     other = linalg.toeplitz(a[:0:-1], np.zeros(phi.size))
-    out: Array = (lower @ lower.T - other @ other.T) / n
-    return out
+    return np.asarray((lower @ lower.T - other @ other.T) / n)
 
 
 def _standard(phi: Array, n: int, extra: Array | float = 0.0) -> Array:
-    out: Array = np.sqrt(np.maximum(np.diag(covariance_of(phi, n)) + extra, 1e-300))
-    return out
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance_of(phi, n)) + extra, 1e-300)))
 
 
 def _interval(phi: Array, n: int, extra: Array) -> tuple[Array, Array]:

@@ -60,8 +60,7 @@ def whitened(x: Array, step: float, spectrum: Callable[[Array], Array]) -> Array
     k = np.arange(1.0, n)
     few = k if n < DENSE else np.unique(np.rint(np.geomspace(1.0, n - 1.0, DENSE)))
     S = spectrum(few / (2.0 * n * step))
-    z: Array = X * np.exp(-0.5 * np.interp(np.log(k), np.log(few), np.log(S / step)))
-    return z
+    return np.asarray(X * np.exp(-0.5 * np.interp(np.log(k), np.log(few), np.log(S / step))))
 
 
 def octaves(n: int) -> list[slice]:
@@ -107,5 +106,4 @@ def _powers(z: Array) -> Array:
     """Return the powers of a whitened channel (n - 1,) in parts of the record, of mean 1."""
     x = fft.idct(np.concatenate([[0.0], z]), norm="ortho", overwrite_x=True)
     power = np.array([float(part @ part) / part.size for part in np.array_split(x, BLOCKS)])
-    out: Array = power / power.mean()
-    return out
+    return np.asarray(power / power.mean())

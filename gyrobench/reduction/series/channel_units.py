@@ -36,9 +36,7 @@ class ChannelUnits:
 
 
 RATE = ChannelUnits("rate", "gyro", "rad/s", "°/h", DPH, "°/h", DPH, "°/h/√Hz", DPH, TERMS)
-FORCE = ChannelUnits(
-    "specific force", "accelerometer", "m/s2", "µg", UG, "m/s²", 1.0, "µg/√Hz", UG, FORCE_TERMS
-)  # fmt: skip
+FORCE = ChannelUnits("specific force", "accelerometer", "m/s2", "µg", UG, "m/s²", 1.0, "µg/√Hz", UG, FORCE_TERMS)
 
 
 def units_of(si_unit: str) -> ChannelUnits:

@@ -49,5 +49,4 @@ def checked_order(order: int, n: int) -> None:
 def block_means(x: Array, m: int) -> Array:
     """Return the means of consecutive blocks of ``m`` values; an incomplete last block is left out."""
     k = x.size // m
-    out: Array = x[: k * m].reshape(k, m).mean(axis=1) if m > 1 else x
-    return out
+    return np.asarray(x[: k * m].reshape(k, m).mean(axis=1) if m > 1 else x)

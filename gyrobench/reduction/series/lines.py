@@ -136,8 +136,7 @@ def _periodogram(r: Array, dt: float) -> Array:
     """Return the one-sided density at j/(n dt), j = 0..n/2."""
     power = np.abs(fft.rfft(r)) ** 2
     power *= 2.0 * dt / r.size
-    out: Array = power
-    return out
+    return np.asarray(power)
 
 
 def local_level(density: Array) -> tuple[Array, Array]:
@@ -187,8 +186,7 @@ def _gamma_degrees(share: float) -> float:
 
 
 def _one_bin(ratio: Array, k: Array) -> Array:
-    out: Array = np.exp(-k * np.log1p(ratio * np.exp(-special.digamma(k))))
-    return out
+    return np.asarray(np.exp(-k * np.log1p(ratio * np.exp(-special.digamma(k)))))
 
 
 def find_lines(x: Any, dt: float, level: float = LEVEL) -> Lines:

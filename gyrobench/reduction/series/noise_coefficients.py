@@ -113,8 +113,7 @@ class NoiseCoefficients:
         """Return the Allan deviation (k,) of the determined terms over tau (s)."""
         n, b, k, r, q = (e.value if e.determined else 0.0 for e in (self.N, self.B, self.K, self.R, self.Q))
         parts = n * n / tau + 2.0 * math.log(2.0) / math.pi * b * b + k * k * tau / 3.0
-        out: Array = np.sqrt(parts + r * r * tau**2 / 2.0 + 3.0 * q * q / tau**2)
-        return out
+        return np.asarray(np.sqrt(parts + r * r * tau**2 / 2.0 + 3.0 * q * q / tau**2))
 
     def spectrum(self, f: Array, tau0: float) -> Array:
         """Return the two-sided spectrum (k,) of the determined terms for samples that are means over tau0 (s).
@@ -155,8 +154,7 @@ class _Fit:
     def _sd(self, v: Array) -> Array:
         info = self.f.information(v)
         d = 1.0 / np.sqrt(np.diag(info))
-        out: Array = d * np.sqrt(np.diag(np.linalg.pinv(info * np.outer(d, d), rcond=1e-10, hermitian=True)))
-        return out
+        return np.asarray(d * np.sqrt(np.diag(np.linalg.pinv(info * np.outer(d, d), rcond=1e-10, hermitian=True))))
 
     def _minimum(self, v: Array, fixed: int | None) -> tuple[Array, float]:
         """Return v >= 0 of the least -2 log likelihood by scoring steps, one component fixed; and the value there."""

@@ -161,8 +161,7 @@ class Likelihood:
     def information(self, v: Array) -> Array:
         """Return the expected information (4, 4) of v, of ordinates taken as uncorrelated."""
         scaled = self.basis / np.maximum(v @ self.basis, FLOOR)
-        out: Array = 0.5 * (scaled * self.count) @ scaled.T
-        return out
+        return np.asarray(0.5 * (scaled * self.count) @ scaled.T)
 
     def check(self, v: Array) -> tuple[float, Array, float, float]:
         """Return p of so large a departure of the spectrum, its band, p of so large an ordinate (a line), its place.
@@ -200,5 +199,4 @@ class Likelihood:
         share = np.add.reduceat(self.count * self.basis, first, axis=1) / level
         weight = np.sqrt(np.minimum(np.add.reduceat(self.count, first), 1e4))
         v, _ = optimize.nnls((share * weight).T, weight)
-        out: Array = np.maximum(v, 0.01 / share.max(axis=1))
-        return out
+        return np.asarray(np.maximum(v, 0.01 / share.max(axis=1)))

@@ -44,8 +44,9 @@ def flicker(n: int = 1024, low: int = 64) -> tuple[Array, Array]:
 
 def folded(nu: Array) -> Array:
     """Spectrum of means of flicker of S = 1/(2 pi f) over unit time, sampled at unit time, at 0 < nu <= 1/2."""
-    out: Array = np.sin(np.pi * nu) ** 2 / (2.0 * np.pi**3) * (special.zeta(3.0, nu) + special.zeta(3.0, 1.0 - nu))
-    return out
+    return np.asarray(
+        np.sin(np.pi * nu) ** 2 / (2.0 * np.pi**3) * (special.zeta(3.0, nu) + special.zeta(3.0, 1.0 - nu))
+    )
 
 
 def basis(k: Array, n: int) -> Array:

@@ -12,7 +12,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from gyrobench import frames
+from gyrobench.arrays import AnyArray
+from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow, RunDocument
 from gyrobench.reduction.setup.window_checks import ReductionError
 
@@ -109,3 +113,12 @@ def phases(run: RunDocument, known: Iterable[str], what: str = "mount") -> dict[
     if unknown:
         raise ReductionError(f"{what} {', '.join(unknown)} unknown; there are {', '.join(known)}")
     return {row.phase: row for row in run.plan}
+
+
+def with_plan(record: Record, **fields: str) -> dict[str, AnyArray]:
+    """Return the windows of a record; those of a run with columns from fields of the plan: ``frequency="target"``."""
+    if record.run.measured:
+        return dict(record.windows)
+    rows = {row.phase: row for row in record.run.plan}
+    of = [rows[p] for p in np.asarray(record.windows["phase"]).astype(int).tolist()]
+    return {**record.windows, **{name: np.array([getattr(row, f) for row in of]) for name, f in fields.items()}}

@@ -157,8 +157,7 @@ class Effect:
         """Return the change (m, q) of the reported values for one unit of each part, SI."""
         if self.error is None:
             return np.atleast_2d(np.zeros(fit.value.size) if self.values is None else self.values)
-        out: Array = np.atleast_2d(self.error) @ fit.gain.T
-        return out
+        return np.asarray(np.atleast_2d(self.error) @ fit.gain.T)
 
     @property
     def names(self) -> list[str]:

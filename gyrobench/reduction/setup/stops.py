@@ -16,8 +16,7 @@ def rests(start: Array, end: Array) -> Array:
     """Return the different angles of the circle (rad, ascending) at which a table rests in its windows."""
     angles = np.sort(np.mod((start + end) / 2.0, 2.0 * math.pi))
     first = np.diff(angles, prepend=angles[-1] - 2.0 * math.pi) > REST
-    out: Array = angles[first] if first.any() else angles[:1]
-    return out
+    return np.asarray(angles[first] if first.any() else angles[:1])
 
 
 def spacing(start: Array, end: Array) -> float:

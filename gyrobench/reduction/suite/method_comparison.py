@@ -15,7 +15,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from gyrobench import drift
+from gyrobench import drift, result_suite
 from gyrobench.record.run_document import RunDocument, SuiteTestRun
 from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.uncertainty import NORMAL
@@ -25,15 +25,6 @@ from gyrobench.reduction.suite.consistency import LEVEL, MethodValue
 from gyrobench.reduction.suite.estimable_combinations import Measurand
 from gyrobench.reduction.suite.ranking import adjusted
 from gyrobench.result import Coefficient, DriftTestResult, Reason, SuiteComparison, SuiteResult, Test
-from gyrobench.result_suite import (
-    FailedMember,
-    MethodPair,
-    ReportedEstimate,
-    SuiteMember,
-    SuiteQuantity,
-    SuiteValue,
-    WeightedMean,
-)
 
 FAMILIES = {
     "single-degree-of-freedom gyro": drift.NAMES,
@@ -190,10 +181,10 @@ def combine_methods(
         rule=RULE,
         shared=list(dict.fromkeys(b.source for r in results.values() for b in r.type_b if b.id in alike)),
         members=[_member(label, m) for label, m in members.items()],
-        failed=[FailedMember(n, why) for n, why in (failed or {}).items()],
+        failed=[result_suite.FailedMember(n, why) for n, why in (failed or {}).items()],
         quantities=[_quantity(c) for c in compared],
         pairs=[
-            MethodPair(c.quantity.name, c.quantity.unit, p.a, p.b, p.difference, p.U, p.E_n)
+            result_suite.MethodPair(c.quantity.name, c.quantity.unit, p.a, p.b, p.difference, p.U, p.E_n)
             for c in compared if c.found is not None for p in c.found.pairs
         ],
         **_consistency(compared),
@@ -242,11 +233,11 @@ def _coefficient(c: MeasurandComparison) -> Coefficient:
     return replace(measured, u_a=u_a, dof=dof if math.isfinite(dof) else None, truth=truth, z=z)
 
 
-def _quantity(c: MeasurandComparison) -> SuiteQuantity:
+def _quantity(c: MeasurandComparison) -> result_suite.SuiteQuantity:
     q, a = c.quantity, c.found
     weights = a.weights.tolist() if a is not None else [None] * len(c.values)
     values = [
-        SuiteValue(
+        result_suite.SuiteValue(
             **{n: getattr(v, n) for n in ("label", "estimate", "u", "U", "u_a", "u_b", "u_shared", "truth")},
             dof=v.dof if math.isfinite(v.dof) else None,
             weight=w,
@@ -256,10 +247,10 @@ def _quantity(c: MeasurandComparison) -> SuiteQuantity:
     ]
     found: dict[str, Any] = dict.fromkeys(("mean", "Q", "dof", "birge", "p", "largest_E_n"))
     if a is not None:
-        found = {"mean": WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1, "birge": a.birge, "p": a.p,
-                 "largest_E_n": max(p.E_n for p in a.pairs)}  # fmt: skip
+        found = {"mean": result_suite.WeightedMean(a.mean, a.u, a.U), "Q": a.Q, "dof": len(c.values) - 1,
+                 "birge": a.birge, "p": a.p, "largest_E_n": max(p.E_n for p in a.pairs)}  # fmt: skip
     found |= {"p_adjusted": c.p, "words": c.words(), "deviating": c.outlier[0] if c.outlier else ""}
-    return SuiteQuantity(
+    return result_suite.SuiteQuantity(
         name=q.name, unit=q.unit, meaning=q.meaning, combination=dict(q.combination), truth=c.truth, values=values,
         verdict="disagree" if c.disagree else "agree" if a else "–", **found,
     )  # fmt: skip
@@ -271,16 +262,17 @@ def _how(reported: str, name: str) -> str:
     return "as reported" if reported == name else f"reported as {reported}"
 
 
-def _member(label: str, m: Member) -> SuiteMember:
+def _member(label: str, m: Member) -> result_suite.SuiteMember:
     r = m.result
-    return SuiteMember(
+    return result_suite.SuiteMember(
         **{n: getattr(r, n) for n in ("system", "title", "method", "verdict", "summary", "warnings", "site")},
         **{n: getattr(r, n) for n in ("instrument", "residual_std", "condition", "rank")},
         label=label,
         unit=r.residual_unit,
         windows=sum(len(s.y) for s in r.series),
         estimates=[
-            ReportedEstimate(c.name, c.unit, c.estimate, c.u, c.k, c.interval, c.truth, c.z) for c in r.coefficients
+            result_suite.ReportedEstimate(c.name, c.unit, c.estimate, c.u, c.k, c.interval, c.truth, c.z)
+            for c in r.coefficients
         ],
         test=m.test.as_dict(),
     )

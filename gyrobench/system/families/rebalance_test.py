@@ -88,7 +88,6 @@ class TwoChannelTest(RebalanceTest):
         **{f"rebalance_{a}": Slot("Rebalance") for a in "xy"},
         **{f"sampler_{a}": Slot("Sampler", "sampler") for a in "xy"},
     }
-    on_request: ClassVar[Mapping[str, OnRequest]] = surroundings() | supply()
     wires = (
         TABLE
         + """
@@ -114,10 +113,5 @@ class TwoChannelTest(RebalanceTest):
     }
     noises: ClassVar[tuple[str, ...]] = (*TWO_AXIS_NOISES, "rebalance_x.meter", "rebalance_y.meter")
     channels: ClassVar[tuple[str, ...]] = (
-        "gyro.u_x",
-        "gyro.u_y",
-        "rebalance_x.i",
-        "rebalance_y.i",
-        "gyro.drift_x",
-        "gyro.drift_y",
-    )
+        "gyro.u_x", "gyro.u_y", "rebalance_x.i", "rebalance_y.i", "gyro.drift_x", "gyro.drift_y",
+    )  # fmt: skip

@@ -13,7 +13,6 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -36,7 +35,7 @@ from gyrobench.system.families.table_test import (
     supply,
     surroundings,
 )
-from gyrobench.system.lab_record import read_record
+from gyrobench.system.lab_record import laboratory_rows
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.plan import Phase, Plan
 from gyrobench.system.system import MeasuredData, OnRequest, Slot
@@ -111,17 +110,12 @@ class ServoTest(ChannelTest, TableTest):
         | {"settle": Option(10.0, "s", "wait after the loop has closed", 0.5)}
         | TRACKING
         | type_b(
-            "unbalance",
-            "remount",
-            "time",
-            "wobble",
-            "angle1",
-            "angle2",
+            "unbalance", "remount", "time", "wobble", "angle1", "angle2",
             axis="standard uncertainty of the table axis, about each axis, each phase",
             mount="standard uncertainty of the input axis against the table axis",
         )
         | SUPPLY
-    )
+    )  # fmt: skip
     shorter: ClassVar[str] = "ask for less travel"  # what to do where a travel takes too long
     assumed: ClassVar[tuple[str, ...]] = (*TableTest.assumed, "stand.base", "stand.mounts")
     noises: ClassVar[tuple[str, ...]] = (*SDF_NOISES, "table.rumble")
@@ -216,4 +210,4 @@ def laboratory_data(template: str, known: Sequence[str], *more: CsvColumn) -> Me
     columns = (*columns, *more)
     names = dict.fromkeys(known, "servo")
     needed = {"latitude": "45.75deg"}
-    return MeasuredData(template, partial(read_record, needed=needed, attitudes=lambda _: names, columns=columns))
+    return laboratory_rows(template, needed=needed, attitudes=lambda _: names, columns=columns)

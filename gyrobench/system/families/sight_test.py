@@ -101,13 +101,8 @@ class SightTest(LoopTest):
         **loop.PROFILE,
     }  # fmt: skip
     noises: ClassVar[tuple[str, ...]] = (
-        "gyro.white",
-        "gyro.turn_on",
-        "gyro.flicker_x",
-        "gyro.flicker_y",
-        "gyro.walk_x",
-        "gyro.walk_y",
-    )
+        "gyro.white", "gyro.turn_on", "gyro.flicker_x", "gyro.flicker_y", "gyro.walk_x", "gyro.walk_y",
+    )  # fmt: skip
     step = 2e-4
     channels: ClassVar[tuple[str, ...]] = (
         "exciter.phase", "exciter.gate", "exciter.motion_angle[1]", "exciter.motion_angle[3]", "exciter.torque[1]",
@@ -117,12 +112,8 @@ class SightTest(LoopTest):
         "platform.keyhole", "decoupler.saturated", *(f"{axis}.{n}" for axis in AXES for n in ("e", "v")),
     )  # fmt: skip
     shown: ClassVar[tuple[str, ...]] = (
-        "platform.los",
-        "platform.theta",
-        "vibration.omega",
-        "pitch.e yaw.e",
-        "pitch.v yaw.v",
-    )
+        "platform.los", "platform.theta", "vibration.omega", "pitch.e yaw.e", "pitch.v yaw.v",
+    )  # fmt: skip
     channel_period = 1e-3
 
     def phases(self) -> list[LoopPhase]:

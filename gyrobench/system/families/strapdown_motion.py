@@ -85,7 +85,6 @@ class StrapdownMotion(System):
     done = "sequencer.done"
     step = 5e-4
     channel_period = 0.5
-    bodies = ""
 
     def periods(self) -> list[float]:
         """Return the frequencies in whole periods of a reading, Hz.  Raises InvalidValueError."""
