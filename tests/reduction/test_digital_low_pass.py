@@ -10,7 +10,8 @@ from scipy import signal
 
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.ordinates import Ordinates, allan, spectrum, split
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.sensor_filters import Grid
+from gyrobench.reduction.noise_model.terms import NoiseTerm
 
 BUTTERWORTH, CASCADE = NoiseTerm("white", "butterworth"), NoiseTerm("white", "cascade")
 W, B, GM = NoiseTerm("readout"), NoiseTerm("flicker"), NoiseTerm("gauss_markov")

@@ -20,7 +20,8 @@ from gyrobench.reduction.noise_model.ordinates import Ordinates, allan
 from gyrobench.reduction.noise_model.posterior import Cloud, beside_free_bands
 from gyrobench.reduction.noise_model.prior import Prior
 from gyrobench.reduction.noise_model.search import ModelSearch
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.sensor_filters import Grid
+from gyrobench.reduction.noise_model.terms import NoiseTerm
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import deviations
 

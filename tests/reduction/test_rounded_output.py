@@ -12,7 +12,8 @@ from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
 from gyrobench.reduction.noise_model.ordinates import Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.terms import Grid, NoiseTerm
+from gyrobench.reduction.noise_model.sensor_filters import Grid
+from gyrobench.reduction.noise_model.terms import NoiseTerm
 from gyrobench.reduction.noise_model.treatment import output_step
 
 

@@ -10,7 +10,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, spectrum
-from gyrobench.reduction.noise_model.terms import Grid
+from gyrobench.reduction.noise_model.sensor_filters import Grid
 from gyrobench.reduction.series.deviations import Deviation
 
 ENOUGH = 0.95  # of the averaging times

@@ -32,9 +32,10 @@ from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseMo
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
+from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
 from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
-from gyrobench.reduction.noise_model.terms import DIGITAL, MEANS, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.terms import NoiseTerm
 from gyrobench.reduction.noise_model.treatment import Placed, Treated, output_step, treat
 from gyrobench.reduction.series.noise_coefficients import Estimate
 

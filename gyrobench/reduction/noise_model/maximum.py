@@ -10,7 +10,8 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.terms import MEANS, PEAKS
+from gyrobench.reduction.noise_model.sensor_filters import MEANS
+from gyrobench.reduction.noise_model.terms import PEAKS
 
 NEARLY_WHOLE = 0.02  # of the width of an average: a mean over a whole number of samples is tried in its place
 STEPS = 40  # of the search for a maximum

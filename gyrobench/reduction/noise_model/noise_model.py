@@ -12,9 +12,10 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
+from gyrobench.reduction.noise_model.sensor_filters import ALL, MEANS, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.slow_changes import Settling, Swing
 from gyrobench.reduction.noise_model.steps import LevelStep
-from gyrobench.reduction.noise_model.terms import ALL, MEANS, PEAKS, SLOW, Grid, filter_of, passes_slow, samples_of
+from gyrobench.reduction.noise_model.terms import PEAKS, SLOW
 from gyrobench.reduction.noise_model.treatment import Treated
 from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate

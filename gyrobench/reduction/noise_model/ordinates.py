@@ -27,15 +27,8 @@ from scipy import fft, ndimage
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.precision import smooth_spectrum
-from gyrobench.reduction.noise_model.terms import (
-    SLOW,
-    Grid,
-    NoiseTerm,
-    allan_of_spectrum,
-    covariance_grid,
-    markov_parts,
-    passes_slow,
-)
+from gyrobench.reduction.noise_model.sensor_filters import Grid, passes_slow
+from gyrobench.reduction.noise_model.terms import SLOW, NoiseTerm, allan_of_spectrum, covariance_grid, markov_parts
 from gyrobench.reduction.series.noise_spectra import flicker
 
 LOW = 16  # first ordinates of each parity that are kept singly

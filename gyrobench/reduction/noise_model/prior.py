@@ -10,7 +10,8 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, split
-from gyrobench.reduction.noise_model.terms import ALL, PEAKS, SLOW, Grid, NoiseTerm
+from gyrobench.reduction.noise_model.sensor_filters import ALL, Grid
+from gyrobench.reduction.noise_model.terms import PEAKS, SLOW, NoiseTerm
 
 GROUP = 0.12  # of the logarithm of frequency, over which the reference spectrum is smoothed
 HELD_BACK = 0.1  # of a spectrum that falls by f^-2

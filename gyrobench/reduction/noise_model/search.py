@@ -14,7 +14,8 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize, nearly_whole
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
 from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
-from gyrobench.reduction.noise_model.terms import ALL, DIGITAL, MEANS, PEAKS, SLOW, NoiseTerm, samples_of
+from gyrobench.reduction.noise_model.sensor_filters import ALL, DIGITAL, MEANS, samples_of
+from gyrobench.reduction.noise_model.terms import PEAKS, SLOW, NoiseTerm
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence

@@ -14,13 +14,7 @@ variance of a sample.  A covariance A z^|h| has S = A P(z), P = (1 - z^2)/(1 - 2
                      angle of a damped oscillator that noise drives   sigma^2, tau, omega0
     band             covariance sigma^2 e^(-h^2/2 tau^2) cos omega0 h  sigma^2, tau, omega0: a resonance that wanders
 
-Filters, "mean4+first" of two in a row:
-"none"; "first" order z = e^(-1/tau); "second" order, natural frequency and damping; "average" over w samples,
-"mean4" over 4 of them, "bartlett4" twice; "first*", "mean4*": of slow noise too, which passes what white noise from the
-same place passes;
-digital low-passes, of slow noise too: "butterworth" of any order and a "cascade" of equal ones of first order (of means
-over two samples, too), with zeros at half the sampling rate (bilinear transform), "recursive" of two poles alone;
-"shape", |H|^2 = exp(sum of c_j (cos j omega - 1)), which is any smooth roll-off (cepstrum).
+Filters: gyrobench.reduction.noise_model.sensor_filters.
 N^2 is the level of the sampled noise towards frequency 0, with what is folded.  Samples are instants, or means over T
 (``means``:  Gauss-Markov drift and random walk; faster terms are those of the samples as they are).
 [DRIFT-NOISE-MODEL; own derivation]
@@ -28,10 +22,8 @@ N^2 is the level of the sampled noise towards frequency 0, with what is folded. 
 
 from __future__ import annotations
 
-import functools
 import math
 import string
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,61 +31,26 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.noise_spectra import folded
+from gyrobench.reduction.noise_model.sensor_filters import (
+    ALL,
+    MEANS,
+    NEARLY_ZERO,
+    Grid,
+    average_parts,
+    covariance_of_mean,
+    filter_of,
+    poisson,
+    samples_of,
+    second_poles,
+)  # fmt: skip
 
 PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")
-DIGITAL = ("butterworth", "cascade", "recursive")  # slow noise passes them too: they hold back what it has above them
 SIZES = {"gauss_markov": 2, "resonance": 3, "band": 3}  # parameters, one of other terms
-MEANS = {"mean": 1, "bartlett": 2}  # over a whole number of samples, with zeros: how often
-ALL = "*"  # at the end of the name of a filter that slow noise passes too
 FLICKER = 2.0 * math.log(2.0) / math.pi  # Allan variance over B^2
-NEARLY_ZERO = 1e-4  # of a cell of a spectrum, where a mean has 0/0
 LAGS = 4096  # of the covariance of a filter "shape"
 FASTEST = 1e-300  # pole
-BIN = ((5.0 / 18.0, -math.sqrt(0.6)), (4.0 / 9.0, 0.0), (5.0 / 18.0, math.sqrt(0.6)))  # Gauss-Legendre: exact to x^5
-LEAST_PASSED = 1e12  # of the power, what a digital low-pass holds back at most
 RISES = 512  # frequencies, over which the angle noise of a filter that rises is summed
-
-
-class Grid:
-    """Frequencies (b,) at which spectra are wanted, with what all terms need of them.
-
-    half_width of bins (b,), samples (b,) of the stretch they are of: infinite for the spectrum itself.
-    """
-
-    def __init__(
-        self, omega: Array, means: bool = False, half_width: Array | None = None, samples: Array | float = math.inf
-    ) -> None:
-        self.omega, self.means, self.samples = omega, means, samples
-        self.half_width = np.zeros_like(omega) if half_width is None else half_width
-
-    @functools.cached_property
-    def cos(self) -> Array:
-        return np.cos(self.omega)
-
-    @functools.cached_property
-    def sine(self) -> Array:
-        """4 sin^2(omega/2)."""
-        return 4.0 * np.sin(0.5 * self.omega) ** 2
-
-    @functools.cached_property
-    def tangent(self) -> Array:
-        """tan(omega/2)."""
-        return np.tan(0.5 * np.minimum(self.omega, math.pi - NEARLY_ZERO))
-
-    @functools.cached_property
-    def flicker(self) -> Array:
-        return folded(self.omega / (2.0 * math.pi))
-
-    @functools.cached_property
-    def walk(self) -> Array:
-        return 1.0 / self.sine - (1.0 / 6.0 if self.means else 0.0)
-
-
-def poisson(z: Any, cos: Array) -> Any:
-    """P(z) = sum of z^|h| cos(h omega) over all h; z (..., 1), real or complex, cos (b,)."""
-    return (1.0 - z * z) / (1.0 - 2.0 * z * cos + z * z)
 
 
 def markov_parts(tau: Array, means: bool) -> tuple[Array, Array, Array]:
@@ -109,134 +66,6 @@ def markov_parts(tau: Array, means: bool) -> tuple[Array, Array, Array]:
     amplitude = np.where(small, 1.0 + r * r / 12.0, (2.0 * np.cosh(safe) - 2.0) / safe**2)
     nugget = np.where(small, r / 3.0, (2.0 * np.sinh(safe) - 2.0 * safe) / safe**2)
     return z, amplitude, nugget
-
-
-# ------------------------------------------------------------------ filters: |H|^2, |H(0)| = 1, covariance of unit N^2
-def _second_poles(p: Array) -> tuple[Any, Any, Any]:
-    """Return z1, z2 and the share a: covariance Re(a z1^h + (1 - a) z2^h) of a second-order low-pass, p: log omega_n,
-    log zeta.
-    """
-    w, zeta = np.exp(np.clip(p[..., 0:1], -8.0, 5.0)), np.exp(np.clip(p[..., 1:2], -5.0, 5.0))
-    root = np.sqrt((zeta * zeta - 1.0 + 1e-9).astype(complex))
-    s1, s2 = -w * (zeta - root), -w * (zeta + root)
-    share = s2 / (s2 - s1)  # of the covariance, from that of white noise through 1/((s - s1)(s - s2))
-    return np.exp(s1), np.exp(s2), share
-
-
-def _first(p: Array, grid: Grid) -> Array:
-    z = np.exp(-np.exp(-p[..., 0:1]))
-    out: Array = ((1.0 - z) ** 2) / (1.0 - 2.0 * z * grid.cos + z * z)
-    return out
-
-
-def _second(p: Array, grid: Grid) -> Array:
-    z1, z2, share = _second_poles(p)
-    at_zero = share * poisson(z1, np.ones(1)) + (1.0 - share) * poisson(z2, np.ones(1))
-    out: Array = np.real(share * poisson(z1, grid.cos) + (1.0 - share) * poisson(z2, grid.cos)) / np.real(at_zero)
-    return out
-
-
-def _fejer(k: Any, grid: Grid, times: int = 1) -> Array:
-    """Return sin^2(k omega/2)/(k sin^2(omega/2)), or its square, of bins by Gauss's rule: about zeros a parabola."""
-    rows = BIN if grid.half_width.any() else ((1.0, 0.0),)
-    halves = [(share, 0.5 * (grid.omega + at * grid.half_width)) for share, at in rows]
-    return np.asarray(sum(share * ((np.sin(k * half) / np.sin(half)) ** 2 / k) ** times for share, half in halves))
-
-
-def _average_parts(p: Array) -> tuple[Array, Array, Array]:
-    """Return m = floor(w) and the shares of the triangles over m and m + 1 in max(0, 1 - |h|/w), h whole, p: log w."""
-    w = np.maximum(np.exp(p[..., 0:1]), 1.0)
-    m = np.floor(w)
-    upper = (m + 1.0) * (1.0 - m / w)
-    return m, 1.0 - upper, upper
-
-
-def _average(p: Array, grid: Grid) -> Array:
-    """Mean of white noise over w samples, w any real number from 1 on: covariance max(0, 1 - |h|/w)."""
-    m, lower, upper = _average_parts(p)
-    out: Array = (lower * _fejer(m, grid) + upper * _fejer(m + 1.0, grid)) / (lower * m + upper * (m + 1.0))
-    return out
-
-
-def _mean(count: int, times: int) -> Callable[[Array, Grid], Array]:
-    gamma = _covariance_of_mean(count, times)[1:, None]
-    h = np.arange(1.0, gamma.size + 1.0)[:, None]
-
-    def mean(p: Array, grid: Grid) -> Array:
-        """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
-        wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
-        leak = -2.0 * np.sum(gamma * wave, axis=0) / grid.samples
-        out = _fejer(count, grid, times) / count**times + np.maximum(leak, 0.0)
-        return np.broadcast_to(out, (*p.shape[:-1], grid.omega.size))
-
-    return mean
-
-
-def _covariance_of_mean(count: int, times: int) -> Array:
-    """Return the covariance at lags from 0 on of white noise, N = 1, of which means over samples are taken."""
-    kernel = functools.reduce(np.convolve, [np.full(count, 1.0 / count)] * times)
-    return np.correlate(kernel, kernel, "full")[kernel.size - 1 :]
-
-
-def _butterworth(p: Array, grid: Grid) -> Array:
-    """1/(1 + (tan(omega/2)/t)^(2 n)), p: log t, log n."""
-    x = 2.0 * np.exp(p[..., 1:2]) * (np.log(grid.tangent) - p[..., 0:1])
-    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(x, math.log(LEAST_PASSED)))))
-
-
-def _cascade(p: Array, grid: Grid) -> Array:
-    """(1 + (tan(omega/2)/t)^2)^-k, p: log t, log k."""
-    x = np.exp(p[..., 1:2]) * np.log1p((grid.tangent * np.exp(-p[..., 0:1])) ** 2)
-    return np.asarray(np.exp(-np.minimum(x, math.log(LEAST_PASSED))))
-
-
-def _recursive(p: Array, grid: Grid) -> Array:
-    """Product of (1 - z)^2/(1 - 2 z cos omega + z^2) over both poles z of a low-pass of second order."""
-    z1, z2, _ = _second_poles(p)
-    out: Array = np.real(np.prod([(1.0 - z) ** 2 / (1.0 - 2.0 * z * grid.cos + z * z) for z in (z1, z2)], axis=0))
-    return out
-
-
-def _shape(p: Array, grid: Grid) -> Array:
-    waves = np.array([np.cos((j + 1) * grid.omega) - 1.0 for j in range(p.shape[-1])])
-    out: Array = np.exp(np.clip(p @ waves, -40.0, 40.0))
-    return out
-
-
-FILTERS: Mapping[str, tuple[Callable[[Array, Grid], Array], int]] = {
-    "none": (lambda p, grid: np.ones(np.shape(p[..., :1])[:-1] + grid.omega.shape), 0),
-    "first": (_first, 1),
-    "second": (_second, 2),
-    "average": (_average, 1),
-    "butterworth": (_butterworth, 2),
-    "cascade": (_cascade, 2),
-    "recursive": (_recursive, 2),
-}
-
-
-def samples_of(name: str) -> int:
-    """Return the samples that a filter of MEANS is over."""
-    return int(name.strip(string.ascii_lowercase + ALL))
-
-
-def passes_slow(name: str) -> bool:
-    """Return whether slow noise passes a filter too."""
-    return name in DIGITAL or name.endswith(ALL)
-
-
-@functools.cache
-def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
-    """Return |H|^2 (.., p) -> (.., b) and the number of parameters of a filter; "shape3" has three, "mean4" none.
-
-    Of two in a row, "mean4+first", the parameters of the first one come first.
-    """
-    name = name.removesuffix(ALL)
-    if "+" in name:
-        (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
-        return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
-    if name.startswith(tuple(MEANS)):
-        return _mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0
-    return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]
 
 
 @dataclass(frozen=True)
@@ -377,14 +206,14 @@ def _allan_white(name: str, p: Array, m: Array) -> Array:
         z = np.exp(-np.exp(-p[..., 0:1]))
         return np.asarray((1.0 - z) / (1.0 + z) * _allan_pole(z, m))
     if name == "second":
-        z1, z2, share = _second_poles(p)
+        z1, z2, share = second_poles(p)
         level = np.real(share * (1.0 + z1) / (1.0 - z1) + (1.0 - share) * (1.0 + z2) / (1.0 - z2))
         return np.asarray(np.real(share * _allan_pole(z1, m) + (1.0 - share) * _allan_pole(z2, m)) / level)
     if name.startswith(tuple(MEANS)) and "+" not in name:
-        gamma = np.append(_covariance_of_mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0.0)
+        gamma = np.append(covariance_of_mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0.0)
         return _allan_covariance(np.broadcast_to(gamma, (*p.shape[:-1], gamma.size)), m)
     if name == "average":
-        k, lower, upper = _average_parts(p)
+        k, lower, upper = average_parts(p)
         lag = np.arange(min(float(np.max(k)) + 2.0, 2.0 * float(np.max(m)) + 1.0))  # a longer mean is not asked for
         gamma = lower * np.maximum(1.0 - lag / k, 0.0) + upper * np.maximum(1.0 - lag / (k + 1.0), 0.0)
         gamma = gamma / (lower * k + upper * (k + 1.0))
