@@ -236,7 +236,7 @@ def _filter_words(name: str, p: Array, tau0: float) -> str:
     if name == "average":
         return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
     if name.startswith(tuple(MEANS)):
-        return f"mean over {samples_of(name)} samples{', taken twice' if name.startswith('bartlett') else ''}"
+        return f"{'two means' if name.startswith('bartlett') else 'mean'} over {samples_of(name)} samples"
     level = float(np.exp(-2.0 * np.sum(p[::2])))
     return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
 
