@@ -29,6 +29,19 @@ def test_powers_are_those_of_the_filters() -> None:
     np.testing.assert_allclose(CASCADE.spectrum(p, Grid(omega)), np.cos(0.5 * omega) ** 8, rtol=1e-9, atol=2e-12)
 
 
+def test_filters_of_poles_and_of_two_means_are_their_transfer_functions() -> None:
+    """Of the impulse responses by scipy: a triangle of four and four samples, two poles z = e^s, s2 + 2 zeta w s + w2 = 0."""
+    omega = math.pi * (np.arange(50) + 0.5) / 50
+    H = signal.freqz(np.convolve(np.full(4, 0.25), np.full(4, 0.25)), 1.0, omega)[1]
+    S = NoiseTerm("white", "bartlett4").spectrum(np.zeros(1), Grid(omega))
+    np.testing.assert_allclose(S, np.abs(H) ** 2, rtol=1e-9, atol=1e-12)
+    w, zeta = 0.5, 0.3
+    a = np.real(np.poly(np.exp(np.roots([1.0, 2.0 * zeta * w, w * w]))))
+    H = signal.freqz([a.sum()], a, omega)[1]
+    S = NoiseTerm("white", "recursive").spectrum(np.array([0.0, math.log(w), math.log(zeta)]), Grid(omega))
+    np.testing.assert_allclose(S, np.abs(H) ** 2, rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("model", "p"),
     [
@@ -36,6 +49,9 @@ def test_powers_are_those_of_the_filters() -> None:
         ((CASCADE, W), [0.0, 0.0, 1.4, -6.0]),
         ((BUTTERWORTH, GM), [0.0, -1.5, 0.7, 1.0, 2.5]),
         ((NoiseTerm("white", "mean5*"), GM), [0.0, 1.0, 2.5]),
+        ((NoiseTerm("white", "bartlett4*"), GM), [0.0, 1.0, 2.5]),
+        ((NoiseTerm("white", "recursive"), GM), [0.0, -0.7, -0.7, 1.0, 2.5]),
+        ((NoiseTerm("white", "first*"), GM), [0.0, 1.0, 1.0, 2.5]),
     ],
 )
 def test_the_deviation_is_that_of_the_spectrum(model: tuple[NoiseTerm, ...], p: list[float]) -> None:

@@ -67,6 +67,14 @@ def test_flicker_under_a_recursive_low_pass() -> None:
 
 
 @pytest.mark.long
+def test_white_noise_through_two_means() -> None:
+    """A Bartlett window over four and four samples: smooth roll-offs in its place left N = 1 at 0.89 to 0.98."""
+    white = np.random.default_rng([45, 1]).normal(size=10_008)
+    model = fit_noise(np.convolve(white, np.convolve(np.ones(4), np.ones(4)) / 16.0)[8:-8], 1.0, means=False)
+    assert model.filter_words().startswith("two means over 4 samples") and model["N"].low <= 1.0 <= model["N"].high
+
+
+@pytest.mark.long
 def test_a_mean_of_five_after_a_low_pass() -> None:
     """A logger that takes running means of a sensor with a low-pass of its own, N = 1: before, N was 0.79 (0.78 to
     0.81), with a step near an end, or below 0.33 with ten bands; and the least deviation was that of a sample.
