@@ -30,7 +30,7 @@ def test_powers_are_those_of_the_filters() -> None:
 
 
 def test_filters_of_poles_and_of_two_means_are_their_transfer_functions() -> None:
-    """Of the impulse responses by scipy: a triangle of four and four samples, poles e^s with s2 + 2 zeta w s + w2 = 0."""
+    """Of impulse responses by scipy: a triangle of four and four samples; poles e^s, s2 + 2 zeta w s + w2 = 0."""
     omega = math.pi * (np.arange(50) + 0.5) / 50
     H = signal.freqz(np.convolve(np.full(4, 0.25), np.full(4, 0.25)), 1.0, omega)[1]
     S = NoiseTerm("white", "bartlett4").spectrum(np.zeros(1), Grid(omega))
