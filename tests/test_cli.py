@@ -288,11 +288,13 @@ def test_parts_are_built_side_by_side(gyrobench: Command, tmp_path: Path, monkey
         alone = packaging.build(name, out=tmp_path / "alone")
         assert alone.read_bytes() == (tmp_path / "o" / f"{name}.fmu").read_bytes()
     assert gyrobench("init", "mine", "--copy", "site")[0] == 0
-    with (tmp_path / "mine" / "components" / "site" / "model.py").open("a", encoding="utf-8") as model:
-        model.write("        oops\n")
+    model = tmp_path / "mine" / "components" / "site" / "model.py"
+    text = model.read_text(encoding="utf-8")
+    model.write_text(f"{text}        oops\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path / "mine")
     code, out, err = gyrobench("build", *names)
-    assert code != 0 and out == "fmus/meter.fmu\n" and "site/model.py:22: IndentationError" in err
+    line = text.count("\n") + 1
+    assert code != 0 and out == "fmus/meter.fmu\n" and f"site/model.py:{line}: IndentationError" in err
 
 
 @pytest.mark.long

@@ -100,4 +100,4 @@ def written_verdicts() -> Iterator[str]:
 @pytest.mark.long
 def test_one_function_writes_verdicts() -> None:
     """SuiteQuantity has a word of comparison (agree, disagree)."""
-    assert set(written_verdicts()) == {"verdict.py:replace", "method_comparison.py:SuiteQuantity"}
+    assert set(written_verdicts()) == {"verdict.py:replace", "method_comparison.py:result_suite.SuiteQuantity"}
