@@ -66,9 +66,10 @@ def _doubts(result: Result) -> list[str]:
     from gyrobench.reduction.estimation.fit_result import UNSTATED
 
     said = {r.id for r in result.reasons}
+    warned = {r.id for r in result.reasons if r.severity in ("error", "warning")}
     doubts = [r for r in result.reasons if r.severity == "doubt" and not r.id.endswith(UNSTATED)]
-    doubts = [r for r in doubts if not any(w.startswith(r.text) for w in result.warnings)]
-    return list(dict.fromkeys(r.text for r in doubts if f"verdict.withheld:{r.id}" not in said))
+    doubts = [r for r in doubts if r.id not in warned and f"verdict.withheld:{r.id}" not in said]
+    return list(dict.fromkeys(r.text for r in doubts))
 
 
 def step_sentence(check: StepCheck) -> str:

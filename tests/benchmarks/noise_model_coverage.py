@@ -8,8 +8,8 @@ even.  any: nothing or one of the first five faults by chance, each as likely.
 
 Truths are white noise, as it is or through a low-pass or a mean, up to three Gauss-Markov processes, K, Q, angles that
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
-rate, of a Butterworth filter that white noise and flicker B pass (all: a mean in its place; poles: a recursive filter,
-natural frequency and damping, without the readout), before a readout of 0.003.
+rate, of a Butterworth filter that white noise and flicker B pass, before a readout of 0.003.  all: numerator and
+denominator of another one that they pass.
 rounded: to a multiple of.
 Faults, wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the rate;
 missing: a tenth of the samples; gaps: a tenth, of 100 on average; slow: a warm-up of 3 standard deviations, a fifteenth
@@ -34,6 +34,8 @@ from scipy.signal import butter, fftconvolve, lfilter
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.fit import fit_noise
 
+_a = np.real(np.poly(np.exp(np.roots([1.0, 0.5, 0.25]))))
+POLES = ([_a.sum()], _a)  # recursive, natural frequency and damping 0.5
 TRUTHS: dict[str, dict[str, Any]] = {
     "white noise": {"N": 1.0},
     "low-pass, one process, walk": {"N": 1.0, "lag": 0.56, "markov": [(0.05, 200.0)], "K": 3e-4},
@@ -42,9 +44,12 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
     "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
     "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
-    "all noise through a mean of 3, flicker": {"N": 1.0, "B": 0.12, "all": 3},
+    "all noise through a mean of 3, flicker": {"N": 1.0, "B": 0.12, "all": (np.full(3, 1.0 / 3.0), [1.0])},
     "digital low-pass, flicker": {"N": 1.0, "B": 0.2, "digital": (2, 0.15)},
-    "recursive low-pass, flicker": {"N": 1.0, "B": 0.15, "poles": (0.5, 0.5)},
+    "recursive low-pass, flicker": {"N": 1.0, "B": 0.15, "all": POLES},
+    "low-pass of 10 samples, flicker": {"N": 1.0, "B": 0.15, "all": ([1.0 - math.exp(-0.1)], [1.0, -math.exp(-0.1)])},
+    "two means over 4": {"N": 1.0, "all": (np.convolve(np.ones(4), np.ones(4)) / 16.0, [1.0])},
+    "two means over 8, flicker": {"N": 1.0, "B": 0.15, "all": (np.convolve(np.ones(8), np.ones(8)) / 64.0, [1.0])},
     "mean of 2, rounded": {"N": 1.0, "mean": 2, "markov": [(0.125, 100.0), (0.042, 3000.0)], "rounded": 0.042},
 }
 
@@ -66,12 +71,8 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         k = np.arange(1.0, 2.0 * n)
         half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
         x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
-    if count := truth.get("all", 0):
-        x = lfilter(np.full(count, 1.0 / count), [1.0], x)
-    if "poles" in truth:
-        w, zeta = truth["poles"]
-        a = np.real(np.poly(np.exp(np.roots([1.0, 2.0 * zeta * w, w * w]))))
-        x = lfilter([a.sum()], a, x)
+    if "all" in truth:
+        x = lfilter(*truth["all"], x)
     if "digital" in truth:
         x = lfilter(*butter(*truth["digital"]), x) + 0.003 * rng.normal(size=n + 500)
     x = x[500:]
