@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 #: the way on from a stopped run at a shell
 RESUMING = "the same command with --resume"
@@ -28,6 +28,9 @@ class GyrobenchError(Exception):
 
     exit_code = 2  # of the command that ends with it
     advice: tuple[Advice, ...] = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:  # whatever its __init__ takes: it may come from another process
+        return Exception.__new__, (type(self), *self.args), self.__dict__
 
     def advised(self, *advice: Advice) -> Self:
         """Return the error, with this advice."""

@@ -6,6 +6,8 @@ import os
 
 import pytest
 
+from gyrobench.engine.fmu_instance import FmuCallError
+from gyrobench.errors import Advice
 from gyrobench.side_by_side import each
 
 
@@ -29,3 +31,14 @@ def test_an_error_of_a_task_is_raised_here(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
     with pytest.raises(ZeroDivisionError):
         each(lambda k: 1 // (k - 1), 3, True)
+
+
+def test_an_error_for_a_person_keeps_what_it_knows_on_its_way_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+
+    def fails(k: int) -> None:
+        raise FmuCallError("gyro", "doStep", "error", 1.5).advised(Advice("fit", "fit it"))
+
+    with pytest.raises(FmuCallError, match=r"^gyro: doStep failed at t = 1.5 s: error\nfit it$") as caught:
+        each(fails, 2, True)
+    assert (caught.value.slot, caught.value.time, caught.value.text) == ("gyro", 1.5, str(caught.value).split("\n")[0])

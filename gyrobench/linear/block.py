@@ -10,7 +10,7 @@ import functools
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -69,6 +69,17 @@ class _Point:
 
     def __hash__(self) -> int:
         return hash(self._key)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _started(point: _Point) -> dict[str, Any]:
+    point.part.initialize()
+    return point.part.get_state()
+
+
+def start(part: Component) -> None:
+    """Initialize a part that stands before it, to what the same part came to before.  Raises ComponentError."""
+    part.set_state(_started(_Point(part)))
 
 
 def _kept(find: Callable[[Component, list[str], list[str], float], T]) -> Callable[..., T]:

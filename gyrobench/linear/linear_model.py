@@ -33,7 +33,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.component import Component
 from gyrobench.errors import GyrobenchError
-from gyrobench.linear.block import LinearBlock, block_of, multirate_of, step_of, undelayed_of
+from gyrobench.linear.block import LinearBlock, block_of, multirate_of, start, step_of, undelayed_of
 from gyrobench.linear.multirate import MultirateStep
 from gyrobench.linear.sampled_model import SampledStep
 from gyrobench.packaging import load_part
@@ -92,7 +92,7 @@ def operating_point(
 
     for slot in assembly.order.order:
         feed(slot)
-        parts[slot].initialize()
+        start(parts[slot])
     for _ in range(PASSES):
         for slot in assembly.order.order:
             feed(slot)

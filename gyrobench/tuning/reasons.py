@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
+from gyrobench.side_by_side import each
 from gyrobench.tuning.controller_search import TuningProblem, frequencies, search
 from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import crossovers, gain_limits
@@ -41,7 +42,7 @@ def reasons_of(
     names = " and ".join(r.wish.name for r in binding)
     found = [f"{names} bind{'s' if len(binding) == 1 else ''}: the best compromise reaches {100.0 * worst:.3g} % of "
              f"what is wanted of {'it' if len(binding) == 1 else 'each'}"]  # fmt: skip
-    found += [_alone(problem, r) for r in binding[:3]]
+    found += each(lambda k: _alone(problem, binding[k]), len(binding[:3]), long=True)
     at = dict(binding[0].at)
     k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
     crossed = max((c[0] for c in crossovers(f, loops[k])), default=None)

@@ -139,7 +139,7 @@ class ControllerStructure:
                 own[1] = min(own[1], max(1.0, (w * own[0] * self.shortest) ** -2.0))
             (n, d), named = block.build(w, own)
             first += len(block.ranges)
-            num, den = np.polymul(num, n), np.polymul(den, d)
+            num, den = np.convolve(num, n), np.convolve(den, d)
             again = self.blocks[:k].count(name)
             values |= {f"{key}_{again + 1}" if again else key: v for key, v in named.items()}
         size = abs(np.polyval(num, 1j * w) / np.polyval(den, 1j * w) * plant_at(w / (2.0 * math.pi)))

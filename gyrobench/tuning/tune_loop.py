@@ -18,9 +18,10 @@ from gyrobench.engine.run_errors import RunError
 from gyrobench.engine.session import Session
 from gyrobench.errors import GyrobenchError
 from gyrobench.linear.linear_model import LinearizationError, known_parts
+from gyrobench.side_by_side import each
 from gyrobench.system.line_of_sight import LineOfSight
 from gyrobench.system.system import System
-from gyrobench.system.values import flatten
+from gyrobench.system.values import flatten, with_elements
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, polished, search
 from gyrobench.tuning.loop_ports import LoopPorts, loops_of
 from gyrobench.tuning.own_controllers import checked_structure, own_controller
@@ -132,17 +133,20 @@ def tune(
     swaps = {**(parts or {}), **({ports.slot: part} if part else {})}
     worst = {n: v for n, v in min(results, key=lambda r: r.ratio).at.items() if n != STICKS}  # a run has both
     runs = [{}, worst] if worst else [{}]
-    proofs = []
-    with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
-        for at in runs:
-            k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
-            expected = ways[k].rms(responses) if ways else 0.0
-            angle = problem.sights[0].angle if sources else ""
-            sight = ExpectedJitter(sources.ride, sources.lowest, expected, angle, sources.lost) if sources else None
+
+    def proof(run: int) -> Proof:
+        at = runs[run]
+        k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == dict(at))
+        expected = ways[k].rms(responses) if ways else 0.0
+        angle = problem.sights[0].angle if sources else ""
+        sight = ExpectedJitter(sources.ride, sources.lowest, expected, angle, sources.lost) if sources else None
+        with quiet(), Session(system, swaps, maps, bench=Bench.find().folder, child=True) as session:
             try:
-                proofs.append(proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight))
+                return proof_of(session, settings, at, f, loops[k], responses, wishes, seed, ports, sight)
             except RunError as error:
-                proofs.append(Proof(at, (), (), 0, "", "", None, f"the run did not end: {error}"))
+                return Proof(at, (), (), 0, "", "", None, f"the run did not end: {error}")
+
+    proofs = each(proof, len(runs), long=True)
     return TunedLoop(
         system.name, shape, dict(given or {}), part, settings, controller, tuple(ranges),
         tuple(at_points), tuple(results), tuple(proofs), f, loops,
@@ -169,6 +173,19 @@ class _Loop:
         #: what is free of friction in the loop that is tuned, and whether that which sticks is judged beside it
         self.free = dict(stated(nominal).free) if stated else without_friction(nominal)
         self.sticks = bool(self.free) and not stated
+
+    def both(self, at: Sequence[Mapping[str, float]]) -> tuple[list[Plant], list[SightModel]]:
+        """Return the plants and the sights at points of the spread, side by side.  Raises TuningError."""
+        if self.stated is None:
+            return self.plants(at), []
+
+        def found(k: int) -> list[Any]:
+            return [s.model for s in self.sights(at)] if k else self.plants(at)
+
+        models, without_loop = each(found, 2, long=True)
+        sources = [self.stated(with_elements(self.nominal, values)) for values in at]
+        sights = [SightModel(m, self.ports, of) for m, of in zip(without_loop, sources, strict=True)]
+        return models, sights
 
     def plants(self, at: Sequence[Mapping[str, float]], step: float | None = None) -> list[Plant]:
         """Return the plants at points of the spread.  Raises TuningError."""
@@ -197,12 +214,13 @@ class _Loop:
         if self.sticks:
             at = [*at[:corners], *({**values, STICKS: 1.0} for values in at[:corners]), *at[corners:]]
             corners *= 2
-        models = self.plants(at)
+        self.plants(at[:1]), self.sights(at[:1])  # what all points have in common is kept from now on
+        models, sights = self.both(at)
         shape = shape.of(models[0])
         wanted = self.system.crossovers().get(self.ports.loop)
         decades = box(shape, wishes, wanted, self.step)
         return TuningProblem(
-            shape, wishes, models, decades, frequencies(models, decades, wishes), corners, sights=self.sights(at)
+            shape, wishes, models, decades, frequencies(models, decades, wishes), corners, sights=sights
         )
 
 
@@ -287,11 +305,9 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
             return {r.name: r.at(float(x)) for r, x in zip(loop.ranges, np.clip(share, 0.0, 1.0), strict=True)}
 
         def ratio(share: Any, controller: Controller = controller) -> float:
-            there = loop.plants([at(share)])
+            there, sights = loop.both([at(share)])
             f = frequencies(there, problem.box, problem.wishes)
-            one = TuningProblem(
-                problem.structure, problem.wishes, there, problem.box, f, sights=loop.sights([at(share)])
-            )
+            one = TuningProblem(problem.structure, problem.wishes, there, problem.box, f, sights=sights)
             return float(one.judged(controller).min())
 
         found = minimize(
@@ -300,7 +316,7 @@ def _worse_points(loop: _Loop, problem: TuningProblem, x: Any) -> Any:
         )  # fmt: skip
         if found.fun > ratios.min() - 2e-3:
             break
-        problem.add(loop.plants([at(found.x)]), loop.sights([at(found.x)]))
+        problem.add(*loop.both([at(found.x)]))
         x = polished(problem, x)
     return x
 
