@@ -9,17 +9,17 @@ from multiprocessing import current_process, get_all_start_methods, get_context
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-_task: Callable[[int], Any]
+_task: Callable[[int], Any] | None = None  # of a process that was started here
 
 
 def each(task: Callable[[int], T], count: int, long: bool) -> list[T]:
     """Return task(0) ... task(count - 1).  long: whether they are worth the start of processes.
 
-    One after the other where the system cannot fork, and in a process that must not have children.
+    One after the other where the system cannot fork, and in a process that is one of several or must not have children.
     """
     forks = "fork" in get_all_start_methods() and hasattr(os, "sched_getaffinity")
     cores = len(os.sched_getaffinity(0)) if forks else 1
-    if count < 2 or cores < 2 or not long or current_process().daemon:
+    if count < 2 or cores < 2 or not long or _task or current_process().daemon:
         return [task(k) for k in range(count)]
     # the task and its data come along with the fork; what comes back is small
     with ProcessPoolExecutor(min(cores, count), get_context("fork"), _take, (task,)) as pool:
@@ -32,4 +32,5 @@ def _take(task: Callable[[int], Any]) -> None:
 
 
 def _done(k: int) -> Any:
+    assert _task is not None
     return _task(k)

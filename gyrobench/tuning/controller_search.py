@@ -4,8 +4,10 @@
 
 A coarse look over the whole box (Sobol), also with notches at the modes and with some factors that do nothing; from
 the best, far apart, differential evolution; from its best the simplex method, large and small, and sequential linear
-programming of t <= ln ratio_ik, which finds the ridge where several wishes bind at once.  The points of the spread are
-the corners and some inside; what is worse between them is added, and the search goes on (scipy; the same each time).
+programming of t <= ln ratio_ik, which finds the ridge where several wishes bind at once.  Over a spread the stable
+controllers are small islands: one way there leads the best of the nominal plant along as the spread widens from a
+point, the other evolves over the corners.  The points of the spread are the corners and some inside; what is worse
+between them is added, and the search goes on (scipy; the same each time).
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import Complex
+from gyrobench.side_by_side import each
 from gyrobench.tuning.plant import STICKS, Plant
 from gyrobench.tuning.robustness import grid, measured
 from gyrobench.tuning.sight_jitter import SightModel, SightWays
@@ -29,6 +32,7 @@ APART = 0.1  # of the box, that these are at first
 GENERATIONS, FEWEST = 50, 8  # of it, and the fewest
 CHEAP = 8  # corners of a spread beyond which there are less
 SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of the box
+WIDER, WIDENED = (0.25, 0.5, 0.75), 0.1  # shares of the spread on the way to it, and the first simplex at each
 SIMPLEX = 150  # evaluations of one
 COSTLY = 64  # controllers that are computed: of the look, and of each simplex
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
@@ -68,6 +72,11 @@ class TuningProblem:
             _past=[],
             _ways=[],
         )
+
+    def narrowed(self, share: float) -> TuningProblem:
+        """Return the problem with the plants moved to the nominal one, linear in their matrices; share 1: not moved."""
+        plants = [self.plants[0].toward(p, share) for p in self.plants]
+        return replace(self, plants=plants, evaluations=0, _responses=[], _past=[])
 
     def add(self, plants: Sequence[Plant], sights: Sequence[SightModel]) -> None:
         """Add points of the spread, with frequencies about their modes."""
@@ -155,15 +164,43 @@ def grazing(loops: Complex) -> Array:
     return np.asarray(np.min(np.where(peak, np.abs(np.angle(-loops[:, 1:-1])), np.inf), axis=1, initial=np.inf))
 
 
-def search(problem: TuningProblem, quick: bool = False) -> Array:
-    """Return the decades of the best controller that was found.  quick: with a sixth of the work, for one wish."""
+def search(problem: TuningProblem) -> Array:
+    """Return the decades of the best controller that was found on two ways.
+
+    What is best at nominal values, led to the spread as that widens from a point; and what evolves over its corners.
+    """
+    if problem.structure.computed:
+        return _computed(problem)
+
+    def way(k: int) -> tuple[Array, int]:
+        corners = problem.of(problem.corners)
+        if k == 1:
+            best = _evolved(problem, corners)
+            return descended(corners, best), corners.evaluations
+        nominal = problem.of(1)
+        best = descended(nominal, _evolved(problem, nominal))
+        if problem.corners == 1:
+            return best, nominal.evaluations
+        for share in WIDER:
+            narrower = corners.narrowed(share)
+            best = polished(narrower, best)
+            best = max(best, polished(narrower, simplex_from(narrower, best, WIDENED)), key=narrower.worst)
+            nominal.evaluations += narrower.evaluations
+        return descended(corners, best), nominal.evaluations + corners.evaluations
+
+    found = each(way, min(2, problem.corners), long=True)
+    problem.evaluations += sum(judged for _, judged in found)
+    corners = problem.of(problem.corners)
+    return polished(problem, max((x for x, _ in found), key=corners.worst))
+
+
+def _evolved(problem: TuningProblem, judge: TuningProblem) -> Array:
+    """Return the best of an evolution as ``judge`` has it, from the best of a coarse look at nominal values."""
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    if problem.structure.computed:
-        return _computed(problem)
     low, high = problem.box.T
-    nominal, corners = problem.of(1), problem.of(problem.corners)
+    nominal = problem.of(1)
     cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
     spread = low + cube * (high - low)
     notched = _notched(problem, spread[: LOOK // 2])
@@ -175,17 +212,21 @@ def search(problem: TuningProblem, quick: bool = False) -> Array:
             first.append(looked[k])
         if len(first) == CROWD:
             break
-    generations = FEWEST if quick else max(FEWEST, int(GENERATIONS * min(1.0, CHEAP / problem.corners)))
+    generations = max(FEWEST, int(GENERATIONS * min(1.0, CHEAP / len(judge.plants))))
     evolved = differential_evolution(
-        lambda x: -corners.worst(x), [*zip(low, high, strict=True)], init=np.array(first), maxiter=generations,
+        lambda x: -judge.worst(x), [*zip(low, high, strict=True)], init=np.array(first), maxiter=generations,
         strategy="currenttobest1bin", mutation=(0.4, 0.9), recombination=0.9, polish=False, tol=0.0, seed=1,
     )  # fmt: skip
-    best = polished(corners, evolved.x)
-    for size in SIZES[:1] if quick else SIZES:
-        tried = polished(corners, simplex_from(corners, best, size))
-        best = max(best, tried, key=corners.worst)
-    problem.evaluations += nominal.evaluations + corners.evaluations
-    return polished(problem, best)
+    judge.evaluations += nominal.evaluations
+    return np.asarray(evolved.x)
+
+
+def descended(problem: TuningProblem, x: Array) -> Array:
+    """Return the best controller down from one by linear programs and the simplex method in turn."""
+    best = polished(problem, x)
+    for size in SIZES:
+        best = max(best, polished(problem, simplex_from(problem, best, size)), key=problem.worst)
+    return best
 
 
 def _computed(problem: TuningProblem) -> Array:

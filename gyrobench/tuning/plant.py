@@ -5,7 +5,7 @@ unit of -v, with the communication step, the order of the parts and every insert
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -66,6 +66,11 @@ class Plant:
         n = len(self.a)
         states = np.linalg.solve(z[:, None, None] * np.eye(n) - self.a, np.broadcast_to(b, (z.size, n, 1)) + 0j)
         return np.asarray((self.c @ states)[:, 0, 0])
+
+    def toward(self, other: Plant, share: float) -> Plant:
+        """Return a plant between this one and another with as many states, linear in the matrices."""
+        names = ("a", "b", "c") if self.beside is None else ("a", "b", "c", "beside")
+        return replace(other, **{n: (1.0 - share) * getattr(self, n) + share * getattr(other, n) for n in names})
 
     def modes(self) -> list[complex]:
         """Return its modes."""

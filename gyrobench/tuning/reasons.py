@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
 from gyrobench.side_by_side import each
-from gyrobench.tuning.controller_search import TuningProblem, frequencies, search
+from gyrobench.tuning.controller_search import TuningProblem, descended, frequencies, polished
 from gyrobench.tuning.plant import Plant
 from gyrobench.tuning.robustness import crossovers, gain_limits
 from gyrobench.tuning.tuned_loop import WishResult
@@ -42,7 +42,7 @@ def reasons_of(
     names = " and ".join(r.wish.name for r in binding)
     found = [f"{names} bind{'s' if len(binding) == 1 else ''}: the best compromise reaches {100.0 * worst:.3g} % of "
              f"what is wanted of {'it' if len(binding) == 1 else 'each'}"]  # fmt: skip
-    found += each(lambda k: _alone(problem, binding[k]), len(binding[:3]), long=True)
+    found += each(lambda k: _alone(problem, x, binding[k]), len(binding[:3]), long=True)
     at = dict(binding[0].at)
     k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
     crossed = max((c[0] for c in crossovers(f, loops[k])), default=None)
@@ -54,16 +54,17 @@ def reasons_of(
     return found
 
 
-def _alone(problem: TuningProblem, result: WishResult) -> str:
-    """Return what the structure gives where only this wish, and stability, counts: as slow a loop as it likes."""
+def _alone(problem: TuningProblem, x: Array, result: WishResult) -> str:
+    """Return what was found from x on where only this wish, and stability, counts: as slow a loop as it likes."""
     decades = problem.box.copy()
     decades[0, 0] -= SLOWER
     one = replace(problem, wishes=[result.wish], box=decades).of(len(problem.plants))
     one.f = frequencies(one.plants, decades, one.wishes)
-    best = max(result.ratio, float(np.exp(one.worst(search(one, quick=True)))))
+    best = max(result.ratio, float(np.exp(one.worst(polished(one, descended(one.of(one.corners), x))))))
     value = result.wish.value * best if result.wish.least else result.wish.value / best
     much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)
-    return f"{result.wish.name} alone: {much}" + ("" if best >= 1.0 else ", too little by itself")
+    beyond = "" if best >= 1.0 else f"no {'more' if result.wish.least else 'less'} than "
+    return f"{result.wish.name} alone: {beyond}{much} was found"
 
 
 def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResult]) -> list[str]:

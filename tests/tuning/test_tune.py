@@ -155,7 +155,7 @@ def test_what_is_left_over_buys_quietness() -> None:
     wishes, shape = parse_wishes(["phase margin=40deg", "bandwidth>5Hz"]), ControllerStructure("pi+lead")
     decades = box(shape, wishes, None, step)
     problem = TuningProblem(shape, wishes, found, decades, frequencies(found, decades, wishes, 200))
-    best = search(problem, quick=True)
+    best = search(problem)
     quiet = quieted(problem, best)
     assert quiet is not None
     assert problem.worst(quiet.x) > KEPT * problem.worst(best) - 0.01

@@ -325,3 +325,18 @@ def test_jitter_of_a_tracking_gimbal_is_had_and_measured(loop: str) -> None:
 def test_jitter_alone_is_no_wish_for_a_tracking_loop() -> None:
     with pytest.raises(UsageError, match="it is least with a loop track yaw that does nothing"):
         tune(gimbal("gimbal_tracking"), ["phase margin=40deg", "jitter=60urad"], loop="track yaw")
+
+
+@pytest.mark.long
+def test_over_a_wide_spread_the_best_of_the_nominal_plant_leads_to_a_better_island() -> None:
+    """J +-30 % and mode +-10 %: a global search of scipy, 30,000 controllers of all corners from four seeds, reached
+    0.752, 0.743, 0.572 and 0.549 of what is wanted; what evolves over the corners alone stayed at 0.47 and said that
+    the jitter could not be had by itself, while that search had 65 urad.
+    """
+    over = ["platform.I_inner[1,1]=±30%", "platform.bending[1]=±10%"]
+    system = gimbal(stiction=0.05, bending=42.0, gyro_noise=math.radians(0.005), gyro_bandwidth=100.0, psd="vehicle")
+    wishes = ["phase margin=40deg", "gain margin=6dB", "jitter=100urad"]
+    tuned = tune(system, wishes, over, "lead-lag+notch+rolloff", loop="pitch")
+    assert not tuned.had and tuned.best > 0.74
+    text = next(r for r in tuned.reasons if r.startswith("jitter alone: "))
+    assert float(text.split()[2]) < 70.0 and text.endswith("µrad was found")
