@@ -97,6 +97,7 @@ def run(
 @app.command()
 def reduce(
     system: options.System,
+    more: Annotated[list[str] | None, typer.Argument(metavar="", hidden=True)] = None,
     data: options.Data = None,
     columns: options.Columns = None,
     source: options.From = None,
@@ -137,6 +138,8 @@ def reduce(
     from gyrobench.workflow.run_execution import RunRequest
 
     test = load_test(system)
+    if more:
+        raise UsageError(f"{more[0]}: measured data are named by --data {more[0]}, a run of another tool by --from")
     if template:
         from gyrobench.workflow.empty_record import empty_record
 
