@@ -55,7 +55,7 @@ REFUSED = [
     (["run", "nothing.ssp"], "nothing.ssp refuses to run:\n  - no such file"),
     (["run", "vertical_gyro", "--set", "phases=erection rst"], "'rst' is none of erection"),
     (["run", "stabilizer_sdf", "--set", "J0=0kg.m2"], "J0 = 0 kg.m2: must be > 0"),
-    (["reduce", "drift_record", "rest.csv"], "rest.csv: measured data are named by --data rest.csv"),
+    (["reduce", "drift_record", "rest.csv"], "rest.csv: not usable:\n  - no such file"),
     (["reduce", "platform_single_axis", "--template"], "no reduction of measured data; there is one for acc"),
 ]
 

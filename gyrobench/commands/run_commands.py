@@ -97,7 +97,7 @@ def run(
 @app.command()
 def reduce(
     system: options.System,
-    more: Annotated[list[str] | None, typer.Argument(metavar="", hidden=True)] = None,
+    files: Annotated[list[Path] | None, typer.Argument(metavar="FILE", help="Measured data, as --data.")] = None,
     data: options.Data = None,
     columns: options.Columns = None,
     source: options.From = None,
@@ -138,8 +138,7 @@ def reduce(
     from gyrobench.workflow.run_execution import RunRequest
 
     test = load_test(system)
-    if more:
-        raise UsageError(f"{more[0]}: measured data are named by --data {more[0]}, a run of another tool by --from")
+    data = [*(files or []), *(data or [])]
     if template:
         from gyrobench.workflow.empty_record import empty_record
 
@@ -164,7 +163,7 @@ def reduce(
     given = taken | parse_settings(values)
     with reports_in(language, test.name, Bench.find().folder):
         verdict = print_runs.reduce(
-            test, data or [], given, spec, out, force, as_json, formats, fit_to, columns, certificate
+            test, data, given, spec, out, force, as_json, formats, fit_to, columns, certificate
         )
     exit_on_fail(verdict, strict)
 
