@@ -162,9 +162,7 @@ def reduce(
         raise UsageError("--part, --map: of a run by another tool (--from); measured data have no FMUs")
     given = taken | parse_settings(values)
     with reports_in(language, test.name, Bench.find().folder):
-        verdict = print_runs.reduce(
-            test, data, given, spec, out, force, as_json, formats, fit_to, columns, certificate
-        )
+        verdict = print_runs.reduce(test, data, given, spec, out, force, as_json, formats, fit_to, columns, certificate)
     exit_on_fail(verdict, strict)
 
 
