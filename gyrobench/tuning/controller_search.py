@@ -29,10 +29,9 @@ from gyrobench.tuning.wishes import JITTER, MARGINS, Wish
 LOOK = 512  # controllers of the coarse look
 CROWD = 48  # controllers of the differential evolution
 APART = 0.1  # of the box, that these are at first
-GENERATIONS, FEWEST = 50, 8  # of it, and the fewest
-CHEAP = 8  # corners of a spread beyond which there are less
+GENERATIONS, WORK = 120, 250  # of it at most; of it times the corners of a spread
 SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of the box
-WIDER, WIDENED = (0.25, 0.5, 0.75), 0.1  # shares of the spread on the way to it, and the first simplex at each
+WIDER, WIDENED = (0.4, 0.7), 0.1  # shares of the spread on the way to it, and the first simplex at each
 SIMPLEX = 150  # evaluations of one
 COSTLY = 64  # controllers that are computed: of the look, and of each simplex
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
@@ -168,17 +167,16 @@ def search(problem: TuningProblem) -> Array:
     """Return the decades of the best controller that was found on two ways.
 
     What is best at nominal values, led to the spread as that widens from a point; and what evolves over its corners.
+    Without a spread two evolutions.
     """
     if problem.structure.computed:
         return _computed(problem)
 
     def way(k: int) -> tuple[Array, int]:
-        corners = problem.of(problem.corners)
-        if k == 1:
-            best = _evolved(problem, corners)
-            return descended(corners, best), corners.evaluations
-        nominal = problem.of(1)
-        best = descended(nominal, _evolved(problem, nominal))
+        nominal, corners = problem.of(1), problem.of(problem.corners)
+        if k == 1 and problem.corners > 1:
+            return descended(corners, _evolved(problem, corners)), corners.evaluations
+        best = descended(nominal, _evolved(problem, nominal, 1 + k))
         if problem.corners == 1:
             return best, nominal.evaluations
         for share in WIDER:
@@ -188,20 +186,20 @@ def search(problem: TuningProblem) -> Array:
             nominal.evaluations += narrower.evaluations
         return descended(corners, best), nominal.evaluations + corners.evaluations
 
-    found = each(way, min(2, problem.corners), long=True)
+    found = each(way, 2, long=True)
     problem.evaluations += sum(judged for _, judged in found)
     corners = problem.of(problem.corners)
     return polished(problem, max((x for x, _ in found), key=corners.worst))
 
 
-def _evolved(problem: TuningProblem, judge: TuningProblem) -> Array:
+def _evolved(problem: TuningProblem, judge: TuningProblem, seed: int = 1) -> Array:
     """Return the best of an evolution as ``judge`` has it, from the best of a coarse look at nominal values."""
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
     low, high = problem.box.T
     nominal = problem.of(1)
-    cube = qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK)
+    cube = qmc.Sobol(len(low), scramble=True, seed=seed).random(LOOK)
     spread = low + cube * (high - low)
     notched = _notched(problem, spread[: LOOK // 2])
     looked = np.vstack([spread, notched, _neutral(problem, notched if len(notched) else spread[: LOOK // 2])])
@@ -212,10 +210,10 @@ def _evolved(problem: TuningProblem, judge: TuningProblem) -> Array:
             first.append(looked[k])
         if len(first) == CROWD:
             break
-    generations = max(FEWEST, int(GENERATIONS * min(1.0, CHEAP / len(judge.plants))))
+    generations = min(GENERATIONS, 1 + WORK // problem.corners)
     evolved = differential_evolution(
         lambda x: -judge.worst(x), [*zip(low, high, strict=True)], init=np.array(first), maxiter=generations,
-        strategy="currenttobest1bin", mutation=(0.4, 0.9), recombination=0.9, polish=False, tol=0.0, seed=1,
+        strategy="currenttobest1bin", mutation=(0.4, 0.9), recombination=0.9, polish=False, tol=0.0, seed=seed,
     )  # fmt: skip
     judge.evaluations += nominal.evaluations
     return np.asarray(evolved.x)

@@ -70,7 +70,7 @@ BLOCKS = {
     "lag": ControllerFactor(((-2.0, 0.0), (0.0, 3.0)), (1, 0.0), _lag),
     "lead": ControllerFactor(((-0.7, 1.0), (0.0, 2.3)), (1, 0.0), _lead),
     "pi": ControllerFactor(((-1.5, 0.0),), (0, -1.5), _pi),
-    "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.3), (-2.0, 0.0)), (2, 0.0), _notch),
+    "notch": ControllerFactor(((-0.5, 1.7), (-1.5, 0.7), (-2.0, 0.0)), (2, 0.0), _notch),
     "rolloff": ControllerFactor(((0.0, 2.0),), (0, 2.0), _rolloff),
 }
 COMPUTED = ("lqg", "hinf")  # whole controllers, of gyrobench.tuning.synthesis

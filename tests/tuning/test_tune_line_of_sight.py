@@ -233,7 +233,7 @@ def test_a_loop_slower_than_its_jitter_says_so() -> None:
 @pytest.mark.long
 def test_wanted_jitter_is_had_and_measured() -> None:
     wishes = ["phase margin=40deg", "gain margin=6dB", "jitter=20urad"]
-    found = tune(gimbal(jitter_from=2.0, ride=20.0), wishes, structure="pi+notch", loop="pitch")
+    found = tune(gimbal(jitter_from=2.0, ride=60.0), wishes, structure="pi+notch", loop="pitch")
     assert found.proven, str(found)
     assert {w.wish.name for w in found.proofs[0].wishes} == {"phase margin", "gain margin", "jitter"}
     jitter = next(w for w in found.proofs[0].wishes if w.wish.name == "jitter")
@@ -329,14 +329,14 @@ def test_jitter_alone_is_no_wish_for_a_tracking_loop() -> None:
 
 @pytest.mark.long
 def test_over_a_wide_spread_the_best_of_the_nominal_plant_leads_to_a_better_island() -> None:
-    """J +-30 % and mode +-10 %: a global search of scipy, 30,000 controllers of all corners from four seeds, reached
-    0.752, 0.743, 0.572 and 0.549 of what is wanted; what evolves over the corners alone stayed at 0.47 and said that
-    the jitter could not be had by itself, while that search had 65 urad.
+    """J +-30 % and mode +-10 %.  With notches of a damping to 2 (now 5) a global search of scipy, 30,000 controllers of
+    all corners from four seeds, reached 0.752, 0.743, 0.572 and 0.549 of what is wanted; what evolves over the corners
+    alone stayed at 0.47 and said that the jitter could not be had by itself, while that search had 65 urad.
     """
     over = ["platform.I_inner[1,1]=±30%", "platform.bending[1]=±10%"]
     system = gimbal(stiction=0.05, bending=42.0, gyro_noise=math.radians(0.005), gyro_bandwidth=100.0, psd="vehicle")
     wishes = ["phase margin=40deg", "gain margin=6dB", "jitter=100urad"]
     tuned = tune(system, wishes, over, "lead-lag+notch+rolloff", loop="pitch")
-    assert not tuned.had and tuned.best > 0.74
+    assert not tuned.had and tuned.best > 0.8
     text = next(r for r in tuned.reasons if r.startswith("jitter alone: "))
     assert float(text.split()[2]) < 70.0 and text.endswith("µrad was found")

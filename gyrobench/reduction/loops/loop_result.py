@@ -197,12 +197,16 @@ class LoopFindings(MeasureFindings):
             read = model_response(model, at)[:, 0, 0]
             same = m.measured_margins([Point(f, complex(v), None, 1.0) for f, v in zip(at, read, strict=True)])
         for name, side, what in (("GM", "upper", "gain margin"), ("GRM", "lower", "gain-reduction margin")):
+            closed = None if dense is None else dense.limit(side)
             if side not in values:
+                if side == "upper" and closed is not None and at:
+                    none = f"no limit up from {min(at):.3g} to {max(at):.3g} Hz, the frequencies that count"
+                    self.measure(f"{name}{key}", what, "dB", None, closed=closed, no_value=none)
                 continue
             factor, u = values[side]
             pair = [None if x is None else getattr(x, side) for x in (dense, same)]
             between = math.log(pair[1] / pair[0]) if pair[0] and pair[1] else 0.0
-            share, closed = math.hypot(u / factor, between), None if dense is None else dense.limit(side)
+            share = math.hypot(u / factor, between)
             self.measure(f"{name}{key}", what, "dB", m.decibel(factor), DECIBEL * share, closed=closed)
             self.modelled(f"{name}{key}", loop, partial(m.Margins.limit, side=side))
 
