@@ -49,18 +49,23 @@ from gyrobench.reduction.toolkit import (
 from gyrobench.result import Reason
 from gyrobench.units import DEG, DPH
 
-from . import handling, tables
+from . import handling, residuals, tables
 from .steps import cycle_of, direction, levels
 
 LEAST = 8  # readings of the sweep
+WHOLE_ANGLE = "gyro.readout_mismatch"  # a parameter that such a gyro alone has
+PERIOD = 0.5 * math.pi  # of the drift of a whole-angle gyro, in the angle of its pattern
 
 
 @dataclass(frozen=True, kw_only=True)
 class RateTableSetup(SiteSetup):
-    """steps: of the plan of a run, 0 of a measured record, whose cycles are a column.  cosine: simulated, less 1."""
+    """steps: of the plan of a run, 0 of a measured record, whose cycles are a column.  cosine: simulated, less 1.
+    pattern: turn of the pattern of a simulated whole-angle gyro over that of its case, 0 of others.
+    """
 
     steps: int = 0
     cosine: float = 0.0
+    pattern: float = 0.0
 
     @property
     def earth(self) -> float:
@@ -77,7 +82,8 @@ class Reduction(DriftReduction[RateTableSetup]):
     def setup_of(cls, run: RunDocument) -> RateTableSetup:
         steps = 0 if run.measured else int(run.options["steps"])
         mount = np.reshape(run.parameters.get("gyro.mount", np.eye(3)), (3, 3))
-        return RateTableSetup.of(run, truth=truth_of(run), steps=steps, cosine=float(mount[0, 0]) - 1.0)
+        gain = float(run.parameters.get("gyro.gain", 0.0)) if WHOLE_ANGLE in run.parameters else 0.0
+        return RateTableSetup.of(run, truth=truth_of(run), steps=steps, cosine=float(mount[0, 0]) - 1.0, pattern=gain)
 
     def problems(self) -> list[str]:
         s = self.setup
@@ -193,7 +199,7 @@ class Reduction(DriftReduction[RateTableSetup]):
                 encoder.append(source.effect(s, np.array([found.error(-x) for x in misread])))
         return [
             TIME_BASE.effect(s, found.error(-table)),
-            COSINE.effect(lean, found.error(self.w[large]), simulated=(s.cosine,) if s.truth is not None else ()),
+            COSINE.effect(lean, found.error(self.w[large]), simulated=(s.cosine,) if s.simulated else ()),
             AXIS_VERTICAL_EAST.effect(s, found.error(-across)),
             LATITUDE.effect(s, found.error(-across)),
             *encoder,
@@ -226,6 +232,7 @@ class Reduction(DriftReduction[RateTableSetup]):
             "constancy of the scale factor", "the scale factor changes with time or temperature: e is of their means",
             "no scale factor that changes with time or temperature",
         )  # fmt: skip
+        residuals.add_tests(found, self.table[self.large], levels(self.table)[self.large], self.d)
 
     def account(self, found: Findings) -> Account:
         large = self.large
@@ -248,10 +255,24 @@ class Reduction(DriftReduction[RateTableSetup]):
             ],
             closed_caption="Least squares under the noise model; closed: the straight line alone, unweighted",
             tables=[self.departures.table(), *self.cycles.table(), *self.small.table()],
-            reasons=jumped(found),
+            reasons=[*jumped(found), *self._pattern()],
             repeatability=self.cycles.shown(),
             random="random drift and noise of the readings",
         )  # fmt: skip
+
+    def _pattern(self) -> list[Reason]:
+        """Return that the drift of a whole-angle gyro, which goes round with its pattern, does not average out."""
+        dt, turning = (self.t1 - self.t0)[self.large], self.sense != 0.0
+        turn = np.abs(self.w[self.large] * self.setup.pattern) * dt
+        if not self.setup.pattern or not np.any(short := turning & (turn < PERIOD)):
+            return []
+        slow, longest = float(np.min(np.abs(self.w[self.large][short]))), PERIOD / self.setup.pattern
+        text = (
+            "The drift of a whole-angle gyro goes round with its pattern, and readings that turn it by less than 90° "
+            "hold that of the angles they were taken at, which comes back in each cycle: u does not hold it. Take "
+            f"windows of {longest / slow:.2g} s and more at {slow / DEG:.3g} °/s."
+        )
+        return [Reason("rate.pattern", text, ("pass", "fail"), severity="doubt")]
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth = (self.setup.truth or {}).get("threshold")
@@ -286,7 +307,8 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
     """Return what the parameters of a simulated gyro make of the coefficients, SI; None where they do not say it.
 
     A gyro with a dead band or lock-in passes sqrt(r2 - d2): it begins to answer with half of a rate at d/sqrt(3/4), and
-    its scale factor depends on the rate in a way that is not that of the model.
+    its scale factor depends on the rate in a way that is not that of the model; nor is that of a ring laser beyond the
+    rate of its dither, or of a gyro whose hysteresis is wider than a step of the plan.
     """
     p: dict[str, Any] = dict(run.parameters)
     if "gyro.scale" not in p or run.measured:
@@ -294,17 +316,20 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
     locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
     band = float(p.get("gyro.dead_band", 0.0)) or locks
     out = {"threshold": band / math.sqrt(0.75)} if band else {}
-    if "gyro.readout_mismatch" in p:  # a whole-angle gyro, whose drift goes round with the pattern
+    if WHOLE_ANGLE in p:  # its drift goes round with the pattern
         return None
     seen = math.cos(float(np.ravel(p.get("gyro.phase_error", 0.0))[0]))  # of a vibrating gyro
     if bias_is_all(p):
         out["b"] = float(np.ravel(p["gyro.bias"])[0]) * seen
     if p.get("gyro.closed", 1.0) < 0.5:  # fibre: a sine of the rate; vibrating: its modes
         return out
+    full = float(run.options["full_scale"])
+    if float(p.get("gyro.hysteresis", 0.0)) and float(p["gyro.hysteresis_width"]) > full / float(run.options["steps"]):
+        return out  # a step of the rates does not go through it
     out["h"] = float(p.get("gyro.hysteresis", 0.0))
-    if not band:
+    if not band and not 0.0 < float(p.get("gyro.dither", 0.0)) < full:
         reset = float(p.get("gyro.reset_error", 0.0))
         out["a"] = float(p.get("gyro.asymmetry", 0.0)) * seen
         out["e"] = (1.0 + float(np.ravel(p["gyro.scale"])[0])) * seen / (1.0 - reset) - 1.0
-        out["c"] = float(p.get("gyro.cubic", 0.0)) * float(run.options["full_scale"]) ** 2
+        out["c"] = float(p.get("gyro.cubic", 0.0)) * full**2
     return out

@@ -13,6 +13,7 @@ from gyrobench.result import Table
 from gyrobench.units import DEG, DPH
 
 PPM = 1e-6
+AT_REST = 1e-3  # of the largest rate: the Earth rate alone
 WAYS = {1.0: "from below", -1.0: "from above", 0.0: "first"}
 
 
@@ -47,6 +48,10 @@ class Departures:
     def largest(self) -> int:
         return int(np.argmax(np.abs(self.departure)))
 
+    def _place(self, j: int) -> str:
+        rest = abs(self.rate[j]) < AT_REST * np.max(np.abs(self.rate))
+        return "at rest" if rest else f"at {signed(self.rate[j] / DEG)} °/s"
+
     def table(self) -> Table:
         rows = [
             [w / DEG, WAYS[d], x / PPM, u / PPM]
@@ -60,7 +65,7 @@ class Departures:
         j = self.largest
         return (
             f"Largest departure from the straight line: {signed(self.departure[j] / PPM)} ppm of full scale (u = "
-            f"{self.u[j] / PPM:.2g} ppm) at {signed(self.rate[j] / DEG)} °/s."
+            f"{self.u[j] / PPM:.2g} ppm) {self._place(j)}."
         )
 
 

@@ -279,6 +279,8 @@ class Findings:
             return text + ", rounding only."
         if self.white:
             return text + ", treated as white noise."
+        if not self.est.noise.slope and self.est.noise.best[1] == 0.0 and self.broken():
+            return text + ", which is not white noise alone (see the warnings)."
         if self.est.noise.best[1] == 0.0:
             reading_errors = " and reading errors" if self.est.noise.best[2] > 0.0 else ""
             return text + f", compatible with white noise{reading_errors}."

@@ -100,7 +100,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         seen.append((fit, rows[1:]))
     coefficients = [coefficient(fit, j, rows[:, j].tolist()) for j in range(rows.shape[1])]
     odd = outliers.find(fit)
-    simulated = setup.truth is not None or any(q.truth is not None for q in fit.quantities)
+    simulated = setup.simulated or setup.truth is not None or any(q.truth is not None for q in fit.quantities)
     robust = outliers.robust(fit) if setup.robust and asked.whole() else []
     return DriftTestResult(
         **account.statements(),
@@ -119,7 +119,7 @@ def fit_result(fit: Findings, account: Account, effects: Sequence[Effect], setup
         ],
         reasons=[
             *_contradictions(fit),
-            *([] if simulated or not fit.ideal else [NO_RESIDUALS]),
+            *([] if (simulated and not setup.in_steps) or not fit.ideal else [NO_RESIDUALS]),
             *_unstated(fit, effects),
             *_slow_drift(fit, coefficients, rows),
             *outliers.warnings(fit, odd),

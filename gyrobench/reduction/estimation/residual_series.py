@@ -137,6 +137,25 @@ def runs_test(x: Array, null: Array | None = None) -> tuple[float, float]:
     return z, float(special.ndtr(z))
 
 
+def variance_ratio(x: Array, rows: NDArray[np.bool_], null: Array | None) -> tuple[float, float]:
+    """Return the mean square of some of the values over that of the others, and the probability of so large a one.
+
+    null: of :func:`fitted_noise`; the logarithm is taken as normal with the mean and variance of these draws, which of
+    few rows says less than F does.  1.0, 1.0 where all values or none are among them.
+    """
+    few, many = int(np.count_nonzero(rows)), int(np.count_nonzero(~rows))
+    if not few or not many or null is None:
+        return 1.0, 1.0
+
+    def log(v: Array) -> Array:
+        square = v * v
+        ratio = np.mean(square[..., rows], axis=-1) / np.maximum(np.mean(square[..., ~rows], axis=-1), 1e-300)
+        return np.asarray(np.log(np.maximum(ratio, 1e-300)))
+
+    drawn, own = log(null), float(log(x))
+    return math.exp(own), float(special.ndtr((drawn.mean() - own) / max(float(drawn.std()), 1e-300)))
+
+
 def normality(x: Array) -> tuple[float, float]:
     """Shapiro-Wilk statistic and the probability of one so small (up to 5000 values), for heavy tails or skewness.
 

@@ -26,6 +26,8 @@ from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.stops import REST, stop_problems
 from gyrobench.reduction.setup.window_checks import ReductionError
 
+STEPS = ("resolution", "counting")  # parameters of parts: size of the steps, 0: none
+
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
@@ -33,9 +35,11 @@ class Setup:
     corrections: measured errors of the set-up (estimation.effects).  robust: a robust fit is shown beside.
 
     sizes: standard uncertainties of type B, SI, by option, "u_axis"; a source takes its own (:meth:`Source.size`).
-    parameters: of the parts of a simulated run, SI, for sources that name one.
+    parameters: of the parts of a simulated run, SI, for sources that name one.  simulated: by a run, whose truth may
+    not be known.
     """
 
+    simulated: bool = False
     truth: Mapping[str, float] | None = None
     instrument: str = ""
     errors: Errors = field(default_factory=dict)
@@ -54,12 +58,19 @@ class Setup:
         shared["robust"] = bool(run.options.get("robust", False))
         shared["sizes"] = sizes(run.options)
         shared["parameters"] = {} if run.measured else run.parameters
+        shared["simulated"] = not run.measured
         return cls(**{**shared, **own})
 
     @property
     def shown(self) -> dict[str, Any]:
         """Return the site as a report prints it."""
         return dict(self.site)
+
+    @property
+    def in_steps(self) -> bool:
+        """True where a part of a simulated run reads in steps, which are larger than its noise if it leaves none."""
+        steps = (v for n, v in self.parameters.items() if n.rpartition(".")[2] in STEPS)
+        return any(float(np.max(v)) > 0.0 for v in steps)
 
     def stated(self) -> dict[str, Any]:
         """Return the fields of a result that say where, and of which instrument."""
