@@ -25,8 +25,23 @@ def test_numbers_of_a_sentence_have_their_uncertainty() -> None:
     """1.96 times 0.02345 is 0.04596; "(95 %)" is said once, behind the last number that has one."""
     (said,) = told([F_C, PM, NONE], "Crossover {f_c}, phase margin {PM}; stable.", "Off by {θ*}.", "")
     assert said == "Crossover 10.151 ± 0.046 Hz, phase margin 62.86 ± 0.29° (95 %); stable."
-    assert with_u(replace(F_C, unit="dB", estimate=-56.77, u=0.01), negated=True) == "56.770 ± 0.020 dB"
+    loss = replace(F_C, unit="dB", estimate=-56.77, u=0.01, interval=(-56.7896, -56.7504))
+    assert with_u(loss, negated=True) == "56.770 ± 0.020 dB"
     assert with_u(replace(F_C, unit="1", estimate=0.5, u=0.0)) == "0.5"
+
+
+def test_an_interval_that_lies_to_one_side_is_written_by_its_ends() -> None:
+    """U = 0.36/2 has two digits; an interval that leaves out zero, as that of a spread, says that it is not zero."""
+    spread = replace(F_C, unit="°/h", estimate=0.379, u=0.18 / 1.96, interval=(0.272, 0.629))
+    assert with_u(spread) == "0.38 (0.27 to 0.63) °/h"
+    assert with_u(replace(spread, estimate=0.1, interval=(0.0, 0.5))) == (
+        "0.10 (0.00 to 0.50) °/h, not distinguishable from zero"
+    )
+    assert with_u(spread, negated=True) == "−0.38 (−0.63 to −0.27) °/h"
+    wide = replace(spread, estimate=2.0, u=3.2, interval=(1.0, 13.4))  # k u exceeds the estimate
+    assert with_u(wide) == "2.0 (1.0 to 13.4) °/h"
+    (said,) = told([spread], "Spread {f_c}.")
+    assert said == "Spread 0.38 (0.27 to 0.63) °/h (95 %)."
 
 
 def test_a_value_below_its_uncertainty_is_not_stated_to_four_digits() -> None:

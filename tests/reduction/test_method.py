@@ -107,10 +107,14 @@ def test_effects_and_verdicts() -> None:
 def test_a_sentence_has_two_digits_of_the_uncertainty() -> None:
     """U = 1.96 u: 5839 is 5800, and the estimate is rounded to hundreds; 0.0023 has four decimals."""
     (c,) = [x for x in judged(line(60, 0.001)).coefficients if x.name == "a"]
-    large = replace(c, estimate=263087.4, u=2979.0, k=1.96, unit="N·m/rad")
-    assert plus_minus(large) == "263100 ± 5800 N·m/rad (95 %)"
-    assert plus_minus(replace(large, estimate=-0.30012, u=0.00117, unit="°/h")) == "−0.3001 ± 0.0023 °/h (95 %)"
-    assert plus_minus(replace(large, estimate=-0.4, u=20.0, unit="°/h")) == "0 ± 39 °/h (95 %)"  # not −0: U = 39.2
+
+    def said(estimate: float, u: float, unit: str) -> str:
+        interval = (estimate - 1.96 * u, estimate + 1.96 * u)
+        return plus_minus(replace(c, estimate=estimate, u=u, k=1.96, unit=unit, interval=interval))
+
+    assert said(263087.4, 2979.0, "N·m/rad") == "263100 ± 5800 N·m/rad (95 %)"
+    assert said(-0.30012, 0.00117, "°/h") == "−0.3001 ± 0.0023 °/h (95 %)"
+    assert said(-0.4, 20.0, "°/h") == "0 ± 39 °/h (95 %)"  # not −0: U = 39.2
 
 
 def test_merge_of_two_channels() -> None:
@@ -211,6 +215,10 @@ def test_extra_columns_under_all_noise_models() -> None:
     assert test.statistic == pytest.approx(f_of[0]) and test.p == pytest.approx(found.est.noise.models[:, 3] @ p_of)
     assert test.p is not None and test.p > 2.0 * p_of[0] and p_of[0] < 0.05
     found.f_test("test", "with a copy", np.column_stack([extra, x + 2.0, np.ones(n)]), "", "", "")
+    assert found.tests[-1].statistic == pytest.approx(test.statistic)
+    with np.errstate(over="raise", invalid="raise"):
+        beside_nothing = found.f_test("test", "beside nothing", np.column_stack([extra, np.zeros(n)]), "", "", "")
+    assert beside_nothing is not None and (beside_nothing[0][2], beside_nothing[1][2]) == (0.0, 0.0)
     assert found.tests[-1].statistic == pytest.approx(test.statistic)
     before = len(found.tests)
     assert found.f_test("test", "held", x[:, None] - 3.0, "", "", "") is None and len(found.tests) == before

@@ -347,7 +347,8 @@ class Findings:
         test, for ideal data, fewer than ``minimum`` degrees of freedom, or columns that the fit holds all.
         """
         basis = self._basis()
-        size = np.maximum(np.linalg.norm(extra, axis=0), 1e-300)
+        norm = np.linalg.norm(extra, axis=0)
+        size = np.where(norm > 0.0, norm, 1.0)  # a column of nothing has no amplitude
         new, s, turned = np.linalg.svd((extra - basis @ (basis.T @ extra)) / size, full_matrices=False)
         there = s > 1e-6
         dof = self.y.size - basis.shape[1] - (k := int(np.count_nonzero(there)))

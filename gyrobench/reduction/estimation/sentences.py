@@ -17,6 +17,7 @@ from gyrobench.result import Coefficient, Result
 
 ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
 SAID = {"arcsec": "″", "1e-6": "ppm"}  # units as a sentence has them
+ONE_SIDED = 0.1  # of its width: how far the middle of an interval is off its estimate, and it is written by its ends
 FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 
 
@@ -26,7 +27,8 @@ def p_text(p: float) -> str:
 
 
 def plus_minus(c: Coefficient) -> str:
-    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits.
+    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits; the two ends, "0.19 (0.00
+    to 1.72) °/h (95 %)", of an interval that lies to one side of the estimate.
 
     Six digits of an estimate whose uncertainty is rounding.
     """
@@ -34,9 +36,14 @@ def plus_minus(c: Coefficient) -> str:
     if not ROUNDING * abs(c.estimate) < U or not math.isfinite(U):
         return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
     digits = 1 - math.floor(math.log10(U))
-    shown = max(0, digits)
-    estimate = round(c.estimate, digits) + 0.0  # no negative zero
-    return f"{estimate:.{shown}f} ± {round(U, digits):.{shown}f} {c.unit} (95 %)".replace("-", "−")
+
+    def rounded(x: float) -> str:
+        return f"{round(x, digits) + 0.0:.{max(0, digits)}f}"  # no negative zero
+
+    low, high = c.interval
+    one_sided = abs(low + high - 2.0 * c.estimate) > ONE_SIDED * (high - low)
+    size = f"({rounded(low)} to {rounded(high)})" if one_sided else f"± {rounded(U)}"
+    return f"{rounded(c.estimate)} {size} {c.unit} (95 %)".replace("-", "−")
 
 
 class Sentence(str):
@@ -51,7 +58,7 @@ class Sentence(str):
         """Put coefficients into a template: {name}, or {-name} for the value with the other sign."""
         known = {c.name: c for c in coefficients}
         texts = {m[0]: with_u(known[m[2]], negated=bool(m[1])) for m in FIELD.finditer(template)}
-        uncertain = [field for field, text in texts.items() if "±" in text]
+        uncertain = [field for field, text in texts.items() if "±" in text or "(" in text]
         if uncertain:  # said once, behind the last of them
             texts[uncertain[-1]] += " (95 %)"
         made = super().__new__(cls, FIELD.sub(lambda m: texts[m[0]], template))
@@ -61,8 +68,11 @@ class Sentence(str):
 
 def with_u(c: Coefficient, negated: bool = False) -> str:
     """Return "10.151 ± 0.046 Hz"; six digits of an estimate without u; whether it may be zero."""
-    zero = ", not distinguishable from zero" if abs(c.estimate) < c.k * c.u else ""
-    shown = replace(c, estimate=-c.estimate if negated else c.estimate, unit=SAID.get(c.unit, c.unit))
+    low, high = c.interval
+    zero = ", not distinguishable from zero" if low <= 0.0 <= high and low < high else ""
+    shown = replace(c, unit=SAID.get(c.unit, c.unit))
+    if negated:
+        shown = replace(shown, estimate=-c.estimate, interval=(-high, -low))
     text = plus_minus(shown).removesuffix(" (95 %)")
     return re.sub(r" (?=[°″′]$)| 1$", "", text) + zero
 
