@@ -27,7 +27,7 @@ def p_text(p: float) -> str:
 
 
 def plus_minus(c: Coefficient) -> str:
-    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty with two digits; the two ends, "0.19 (0.00
+    """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty, two digits; the two ends, "0.19 (0.00
     to 1.72) °/h (95 %)", of an interval that lies to one side of the estimate.
 
     Six digits of an estimate whose uncertainty is rounding.
