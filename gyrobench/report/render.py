@@ -16,7 +16,7 @@ from gyrobench.files import temporary_folder
 from gyrobench.reading import visible
 from gyrobench.report.assets import content_dir, read_content
 from gyrobench.report.page_model import Equation, Page, walk
-from gyrobench.report.style import clean_svg, themed
+from gyrobench.report.style import WIDE, clean_svg, themed
 
 SCHEME = re.compile(r"[\s\x00-\x20]*([A-Za-z][\w+.\-\s]*):")
 
@@ -133,7 +133,9 @@ def _plain(value: Any, key: str = "") -> Any:
 
 
 def _theme(block: dict[str, Any]) -> None:
+    """Let figures follow the reader's colours, and be drawn to one scale: a narrow one takes its share of the page."""
     for picture in block.get("items", []) if block["kind"] == "pictures" else []:
+        picture["share"] = min(_width(picture["svg"]) / (72.0 * WIDE), 1.0)
         picture["svg"] = themed(picture["svg"])
     for inner in block.get("blocks", []):
         _theme(inner)
@@ -144,10 +146,15 @@ def _strip(block: dict[str, Any]) -> None:
     if block["kind"] == "equation":
         block["svg"] = "typeset" if block["svg"] else ""
     for picture in block.get("items", []) if block["kind"] == "pictures" else []:
-        match = re.search(r'width="([\d.]+)pt"', picture.pop("svg"))
-        picture["width"] = float(match.group(1)) if match else 480.0
+        picture["width"] = _width(picture.pop("svg"))
     for inner in block.get("blocks", []):
         _strip(inner)
+
+
+def _width(svg: str) -> float:
+    """Return the width of a figure, pt."""
+    match = re.search(r'width="([\d.]+)pt"', svg)
+    return float(match.group(1)) if match else 72.0 * WIDE
 
 
 @functools.lru_cache(maxsize=8)

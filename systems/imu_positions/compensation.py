@@ -38,6 +38,11 @@ def values_of(result: Result) -> dict[str, tuple[Any, Any, str]]:
             f"--fit-to imu_compensator: the record shows {', '.join(more)}, powers of the temperature that the part "
             "does not have. Reduce it with nuisances = none (the nearest lower powers), or over narrower temperatures"
         )
+    if more := [n for n in by_name if n.startswith("K2_")]:
+        raise UsageError(
+            f"--fit-to imu_compensator: the record shows {', '.join(more)}, squares of the specific force that the "
+            "part does not have. Reduce it with nuisances = none (they are then in bias and scale factor)"
+        )
 
     def of(name: str) -> tuple[float, float]:
         c = by_name.get(name)

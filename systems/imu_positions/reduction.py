@@ -8,8 +8,8 @@ table that were read, the site and the Earth rate; the noise of each instrument 
 estimated from the same record.  Turns about each axis show the columns of Sg; those that the record does not show are
 taken as zero and are a line of the budget.  [IMU-POSITIONS; IEEE 1559]
 
-Not modelled: nonlinearity, asymmetry, lever arms (accelerometers are read at rest), bias that changes other than by a
-trend or by its noise.
+Not modelled: nonlinearity but for squares of the accelerometers, asymmetry, lever arms (accelerometers are read at
+rest), bias that changes other than by a trend or by its noise.
 """
 
 from __future__ import annotations
@@ -110,12 +110,18 @@ class ImuChannel(DriftReduction[ImuSetup]):
         )  # fmt: skip
 
     def _candidates(self) -> list[Candidate]:
-        """Return trend and temperature of the bias; over temperature the power beyond its order."""
+        """Return trend and temperature of the bias, the square of what an accelerometer feels; over temperature the
+        power beyond its order.
+        """
         c = self.channel
         taken = "temperature" if self.thermal is not None else "-"  # the model has more of it
         rows = {n: np.asarray(v)[self.rows] for n, v in self.windows.items() if not n.startswith(taken)}
         of = nuisances.DRIFT if c.gyro else nuisances.FORCE
         found = [f for f in nuisances.common(rows, f" {c.name}", of) if c.gyro or not f.scatter]
+        if not c.gyro:
+            own = self.kinematics.felt[1][self.rows, c.axis]
+            words = f"square of the specific force in the bias of the {c.words}"
+            found.append(Candidate(f"K2_{c.letter}", words, "µg/g²", UG / frames.G0**2, own**2))
         return found if self.thermal is None else [*found, *self._powers(self.thermal, of)]
 
     def _powers(self, thermal: Thermal, of: nuisances.Read) -> list[Candidate]:
@@ -162,12 +168,20 @@ class ImuChannel(DriftReduction[ImuSetup]):
         """Add an F test of constants of each phase: errors of single positions, nonlinearity; over temperature those of
         plays of another width, of higher powers, of misalignments that follow it.
         """
-        phase = np.asarray(self.windows["phase"])[self.rows]
+        c, phase = self.channel, np.asarray(self.windows["phase"])[self.rows]
         block = np.array([phase == p for p in np.unique(phase)], dtype=float).T
         found.f_test(
             "phases.agree", "constants of the phases", block, "errors of single positions, nonlinearity",
             "the phases differ from the model by more than the noise", "the phases agree within the noise",
         )  # fmt: skip
+        if not c.gyro:
+            force = self.kinematics.felt[1][self.rows] / frames.G0
+            found.f_test(
+                "square", "squares of the accelerometers",
+                np.column_stack([force**2, force * np.roll(force, 1, axis=1)]), "quadratic nonlinearity",
+                "the readings hold squares of the specific force, which the biases are off by",
+                "no squares of the specific force are in the residuals",
+            )  # fmt: skip
         if self.thermal is not None:
             found.f_test(
                 "hysteresis.width", "hysteresis of another width", self.thermal.others,
@@ -175,7 +189,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "the hysteresis has another width than is stated (hysteresis_width), or the temperature is late",
                 "no hysteresis of another width is in the residuals",
             )  # fmt: skip
-            c, more = self.channel, "take narrower temperatures, or higher orders"
+            more = "take narrower temperatures, or higher orders"
             omega, force = (v[self.rows] for v in self.kinematics.felt)
             own, seen = (omega if c.gyro else force)[:, c.axis], [k for k in self.seen if k != c.axis]
             found.f_test(

@@ -68,7 +68,10 @@ def by_position(windows: Mapping[str, Any], motion: Motion, found: DriftTestResu
         rows.append([int(p), *(at if rest else [None, None]), 0.0 if rest else max(turned, key=abs), *means])
     head = ["phase", "outer / °", "inner / °", "rate / (°/s)"]
     head += [f"{c.name} / {'(°/h)' if c.gyro else 'µg'}" for c in CHANNELS]
-    caption = "Mean of the readings of a phase less the fit; one that stands out is a position that was mistaken"
+    caption = (
+        "Mean of the readings of a phase less the fit. One that stands out is a position that was mistaken; an "
+        "accelerometer off alike wherever its axis is level, and the other way where it is up or down, has a square"
+    )
     return Table("imu.positions", "Residuals by position", caption, head, rows)
 
 

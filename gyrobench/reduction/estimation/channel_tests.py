@@ -60,10 +60,9 @@ class ChannelTests(DriftReduction[S]):
         """Return what all channels say, without the checks of :meth:`problems`."""
         self.each = {c: self.of_channel(c) for c in self.names}
         results = {self.label.format(c): test.result() for c, test in self.each.items()}
-        noise = " ".join(f"{name}: {r.summary[0]}" for name, r in results.items())
-        others = [f"{name}: {text}" for name, r in results.items() for text in r.summary[1:]]
+        own = [f"{name}: {text}" for name, r in results.items() for text in r.summary]
         coefficients = [c for r in results.values() for c in r.coefficients]
         return merge(
-            results, equation=self.equation(), summary=[*self.overview(results), noise, *others],
+            results, equation=self.equation(), summary=[*self.overview(results), *own],
             tables=self.tables(coefficients), reasons=self.reasons(),
         )  # fmt: skip

@@ -199,7 +199,10 @@ class Findings:
         return [] if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
 
     def nuisance_sentences(self) -> list[str]:
-        return nuisances.sentences(self.candidates, self.est)
+        stated = zip(
+            (q.title for q in self.quantities), zip(self.value.tolist(), self.u.tolist(), strict=True), strict=True
+        )
+        return nuisances.sentences(self.candidates, self.est, dict(stated))
 
     def implausible_nuisances(self) -> list[Reason]:
         return nuisances.implausible(self.candidates, self.est)

@@ -287,13 +287,16 @@ def table(
     return [Table(NUISANCES, "Nuisance model", caption, COLUMNS, rows)]
 
 
-def sentences(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[str]:
-    """Return what joined the model, as sentences."""
+def sentences(
+    candidates: Sequence[Candidate], est: NoiseEstimate, stated: Mapping[str, tuple[float, float]]
+) -> list[str]:
+    """Return what joined the model, as sentences; stated: name -> value and u (SI) of those that are coefficients."""
     out: list[str] = []
     for c, e in zip(candidates, est.evidence, strict=True):
         if not e.joined:
             continue
-        value, u = (e.scatter[0], e.scatter[1]) if c.scatter else (float(e.value[0]), float(e.u[0]))
+        of_columns = float(e.value[0]), float(e.u[0])
+        value, u = (e.scatter[0], e.scatter[1]) if c.scatter else stated.get(c.name, of_columns)
         text = (
             f"In the model: {c.meaning}, {c.name} = {value / c.scale:.3g} {c.unit} (u = {u / c.scale:.2g} {c.unit}, "
             f"probability {_percent(e.probability)})."
