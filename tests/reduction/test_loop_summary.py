@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from gyrobench.reduction.estimation.sentences import Sentence, renewed, told, with_u
+from gyrobench.reduction.estimation.sentences import Sentence, renewed, seconds, told, with_u
 from gyrobench.reduction.loops.loop_summary import base_torques
 from gyrobench.result import Coefficient, LoopResult
 
@@ -42,6 +42,11 @@ def test_an_interval_that_lies_to_one_side_is_written_by_its_ends() -> None:
     assert with_u(wide) == "2.0 (1.0 to 13.4) °/h"
     (said,) = told([spread], "Spread {f_c}.")
     assert said == "Spread 0.38 (0.27 to 0.63) °/h (95 %)."
+
+
+def test_a_long_time_has_no_power_of_ten() -> None:
+    assert [seconds(t) for t in (0.01234, 15.44, 1287.6, 4500.0)] == ["0.0123 s", "15.4 s", "1290 s", "4500 s"]
+    assert seconds(13512.0, 4) == "13510 s"
 
 
 def test_a_value_below_its_uncertainty_is_not_stated_to_four_digits() -> None:

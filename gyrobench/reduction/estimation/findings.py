@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimat
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.reported import Estimates
-from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.sentences import p_text, seconds
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.result import AllanDeviation, Autocorrelation, PowerSpectrum, Reason, Series, Table, Test
 
@@ -289,7 +289,7 @@ class Findings:
             return text + f", compatible with white noise{reading_errors}."
         if slope := self.est.noise.slope:
             return text + f"; spectrum of the drift about 1/f^{slope:g}, included in the coverage intervals."
-        return text + f"; correlation time about {self.est.noise.tau[0]:.3g} s, included in the coverage intervals."
+        return text + f"; correlation time about {seconds(self.est.noise.tau[0])}, included in the coverage intervals."
 
     # ------------------------------------------------------------------------------------------ tests
     def _residual_tests(self) -> list[Test]:

@@ -35,6 +35,7 @@ from gyrobench.reduction.estimation.normal_equations import NormalEquations, mom
 from gyrobench.reduction.estimation.nuisance_evidence import evidence_of, repeated
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock, NuisanceState
 from gyrobench.reduction.estimation.regression import Design, RegressionError, check_data, least_squares
+from gyrobench.reduction.estimation.sentences import seconds
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 
 SLOW = 0.125  # of the record: longer correlation times are slow drift, which a record tells from white noise badly
@@ -260,13 +261,13 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     unbounded = ""
     if float(models[law].sum()) > 0.5:
         unbounded = (
-            f"Over this record of {record:.4g} s the spectrum of the drift rises towards low frequencies as that of "
-            "flicker noise or faster. Slower drift is confounded with the constant term, whose interval is valid for "
+            f"Over this record of {seconds(record, 4)} the spectrum of the drift rises towards low frequencies as that "
+            "of flicker noise or faster. Slower drift is confounded with the constant term, whose interval is valid for "
             "this record only."
         )
     elif float(models[grid.share == 0.0].sum()) < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
         unbounded = (
-            f"The correlation time of the drift is not bounded by this record of {record:.4g} s (it may exceed "
+            f"The correlation time of the drift is not bounded by this record of {seconds(record, 4)} (it may exceed "
             f"{tau[2]:.0f} s). Slower drift is confounded with the constant term, whose interval is valid for this "
             "record only."
         )

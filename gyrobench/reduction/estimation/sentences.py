@@ -26,6 +26,11 @@ def p_text(p: float) -> str:
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
+def seconds(t: float, digits: int = 3) -> str:
+    """Return "15.4 s", "13510 s": a time with so many digits, without a power of ten."""
+    return f"{t:.{digits}g} s" if t < 1000.0 else f"{float(f'{t:.{digits}g}'):.0f} s"
+
+
 def plus_minus(c: Coefficient) -> str:
     """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty, two digits; the two ends, "0.19 (0.00
     to 1.72) °/h (95 %)", of an interval that lies to one side of the estimate.
