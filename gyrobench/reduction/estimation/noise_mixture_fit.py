@@ -262,8 +262,8 @@ def _noise(problem: Problem, weighed: Weighed, models: Array, counted: NDArray[n
     if float(models[law].sum()) > 0.5:
         unbounded = (
             f"Over this record of {seconds(record, 4)} the spectrum of the drift rises towards low frequencies as that "
-            "of flicker noise or faster. Slower drift is confounded with the constant term, whose interval is valid for "
-            "this record only."
+            "of flicker noise or faster. Slower drift is confounded with the constant term, whose interval is valid "
+            "for this record only."
         )
     elif float(models[grid.share == 0.0].sum()) < 0.5 and tau[2] > 0.9 * float(grid.tau.max()):
         unbounded = (
