@@ -27,6 +27,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, Effect
@@ -38,17 +39,20 @@ from gyrobench.units import DPH
 LEAST = 8  # readings
 MOST = 100.0  # Earth rates that a torquer may hold at rest in a sound record
 QUIETEST = 2e-6  # deg/sqrt(h), a twentieth of the best gyros' angle random walk
+#: what else a reading of the Earth rate is wrong by
+SCALES = ("scale", "asymmetry", "dead_band", "reset_error", "phase_error", "readout_mismatch", "resolution", "counting")
 RATE_SCALE = replace(TORQUER_SCALE, id="gyro.scale_factor", name="scale factor of the rate gyro", large=())
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixedPositionSetup(SiteSetup):
     """attitude: rows I, O, S in (E, N, U).  k: torquer scale factor, rad/s/A, 1 where a rate is read.  quantum:
-    resolution of the current reading.
+    resolution of the current reading.  bias: true drift of a simulated rate gyro, rad/s.
     """
 
     k: float
     rate: bool = False
+    bias: float | None = None
     attitude: Array = field(default_factory=lambda: np.eye(3))
     quantum: float = 0.0
     supplies: Supplies = field(default_factory=Supplies)
@@ -76,6 +80,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             attitude=attitude_of(run),
             k=rate_per_reading(run),
             rate=reads_rate(run),
+            bias=_true_drift(run),
             truth=truth_of(run, drift.NAMES),
             quantum=float(run.parameters.get("rebalance.resolution", 0.0)),
             supplies=Supplies() if reads_rate(run) else Supplies.of(run),
@@ -95,7 +100,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         columns = ("t_start", "t_end", "mean")
         self.t0, self.t1, self.current = (np.asarray(self.windows[n], dtype=float) for n in columns)
         y = s.input_rate - s.k * self.current
-        true = None if s.truth is None else float(drift.drift(s.xyz, s.truth))
+        true = s.bias if s.rate else None if s.truth is None else float(drift.drift(s.xyz, s.truth))
         self.book = float(np.average(y, weights=self.t1 - self.t0))
         self.middle = (self.t0 + self.t1) / 2.0
         shown = Group("composite drift", np.arange(y.size), (self.middle - self.t0[0]) / 3600.0, "time", "h")
@@ -168,7 +173,9 @@ class Reduction(DriftReduction[FixedPositionSetup]):
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [
             *told(coefficients, "Composite drift ω_d = {ω_d} in one attitude."),
-            "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
+            "The bias of the gyro is −ω_d; what depends on g is in it, which other attitudes part."
+            if self.setup.rate
+            else "Constant drift, unbalance and compliance are in it together; other attitudes part them.",
             found.noise_sentence("readings"),
             *found.nuisance_sentences(),
         ]
@@ -183,6 +190,20 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         """Return what a record says; a long one has a table of its noise coefficients."""
         result = super().from_record(record)
         return replace(result, tables=[*result.tables, *noise_coefficients_table(result, record)])
+
+
+def _true_drift(run: RunDocument) -> float | None:
+    """Return the drift of a simulated rate gyro in precession sign, where its bias is all that it adds."""
+    p = run.parameters
+    mount = np.reshape(p.get("gyro.mount", np.eye(3)), (3, 3))
+    axis = np.reshape(p.get("gyro.axes", np.eye(2, 3)), (2, 3))[0] @ mount
+    straight = np.array_equal(axis, [1.0, 0.0, 0.0])
+    known = straight and bias_is_all(p) and not any(np.any(p.get(f"gyro.{n}", 0.0)) for n in SCALES)
+    if run.measured or not reads_rate(run) or "gyro.bias" not in p or not known or p.get("gyro.closed", 1.0) < 0.5:
+        return None
+    if p.get("gyro.lock_in", 0.0) and not p.get("gyro.dither", 0.0):
+        return None
+    return -float(np.ravel(p["gyro.bias"])[0])
 
 
 def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:

@@ -309,10 +309,12 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         return []
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
-        compass, expected = coefficients[0].estimate % 360.0, self.north / DPH
+        psi, expected = coefficients[0], self.north / DPH
+        decimals = max(0, 1 - math.floor(math.log10(psi.k * psi.u))) if psi.u > 0.0 else 3
+        compass = f"{round(psi.estimate % 360.0, decimals) % 360.0:.{decimals}f}"
         rate = f"Horizontal Earth rate {{A}}; the latitude gives {expected:.5g} °/h."
         return [
-            *told(coefficients, f"Heading ψ = {{ψ}}, clockwise from north; on the compass {compass:.3f}°."),
+            *told(coefficients, f"Heading ψ = {{ψ}}, clockwise from north; on the compass {compass}°."),
             *found.nuisance_sentences(),
             *told(coefficients, rate),
         ]

@@ -51,6 +51,26 @@ def test_sign_and_earth_rate_in_the_fixed_position() -> None:
     assert dict((r[0], r[1]) for r in table.rows)["mean rate ω_g"] == pytest.approx(earth + 3.0, rel=1e-9)
 
 
+def test_a_rate_gyro_at_rest_has_its_own_truth_and_words() -> None:
+    """-3 deg/h with a bias of 3; a scale factor that is off reads the Earth rate wrong as well, and states none."""
+    values: dict[str, object] = {"gyro.bias": [3.0 * DPH, 0.0], "dwell": 60.0, "readings": 10}
+    _, result = reduced("fixed_position", "gyro_fog", values)
+    assert result.simulated and result["ω_d"].truth == pytest.approx(-3.0)
+    assert any(s.startswith("The bias of the gyro is −ω_d") for s in result.summary)
+    assert not any("unbalance" in s for s in result.summary)
+    _, other = reduced("fixed_position", "gyro_fog", {**values, "gyro.scale": [1e-3, 0.0]})
+    assert other.simulated and other["ω_d"].truth is None
+
+
+def test_the_compass_has_the_digits_of_its_uncertainty() -> None:
+    """U of some degrees: the heading to a degree, or to a tenth below 10 deg; it was said to 0.001."""
+    _, result = reduced("north_finder", "gyro_mems", {"gyro.white": 0.2 * DPH * 60.0, "heading": 0.7})
+    psi, said = result["ψ"], result.summary[0]
+    decimals = max(0, 1 - math.floor(math.log10(psi.k * psi.u)))
+    assert psi.k * psi.u > 1.0
+    assert said.endswith(f"on the compass {psi.estimate % 360.0:.{decimals}f}°.")
+
+
 def test_g_sensitivity_reaches_the_rate() -> None:
     """Axis up, f = g: 1e-6 s/m of 9.8 m/s2 are 2 deg/h more."""
     values: dict[str, object] = {
