@@ -155,12 +155,15 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
-@pytest.mark.long
 def test_from_python() -> None:
     test = gb.load("drift_record", {"duration": "600s"}, instrument="adis16405")
     run = test.run(seed=1)
     assert run.record.run.parts["gyro"].name == "GyroMems"
     assert run.result.instrument.startswith("Analog Devices ADIS16405")
+    shaken = gb.load("gyro_bandwidth", {"points": 8, "dwell": "0.2s"}, instrument="crg20").run()
+    assert shaken.result.instrument.startswith("Silicon Sensing CRG20")
+    turned = gb.load("imu_positions", {"positions": 6, "dwell": "10s", "turns": 0}).run()
+    assert turned.result.instrument == "Imu 1.0.0, simulated"
 
 
 @pytest.mark.parametrize(

@@ -339,7 +339,7 @@ class Session:
             )
             for slot, d in self.assembly.descriptions.items()
         }
-        item = next((parts[s] for s in ("gyro", "accelerometer") if s in parts), None)  # what the test is about
+        item = next((parts[s] for s in ("gyro", "imu", "accelerometer") if s in parts), None)  # what the test is about
         return RunDocument(
             system=system.name,
             title=system.title,

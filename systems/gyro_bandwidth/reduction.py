@@ -43,7 +43,6 @@ NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
 class Reduction(MeasureReduction):
     """Frequency response of a rate gyro."""
 
-    part = "gyro"
     ranked_by = "f_3dB"
 
     def measure(self) -> Account:

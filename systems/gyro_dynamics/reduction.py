@@ -54,7 +54,6 @@ APART = 0.001  # probability below which sines and steps differ
 class Reduction(MeasureReduction):
     """Dynamics of a floated gyro."""
 
-    part = "gyro"
     ranked_by = "tau"
 
     def measure(self) -> Account:

@@ -55,8 +55,6 @@ class SelfTest:
 class Reduction(MeasureReduction):
     """Start, self-tests, test and shutdown as the program wrote them down."""
 
-    part = "gyro"
-
     def measure(self) -> Account:
         w = {n: np.asarray(v, dtype=float) for n, v in self.record.windows.items()}
         if not w.get("step", np.zeros(0)).size:
