@@ -155,6 +155,7 @@ def test_a_sheet_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values == {"gyro.white": pytest.approx(0.01 * DEG / math.sqrt(2.0))}
 
 
+@pytest.mark.long
 def test_from_python() -> None:
     test = gb.load("drift_record", {"duration": "600s"}, instrument="adis16405")
     run = test.run(seed=1)
