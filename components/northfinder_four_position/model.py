@@ -46,5 +46,6 @@ class NorthfinderFourPosition(NorthFinder):
             self.offset = 0.25 * (w[0] + w[1] + w[2] + w[3])
             even = 1.0 / self.dwell[0] + 1.0 / self.dwell[2]
             odd = 1.0 / self.dwell[1] + 1.0 / self.dwell[3]
-            self.sd = 0.5 * self.density * sqrt(odd * c * c + even * b * b) / square
-            self.state = VALID
+            if square > 0.0:  # readings in steps may be alike in all positions
+                self.sd = 0.5 * self.density * sqrt(odd * c * c + even * b * b) / square
+                self.state = VALID

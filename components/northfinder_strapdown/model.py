@@ -78,9 +78,10 @@ class NorthfinderStrapdown(NorthFinder):
                 self.seen = sqrt(square) / (ct * cos(self.gamma))
                 by_x = north * ct
                 by_y = north * sg * st - east * cos(self.gamma)
-                self.sd = self.density * sqrt(mean * (by_x * by_x + by_y * by_y)) / square
-                if fabs(self.gamma) < STEEP:
-                    self.state = VALID
+                if square > 0.0:
+                    self.sd = self.density * sqrt(mean * (by_x * by_x + by_y * by_y)) / square
+                    if fabs(self.gamma) < STEEP:
+                        self.state = VALID
 
     def outputs(self) -> None:
         self.pitch = self.theta

@@ -155,9 +155,10 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         elif not found.ideal and not MANY * float(np.max(np.asarray(found.u)[: self.model.X.shape[1]][:2])) < A:
             raise ReductionError(UNDETERMINED)
         if abs(A / self.north - 1.0) > NEAR:
+            small = ", or the gyro answers it in part (dead band, lock-in, steps of its word)" * bool(self.north > A)
             raise ReductionError(
                 f"horizontal Earth rate {A / DPH:.4g} °/h, at this latitude it is {self.north / DPH:.4g} °/h: "
-                "latitude, unit or axes are wrong, or the base moves"
+                f"latitude, unit or axes are wrong, or the base moves{small}"
             )
 
         def near(angle: float) -> float:  # no jump at the south

@@ -27,7 +27,7 @@ from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, whole_angle
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -53,7 +53,6 @@ from . import handling, residuals, tables
 from .steps import cycle_of, direction, levels
 
 LEAST = 8  # readings of the sweep
-WHOLE_ANGLE = "gyro.readout_mismatch"  # a parameter that such a gyro alone has
 PERIOD = 0.5 * math.pi  # of the drift of a whole-angle gyro, in the angle of its pattern
 
 
@@ -82,7 +81,7 @@ class Reduction(DriftReduction[RateTableSetup]):
     def setup_of(cls, run: RunDocument) -> RateTableSetup:
         steps = 0 if run.measured else int(run.options["steps"])
         mount = np.reshape(run.parameters.get("gyro.mount", np.eye(3)), (3, 3))
-        gain = float(run.parameters.get("gyro.gain", 0.0)) if WHOLE_ANGLE in run.parameters else 0.0
+        gain = float(run.parameters.get("gyro.gain", 0.0)) if whole_angle(run.parameters) else 0.0
         return RateTableSetup.of(run, truth=truth_of(run), steps=steps, cosine=float(mount[0, 0]) - 1.0, pattern=gain)
 
     def problems(self) -> list[str]:
@@ -316,7 +315,7 @@ def truth_of(run: RunDocument) -> dict[str, float] | None:
     locks = 0.0 if p.get("gyro.dither") else float(p.get("gyro.lock_in", 0.0))
     band = float(p.get("gyro.dead_band", 0.0)) or locks
     out = {"threshold": band / math.sqrt(0.75)} if band else {}
-    if WHOLE_ANGLE in p:  # its drift goes round with the pattern
+    if whole_angle(p):  # its drift goes round with the pattern
         return None
     seen = math.cos(float(np.ravel(p.get("gyro.phase_error", 0.0))[0]))  # of a vibrating gyro
     if bias_is_all(p):

@@ -36,7 +36,7 @@ def find(
     part: str, heading: float, latitude: float, *, pitch: float = 0.0, roll: float = 0.0,
     bias: tuple[float, float] = (0.0, 0.0), accelerometer: float = 0.0, drift: float = 0.0,
     angles: list[float] | None = None, noise: float = 0.0, seed: int = 0, dwell: int = 20, power: int = 1,
-    **parameters: float,
+    word: float = 0.0, **parameters: float,
 ) -> dict[str, float]:  # fmt: skip
     """Outputs of a finder after its plan: positions of ``dwell`` steps of 0.1 s, or one turn of 360 steps."""
     h = 0.1
@@ -53,6 +53,7 @@ def find(
     for n, (phase, angle) in enumerate(rows):
         w, f = seen(heading, pitch, roll, latitude, angle)
         rate = w[:2] + np.array(bias) + drift * (n * h) ** power + noise / math.sqrt(h) * rng.normal(size=2)
+        rate = np.round(rate / word) * word if word else rate
         last = float(n == len(rows) - 1)
         plain.set({"rate[1]": rate[0], "rate[2]": rate[1], "f[1]": f[0] + accelerometer, "f[2]": f[1] + accelerometer,
                    "f[3]": f[2], "angle": angle, "gate": 1.0, "phase": float(phase), "finished": last})  # fmt: skip
@@ -242,6 +243,16 @@ def test_status() -> None:
     assert find("strapdown", 1.0, 0.7, roll=math.radians(-86.0))["status"] == 2.0
     with pytest.raises(InstanceError, match="stands upright"):
         find("tilt", 1.0, 0.7, pitch=math.pi / 2.0, gravity=0.999 * G)
+
+
+@pytest.mark.parametrize("part", [*PLANS, "continuous"])
+def test_readings_alike_in_all_positions_give_no_heading(part: str) -> None:
+    """Words of 1 deg/s read the Earth rate as zero: no heading; sigma was NaN, and the run ended with an error.  Two
+    positions, which know the size of the rate, and a strapdown head, which knows the vertical one, still have one.
+    """
+    found = find(part, 1.0, 0.7, word=math.radians(1.0))
+    assert all(math.isfinite(v) for v in found.values())
+    assert (found["status"] == 1.0) == (part == "two_position")
 
 
 def test_done_follows_the_last_estimate() -> None:

@@ -62,6 +62,38 @@ def test_a_rate_gyro_at_rest_has_its_own_truth_and_words() -> None:
     assert other.simulated and other["ω_d"].truth is None
 
 
+def test_the_word_of_a_gyro_is_in_the_budget_as_far_as_noise_does_not_dither_it() -> None:
+    """A word of 36 deg/h alone makes 36/sqrt(12) = 10.4 deg/h; noise of 0.3 words before it leaves the first
+    harmonic of rounding, 36/(pi sqrt 2) exp(-2 (0.3 pi)2) = 1.37 deg/h, noise of ten words nothing.
+
+    White noise of density N has the rms N sqrt(f pi/sqrt 2) behind the filter of f = 50 Hz: 10.5 N per sqrt(Hz).
+    """
+    q = 36.0 * DPH
+    for white, u in (
+        (1e-9, 10.392),
+        (0.3 * q / 10.539, 36.0 / 4.4429 * math.exp(-2.0 * (0.3 * math.pi) ** 2)),
+        (q, 0.0),
+    ):
+        values: dict[str, object] = {"gyro.resolution": q, "gyro.white": white, "gyro.bandwidth": 50.0}
+        _, result = reduced("fixed_position", "gyro_mems", {**values, "dwell": 60.0, "readings": 10})
+        lines = {b.source: b.contribution for b in result.budget}
+        assert lines.get("word of the gyro", 0.0) == pytest.approx(u, rel=0.01, abs=1e-6)
+
+
+def test_a_gyro_that_answers_nothing_has_a_doubt() -> None:
+    """A ring laser without dither, locked within 0.05 deg/s, reads zero at rest: no noise, u = 0, its bias hidden."""
+    values: dict[str, object] = {"gyro.dither": 0.0, "gyro.bias": [3.0 * DPH, 0.0], "dwell": 60.0, "readings": 10}
+    _, result = reduced("fixed_position", "gyro_laser", values)
+    assert result["ω_d"].u == 0.0
+    assert "noise.none" in {r.id for r in result.reasons if r.severity == "doubt"}
+
+
+def test_a_whole_angle_gyro_at_rest_is_at_one_angle_of_its_pattern() -> None:
+    for part in ("gyro_hemispherical", "gyro_fog"):
+        _, result = reduced("fixed_position", part, {"dwell": 60.0, "readings": 10})
+        assert ("gyro.pattern" in {r.id for r in result.reasons}) == (part == "gyro_hemispherical")
+
+
 def test_the_compass_has_the_digits_of_its_uncertainty() -> None:
     """U of some degrees: the heading to a degree, or to a tenth below 10 deg; it was said to 0.001."""
     _, result = reduced("north_finder", "gyro_mems", {"gyro.white": 0.2 * DPH * 60.0, "heading": 0.7})

@@ -217,5 +217,6 @@ class RotatingFinder(NorthFinder):
                 drift = self.fit_x[3] + self.t * (self.fit_x[4] + self.t * self.fit_x[5])
                 self.offset = self.offset + self.t * drift
             along = b * b * self.fit_P[0][0] - 2.0 * b * c * self.fit_P[0][1] + c * c * self.fit_P[1][1]
-            self.sd = self.density * sqrt(along) / square
-            self.state = VALID
+            if square > 0.0:  # readings in steps may be alike at all angles
+                self.sd = self.density * sqrt(along) / square
+                self.state = VALID

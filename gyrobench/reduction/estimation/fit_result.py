@@ -72,8 +72,8 @@ class Account:
 #: of a measured record: readings in steps larger than their noise can lie on the model to the last digit
 NO_RESIDUALS = Reason(
     "noise.none",
-    "The data lie on the model to the last digit, which measured ones do not: they are computed, or read in steps "
-    "larger than their noise; u holds neither the noise nor the steps.",
+    "The data lie on the model to the last digit, which measured ones do not: they are computed, read in steps "
+    "larger than their noise, or of a rate that is not answered; u holds none of these.",
     ("pass", "fail"),
     severity="doubt",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,8 @@ BESIDE = (
     "turn_on", "flicker_x", "flicker_y", "walk_x", "walk_y", "g", "g2", "langmuir", "damping_difference",
     "frequency_difference", "drive_angle",
 )  # fmt: skip
+
+HARMONICS = 1000  # of the sawtooth: the others make 1e-3 of its square
 
 
 def bias_is_all(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
@@ -24,3 +27,23 @@ def bias_is_all(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
         return bool(np.any(np.asarray(parameters.get(f"{slot}.{name}", 0.0), dtype=float)))
 
     return not (any(there(n) for n in BESIDE) or (there("quadrature") and there("phase_error")))
+
+
+def word_error(parameters: Mapping[str, Any], slot: str = "gyro") -> float:
+    """Return the rms error of a mean of readings in words of a simulated gyro with a filter, rad/s; 0 of others.
+
+    Of words q and a noise of the rms s before them the square is sum over k of (q/(pi k))2/2 exp(-(2 pi k s/q)2): the
+    harmonics of the sawtooth of rounding, which the noise smooths; q/sqrt(12) without it.  A white density N leaves
+    s2 = 2 N2 f pi/(4 sin(pi/4)) behind a Butterworth filter of second order.  [own derivation]
+    """
+    q, f = (float(parameters.get(f"{slot}.{n}", 0.0)) for n in ("resolution", "bandwidth"))
+    if not q or not f:
+        return 0.0
+    s = float(parameters.get(f"{slot}.white", 0.0)) * math.sqrt(f * math.pi / math.sqrt(2.0))
+    k = np.arange(1, HARMONICS)
+    return q * math.sqrt(float(np.sum(np.exp(-((2.0 * math.pi * k * s / q) ** 2)) / (2.0 * (math.pi * k) ** 2))))
+
+
+def whole_angle(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
+    """Return whether the gyro of a run is a whole-angle one, whose drift goes round with its pattern."""
+    return f"{slot}.readout_mismatch" in parameters

@@ -26,7 +26,7 @@ from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.stops import REST, stop_problems
 from gyrobench.reduction.setup.window_checks import ReductionError
 
-STEPS = ("resolution", "counting")  # parameters of parts: size of the steps, 0: none
+STEPS = ("resolution", "counting", "dead_band", "lock_in")  # parameters of parts: size of steps and bands, 0: none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,9 @@ class Setup:
 
     @property
     def in_steps(self) -> bool:
-        """True where a part of a simulated run reads in steps, which are larger than its noise if it leaves none."""
+        """True where a part of a simulated run reads in steps or leaves rates unanswered, which may take all noise from
+        its data.
+        """
         steps = (v for n, v in self.parameters.items() if n.rpartition(".")[2] in STEPS)
         return any(float(np.max(v)) > 0.0 for v in steps)
 
