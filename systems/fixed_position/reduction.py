@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, whole_angle, word_error
+from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, word_error
 from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, Effect
@@ -41,13 +41,6 @@ MOST = 100.0  # Earth rates that a torquer may hold at rest in a sound record
 QUIETEST = 2e-6  # deg/sqrt(h), a twentieth of the best gyros' angle random walk
 #: what else a reading of the Earth rate is wrong by
 SCALES = ("scale", "asymmetry", "dead_band", "reset_error", "phase_error", "readout_mismatch")
-PATTERN = Reason(
-    "gyro.pattern",
-    "The drift of a whole-angle gyro goes round with its pattern: the composite drift is that of the pattern angle at "
-    "which it stood. rate_table_test turns the pattern.",
-    ("pass", "fail"),
-    severity="doubt",
-)
 RATE_WORD = replace(
     CURRENT_RESOLUTION,
     id="gyro.word",
@@ -161,7 +154,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             closed_caption="Least squares under the noise model; closed: ω_IA − "
             + ("the mean rate" if s.rate else "k times the mean current"),
             tables=[_table(s, self.current, self.t0, self.t1, self.book)],
-            reasons=[*self._of_unit(found), *[PATTERN] * whole_angle(s.parameters)],
+            reasons=[*self._of_unit(found), *at_one_pattern(s.parameters)],
             repeatability={} if trend is None else {
                 "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
                 "record / s": float(np.ptp(self.middle)),

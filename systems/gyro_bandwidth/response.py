@@ -187,7 +187,8 @@ class PoleCurve:
         """
         more = max(1.0, self.chi2 / max(self.dof, 1))
         if self.resonant:
-            steps = np.linalg.cholesky(self.cov * more * self.p.size).T
+            size, along = np.linalg.eigh(self.cov * more * self.p.size)  # singular of a pole that nothing shows
+            steps = (along * np.sqrt(np.maximum(size, 0.0))).T
             moved = np.array([self.values(self.p + d) for d in (*steps, *-steps)])
             away = np.nan_to_num(moved - self.values(self.p))
             return np.asarray(np.sum(away * away, axis=0) / np.maximum(np.sum(np.isfinite(moved), axis=0), 1))

@@ -30,7 +30,7 @@ from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
+from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all
 from gyrobench.reduction.setup.sources import GRAVITY, LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -287,7 +287,7 @@ class Reduction(ChannelTests[VibrationSetup]):
 
     def result(self) -> DriftTestResult:
         found = super().result()
-        s, said = self.setup, [*mistakes.implausible(found.coefficients)]
+        s, said = self.setup, [*mistakes.implausible(found.coefficients), *at_one_pattern(self.setup.parameters)]
         if s.measured and np.count_nonzero(np.diff(self.windows["up"])) == 1:
             said.append(ONCE)
         if s.axis == "x":

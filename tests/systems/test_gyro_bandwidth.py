@@ -367,3 +367,17 @@ def test_a_late_sample_and_a_table_that_falls_off_are_said(tmp_path: Path) -> No
     low = rows * np.column_stack([*np.ones((2, 20)), 1.0 - 0.04 * (rows[:, 0] / 200.0) ** 2, np.ones(20)])
     for table, said in ((rows, False), (low, True)):
         assert any(r.id == "response.early" for r in measured(tmp_path, table).reasons) == said
+
+
+def test_a_resonance_whose_covariance_is_singular_has_its_variances() -> None:
+    """Of a covariance of one direction, less a little by rounding, no root of Cholesky: the step along it is its own.
+
+    K alone (its logarithm) is off by 0.01: the mean square of exp(+-0.01 sqrt n) - 1 over n is 0.01 squared.
+    """
+    n = 6
+    p = np.array([0.0, 1e-3, math.log(0.3), math.log(2.0 * math.pi * 80.0), 0.01, 0.1])
+    cov = np.zeros((n, n))
+    cov[0, 0] = 1e-4
+    curve = RESPONSE.PoleCurve(0, p, cov - 1e-22 * np.eye(n), 1.0, 10, 0.0, 100.0, resonant=True)
+    variance = curve.variances()
+    assert variance[0] == pytest.approx(1e-4, rel=0.01)

@@ -89,8 +89,13 @@ def test_a_gyro_that_answers_nothing_has_a_doubt() -> None:
 
 
 def test_a_whole_angle_gyro_at_rest_is_at_one_angle_of_its_pattern() -> None:
-    for part in ("gyro_hemispherical", "gyro_fog"):
-        _, result = reduced("fixed_position", part, {"dwell": 60.0, "readings": 10})
+    short: dict[str, dict[str, object]] = {
+        "fixed_position": {"dwell": 60.0, "readings": 10},
+        "turn_on_repeatability": {"days": 1, "turn_ons": 3, "dwell": 60.0, "window": 5.0},
+        "vibration_rectification": {"levels": "0 1 2", "readings": 2, "window": 1.0},
+    }
+    for part, name in ((p, n) for p in ("gyro_hemispherical", "gyro_fog") for n in short):
+        _, result = reduced(name, part, short[name])
         assert ("gyro.pattern" in {r.id for r in result.reasons}) == (part == "gyro_hemispherical")
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.result import Reason
+
 #: parameters of rate gyros that make a steady or slow rate beside `bias`; with one of them the bias of a run is not it
 BESIDE = (
     "turn_on", "flicker_x", "flicker_y", "walk_x", "walk_y", "g", "g2", "langmuir", "damping_difference",
@@ -47,3 +49,12 @@ def word_error(parameters: Mapping[str, Any], slot: str = "gyro") -> float:
 def whole_angle(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
     """Return whether the gyro of a run is a whole-angle one, whose drift goes round with its pattern."""
     return f"{slot}.readout_mismatch" in parameters
+
+
+def at_one_pattern(parameters: Mapping[str, Any]) -> list[Reason]:
+    """Return that a test at rest is one at the angles at which the pattern of a whole-angle gyro stood."""
+    text = (
+        "The drift of a whole-angle gyro goes round with its pattern: what is found at rest is that of the angles at "
+        "which the pattern stood, and changes as it turns. rate_table_test turns it."
+    )
+    return [Reason("gyro.pattern", text, ("pass", "fail"), severity="doubt")] * whole_angle(parameters)
