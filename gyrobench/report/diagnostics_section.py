@@ -77,7 +77,11 @@ def _residuals(report: Report[RunResult], result: DriftTestResult) -> list[Any]:
     sentence = f"Residual standard deviation {spread} {result.residual_unit} with {dof} degrees of freedom."
     if len(units) > 1:
         sentence = f"{dof} degrees of freedom; the rms residual of each series stands with the measured series."
-    tests = _tests(report, "Tests of the residuals. A small p is evidence against the model.")
+    tests = _tests(
+        report,
+        "Tests of the residuals. A small p is evidence against the model; one in 20 falls below 0.05 by chance. What "
+        "contradicts the result, as a p of 0.01 over the number of tests does, is among the warnings.",
+    )
     return [Text(sentence), *in_time, *pictures(acf, quantiles), *tests, *noise]
 
 
