@@ -220,7 +220,7 @@ class Reduction(DriftReduction[RateTableSetup]):
             )  # fmt: skip
         found.f_test(
             "hysteresis.rate", "way to the rate times the rate", (self.d * np.abs(x))[:, None],
-            "hysteresis", "the hysteresis changes with the rate: h is of no rate",
+            "hysteresis", "the hysteresis changes with the rate: h is their mean",
             "no hysteresis that changes with the rate",
         )  # fmt: skip
         with_time = [(self.t0 + self.t1)[self.large], *(np.asarray(v)[self.large] for n, v in self.windows.items()
