@@ -27,10 +27,17 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, word_error
+from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, unanswered, word_error
 from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
-from gyrobench.reduction.setup.sources import CURRENT_OFFSET, CURRENT_RESOLUTION, LATITUDE, TORQUER_SCALE, Effect
+from gyrobench.reduction.setup.sources import (
+    CURRENT_OFFSET,
+    CURRENT_RESOLUTION,
+    GYRO_WORD,
+    LATITUDE,
+    TORQUER_SCALE,
+    Effect,
+)
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
@@ -41,13 +48,6 @@ MOST = 100.0  # Earth rates that a torquer may hold at rest in a sound record
 QUIETEST = 2e-6  # deg/sqrt(h), a twentieth of the best gyros' angle random walk
 #: what else a reading of the Earth rate is wrong by
 SCALES = ("scale", "asymmetry", "dead_band", "reset_error", "phase_error", "readout_mismatch")
-RATE_WORD = replace(
-    CURRENT_RESOLUTION,
-    id="gyro.word",
-    name="word of the gyro",
-    unit="rad/s",
-    note="as far as its noise does not dither it",
-)
 RATE_SCALE = replace(TORQUER_SCALE, id="gyro.scale_factor", name="scale factor of the rate gyro", large=())
 
 
@@ -129,7 +129,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             scale.effect(s, found.error(-s.k * self.current)),
         ]
         if s.rate:
-            return [*of_site, RATE_WORD.effect(word_error(s.parameters), offset)]
+            return [*of_site, GYRO_WORD.effect(word_error(s.parameters), offset)]
         torque = s.k * self.current
         readings = rebalanced(np.full_like(torque, s.input_rate), torque)
         return [
@@ -154,7 +154,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             closed_caption="Least squares under the noise model; closed: ω_IA − "
             + ("the mean rate" if s.rate else "k times the mean current"),
             tables=[_table(s, self.current, self.t0, self.t1, self.book)],
-            reasons=[*self._of_unit(found), *at_one_pattern(s.parameters)],
+            reasons=[*self._of_unit(found), *at_one_pattern(s.parameters), *unanswered(s.parameters)],
             repeatability={} if trend is None else {
                 "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
                 "record / s": float(np.ptp(self.middle)),

@@ -30,8 +30,8 @@ from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all
-from gyrobench.reduction.setup.sources import GRAVITY, LATITUDE
+from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, unanswered, word_error
+from gyrobench.reduction.setup.sources import GRAVITY, GYRO_WORD, LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
     Array,
@@ -160,6 +160,9 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             "about north": np.full_like(self.up, -up), "about up": np.full_like(self.up, north)}  # fmt: skip
         errors = {f"{way}, {axis}": w * e for way, w in self.ways.items() for axis, e in turns.items()}
         out.append(LEAN.effect(s, np.array([*errors.values()]), parts=tuple(errors)))
+        level = np.round(np.sqrt(self.s2) / G0, 1)  # as it was wanted; each reading of it is a little off
+        each = {f"{way}, {g:g} g": w * (level == g) for way, w in self.ways.items() for g in np.unique(level)}
+        out.append(GYRO_WORD.effect(word_error(s.parameters), np.array([*each.values()]), parts=tuple(each)))
         if self.both:
             across = abs(float(found.value[1])) * s.gravity  # along each of two level axes
             out.append(LEAN_ACROSS.effect(s, np.array([across * w for w in self.ways.values() for _ in range(2)])))
@@ -288,6 +291,7 @@ class Reduction(ChannelTests[VibrationSetup]):
     def result(self) -> DriftTestResult:
         found = super().result()
         s, said = self.setup, [*mistakes.implausible(found.coefficients), *at_one_pattern(self.setup.parameters)]
+        said += unanswered(s.parameters) if s.axis == "x" else []
         if s.measured and np.count_nonzero(np.diff(self.windows["up"])) == 1:
             said.append(ONCE)
         if s.axis == "x":

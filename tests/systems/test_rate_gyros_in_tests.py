@@ -88,6 +88,34 @@ def test_a_gyro_that_answers_nothing_has_a_doubt() -> None:
     assert "noise.none" in {r.id for r in result.reasons if r.severity == "doubt"}
 
 
+def test_a_dead_band_that_hides_the_earth_rate_is_said() -> None:
+    """Axis x up and down: a dead band of 0.01 deg/s = 36 deg/h reads none of W sin(45.75 deg) = 10.77 deg/h, and G is
+    off by that per g; axis z up, x east, there is nothing to answer.
+    """
+    short: dict[str, object] = {
+        "levels": "0 1 2", "readings": 2, "window": 1.0, "gyro.dead_band": 36.0 * DPH, "gyro.g": [[0.0] * 3] * 2,
+    }  # fmt: skip
+    for axis in "xz":
+        _, result = reduced("vibration_rectification", "gyro_fog", {**short, "axis": axis})
+        said = [r.text for r in result.reasons if r.id == "gyro.unanswered"]
+        assert [("±36 °/h" in t) for t in said] == [True] * (axis == "x")
+        assert abs(result["G"].estimate) == pytest.approx(10.77 if axis == "x" else 0.0, abs=0.3)
+
+
+def test_a_word_hides_the_g_sensitivity() -> None:
+    """Words of 0.36 deg/s, hardly noise: three levels up and three down, each off by 1296/sqrt(12) deg/h rms, and G is
+    half the difference of their means, G2 the slope over s2 = 0, 1, 4 g2 of all six.
+    """
+    values: dict[str, object] = {
+        "levels": "0 1 2", "readings": 2, "window": 1.0, "gyro.resolution": 1296.0 * DPH, "gyro.white": 1e-9,
+    }  # fmt: skip
+    _, result = reduced("vibration_rectification", "gyro_mems", values)
+    off = 1296.0 / math.sqrt(12.0)
+    square = np.array([0.0, 1.0, 4.0] * 2)
+    assert result["G"].u == pytest.approx(off / math.sqrt(6.0), rel=0.01)
+    assert result["G2"].u == pytest.approx(off / math.sqrt(float(np.sum((square - square.mean()) ** 2))), rel=0.02)
+
+
 def test_a_whole_angle_gyro_at_rest_is_at_one_angle_of_its_pattern() -> None:
     short: dict[str, dict[str, object]] = {
         "fixed_position": {"dwell": 60.0, "readings": 10},

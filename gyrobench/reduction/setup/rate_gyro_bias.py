@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.result import Reason
+from gyrobench.units import DPH
 
 #: parameters of rate gyros that make a steady or slow rate beside `bias`; with one of them the bias of a run is not it
 BESIDE = (
@@ -58,3 +59,17 @@ def at_one_pattern(parameters: Mapping[str, Any]) -> list[Reason]:
         "which the pattern stood, and changes as it turns. rate_table_test turns it."
     )
     return [Reason("gyro.pattern", text, ("pass", "fail"), severity="doubt")] * whole_angle(parameters)
+
+
+def unanswered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
+    """Return that a simulated gyro with a dead band or a lock-in does not answer the Earth rate, or less of it."""
+    p = {n: float(parameters.get(f"{slot}.{n}", 0.0)) for n in ("dead_band", "lock_in", "dither", "closed")}
+    locked = 0.0 if p["dither"] else p["lock_in"]
+    band = max(locked, p["dead_band"] * (p["closed"] > 0.5)) / DPH
+    if not band:
+        return []
+    text = (
+        f"The gyro does not answer rates within ±{band:.3g} °/h (dead band, lock-in), and less of those beyond: the "
+        "Earth rate that is taken off was not read, and what is found is off by up to all of it."
+    )
+    return [Reason("gyro.unanswered", text, ("pass", "fail"), severity="doubt")]

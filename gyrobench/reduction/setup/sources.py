@@ -295,6 +295,7 @@ CURRENT_OFFSET = Source(
     doc="standard uncertainty of the zero of the current meter",
 )  # fmt: skip
 CURRENT_RESOLUTION = Source("current.resolution", "resolution of the current reading", "A", note="as if never dithered")
+GYRO_WORD = Source("gyro.word", "word of the gyro", "rad/s", note="as far as its noise does not dither it")
 #: of a gyro with two channels: the torquer about an axis, and the meter of its current
 TORQUER_SCALE_OF = replace(
     TORQUER_SCALE, id="torquer.{axis}.scale_factor", name="scale factor of the torquer about {axis}"
