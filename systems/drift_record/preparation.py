@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -169,21 +170,34 @@ GIVEN = {"B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
 
 
 #: the same of the axis x of a rate gyro
+FOLDS = 1.001  # of the density, from where on it is said to fold
 GIVEN_X = {"B": "flicker_x", "K": "walk_x"}
 #: and of that of accelerometers
 GIVEN_FORCE = {"N": "white", "B": "x_flicker", "K": "x_walk"}
+
+
+def folded(parameters: Mapping[str, Any], slot: str) -> float:
+    """Return the density of white noise in the samples of a part over that before its filter, a Butterworth one of
+    second order: the root of the sum over k of 1/(1 + (k/(T f))4), T the time between two samples.
+    """
+    T, f = (float(parameters.get(f"{slot}.{n}", 0.0)) for n in ("period", "bandwidth"))
+    if not T or not f:
+        return 1.0
+    return math.sqrt(1.0 + 2.0 * float(np.sum(1.0 / (1.0 + (np.arange(1, 1000) / (T * f)) ** 4))))
 
 
 def truth_of(record: Record) -> dict[str, float]:
     """Return the noise coefficients that the gyro of a run was given, SI; {} for measured data.
 
     N of a rate gyro is the density that it shows, or its parameter; otherwise the noise of the current reading is part
-    of N.  Pickoff noise is angle noise that the loop shapes: with it Q has no stated truth.
+    of N.  Samples of a filter above half their rate fold its noise down (:func:`folded`).  Pickoff noise is angle noise
+    that the loop shapes: with it Q has no stated truth.
     """
     run = record.run
     p: dict[str, Any] = dict(run.parameters)
     if run.options.get("reading") == "force":
         out = {term: float(p[n]) for term, name in GIVEN_FORCE.items() if (n := f"accelerometers.{name}") in p}
+        out |= {n: folded(p, "accelerometers") * v for n, v in out.items() if n == "N"}
         return out or ({"N": float(p["accelerometers.white_x"])} if "accelerometers.white_x" in p else {})
     if run_metadata.reads_rate(run):
         out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN_X.items() if f"gyro.{name}" in p}
@@ -191,7 +205,10 @@ def truth_of(record: Record) -> dict[str, float]:
             out["N"] = float(record.channels["gyro.density"][0])
         elif "gyro.white_x" in p:
             out["N"] = float(p["gyro.white_x"])
-        return out
+        fold = folded(p, "gyro")
+        if fold > FOLDS and "gyro.split" in p:  # the sense mode filters it, too
+            out.pop("N", None)
+        return out | {n: fold * v for n, v in out.items() if n == "N"}
     out = {term: float(p[f"gyro.{name}"]) for term, name in GIVEN.items() if f"gyro.{name}" in p}
     if p.get("gyro.pickoff") or not p.get("gyro.quantization"):
         out.pop("Q", None)

@@ -40,6 +40,23 @@ def test_drift_record_gives_the_density_that_the_gyro_shows(part: str) -> None:
     assert n.u < 0.1 * n.truth
 
 
+@pytest.mark.parametrize(("part", "known"), [("gyro_mems", True), ("gyro_vibratory", False)])
+@pytest.mark.long
+def test_samples_of_a_wide_filter_fold_its_noise(part: str, known: bool) -> None:
+    """20 ms between samples of a filter of 50 Hz: k/(T f) = k, N is sqrt(1 + 2 (1/2 + 1/17 + 1/82 + ...)) = 1.469 times
+    that before it.  A vibrating gyro, whose loop filters the noise as well, states none.
+    """
+    values: dict[str, object] = {"duration": 400.0, "window": 0.2, "gyro.period": 0.02, "gyro.bandwidth": 50.0}
+    _, result = reduced("drift_record", part, values)
+    n = next(c for c in result.coefficients if c.name == "N")
+    assert (n.truth is not None) == known
+    if known:
+        _, plain = reduced("drift_record", part, values | {"gyro.period": 0.0})
+        before = next(c for c in plain.coefficients if c.name == "N").truth
+        assert n.truth == pytest.approx(1.469 * before, rel=1e-3)
+        assert abs(n.estimate - n.truth) < 4.0 * n.u
+
+
 def test_sign_and_earth_rate_in_the_fixed_position() -> None:
     """The input axis up reads W sin(latitude) + bias: the drift in precession sign is -bias."""
     values: dict[str, object] = {"attitude": "U E", "gyro.bias": [3.0 * DPH, 0.0], "dwell": 60.0, "readings": 10}
