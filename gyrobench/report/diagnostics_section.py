@@ -149,8 +149,9 @@ def _estimates(report: Report[RunResult]) -> list[Any]:
     blocks: list[Any] = []
     if isinstance(result, DriftTestResult) and result.rank:
         condition = number_cell(doc, ("condition",), significant=3).text
+        count = len(result.correlation) or len(names)  # without those that are not of the fit, as a threshold
         text = (
-            f"The design matrix has rank {result.rank} for {len(names)} reported estimates and condition number "
+            f"The design matrix has rank {result.rank} for {count} reported estimates and condition number "
             f"{condition}. Above 100, errors of the model are amplified in the least-determined combination."
         )
         blocks.append(Text(text))

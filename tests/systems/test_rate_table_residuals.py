@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
+from gyrobench.report.diagnostics_section import validity
+from gyrobench.report.page_model import Text
+from gyrobench.report.result_json import Report
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
@@ -108,3 +111,11 @@ def test_the_ratio_of_variances() -> None:
     assert ratio == pytest.approx(4.0)
     assert 0.001 < p < 0.1  # F(4, 12) beyond 4 has 0.027
     assert series.variance_ratio(np.ones(16), np.ones(16, dtype=bool), null) == (1.0, 1.0)
+
+
+def test_the_rank_is_that_of_the_estimates_of_the_fit() -> None:
+    """A threshold, which stands between two rates, is no unknown of the design matrix: rank 5 for 5, not for 6."""
+    result = reduced("gyro_fog", {"gyro.dead_band": 0.02 * DEG, "small": "0.01 0.03 0.1"})
+    assert len(result.coefficients) == 6
+    texts = [b.text for s in validity(Report.of(result)) for b in s.blocks if isinstance(b, Text)]
+    assert any(t.startswith("The design matrix has rank 5 for 5 reported estimates") for t in texts)
