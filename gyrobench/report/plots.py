@@ -140,6 +140,7 @@ def acf(lags: Sequence[float], values: Sequence[float], bound: Sequence[float], 
     ax.vlines(lag, 0, rho, color=style.BLUE, linewidth=1.2)
     ax.plot(lag, rho, "o", color=style.BLUE, markersize=2.6, markeredgewidth=0)
     ax.set_xlabel(style.axis_label("lag", of))
+    ax.xaxis.get_major_locator().set_params(integer=True)
     ax.set_ylabel(style.axis_label("autocorrelation", "1"))
     ax.set_ylim(min(-0.5, min(rho) * 1.1), max(0.5, max(rho) * 1.1))
     ax.set_xlim(0, max(lag) + 0.5)

@@ -72,8 +72,8 @@ def unit_groups(coefficients: Sequence[Coefficient]) -> list[tuple[str, list[int
 def method_table(doc: Any, path: tuple[str | int, ...], table: Table, wide: Collection[str] = ()) -> list[Any]:
     """Return a table of a method as a block, none where it has no rows.  wide: heads that take the room that is left.
 
-    Numbers are rounded to the column "u(symbol)" of their own or "u" where there is one; a column "p" is written as
-    probabilities, a "difference", which may be far below u, to two digits.
+    Numbers are rounded to the column "u(symbol)" of their own or "u" where there is one; columns "p" and "probability"
+    are written as probabilities, a "difference", which may be far below u, and multiples "of u" to two digits.
     """
     heads = [str(h) for h in table.columns]
     rows = []
@@ -82,8 +82,8 @@ def method_table(doc: Any, path: tuple[str | int, ...], table: Table, wide: Coll
         cells = []
         for j, head in enumerate(heads):
             u = beside.get(f"u({SYMBOLS.get(words(head)[0], words(head)[0])})") or beside.get("u")
-            shown: dict[str, Any] = {"significant": 2} if head == "difference" else {"u": u}
-            if head == "p" or head.startswith("p "):
+            shown: dict[str, Any] = {"significant": 2} if head in ("difference", "of u") else {"u": u}
+            if head in ("p", "probability") or head.startswith("p "):
                 shown = {"write": write_p}
             cells.append(number_cell(doc, (*path, "rows", i, j), **shown))
         rows.append(Row(cells))

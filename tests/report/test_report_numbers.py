@@ -1,10 +1,14 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
+from gyrobench.report import plots
 from gyrobench.report.numbers import decimals, write_number, write_p
+from gyrobench.report.tables import method_table
+from gyrobench.result import Table
 
 
 @pytest.mark.parametrize(
@@ -64,3 +68,18 @@ def test_p_values():
     assert write_p(1e-9).text == "< 0.001"
     assert float(write_p(1e-9).full) == 1e-9
     assert write_p(None).text == "–"
+
+
+def test_a_probability_is_not_rounded_to_the_u_of_its_row() -> None:
+    """u = 41 rounds an estimate of -35.9 to -36, but not the probability 0.513 to 1, nor a change of 0.84 u."""
+    heads = ["candidate", "estimate", "u", "probability", "largest change", "of u"]
+    table = Table("nuisances", "Nuisance model", "", heads, [["K2_y", -35.9, 40.9, 0.5134, "ba_y", 0.84009]])
+    document = {"tables": [{"rows": table.rows}]}
+    (block,) = method_table(document, ("tables", 0), table)
+    assert [c.text for c in block.rows[0].cells] == ["K2_y", "−36", "41", "0.513", "ba_y", "0.84"]
+
+
+def test_lags_are_whole_windows() -> None:
+    """Three lags have the ticks 0, 1, 2, and none between them: zoomed figures carry the tick in its group."""
+    drawn = plots.acf([0.0, 1.0, 2.0], [1.0, -0.3, -0.1], [0.2, 0.2, 0.2], "acf")
+    assert len(re.findall(r'id="[^"]*xtick_\d+"', drawn)) == 3
