@@ -118,7 +118,7 @@ class Reduction(MeasureReduction):
     def _curve_named(self) -> str:
         c = self.figures.curve
         more = f", a delay and a resonance at {c.resonance:.4g} Hz" if c.resonant else " and a delay"
-        return f"{c.poles} poles{more}"
+        return f"{c.poles} pole{'s' * (c.poles != 1)}{more}"
 
     def _pure_delay(self) -> tuple[float, float]:
         """Return the delay that the gain does not explain, and its u, s: the gyro's own, or that of a late reading."""

@@ -6,6 +6,7 @@ import importlib
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -381,3 +382,11 @@ def test_a_resonance_whose_covariance_is_singular_has_its_variances() -> None:
     curve = RESPONSE.PoleCurve(0, p, cov - 1e-22 * np.eye(n), 1.0, 10, 0.0, 100.0, resonant=True)
     variance = curve.variances()
     assert variance[0] == pytest.approx(1e-4, rel=0.01)
+
+
+@pytest.mark.parametrize(("poles", "said"), [(1, "1 pole and a delay"), (2, "2 poles and a delay")])
+def test_one_pole_is_one(poles: int, said: str) -> None:
+    curve = SimpleNamespace(poles=poles, resonant=False)
+    test = SimpleNamespace(figures=SimpleNamespace(curve=curve))
+    reduction: Any = importlib.import_module(".reduction", type(load_system(NAME)).__module__)
+    assert reduction.Reduction._curve_named(test) == said
