@@ -67,8 +67,16 @@ def values_of(result: Result) -> dict[str, tuple[Any, Any, str]]:
 def truth_of(parameters: Mapping[str, Any]) -> dict[str, float] | None:
     """Return the coefficients of what is read, SI: of the simulated instruments, or behind a compensator of them.
 
-    None behind one that follows the temperature: what it leaves is no polynomial.
+    None behind one that follows the temperature: what it leaves is no polynomial.  Without the scale factors of
+    accelerometers with a cubic, which are those of no single force.
     """
+    found = _truth(parameters)
+    if found is None or not parameters.get("accelerometers.cubic"):
+        return found
+    return {n: v for n, v in found.items() if n not in ("Sa_xx", "Sa_yy", "Sa_zz")}
+
+
+def _truth(parameters: Mapping[str, Any]) -> dict[str, float] | None:
     thermal_parameters = thermal.parameters()
     found = instruments_of(parameters, thermal_parameters)
     if found is None or "compensator.gyro_bias" not in parameters:

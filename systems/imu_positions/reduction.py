@@ -14,6 +14,7 @@ rest), bias that changes other than by a trend or by its noise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -24,6 +25,7 @@ from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.nuisances import BOTH
+from gyrobench.reduction.setup.rate_gyro_bias import word_error
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.toolkit import (
     Account,
@@ -57,6 +59,7 @@ from .updown import UpDownReduction
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
 LEAST_SPAN = 3.0  # K, from which on a record is one over temperature
 POWERS = ("", "", "²", "³", "⁴")
+COUNTS = 0.3  # of u of a bias: an error of a reading that is told
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
 
 
@@ -234,7 +237,10 @@ class ImuChannel(DriftReduction[ImuSetup]):
             )
         else:
             equation = f'f_"read,{c.letter}" - f_{c.letter} = b_a + sum_k S_(a,k) f_k'
-        more = []
+        more = [
+            "Scale factors are those at the forces of the positions, up to 1 g: a cubic is in them and not in their "
+            "uncertainties; vibration_rectification shows it."
+        ]
         if c.gyro:
             more = [
                 "Scale factors are those at the rates of the turns: what of them changes with the rate is in them and "
@@ -351,7 +357,19 @@ class Reduction(ChannelTests[ImuSetup]):
             self.each, self.setup, lambda setup, name: ImuChannel(self.windows, setup, name, self.kinematics)
         )
         by_position = tables.by_position(self.windows, self.kinematics.motion, found)
-        return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off])
+        return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off, *self._words(found)])
+
+    def _words(self, found: DriftTestResult) -> list[Reason]:
+        """Return that words of simulated accelerometers are not dithered by their noise, as far as it counts."""
+        off = word_error(self.setup.parameters, "accelerometers")
+        biases = [c for c in found.coefficients if c.name.startswith("ba_")]
+        if not off > COUNTS * min((c.u * UG for c in biases), default=math.inf):
+            return []
+        text = (
+            f"The words of the accelerometers are larger than their noise: a reading at rest is off by {off / UG:.0f} "
+            "µg rms, alike in all windows of a position, which u holds in part."
+        )
+        return [Reason("accelerometers.words", text, BOTH, severity="doubt")]
 
 
 def _places(force: Array) -> Array:

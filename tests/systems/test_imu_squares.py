@@ -13,6 +13,7 @@ import pytest
 
 from gyrobench.bench import UsageError
 from gyrobench.engine.session import Session
+from gyrobench.frames import G0
 from gyrobench.result import Result
 from gyrobench.system.system import load_system
 
@@ -57,3 +58,25 @@ def test_a_square_that_is_not_weighed_is_named() -> None:
     named = {t.id for t in result.tests if t.id.startswith("square") and (t.p or 0.0) < 1e-4}
     assert named == {f"square:a{a}" for a in "xyz"}
     assert any(r.id == "residuals.contradict" for r in result.reasons)
+
+
+def test_words_larger_than_their_noise_are_doubted() -> None:
+    """Words of 14 mg are off by 14000/sqrt(12) = 4041 ug rms without noise, with noise of 10 words by nothing."""
+    system = load_system(NAME).with_values(SHORT)
+    word = 14e-3 * G0
+    for white, said in ((1e-9, True), (word, False)):  # a density of N has the rms 10.5 N behind 50 Hz
+        values = {**SHORT, "accelerometers.resolution": word, "accelerometers.white": white}
+        with Session(system, {"accelerometers": "accelerometer_mems"}) as session:
+            result = system.reduce(session.run(values, seed=4))
+        words = [r for r in result.reasons if r.id == "accelerometers.words"]
+        assert bool(words) == said
+        assert not said or 4035 < int(words[0].text.split("off by ")[1].split()[0]) < 4042
+
+
+def test_a_cubic_leaves_no_true_scale_factor() -> None:
+    system = load_system(NAME).with_values(SHORT)
+    for cubic, known in ((0.0, True), (1e-3 / G0**2, False)):
+        with Session(system, {"accelerometers": "accelerometer_mems"}) as session:
+            result = system.reduce(session.run({**SHORT, "accelerometers.cubic": cubic}, seed=4))
+        assert (result["Sa_xx"].truth is not None) == known
+        assert result["Sa_xy"].truth is not None
