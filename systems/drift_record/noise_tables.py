@@ -31,7 +31,9 @@ def number(x: float, u: float | None = None) -> str:
 
 
 def range_text(e: Estimate, si: float = 1.0) -> str:
-    """Return a value with its interval, "25.3 (24.1 to 27.0)"."""
+    """Return a value with its interval, "25.3 (24.1 to 27.0)"; alone where that is the value itself."""
+    if e.low == e.value == e.high:
+        return number(e.value / si)
     u = (e.high - e.low) / (2.0 * 1.96 * si) if math.isfinite(e.high) and e.high > e.low else None
     return f"{number(e.value / si, u)} ({number(e.low / si, u)} to {number(e.high / si, u)})"
 

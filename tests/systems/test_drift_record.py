@@ -7,6 +7,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -369,3 +370,10 @@ def test_missing_samples_are_completed_and_long_gaps_cut(monkeypatch: pytest.Mon
     assert p.stretch[there] == pytest.approx(x[p.first :][there], abs=1e-9)
     assert np.std(p.stretch[~there]) == pytest.approx(1.0, abs=4.0 / math.sqrt(2.0 * np.count_nonzero(~there)))
     assert p.noise.treatment.filled == np.count_nonzero(~there) + np.count_nonzero(np.isnan(x[1:3000]))
+
+
+def test_an_interval_of_one_value_is_not_written() -> None:
+    """The least Allan deviation "at 48 (48 to 48) s" is at 48 s."""
+    tables: Any = importlib.import_module(".noise_tables", type(load_system(NAME)).__module__)
+    assert tables.range_text(SimpleNamespace(value=48.0, low=48.0, high=48.0)) == "48"
+    assert tables.range_text(SimpleNamespace(value=25.3, low=24.1, high=27.0)) == "25.30 (24.10 to 27.00)"  # u = 0.74
