@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.series.noise_coefficients_table import noise_coefficients_table
-from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, unanswered, word_error
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, doubts_at_rest, unanswered, word_error
 from gyrobench.reduction.setup.run_metadata import rate_per_reading, reads_rate, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.setup.sources import (
@@ -154,7 +154,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
             closed_caption="Least squares under the noise model; closed: ω_IA − "
             + ("the mean rate" if s.rate else "k times the mean current"),
             tables=[_table(s, self.current, self.t0, self.t1, self.book)],
-            reasons=[*self._of_unit(found), *at_one_pattern(s.parameters), *unanswered(s.parameters)],
+            reasons=[*self._of_unit(found), *doubts_at_rest(s.parameters), *unanswered(s.parameters)],
             repeatability={} if trend is None else {
                 "trend over the record / (°/h)": trend[0] / DPH, "u of it / (°/h)": trend[1] / DPH,
                 "record / s": float(np.ptp(self.middle)),

@@ -27,7 +27,7 @@ from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, whole_angle
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, dithered, whole_angle
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -254,7 +254,7 @@ class Reduction(DriftReduction[RateTableSetup]):
             ],
             closed_caption="Least squares under the noise model; closed: the straight line alone, unweighted",
             tables=[self.departures.table(), *self.cycles.table(), *self.small.table()],
-            reasons=[*jumped(found), *self._pattern()],
+            reasons=[*jumped(found), *self._pattern(), *dithered(self.setup.parameters)],
             repeatability=self.cycles.shown(),
             random="random drift and noise of the readings",
         )  # fmt: skip

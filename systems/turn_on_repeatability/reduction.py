@@ -22,7 +22,7 @@ import numpy as np
 
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern
+from gyrobench.reduction.setup.rate_gyro_bias import doubts_at_rest
 from gyrobench.reduction.setup.sources import TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -230,7 +230,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
             self.endless = self._endless()
             own = [self._allowed(c) for c in own]
         warm = self._time(truth.get("t_w"))
-        reasons = [*result.reasons, *at_one_pattern(self.setup.parameters)]
+        reasons = [*result.reasons, *doubts_at_rest(self.setup.parameters)]
         if warm and asked.whole() and not self.endless:
             left = self._of_each(lambda w, _: w.left(self.read), self.allowed)
             reasons += shape.extrapolated(left, self.read, self.setup.limit)

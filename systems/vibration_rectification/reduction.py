@@ -30,7 +30,7 @@ from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import at_one_pattern, bias_is_all, unanswered, word_error
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, doubts_at_rest, unanswered, word_error
 from gyrobench.reduction.setup.sources import GRAVITY, GYRO_WORD, LATITUDE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -290,7 +290,7 @@ class Reduction(ChannelTests[VibrationSetup]):
 
     def result(self) -> DriftTestResult:
         found = super().result()
-        s, said = self.setup, [*mistakes.implausible(found.coefficients), *at_one_pattern(self.setup.parameters)]
+        s, said = self.setup, [*mistakes.implausible(found.coefficients), *doubts_at_rest(self.setup.parameters)]
         said += unanswered(s.parameters) if s.axis == "x" else []
         if s.measured and np.count_nonzero(np.diff(self.windows["up"])) == 1:
             said.append(ONCE)

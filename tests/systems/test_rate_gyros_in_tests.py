@@ -105,6 +105,14 @@ def test_a_gyro_that_answers_nothing_has_a_doubt() -> None:
     assert "noise.none" in {r.id for r in result.reasons if r.severity == "doubt"}
 
 
+def test_a_dither_in_the_output_folds_into_the_mean() -> None:
+    """A dither of 384 Hz put the drift off by 12 U, the residuals ordinary; taken off, it is in no sample."""
+    for stripped in (0.0, 1.0):
+        values: dict[str, object] = {"dwell": 60.0, "readings": 10, "gyro.stripped": stripped}
+        _, result = reduced("fixed_position", "gyro_laser", values)
+        assert ("gyro.dithered" in {r.id for r in result.reasons}) == (stripped == 0.0)
+
+
 def test_a_dead_band_that_hides_the_earth_rate_is_said() -> None:
     """Axis x up and down: a dead band of 0.01 deg/s = 36 deg/h reads none of W sin(45.75 deg) = 10.77 deg/h, and G is
     off by that per g; axis z up, x east, there is nothing to answer.

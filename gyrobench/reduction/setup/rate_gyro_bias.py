@@ -52,13 +52,27 @@ def whole_angle(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
     return f"{slot}.readout_mismatch" in parameters
 
 
-def at_one_pattern(parameters: Mapping[str, Any]) -> list[Reason]:
-    """Return that a test at rest is one at the angles at which the pattern of a whole-angle gyro stood."""
+def doubts_at_rest(parameters: Mapping[str, Any]) -> list[Reason]:
+    """Return what makes the mean rate of a simulated gyro at rest another one than its residuals show: the angles at
+    which the pattern of a whole-angle gyro stood, a dither in the output.
+    """
     text = (
         "The drift of a whole-angle gyro goes round with its pattern: what is found at rest is that of the angles at "
         "which the pattern stood, and changes as it turns. rate_table_test turns it."
     )
-    return [Reason("gyro.pattern", text, ("pass", "fail"), severity="doubt")] * whole_angle(parameters)
+    pattern = [Reason("gyro.pattern", text, ("pass", "fail"), severity="doubt")] * whole_angle(parameters)
+    return pattern + dithered(parameters)
+
+
+def dithered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
+    """Return that the dither of a simulated ring laser is in its output."""
+    if not parameters.get(f"{slot}.dither", 0.0) or parameters.get(f"{slot}.stripped", 1.0) > 0.5:
+        return []
+    text = (
+        "The dither is in the output (stripped = 0). What its samples fold down is in the means, and in no residual "
+        "where its frequency is near a multiple of theirs: take it off, or change the time between two samples."
+    )
+    return [Reason("gyro.dithered", text, ("pass", "fail"), severity="doubt")]
 
 
 def unanswered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
