@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimat
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.reported import Estimates
-from gyrobench.reduction.estimation.sentences import p_text, seconds
+from gyrobench.reduction.estimation.sentences import p_text
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.result import AllanDeviation, Autocorrelation, PowerSpectrum, Reason, Series, Table, Test
 
@@ -103,6 +103,10 @@ class Findings:
         added.
         """
         return self._residual_tests() if self.known_tests is None else list(self.known_tests)
+
+    @property
+    def titles(self) -> list[str]:
+        return [q.title for q in self.quantities]
 
     @property
     def made_tests(self) -> list[Test] | None:
@@ -195,14 +199,11 @@ class Findings:
 
     def nuisance_tables(self) -> list[Table]:
         """Return the table of the nuisance model (none without candidates)."""
-        names = [q.title for q in self.quantities]
-        return [] if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, names)
+        return [] if self.ideal else nuisances.table(self.candidates, self.hidden, self.est, self.titles)
 
     def nuisance_sentences(self) -> list[str]:
-        stated = zip(
-            (q.title for q in self.quantities), zip(self.value.tolist(), self.u.tolist(), strict=True), strict=True
-        )
-        return nuisances.sentences(self.candidates, self.est, dict(stated))
+        values = zip(self.value.tolist(), self.u.tolist(), strict=True)
+        return nuisances.sentences(self.candidates, self.est, dict(zip(self.titles, values, strict=True)))
 
     def implausible_nuisances(self) -> list[Reason]:
         return nuisances.implausible(self.candidates, self.est)
@@ -278,18 +279,9 @@ class Findings:
     def noise_sentence(self, what: str = "windows") -> str:
         """Return the residual standard deviation and its noise model as a sentence, for the summary."""
         text = f"Residual standard deviation of the {what}: {self.residual_std:.3g} {self.y_unit}"
-        if self.ideal:
-            return text + ", rounding only."
-        if self.white:
-            return text + ", treated as white noise."
-        if not self.est.noise.slope and self.est.noise.best[1] == 0.0 and self.broken():
-            return text + ", which is not white noise alone (see the warnings)."
-        if self.est.noise.best[1] == 0.0:
-            reading_errors = " and reading errors" if self.est.noise.best[2] > 0.0 else ""
-            return text + f", compatible with white noise{reading_errors}."
-        if slope := self.est.noise.slope:
-            return text + f"; spectrum of the drift about 1/f^{slope:g}, included in the coverage intervals."
-        return text + f"; correlation time about {seconds(self.est.noise.tau[0])}, included in the coverage intervals."
+        if self.ideal or self.white:
+            return text + (", rounding only." if self.ideal else ", treated as white noise.")
+        return f"{text}{self.est.noise.words(bool(self.broken()))}."
 
     # ------------------------------------------------------------------------------------------ tests
     def _residual_tests(self) -> list[Test]:

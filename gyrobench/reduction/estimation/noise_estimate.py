@@ -11,6 +11,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.mixture import Mixture
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
 from gyrobench.reduction.estimation.regression import Design
+from gyrobench.reduction.estimation.sentences import seconds
 
 JOINED = 0.99  # probability from which on a possible effect is reported with the coefficients
 Range = tuple[float, float, float]  # of the likeliest model, 5 % and 95 % point over all
@@ -79,6 +80,16 @@ class NoiseSummary:
     def slope(self) -> float:
         """Return a of the most likely model's spectrum f^-a; 0 of a model without a power law."""
         return max(-self.best[0], 0.0)
+
+    def words(self, broken: bool) -> str:
+        """Return what the noise is, as the end of a sentence; broken: the residuals contradict it."""
+        if self.best[1] > 0.0:
+            if self.slope:
+                return f"; spectrum of the drift about 1/f^{self.slope:g}, included in the coverage intervals"
+            return f"; correlation time about {seconds(self.tau[0])}, included in the coverage intervals"
+        if broken:
+            return ", which is not white noise alone (see the warnings)"
+        return f", compatible with white noise{' and reading errors' if self.best[2] > 0.0 else ''}"
 
 
 @dataclass(frozen=True)
