@@ -27,7 +27,7 @@ from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.unshown_columns import intervals_with
-from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, dithered, whole_angle
+from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, dithered, whole_angle, worded
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
     Account,
@@ -259,6 +259,21 @@ class Reduction(DriftReduction[RateTableSetup]):
             random="random drift and noise of the readings",
         )  # fmt: skip
 
+    def _tail(self, e: Coefficient) -> list[Reason]:
+        """Return that what a band d takes off all rates, d2/(2 w2) of the smallest, is more than U of e."""
+        low, high = self.small.bounds or (0.0, math.inf)
+        if not low or math.isinf(high):
+            return []
+        least = float(np.min(np.abs(self.w[self.large][self.sense != 0.0])))
+        off = 0.75 * (0.5 * (low + high) / least) ** 2 / 2.0  # the threshold is d/sqrt(3/4)
+        if not off > 1e-6 * e.k * e.u:
+            return []
+        text = (
+            f"A gyro with this threshold that passes √(w² − d²) lacks {1e6 * off:.3g} ppm of the smallest rate of the "
+            "sweep, and less of larger ones: e and c hold that in part, their u does not. Take larger steps."
+        )
+        return [Reason("threshold.tail", text, ("pass", "fail"), ("e", "c"), severity="doubt")]
+
     def _pattern(self) -> list[Reason]:
         """Return that the drift of a whole-angle gyro, which goes round with its pattern, does not average out."""
         dt, turning = (self.t1 - self.t0)[self.large], self.sense != 0.0
@@ -276,7 +291,9 @@ class Reduction(DriftReduction[RateTableSetup]):
     def completed(self, result: DriftTestResult) -> DriftTestResult:
         truth = (self.setup.truth or {}).get("threshold")
         added = self.small.coefficient(truth)
-        reasons = handling.implausible(*result.coefficients[:2])
+        e, _, _, _, b = result.coefficients[:5]
+        reasons = [*handling.implausible(*result.coefficients[:2]), *worded(self.setup.parameters, b.u * DPH)]
+        reasons += self._tail(e)
         return replace(
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],

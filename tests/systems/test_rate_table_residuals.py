@@ -101,6 +101,27 @@ def test_the_summary_does_not_call_white_what_the_tests_do_not() -> None:
     assert "compatible with white noise" not in noise[0]
 
 
+def test_words_of_the_gyro_are_doubted_where_they_are_as_large_as_the_steps() -> None:
+    """One cycle of three steps and words of a step: whatever the fit leaves, 33.3/sqrt(12) = 9.6 deg/s are rounded."""
+    word = 100.0 / 3.0 * 1.01 * DEG
+    for white, said in ((1e-6 * DEG, True), (word / 10.0, False)):
+        values = {"gyro.range_max": 0.0, "steps": 3, "cycles": 1, "gyro.resolution": word, "gyro.white": white}
+        result = reduced("gyro_mems", values)
+        assert ("gyro.words" in {r.id for r in result.reasons}) == said
+
+
+def test_what_a_band_lacks_of_the_sweep_is_told_from_its_threshold() -> None:
+    """A band of 1 deg/s, threshold 1.15 between 1.1 and 1.2, lacks (1/20)2/2 = 1250 ppm at 20 deg/s."""
+    band = {"gyro.dead_band": DEG, "small": "0.5 1.1 1.2 1.9"}
+    said = [r.text for r in reduced("gyro_fog", band).reasons if r.id == "threshold.tail"]
+    assert len(said) == 1
+    assert float(said[0].split("lacks ")[1].split()[0]) == pytest.approx(
+        0.75 * (1.15 / 20.0) ** 2 / 2.0 * 1e6, rel=0.01
+    )
+    tiny = {"gyro.dead_band": 1e-4 * DEG, "small": "0.00005 0.0002 0.0004"}
+    assert "threshold.tail" not in {r.id for r in reduced("gyro_fog", tiny).reasons}
+
+
 def test_the_ratio_of_variances() -> None:
     """Four values of 2 and twelve of 1, signs by turns: 4; of white noise the probability is uniform, here near 0.5."""
     import gyrobench.reduction.estimation.residual_series as series

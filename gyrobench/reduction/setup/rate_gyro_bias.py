@@ -87,3 +87,15 @@ def unanswered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason
         "Earth rate that is taken off was not read, and what is found is off by up to all of it."
     )
     return [Reason("gyro.unanswered", text, ("pass", "fail"), severity="doubt")]
+
+
+def worded(parameters: Mapping[str, Any], u: float) -> list[Reason]:
+    """Return that words of a simulated gyro are not dithered by its noise, where that exceeds u of a bias, rad/s."""
+    off = word_error(parameters)
+    if not off > u:
+        return []
+    text = (
+        f"The words of the gyro are larger than their noise: a reading is off by {off / DPH:.3g} °/h rms, alike each "
+        "time it is taken, which u holds in part."
+    )
+    return [Reason("gyro.words", text, ("pass", "fail"), severity="doubt")]
