@@ -18,6 +18,7 @@ PART = 0.1  # of the record: longest averaging time
 SHORTEST = 2  # samples: least averaging time
 NARROW = 0.5  # rad, phase over an averaging time below which a cell is narrow against its frequency
 LOW_CELLS, CELLS = 4000, 1 << 15  # of the spectrum that decides the degrees of freedom: equal logarithms, equal width
+ORDERS = np.arange(1.0, 5.0)[:, None]  # of the waves whose sum sin^8 is
 
 
 @dataclass(frozen=True)
@@ -113,9 +114,23 @@ def squares_of_spectrum(tau: Array, model: Model, p: Array) -> Array:
     out = np.empty(tau.size)
     for i, m in enumerate(tau.tolist()):
         # the mean of sin^8(m omega/2) over each cell, which may hold many of its periods
-        wave = np.array([np.cos(k * m * omega) * np.sinc(0.5 * k * m * width / np.pi) for k in (1, 2, 3, 4)])
+        wave = _cosines(m * omega) * _sines(0.5 * m * width) / (0.5 * m * width * ORDERS)
         eighth = (35.0 - 56.0 * wave[0] + 28.0 * wave[1] - 8.0 * wave[2] + wave[3]) / 128.0
         # at low frequency the sum cancels to rounding errors, which y of a random walk magnifies; the cells are narrow
         eighth = np.where(m * omega < NARROW, np.sin(0.5 * m * omega) ** 8, np.maximum(eighth, 0.0))
         out[i] = float(np.sum(width * y * y * eighth)) * 4.0 / (np.pi * m**4)
     return out
+
+
+def _cosines(x: Array) -> Array:
+    """Return cos(k x) (4, b), k = 1 to 4."""
+    one = np.cos(x)
+    two = 2.0 * one * one - 1.0
+    return np.array([one, two, one * (2.0 * two - 1.0), 2.0 * two * two - 1.0])
+
+
+def _sines(x: Array) -> Array:
+    """Return sin(k x) (4, b), k = 1 to 4."""
+    one, cos = np.sin(x), np.cos(x)
+    two = 2.0 * one * cos
+    return np.array([one, two, one * (3.0 - 4.0 * one * one), 2.0 * two * (1.0 - 2.0 * one * one)])

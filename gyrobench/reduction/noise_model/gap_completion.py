@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage, special
+from scipy import fft, special
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.precision import FIRST, Precision, ordinates, smooth_spectrum
@@ -167,6 +167,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
     S: Array | None = None
     stays = True
     draws = min(max(DRAWS // x.size, 1), 4)
+    filled = _Filler(x)
     Y = ordinates(y)
     for k in range(MOST_ROUNDS):
         now = smooth_spectrum(Y**2 + lost)
@@ -178,12 +179,12 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
         rng = np.random.default_rng([SEED, max(last, 0)])  # the same draws: what changes is the spectrum
         S = now if S is None or k == 1 or last >= 0 else S * (now / S) ** ONWARD
         P = Precision(S)
-        y = _filled(x, missing | wild, P)
+        y = filled(missing | wild, P)
         if k == 1 and wild.any():
             # what was wild beside a wilder one may be none by what the others say of it: it is judged once more
             far = np.abs(np.where(missing, 0.0, x) - y) * math.sqrt(P.diagonal)
             wild &= far > AGAIN * float(-special.ndtri(0.5 * FALSE / x.size))
-            y = _filled(x, missing | wild, P)
+            y = filled(missing | wild, P)
         for _ in range(SWEEPS if find_wild else 1):
             Y = ordinates(y)
             z = P.of(Y) / math.sqrt(P.diagonal)
@@ -191,7 +192,7 @@ def complete(x: Array, find_wild: bool = True) -> Completed:
             if not fresh.any():
                 break
             wild |= fresh
-            y = _filled(x, missing | wild, P)
+            y = filled(missing | wild, P)
         else:
             Y = ordinates(y)
         at = np.flatnonzero(missing | wild)
@@ -291,16 +292,26 @@ def octaves(x: Array, parts: int = 1) -> Array:
     return out
 
 
-def _filled(x: Array, gone: NDArray[np.bool_], P: Precision) -> Array:
-    """Return x with the conditional mean of what is gone."""
-    at = np.flatnonzero(gone)
-    if not at.size:
-        return x.copy()
-    base = level(np.where(gone, np.nan, x))  # the gradients start from it
-    y = np.where(gone, 0.0, x - base)
-    y[at] = P.solver(at)(-P(y + base)[at])
-    y += base
-    return y
+class _Filler:
+    """A stretch x (n,) with the conditional mean of what is gone; what does not change with the spectrum is kept."""
+
+    def __init__(self, x: Array) -> None:
+        self.x, self.gone = x, np.zeros(x.size, dtype=bool)
+        self.base = self.rest = self.Y = np.empty(0)
+
+    def __call__(self, gone: NDArray[np.bool_], P: Precision) -> Array:
+        at = np.flatnonzero(gone)
+        if not at.size:
+            return self.x.copy()
+        if not np.array_equal(gone, self.gone):
+            self.gone = gone.copy()
+            self.base = level(np.where(gone, np.nan, self.x))  # the gradients start from it
+            self.rest = np.where(gone, 0.0, self.x - self.base)
+            self.Y = ordinates(self.rest + self.base)
+        y = self.rest.copy()
+        y[at] = P.solver(at)(-P.of(self.Y)[at])
+        y += self.base
+        return y
 
 
 def completed_by(y: Array, at: NDArray[np.int64], S: Array) -> Array:
@@ -329,5 +340,8 @@ def _wildest(z: Array, missing: NDArray[np.bool_], wild: NDArray[np.bool_]) -> N
     size /= scale
     inner = slice(ENDS, -ENDS) if z.size > 4 * ENDS else slice(None)  # what exceeds it at the ends is judged by itself
     limit = max(limit_of(size[inner][~gone[inner]]), LEAKS * float(size.max()))
-    out: NDArray[np.bool_] = (size > limit) & (size >= ndimage.maximum_filter1d(size, 7))
+    beyond = np.flatnonzero(size > limit)
+    around = size[np.clip(beyond[:, None] + np.arange(-3, 4), 0, size.size - 1)]
+    out = np.zeros(size.size, dtype=bool)
+    out[beyond[size[beyond] >= around.max(axis=1)]] = True
     return out

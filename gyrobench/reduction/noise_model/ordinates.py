@@ -282,8 +282,9 @@ class Ordinates:
         value = float(np.sum(self.count * np.log(S[high]) + self.power / S[high]))
         gradient = slope[:, high] @ (self.count - self.power / S[high])
         h = 1e-4
-        q2 = float(self.angle(model, p))
-        dq = (self.angle(model, p + h * np.eye(p.size)) - self.angle(model, p - h * np.eye(p.size))) / (2.0 * h)
+        q2, dq = float(self.angle(model, p)), np.zeros(p.size)
+        if any(term.rises for term in model):
+            dq = (self.angle(model, p + h * np.eye(p.size)) - self.angle(model, p - h * np.eye(p.size))) / (2.0 * h)
         signs = np.concatenate([[0.0], np.full(p.size, h), np.full(p.size, -h)])
         which = np.concatenate([[0], np.arange(p.size), np.arange(p.size)])
         moved = S[high] + signs[:, None] * dS[which][:, high] if q2 else np.broadcast_to(S[high], (signs.size, self.b))

@@ -90,8 +90,9 @@ class Precision:
 
     @functools.cached_property
     def _correlation(self) -> Array:
-        """Return the series (2n,) of the inverse of the spectrum."""
-        out: Array = np.fft.irfft(np.append(1.0 / self.S, 1.0 / self.S[-1]))
+        """Return the series (n + 1,) of the inverse of the spectrum at lags 0 to n; beyond n it comes back."""
+        inverse = 1.0 / self.S
+        out: Array = fft.dct(np.append(inverse, inverse[-1]), type=1, norm="forward")
         return out
 
     def _among(self, at: NDArray[np.int64]) -> Callable[[Array], Array]:
@@ -109,7 +110,8 @@ class Precision:
 
             return through
         p = self._correlation
-        elements = p[np.abs(np.subtract.outer(at, at))] + p[np.add.outer(at, at) + 1]
+        together = np.add.outer(at, at) + 1
+        elements = p[np.abs(np.subtract.outer(at, at))] + p[np.minimum(together, 2 * self.S.size - together)]
         return lambda d: elements @ d
 
     def solver(self, at: NDArray[np.int64]) -> Callable[[Array], Array]:

@@ -42,6 +42,16 @@ class Grid:
     ) -> None:
         self.omega, self.means, self.samples = omega, means, samples
         self.half_width = np.zeros_like(omega) if half_width is None else half_width
+        self._kept: dict[tuple[str, int, int], Array] = {}
+
+    def kept(self, name: str, count: int, times: int, made: Callable[[int, Grid, int], Array]) -> Array:
+        """Return what is made (b,) of a mean over ``count`` samples taken so often; it has no other parameter, and is
+        made once.
+        """
+        key = name, count, times
+        if key not in self._kept:
+            self._kept[key] = made(count, self, times)
+        return self._kept[key]
 
     @functools.cached_property
     def cos(self) -> Array:
@@ -95,7 +105,7 @@ def _second(p: Array, grid: Grid) -> Array:
     return out
 
 
-def _fejer(k: Any, grid: Grid, times: int = 1) -> Array:
+def _fejer(k: int, grid: Grid, times: int) -> Array:
     """Return sin^2(k omega/2)/(k sin^2(omega/2)), or its square, of bins by Gauss's rule: about zeros a parabola."""
     rows = BIN if grid.half_width.any() else ((1.0, 0.0),)
     halves = [(share, 0.5 * (grid.omega + at * grid.half_width)) for share, at in rows]
@@ -113,22 +123,21 @@ def average_parts(p: Array) -> tuple[Array, Array, Array]:
 def _average(p: Array, grid: Grid) -> Array:
     """Mean of white noise over w samples, w any real number from 1 on: covariance max(0, 1 - |h|/w)."""
     m, lower, upper = average_parts(p)
-    out: Array = (lower * _fejer(m, grid) + upper * _fejer(m + 1.0, grid)) / (lower * m + upper * (m + 1.0))
+    whole, place = np.unique(m, return_inverse=True)
+    two = [np.array([grid.kept("fejer", int(k) + more, 1, _fejer) for k in whole]) for more in (0, 1)]
+    below, above = (rows[place].reshape(*m.shape[:-1], -1) for rows in two)
+    out: Array = (lower * below + upper * above) / (lower * m + upper * (m + 1.0))
     return out
 
 
-def _mean(count: int, times: int) -> Callable[[Array, Grid], Array]:
+def _mean(count: int, grid: Grid, times: int) -> Array:
+    """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
     gamma = covariance_of_mean(count, times)[1:, None]
     h = np.arange(1.0, gamma.size + 1.0)[:, None]
-
-    def mean(p: Array, grid: Grid) -> Array:
-        """Mean of white noise over ``count`` samples; its zeros hold what a stretch of n samples leaks there."""
-        wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
-        leak = -2.0 * np.sum(gamma * wave, axis=0) / grid.samples
-        out = _fejer(count, grid, times) / count**times + np.maximum(leak, 0.0)
-        return np.broadcast_to(out, (*p.shape[:-1], grid.omega.size))
-
-    return mean
+    wave = h * np.cos(h * grid.omega) + np.sin(h * grid.omega) / np.sin(np.minimum(grid.omega, math.pi - 1e-7))
+    leak = -2.0 * np.sum(gamma * wave, axis=0) / grid.samples
+    out: Array = _fejer(count, grid, times) / count**times + np.maximum(leak, 0.0)
+    return out
 
 
 def covariance_of_mean(count: int, times: int) -> Array:
@@ -194,5 +203,6 @@ def filter_of(name: str) -> tuple[Callable[[Array, Grid], Array], int]:
         (one, count), (two, more) = (filter_of(part) for part in name.split("+"))
         return (lambda p, grid: one(p[..., :count], grid) * two(p[..., count:], grid)), count + more
     if name.startswith(tuple(MEANS)):
-        return _mean(samples_of(name), MEANS[name.rstrip(string.digits)]), 0
+        of = samples_of(name), MEANS[name.rstrip(string.digits)]
+        return lambda p, grid: np.broadcast_to(grid.kept("mean", *of, _mean), (*p.shape[:-1], grid.omega.size)), 0
     return (_shape, int(name[5:])) if name.startswith("shape") else FILTERS[name]

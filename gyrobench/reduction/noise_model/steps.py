@@ -51,7 +51,7 @@ def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Arra
     a = np.zeros(n)
     a[1:] = 1.0 / (4.0 * S[1:] * np.sin(half) ** 2)
     # sum of a_k cos(2 pi k s/n)
-    d = (a.sum() - np.real(np.fft.fft(a))) / n
+    d = (a.sum() - np.real(fft.fft(a))) / n
     for share, weighed in ends:
         d = d - share * passed(weighed) ** 2
     d[:EDGE] = d[n - EDGE :] = np.inf
