@@ -233,7 +233,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
              "settling": noise_tables.settling_text(noise, p.units),
-             "swings": noise_tables.swings_text(noise, p.units),
+             "swings": noise_tables.swings_text(noise, p.units), "curve": noise_tables.curve_text(noise),
              "level": noise_tables.levels_text(noise), "changes": noise_tables.over_time_text(noise),
              "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():

@@ -19,6 +19,8 @@ from gyrobench.result import Table
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
 CHANGED = {"white": "white noise behind its filter", "readout": "white noise of the reading",
            "gauss_markov": "σ of the Gauss-Markov drift"}  # fmt: skip
+STEEP = 0.03  # probability of a fall of the slow drift below which it is said
+FEW_CYCLES, SLOWEST = 50.0, 1e-3  # of a line; part of the record from which on the tau of a process is slow
 SHOWN = 6  # wild samples or steps that are listed
 NAMES = {
     "white": "white noise", "readout": "white noise of the reading", "quantization": "angle noise of a reading",
@@ -244,6 +246,39 @@ def swings_text(noise: NoiseModel, units: ChannelUnits) -> str:
     return (
         f"The level swings by {', '.join(said)}: few cycles, which no noise of the rest makes, are taken out before "
         "the model; left in, K and B take them for theirs. Record the temperature beside the rate."
+    )
+
+
+def curve_text(noise: NoiseModel) -> str:
+    """Return why K, R and slow processes may be those of a curve that is no noise; "" where nothing says so, or none of
+    them is stated.
+    """
+    t = noise.treatment
+    slow = SLOWEST * t.samples * noise.scale.tau0
+    of = [noise["K"].determined, noise["R"].determined]
+    of += [g.tau.determined and g.tau.value > slow for g in noise.processes]
+    if not noise.agrees or not any(of):
+        return ""
+    if noise.steep < STEEP:
+        p = write_p(noise.steep).text
+        why = f"it falls faster with frequency than its terms do (p {p if p.startswith('<') else f'= {p}'})"
+    elif t.settling or t.swings or any(x.frequency * t.samples < FEW_CYCLES for x in t.lines):
+        why = "what was taken out of it settles or has few cycles, and need not be an exponential or a sine"
+    else:
+        return ""
+    return (
+        f"The slow drift may be a curve that is no noise: {why}. K, R and slow processes are those of this curve, and "
+        "another record need not have them. Repeat the record, with the temperature beside the rate."
+    )
+
+
+def one_curve_text(noise: NoiseModel) -> str:
+    """Return of what K and R are, in one record; "" where neither is stated."""
+    if not noise.agrees or not (noise["K"].determined or noise["R"].determined):
+        return ""
+    return (
+        "K and R are of the one drift curve of this record: a curve that is no noise, a bend or a bump, may look the "
+        "same. What stays in a second record is the instrument's."
     )
 
 

@@ -106,9 +106,11 @@ def _named(term: str, a: Analysed, several: bool) -> str:
 def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
     names = tuple(_named(term, a, several) for term in (*TERMS, LEAST_DEVIATION))
-    against = description.doubts(a.of, run).items()
+    against = [(id, text, names) for id, text in description.doubts(a.of, run).items()]
+    if curve := noise_tables.curve_text(a.noise):
+        against.append(("drift_record.curve", curve, tuple(_named(term, a, several) for term in ("K", "R"))))
     return description.warnings(a.of, run) + [
-        Reason(id, text, ("pass", "fail"), names, severity="doubt") for id, text in against
+        Reason(id, text, ("pass", "fail"), of, severity="doubt") for id, text, of in against
     ]
 
 
@@ -230,7 +232,8 @@ def _column(a: Analysed, run: RunDocument) -> DriftColumn:
         texts={
             "acquisition": description.acquisition_texts(p, run),
             "regression": p.inseparable,
-            "deviations": [noise_tables.agreement_text(a.noise), *([RESIDUAL] if p.cleaned else [])],
+            "deviations": [noise_tables.agreement_text(a.noise), *([RESIDUAL] if p.cleaned else []),
+                           *([text] if (text := noise_tables.one_curve_text(a.noise)) else [])],
             "spectrum": [*description.line_texts(p), noise_tables.terms_text(a.noise)],
             "model": model_tables.model_texts(m, p.units),
         },

@@ -10,7 +10,7 @@ Truths are white noise, as it is or through a low-pass or a mean, up to three Ga
 swing (rms, angular frequency, decay of each); unit time is a sample.  digital: order and cutoff, over half the sampling
 rate, of a Butterworth filter that white noise and flicker B pass, before a readout of 0.003.  all: numerator and
 denominator of another one that they pass.
-rounded: to a multiple of.
+behind: processes that pass what "all" does.  rounded: to a multiple of.
 Faults, wild: a thousandth of samples off by 20 standard deviations; step: of one; line: of 0.3 at 0.2317 of the rate;
 missing: a tenth of the samples; gaps: a tenth, of 100 on average; slow: a warm-up of 3 standard deviations, a fifteenth
 of the record long, and three cycles of one.  "slow" stated: records with either taken out.
@@ -49,6 +49,11 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "recursive low-pass, flicker": {"N": 1.0, "B": 0.15, "all": POLES},
     "low-pass of 10 samples, flicker": {"N": 1.0, "B": 0.15, "all": ([1.0 - math.exp(-0.1)], [1.0, -math.exp(-0.1)])},
     "two means over 4": {"N": 1.0, "all": (np.convolve(np.ones(4), np.ones(4)) / 16.0, [1.0])},
+    "two means over 4, one process": {
+        "N": 1.0,
+        "all": (np.convolve(np.ones(4), np.ones(4)) / 16.0, [1.0]),
+        "behind": [(0.1, 100.0)],
+    },
     "two means over 8, flicker": {"N": 1.0, "B": 0.15, "all": (np.convolve(np.ones(8), np.ones(8)) / 64.0, [1.0])},
     "mean of 2, rounded": {"N": 1.0, "mean": 2, "markov": [(0.125, 100.0), (0.042, 3000.0)], "rounded": 0.042},
 }
@@ -71,6 +76,9 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         k = np.arange(1.0, 2.0 * n)
         half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
         x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
+    for sigma, tau in truth.get("behind", []):
+        a = math.exp(-1.0 / tau)
+        x = x + lfilter([1.0], [1.0, -a], sigma * math.sqrt(1.0 - a * a) * rng.normal(size=n + 500))
     if "all" in truth:
         x = lfilter(*truth["all"], x)
     if "digital" in truth:
@@ -131,7 +139,8 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                 stated[term].append(e.determined)
             stated["filter"].append(bool(model.filter_words()))
             stated["slow"].append(bool(model.settling or model.swings))
-            left = list(truth.get("markov", []))
+            processes = [*truth.get("markov", []), *truth.get("behind", [])]
+            left = list(processes)
             for g in (g for g in model.processes if g.tau.determined):
                 if not left:
                     stated["one process too many"].append(True)
@@ -139,7 +148,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                 sigma, tau = left.pop(min(range(len(left)), key=lambda k: abs(math.log(left[k][1] / g.tau.value))))
                 inside["sigma"].append(g.sigma.low <= sigma <= g.sigma.high)
                 inside["tau"].append(g.tau.low <= tau <= g.tau.high)
-                if those := [s for s, t in truth["markov"] if g.tau.low <= t <= g.tau.high]:
+                if those := [s for s, t in processes if g.tau.low <= t <= g.tau.high]:
                     inside["sigma together"].append(g.sigma.low <= math.hypot(*those) <= g.sigma.high)
         seconds = (time.process_time() - began) / len(seeds)
         among = f"{lengths[0]:.0f} to {lengths[1]:.0f} samples {' '.join(kinds)}"

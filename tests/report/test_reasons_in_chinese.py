@@ -26,6 +26,19 @@ SAID = {
         "No residual of this record would show: the scale of the autocollimator wrong by 2 % (E1 sin by 3.4 u). State "
         "its uncertainty (u_scale), or that units and scales were checked (arrangement = checked).",
     ),
+    "drift_record": (
+        "The slow drift may be a curve that is no noise: it falls faster with frequency than its terms do (p = 0.02). K"
+        ", R and slow processes are those of this curve, and another record need not have them. Repeat the record, "
+        "with the temperature beside the rate.",
+        "gyro_x: The slow drift may be a curve that is no noise: it falls faster with frequency than its terms do (p < "
+        "0.001). K, R and slow processes are those of this curve, and another record need not have them. Repeat the "
+        "record, with the temperature beside the rate.",
+        "The slow drift may be a curve that is no noise: what was taken out of it settles or has few cycles, and need "
+        "not be an exponential or a sine. K, R and slow processes are those of this curve, and another record need not "
+        "have them. Repeat the record, with the temperature beside the rate.",
+        "K and R are of the one drift curve of this record: a curve that is no noise, a bend or a bump, may look the "
+        "same. What stays in a second record is the instrument's.",
+    ),
     "sculling_test": (
         "From row 73 on the level of the record is another one, by +2.84 µg (7 standard deviations). The estimates "
         "take it for slow noise, or for what was done then. Look for the cause, and measure again or leave the rows "

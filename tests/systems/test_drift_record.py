@@ -238,6 +238,24 @@ def test_a_warm_up_is_taken_out_and_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_what_a_curve_that_is_no_noise_leaves_is_doubted(tmp_path: Path) -> None:
+    """White noise of 1 and ln(1 + 100 t/T)/2, nearly an exponential: what that leaves is a ramp, which no verdict may
+    rest on; N is that of the white noise.
+    """
+    n, rng = 20_000, np.random.default_rng([78, 1])
+    t = np.arange(float(n))
+    x = rng.normal(size=n) + 0.5 * np.log1p(100.0 * t / n)
+    system = load()
+    file = write(tmp_path / "r.csv", {"time [s]": t, "rate [deg/h]": x}, "# type_b = none")
+    result = system.reduce(system.read_measured(file, {}), {"N": (None, 0.1), "R": (None, 1e3)})
+    assert isinstance(result, DriftRecordResult)
+    (doubt,) = [r for r in result.reasons if r.id == "drift_record.curve" and r.severity == "doubt"]
+    assert doubt.names == ("K", "R") and "settles or has few cycles" in doubt.text
+    assert not result["R"].no_value and result["R"].verdict == "inconclusive" and result["N"].verdict == "pass"
+    assert any(text.startswith("K and R are of the one drift curve") for text in result.columns[0].texts["deviations"])
+
+
+@pytest.mark.long
 def test_steps_and_wild_samples_are_taken_out_and_told(tmp_path: Path) -> None:
     """A step of one standard deviation of a sample, and a thousandth of samples off by 20 of them.
 

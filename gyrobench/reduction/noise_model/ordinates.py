@@ -12,8 +12,12 @@ out.  Under the model their covariance is
 The first LOW of each parity are kept singly with all of this (of Gauss-Markov drift a rank that matters is in them);
 the others are summed up in bins of equal logarithmic width.  The errors of the end angles are kept in all of them.  A
 ramp common to the stretches, a mean of the odd ordinates, is eliminated as in restricted maximum likelihood; it is
-taken off by least squares before, so that what is left of it is in the first ordinates alone.  [DRIFT-NOISE-MODEL; own
-derivation]
+taken off by least squares before, so that what is left of it is in the first ordinates alone.
+
+At the zeros of a filter the diagonal is less than what the two ends of a stretch leave there, a few numbers in hundreds
+of ordinates.  So the ordinates from EDGES/(samples of a taper) on are those of the stretch with tapered ends, which
+leave nothing; of a taper w they are worth <w^2>^2/<w^4> of as many, and have no error of an end angle.
+[DRIFT-NOISE-MODEL; own derivation]
 """
 
 from __future__ import annotations
@@ -38,6 +42,8 @@ AROUND, NEAR, CLEAR = 257, 9, 5.0  # ordinates around and near a peak, and how m
 SINGLE = 500  # of the near ones that exceed most, at most
 CHI = 1.2703628454614782  # log of chi squared of one degree of freedom: its mean is minus this
 HUGE = 1e30
+TAPER, LEAST_TAPER, MOST_TAPER = 0.025, 32, 256  # of an end of a stretch: part of it, and samples
+EDGES = 30.0  # rad over a taper from which on it makes little of a slow change: the sixth power of that less
 FLOOR = 1e-14  # of a spectrum, where the variance of the first differences of the record is 1
 
 Model = tuple[NoiseTerm, ...]
@@ -55,19 +61,22 @@ class _Part:
     count: Array
     power: Array
     total: Array
+    plain: NDArray[np.bool_]  # of the stretch as it is, not with tapered ends
 
 
 def _parts(x: Array, extra: Array | None) -> list[_Part]:
     """Both parities of a stretch (n,), odd ones first; extra: powers (n,) of the ordinates to be added."""
     n = x.size
     c = fft.dct(x, norm="ortho")
-    square, known = c * c, np.ones(n)
-    edges = _edges(square)
+    square, known, worth = c * c, np.ones(n), np.ones(n)
+    first, tapered, share = _tapered(x)
+    square[first:], worth[first:], c[first:] = tapered, share, 0.0
+    edges = np.union1d(_edges(square), [first])
     if extra is not None:
         square = square + extra
         known = _known(extra, square)
         c = c / np.sqrt(known)
-    weight = np.minimum(known / np.mean(known), 1.0) ** 2
+    weight = worth * np.minimum(known / np.mean(known), 1.0) ** 2
     out = []
     for odd in (True, False):
         k = np.arange(1 if odd else 2, n, 2)
@@ -75,11 +84,28 @@ def _parts(x: Array, extra: Array | None) -> list[_Part]:
         start = np.unique(np.searchsorted(k, edges))
         start = start[start < k.size]
         count = np.add.reduceat(weight[k], start)
-        first, last = k[start].astype(float), k[np.append(start[1:], k.size) - 1].astype(float)
-        out.append(_Part(odd, n, c[low], 0.5 * (first + last), 0.5 * (last - first) + 1.0, count,
+        begin, last = k[start].astype(float), k[np.append(start[1:], k.size) - 1].astype(float)
+        out.append(_Part(odd, n, c[low], 0.5 * (begin + last), 0.5 * (last - begin) + 1.0, count,
                          np.add.reduceat((weight * square)[k], start),
-                         np.add.reduceat((weight * c)[k], start)))  # fmt: skip
+                         np.add.reduceat((weight * c)[k], start), begin < first))  # fmt: skip
     return out
+
+
+def _tapered(x: Array) -> tuple[int, Array, float]:
+    """Return the first ordinate that is taken of a stretch (n,) with tapered ends, the powers from it on, and how many
+    independent ones each of them is worth; of a short stretch none.
+    """
+    n = x.size
+    length = min(int(TAPER * n), MOST_TAPER)
+    if length < LEAST_TAPER:
+        return n, np.empty(0), 1.0
+    rise = np.sin(0.5 * np.pi * (np.arange(length) + 0.5) / length) ** 2
+    y = x - x.mean()
+    y[:length] *= rise
+    y[n - length :] *= rise[::-1]
+    square, fourth = (1.0 - 2.0 * length / n * (1.0 - float(np.mean(rise**p))) for p in (2, 4))
+    first = max(int(EDGES / length * n / np.pi), 2 * LOW + 1)
+    return first, fft.dct(y, norm="ortho")[first:] ** 2 / square, square**2 / fourth
 
 
 def _known(extra: Array, square: Array) -> Array:
@@ -143,9 +169,9 @@ class Ordinates:
         self.count, self.power, self.total = weight * self.count, weight * self.power, weight * self.total
         self.starts = np.cumsum([0] + [p.k.size for p in parts])[:-1]
         grid = np.concatenate([omega, self.low_omega.ravel()])
-        sizes = np.concatenate([np.repeat(self.n, [p.k.size for p in parts]), np.repeat(self.n, LOW)]).astype(float)
+        sizes = np.concatenate([*(np.where(p.plain, float(p.n), np.inf) for p in parts), np.repeat(self.n, LOW)])
         self.grid = Grid(grid, means, np.concatenate([half, np.zeros(self.low_omega.size)]), sizes)
-        self.ends = np.sqrt(2.0 / np.repeat(self.n, [p.k.size for p in parts])) * np.cos(0.5 * omega)
+        self.ends = np.concatenate([np.sqrt(2.0 / p.n) * np.cos(0.5 * np.pi * p.k / p.n) * p.plain for p in parts])
         half_low = 0.5 * self.low_omega
         self.low_ends = np.sqrt(2.0 / self.n[:, None]) * np.cos(half_low)
         self.all_ends = np.concatenate([self.ends, self.low_ends.ravel()])

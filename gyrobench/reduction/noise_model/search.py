@@ -24,6 +24,8 @@ N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", 
 BEHIND = ("first", "shape3")
 SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
 TWICE = tuple(f"bartlett{k}" for k in range(3, 17))  # of two samples: a cascade
+AFTER_FIRST = tuple(f"mean{k}+first" for k in range(2, 17))
+MOST_STARTS = 4  # of these, the likeliest as they are
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
@@ -182,8 +184,8 @@ class ModelSearch:
         for name in names:
             if name == base or (name == "none" and W in at.model):
                 continue
-            least = [(W, np.array([self.prior.readout]))]  # shows in a stop band
-            others = rest + least if name in DIGITAL and W not in at.model else rest
+            least = [(W, np.array([self.prior.readout]))]  # shows in a stop band, and in zeros of the fourth order
+            others = rest + least if name in DIGITAL + TWICE + AFTER_FIRST and W not in at.model else rest
             for end in ("", ALL) if self.may_pass_all(name) else ("",):
                 new = NoiseTerm("white", name + end)
                 for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
@@ -208,13 +210,18 @@ class ModelSearch:
         return at
 
     def try_digital(self) -> None:
-        """Try digital low-passes in place of the best filter where the spectrum falls; they stay if nearly as good."""
+        """Try digital low-passes and means in place of the best filter where the spectrum falls; they stay if nearly as
+        good.  From an average of any width no step leads across the zeros to that of another one.
+        """
         before = dict(self.seen)
         if not self.holds_back:
             return
-        for model, start in [(m, s) for m, starts in self.filters(self.best, DIGITAL + TWICE) for s in starts]:
+        fits, means = ([(m, s) for m, starts in self.filters(self.best, names) for s in starts]
+                       for names in (DIGITAL + TWICE, AFTER_FIRST))  # fmt: skip
+        means.sort(key=lambda t: float(self.data.value(t[0], t[1][None])[0]))
+        for model, start in [*fits, *means[:MOST_STARTS]]:
             self.fit(model, start)
-        if any(t.filter in DIGITAL + TWICE for t in self.best.model):
+        if any(t.filter in DIGITAL + TWICE + AFTER_FIRST for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
             near = self.best.evidence - NEARLY

@@ -1,0 +1,42 @@
+"""Whether slow drift falls faster with frequency than its terms do, as a smooth curve that is no noise does.
+
+Of ordinates of power P and count c under a spectrum S with the part s of slow terms, P/S - c has variance 2 c.  A tilt
+of s adds s/S (log omega - its mean), the mean such that the size of s takes nothing of it: the sum of the products is
+large and negative where the first ordinates exceed S and the next ones fall short of it.  Its distribution is that of
+draws of chi squared.  What a walk of the same steepness looks like no record tells from a curve.
+[DRIFT-NOISE-MODEL; own derivation]
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gyrobench.reduction.noise_model.maximum import Fitted
+from gyrobench.reduction.noise_model.ordinates import joined, spectrum, split
+from gyrobench.reduction.noise_model.search import ModelSearch
+from gyrobench.reduction.noise_model.terms import SLOW
+
+SLOW_PART, FEWEST = 0.3, 4  # of the spectrum that slow noise is, and ordinates where it is more
+DRAWS, SEED = 4000, 6203
+
+
+def steep_fall(found: ModelSearch, at: Fitted) -> float:
+    """Return the probability of so steep a fall of the slow drift by chance; 1.0 where there is too little of it.
+
+    The first ordinate is left out: most of it is the ramp's.
+    """
+    grid, count = found.data.grid, found.data.all_count
+    parts = split(at.model, at.p)
+    fast = [(t, p) for t, p in parts if t.name not in SLOW]
+    S, excess = found.excess(at)
+    slow = spectrum(at.model, at.p, grid) - (spectrum(*joined(fast), grid) if fast else 0.0)
+    share = slow / S
+    use = (share > SLOW_PART) & (grid.omega > 1.5 * math.pi / float(found.data.n.max()))
+    if np.count_nonzero(use) < FEWEST:
+        return 1.0
+    share, count, log = share[use], count[use], np.log(grid.omega[use])
+    tilt = share * (log - float(np.average(log, weights=count * share**2)))
+    chance = np.random.default_rng(SEED).gamma(0.5 * count, 2.0, (DRAWS, count.size)) - count
+    return float(np.mean(chance @ tilt <= float(excess[use] @ tilt)))
